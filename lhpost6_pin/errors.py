@@ -1,0 +1,43 @@
+"""Errors that a user can act on: each message names the file, channel or key and says what to do."""
+
+__all__ = [
+    "LhpostError",
+    "MotionError",
+    "OutOfRangeError",
+    "ParameterError",
+    "RecordError",
+    "SimulationError",
+    "UnknownNameError",
+]
+
+
+class LhpostError(Exception):
+    """Base of all errors raised on purpose by this package; the command line prints it without a traceback."""
+
+
+class ParameterError(LhpostError):
+    """A machine or controller file has a missing, unknown or impossible value; the message names the key."""
+
+
+class RecordError(LhpostError):
+    """A test record cannot be read or lacks what was asked of it; the message names file, channel and sample."""
+
+
+class MotionError(LhpostError):
+    """A ground-motion file or description cannot be understood; the message names file and line."""
+
+
+class OutOfRangeError(LhpostError):
+    """A motion asks for more than the machine can give; the message says which limit and the scale that fits."""
+
+
+class SimulationError(LhpostError):
+    """A run cannot be started as asked, or it diverged; the message names time and component."""
+
+
+class UnknownNameError(LhpostError):
+    """A name is not one of those that exist; the message lists the valid ones."""
+
+    def __init__(self, kind: str, name: str, valid: "list[str] | tuple[str, ...]") -> None:
+        """Say that `name` is no `kind` and list the `valid` names."""
+        super().__init__(f"no {kind} named {name!r}; valid names: {', '.join(sorted(valid))}")

@@ -1,0 +1,37 @@
+"""Where shipped data lives, and writing files whole or not at all."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+__all__ = ["models_folder", "write_whole"]
+
+
+def models_folder() -> Path:
+    """Folder of machine files, URDFs and ground motions: inside the installed package, else beside it."""
+    package = Path(__file__).parent
+    installed = package / "models"
+    return installed if installed.is_dir() else package.parent / "models"
+
+
+@contextmanager
+def write_whole(path: "Path | str") -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it to `path` only if the block succeeds.
+
+    An interrupted or failed write leaves whatever stood at `path` before, never half a file.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
+    os.close(handle)
+    beside = Path(name)
+    try:
+        yield beside
+        umask = os.umask(0)
+        os.umask(umask)
+        beside.chmod(0o666 & ~umask)  # mkstemp makes private files; results get the ordinary permissions
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,119 @@
+"""The `compiled` decorator: numba with a disk cache that is private, always fresh and optional.
+
+The cache folder is keyed by the package's own source text and by the versions of numba and Python, so an edit never
+meets stale machine code, not even in a function that calls the edited one. It belongs to one user (numba's cache is
+pickles: reading another user's would run his code). Where none can be written, functions compile in memory and a
+warning says so.
+"""
+
+import hashlib
+import logging
+import os
+import platform
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+__all__ = ["cache_folder", "compiled"]
+
+log = logging.getLogger(__name__)
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+_KEEP = 4
+"""Cache folders of older sources that are kept, newest first."""
+
+
+@cache
+def source_key() -> str:
+    """Digest of every source file of the package and of the compiler's and interpreter's versions."""
+    digest = hashlib.sha256()
+    package = Path(__file__).parent
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    versions = f"{numba.__version__} {platform.python_version()} {platform.machine()}"
+    digest.update(versions.encode())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Folder that holds compiled code for this source, or None where nothing private can be written.
+
+    Tried in turn: $LHPOST6_CACHE_DIR, $XDG_CACHE_HOME, ~/.cache, and a folder named after the user in the
+    temporary directory.
+    """
+    for base in _candidates():
+        folder = base / source_key()
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            if not (_private(base) and _writable(folder)):
+                continue
+        except OSError:
+            continue
+        _drop_old(base, folder)
+        return folder
+    log.warning(
+        "no private folder for compiled code can be written: this run compiles anew (about a minute); "
+        "set LHPOST6_CACHE_DIR to a folder of your own to keep it"
+    )
+    return None
+
+
+def compiled(function: _F) -> _F:
+    """Compile a function with numba (no Python objects, IEEE arithmetic, GIL released), cached on disk.
+
+    The pure Python original stays at ``.py_func`` and is the reference in tests.
+    """
+    folder = cache_folder()
+    config = cast(Any, numba.config)
+    before = config.CACHE_DIR
+    config.CACHE_DIR = "" if folder is None else str(folder)
+    try:
+        return cast(_F, numba.njit(cache=folder is not None, error_model="numpy", nogil=True)(function))
+    finally:
+        config.CACHE_DIR = before
+
+
+def _candidates() -> list[Path]:
+    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    found = []
+    if chosen := os.environ.get("LHPOST6_CACHE_DIR"):
+        found.append(Path(chosen) / f"user-{user}")
+    if xdg := os.environ.get("XDG_CACHE_HOME"):
+        found.append(Path(xdg) / "lhpost6_pin")
+    home = os.path.expanduser("~")
+    if home not in ("~", "/"):
+        found.append(Path(home) / ".cache" / "lhpost6_pin")
+    found.append(Path(tempfile.gettempdir()) / f"lhpost6_pin-{user}")
+    return found
+
+
+def _private(folder: Path) -> bool:
+    """True if the folder is a real folder of this user that no one else may write."""
+    if not hasattr(os, "getuid"):
+        return True
+    info = folder.lstat()
+    others = stat.S_IWGRP | stat.S_IWOTH
+    return stat.S_ISDIR(info.st_mode) and info.st_uid == os.getuid() and not info.st_mode & others
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _drop_old(base: Path, current: Path) -> None:
+    """Remove the caches of sources long gone, so that a developer's folder does not grow without end."""
+    others = [p for p in base.iterdir() if p.is_dir() and p != current]
+    for old in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[_KEEP:]:
+        shutil.rmtree(old, ignore_errors=True)

@@ -1,0 +1,134 @@
+"""The per-step engine: compiled stages around pin.aba and pin.integrate. The default, and the fused engine's oracle.
+
+It assumes nothing of the number of velocities: specimen joints ride in the same model and the same ABA.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from .plant import Plant
+from .schemes import DQ, TAU, V_SEEN, A, V, kick, open_step, rates_stage, staggered_stage
+from .workspace import Workspace
+
+__all__ = ["make_stepper", "settle"]
+
+Array = NDArray[np.float64]
+Stepper = Callable[[Workspace, Array], int]
+"""Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
+
+
+def settle(plant: Plant, ws: Workspace, spool: Array) -> int:
+    """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
+    ws.motion[V_SEEN] = ws.motion[V]
+    status = int(_rates(plant, ws, ws.q, ws.z, spool))
+    if status == 0:
+        ws.motion[A] = pin.aba(plant.model, plant.model.createData(), ws.q, ws.motion[V], ws.motion[TAU])
+    return status
+
+
+def _rates(plant: Plant, ws: Workspace, q: Array, z: Array, spool: Array) -> int:
+    return rates_stage(
+        q,
+        plant.axes,
+        plant.legs,
+        plant.body,
+        plant.rows,
+        plant.model.damping,
+        spool,
+        plant.supply,
+        ws.frame,
+        ws.port,
+        ws.JB,
+        z,
+        ws.zd,
+        ws.force,
+        ws.motion,
+    )
+
+
+def make_stepper(plant: Plant, scheme: str, dt: float) -> Stepper:
+    """Return the stepper of a scheme for steps of dt [s]; call `settle` on the workspace first."""
+    return {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}[scheme](plant, dt)
+
+
+def _semi_implicit(plant: Plant, dt: float) -> Stepper:
+    model, data = plant.model, plant.model.createData()
+    axes, legs, body, rows, supply = plant.axes, plant.legs, plant.body, plant.rows, plant.supply
+    damping = np.array(model.damping)
+    aba, integrate = pin.aba, pin.integrate
+    opened: Workspace | None = None
+
+    def advance(ws: Workspace, spool: Array) -> int:
+        nonlocal opened
+        motion, frame, port, JB, z, force = ws.motion, ws.frame, ws.port, ws.JB, ws.z, ws.force
+        dq, v_seen, tau = motion[DQ], motion[V_SEEN], motion[TAU]
+        if opened is not ws:
+            open_step(motion, dt)
+            opened = ws
+        q = ws.q
+        for held in spool:
+            q = integrate(model, q, dq)
+            status = staggered_stage(
+                q, dt, axes, legs, body, rows, damping, held, supply, frame, port, JB, z, force, motion
+            )
+            if status:
+                break
+            kick(motion, aba(model, data, q, v_seen, tau), dt)
+        ws.q[:] = q
+        return status
+
+    return advance
+
+
+def _euler(plant: Plant, dt: float) -> Stepper:
+    model, data = plant.model, plant.model.createData()
+
+    def advance(ws: Workspace, spool: Array) -> int:
+        motion = ws.motion
+        for held in spool:
+            motion[V_SEEN] = motion[V]
+            status = _rates(plant, ws, ws.q, ws.z, held)
+            if status:
+                return status
+            motion[A] = pin.aba(model, data, ws.q, motion[V], motion[TAU])
+            ws.q[:] = pin.integrate(model, ws.q, dt * motion[V])
+            motion[V] += dt * motion[A]
+            ws.z += dt * ws.zd
+        return 0
+
+    return advance
+
+
+def _rk4(plant: Plant, dt: float) -> Stepper:
+    model, data = plant.model, plant.model.createData()
+
+    def advance(ws: Workspace, spool: Array) -> int:
+        motion, q0 = ws.motion, ws.q
+        for held in spool:
+            v0, z0 = motion[V].copy(), ws.z.copy()
+            sums = [np.zeros_like(v0), np.zeros_like(v0), np.zeros_like(z0)]
+            step, dv, dz = np.zeros_like(v0), np.zeros_like(v0), np.zeros_like(z0)
+            for reach, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
+                q = pin.integrate(model, q0, reach * dt * step)
+                v, z = v0 + reach * dt * dv, z0 + reach * dt * dz
+                motion[V_SEEN] = v
+                status = _rates(plant, ws, q, z, held)
+                if status:
+                    return status
+                # local coordinates of the pose move with the inverse differential of `difference`
+                step = pin.dDifference(model, q0, q, pin.ArgumentPosition.ARG1) @ v
+                dv, dz = pin.aba(model, data, q, v, motion[TAU]), ws.zd
+                if reach == 0.0:
+                    motion[A] = dv
+                for total, rate in zip(sums, (step, dv, dz), strict=True):
+                    total += weight / 6.0 * rate
+                dz = dz.copy()
+            q0[:] = pin.integrate(model, q0, dt * sums[0])
+            motion[V] = v0 + dt * sums[1]
+            ws.z[:] = z0 + dt * sums[2]
+        return 0
+
+    return advance

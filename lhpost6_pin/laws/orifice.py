@@ -1,0 +1,66 @@
+"""Servovalve flow through one orifice (Eqs. 4-1 and 4-2).
+
+Q = k g root(dP),  g = 1 - exp(-lambda |x|),  k = q w/w3 / sqrt(P_rated)
+
+q [m3/s] flow at P_rated with the orifice wide open, w/w3 [1] its width ratio, x [1] spool over stroke, dP [Pa] the
+drop along the flow. dP can turn negative for an instant: the root is signed, and smooth through zero.
+Stored energy: none; an orifice dissipates. Source: report Section 4.1.2, after Merritt (1967).
+"""
+
+import math
+
+from ..compiled import compiled
+
+__all__ = ["opening", "port_flow", "signed_root", "width_ratios"]
+
+
+@compiled
+def signed_root(x: float, linear_below: float) -> float:
+    """Signed square root of `x`; below `linear_below` a cubic that meets it in value and slope [sqrt(Pa)]."""
+    size = abs(x)
+    if size >= linear_below:
+        return math.copysign(math.sqrt(size), x)
+    ratio = size / linear_below
+    return x / math.sqrt(linear_below) * (1.25 - 0.25 * ratio * ratio)
+
+
+@compiled
+def signed_root_slope(x: float, linear_below: float) -> float:
+    """Derivative of `signed_root` with respect to `x` [1/sqrt(Pa)]."""
+    size = abs(x)
+    if size >= linear_below:
+        return 0.5 / math.sqrt(size)
+    ratio = size / linear_below
+    return (1.25 - 0.75 * ratio * ratio) / math.sqrt(linear_below)
+
+
+@compiled
+def opening(spool: float, flow_curve: float) -> float:
+    """Signed opening of the valve, -1..1: sign(x) (1 - exp(-lambda |x|)) (Eq. 4-2); spool [1], lambda [1]."""
+    return math.copysign(1.0 - math.exp(-flow_curve * abs(spool)), spool)
+
+
+@compiled
+def port_flow(
+    opened: float, k_supply: float, k_return: float, supply: float, back: float, chamber: float, linear_below: float
+) -> tuple[float, float]:
+    """Flow from the valve into one chamber [m3/s] and its slope with the chamber's pressure [m3/s/Pa] (Eq. 4-2).
+
+    opened > 0 joins the chamber to the supply through k_supply, opened < 0 to the return through k_return
+    [m3/s/sqrt(Pa)]; supply, back, chamber are pressures [Pa].
+    """
+    if opened >= 0.0:
+        k = opened * k_supply
+        drop = supply - chamber
+    else:
+        k = -opened * k_return
+        drop = chamber - back
+    slope = -k * signed_root_slope(drop, linear_below)
+    flow = k * signed_root(drop, linear_below)
+    return (flow if opened >= 0.0 else -flow), slope
+
+
+def width_ratios(area_a: float, area_b: float) -> tuple[float, float, float, float]:
+    """Port widths w1, w2, w3, w4 over w3 of a 4-way valve on a single-ended piston (Eq. 4-1)."""
+    ratio = area_b / area_a
+    return ratio**0.5, ratio**1.5, 1.0, ratio

@@ -1,0 +1,352 @@
+"""The machine: a platen, its actuators and hold-down struts, typed, checked and immutable.
+
+A `Machine` is built from a `Parameters` mapping, so that another table is another file in ``models/``. It holds
+plain floats; where each comes from stays in `Machine.parameters` under the same path.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .effects import Effect, standard_effects
+from .errors import ParameterError, UnknownNameError
+from .parameters import Parameters, Value, load_parameters, override_parameters
+from .specimen import Specimen
+
+__all__ = ["Actuator", "Hydraulics", "Limits", "Machine", "Platen", "Strut", "load_machine"]
+
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Platen axes in the order of every record."""
+
+Vec3 = tuple[float, float, float]
+
+
+def _q(unit: str, *, length: int = 0, bound: str = "any", optional: bool = False) -> Any:
+    """Dataclass field that holds a quantity: its unit, vector length (0 for a scalar) and bound."""
+    meta = {"unit": unit, "length": length, "bound": bound, "optional": optional}
+    return field(metadata=meta, default=None) if optional else field(metadata=meta)
+
+
+@dataclass(frozen=True)
+class Platen:
+    """Effective rigid body: platen and the moving parts lumped to it (Table 4.1), frame {b} at B."""
+
+    mass: Vec3 = _q("kg", length=3, bound="positive")
+    inertia: Vec3 = _q("kg m2", length=3, bound="positive")
+    centre_of_gravity: Vec3 = _q("m", length=3)
+    bearing_plane: Vec3 = _q("m", length=3)
+    size: tuple[float, float] = _q("m", length=2, bound="positive")
+    gravity: float = _q("m/s2", bound="nonnegative")
+
+
+@dataclass(frozen=True)
+class Hydraulics:
+    """Oil and supply shared by all actuators."""
+
+    supply_pressure: float = _q("Pa", bound="positive")
+    return_pressure: float = _q("Pa", bound="nonnegative")
+    rated_pressure: float = _q("Pa", bound="positive")
+    bulk_modulus: float = _q("Pa", bound="positive")
+    root_regularisation: float = _q("Pa", bound="positive")
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """One servo-hydraulic actuator; points in {s}, control zero-position.
+
+    mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
+    valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are 0 without chamber B,
+    pad quantities 0 without a bearing.
+    """
+
+    name: str
+    kind: str
+    mount: str
+    valve: str
+    valves: int
+    platen_point: Vec3 = _q("m", length=3)
+    base_point: Vec3 = _q("m", length=3)
+    area_a: float = _q("m2", bound="positive")
+    flow: float = _q("m3/s", bound="positive")
+    flow_curve: float = _q("1", bound="positive")
+    leakage: float = _q("m3/s/Pa", bound="nonnegative")
+    chamber_a: float = _q("m", bound="positive")
+    stroke: float = _q("m", bound="positive")
+    valve_delay: float = _q("s", bound="nonnegative")
+    seal_friction: float = _q("N", bound="nonnegative")
+    seal_yield: float = _q("m", bound="positive")
+    seal_shape: float = _q("1", bound="fraction")
+    viscous: float = _q("N s/m", bound="nonnegative")
+    mass_along: float = _q("kg", bound="nonnegative")
+    mass_across: float = _q("kg", bound="nonnegative")
+    area_b: float = _q("m2", bound="positive", optional=True)
+    chamber_b: float = _q("m", bound="positive", optional=True)
+    pad_friction: float = _q("N", bound="nonnegative", optional=True)
+    pad_yield: float = _q("m", bound="positive", optional=True)
+    pad_shape: float = _q("1", bound="fraction", optional=True)
+
+
+@dataclass(frozen=True)
+class Strut:
+    """One nitrogen hold-down strut (Eq. 4-8); points in {s}, control zero-position."""
+
+    name: str
+    kind: str
+    platen_point: Vec3 = _q("m", length=3)
+    base_point: Vec3 = _q("m", length=3)
+    area: float = _q("m2", bound="positive")
+    pressure: float = _q("Pa", bound="nonnegative")
+    gas_length: float = _q("m", bound="positive")
+    polytropic_index: float = _q("1", bound="positive")
+    seal_friction: float = _q("N", bound="nonnegative")
+    seal_yield: float = _q("m", bound="positive")
+    seal_shape: float = _q("1", bound="fraction")
+    mass_along: float = _q("kg", bound="nonnegative")
+    mass_across: float = _q("kg", bound="nonnegative")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the machine is said to give (Table 2.2), axis order x y z roll pitch yaw."""
+
+    displacement: tuple[float, ...] = _q("m | rad", length=6, bound="nonnegative")
+    velocity: tuple[float, ...] = _q("m/s | rad/s", length=6, bound="nonnegative")
+    acceleration: tuple[float, ...] = _q("m/s2 | rad/s2", length=6, bound="nonnegative")
+    bandwidth: float = _q("Hz", bound="positive")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A shake table as an ordered list of force effects on a platen.
+
+    Change it with `with_params`, `with_effect` and `with_specimen`; each returns a changed copy.
+    """
+
+    name: str
+    title: str
+    motion: str
+    thrust: str
+    platen: Platen
+    hydraulics: Hydraulics
+    actuators: tuple[Actuator, ...]
+    struts: tuple[Strut, ...]
+    limits: Limits
+    parameters: Parameters
+    added_effects: tuple[Effect, ...] = ()
+    specimen: Specimen | None = None
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """All force effects in ledger order: the report's, then those added."""
+        return (*standard_effects(self.actuators, self.struts, self.hydraulics), *self.added_effects)
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """Names of actuators in file order."""
+        return tuple(a.name for a in self.actuators)
+
+    @property
+    def strut_names(self) -> tuple[str, ...]:
+        """Names of struts in file order."""
+        return tuple(s.name for s in self.struts)
+
+    @property
+    def double_acting(self) -> tuple[str, ...]:
+        """Names of the actuators that have a chamber B; the `horizontal` dimension of records."""
+        return tuple(a.name for a in self.actuators if a.area_b is not None)
+
+    def with_params(self, changes: Mapping[str, Any] | str | Path | None = None, /, **keywords: Any) -> "Machine":
+        """Return a copy with parameters replaced: a mapping by path, a small TOML file, or keywords.
+
+        In a keyword the dot of a path is two underscores: ``with_params(platen__mass=[1e5, 1e5, 1e5])``.
+        Raises ParameterError or UnknownNameError that name the key.
+        """
+        parameters = self.parameters
+        if changes is not None:
+            parameters = override_parameters(parameters, changes)
+        if keywords:
+            parameters = override_parameters(parameters, {k.replace("__", "."): v for k, v in keywords.items()})
+        return build_machine(parameters, added_effects=self.added_effects, specimen=self.specimen)
+
+    def with_effect(self, effect: Effect) -> "Machine":
+        """Return a copy with one more force effect; its name must be new. Raises ParameterError."""
+        if effect.name in {e.name for e in self.effects}:
+            raise ParameterError(f"an effect named {effect.name!r} is in this machine already; give it another name")
+        return replace(self, added_effects=(*self.added_effects, effect))
+
+    def with_specimen(
+        self, urdf: str | Path, position: Vec3 = (0.0, 0.0, 0.0), rpy: Vec3 = (0.0, 0.0, 0.0), *, locked: bool = False
+    ) -> "Machine":
+        """Return a copy with the specimen of a URDF bolted to the platen.
+
+        position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
+        locked joints make it one rigid body; free ones join the same Pinocchio model.
+        """
+        return replace(self, specimen=Specimen(Path(urdf), position, rpy, locked))
+
+
+def load_machine(name_or_path: str | Path = "lhpost6", override: Mapping[str, Any] | str | Path | None = None) -> Machine:
+    """Read a machine file by shipped name or path, with an optional override file or mapping.
+
+    Raises ParameterError that names file and key for a missing, unknown, ill-dimensioned or impossible value.
+    """
+    parameters = load_parameters(name_or_path)
+    if override is not None:
+        parameters = override_parameters(parameters, override)
+    return build_machine(parameters)
+
+
+_T = TypeVar("_T")
+
+
+def build_machine(
+    parameters: Parameters, added_effects: tuple[Effect, ...] = (), specimen: Specimen | None = None
+) -> Machine:
+    """Give typed objects to a flat mapping of quantities; raises ParameterError."""
+    words = parameters.words
+    options = {
+        "motion": _word(parameters, "machine.motion", ("free", "x", "y", "z")),
+        "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
+    }
+    components = [path.split(".")[0] for path in words if path.endswith(".kind")]
+    kinds = {str(words[f"{c}.kind"]) for c in components}
+    actuators, struts = [], []
+    for name in components:
+        kind = str(words[f"{name}.kind"])
+        role = _word(parameters, f"{kind}.role", ("actuator", "strut"))
+        if role == "strut":
+            struts.append(_build(Strut, parameters, (name, kind), name=name, kind=kind))
+            continue
+        actuator = _build(
+            Actuator,
+            parameters,
+            (name, kind),
+            name=name,
+            kind=kind,
+            mount=_word(parameters, f"{kind}.mount", ("swivel", "bearing")),
+            valve=_word(parameters, f"{kind}.valve", ("4-way", "3-way")),
+            valves=_count(parameters, name, kind),
+        )
+        _check_actuator(actuator, parameters.origin)
+        actuators.append(actuator)
+    if not actuators:
+        raise ParameterError(f"{parameters.origin}: no actuator; give at least one [component.NAME] of role actuator")
+    machine = Machine(
+        name=str(words.get("machine.name", "unnamed")),
+        title=str(words.get("machine.title", "")),
+        **options,
+        platen=_build(Platen, parameters, ("platen",)),
+        hydraulics=_build(Hydraulics, parameters, ("hydraulics",)),
+        actuators=tuple(actuators),
+        struts=tuple(struts),
+        limits=_build(Limits, parameters, ("limits",)),
+        parameters=parameters,
+        added_effects=added_effects,
+        specimen=specimen,
+    )
+    _check_names(parameters, components, kinds)
+    _check_machine(machine)
+    return machine
+
+
+def _build(cls: type[_T], parameters: Parameters, sections: tuple[str, ...], **given: Any) -> _T:
+    """Fill a dataclass from the first section that has each key."""
+    values = dict(given)
+    for spec in fields(cls):  # type: ignore[arg-type]
+        if spec.name in given:
+            continue
+        path = next((f"{s}.{spec.name}" for s in sections if f"{s}.{spec.name}" in parameters), None)
+        if path is None:
+            if spec.metadata["optional"]:
+                continue
+            raise ParameterError(f"{parameters.origin}: {sections[-1]}.{spec.name} is missing")
+        quantity = parameters[path]
+        key = f"{parameters.origin}: {path}"
+        if quantity.unit != spec.metadata["unit"]:
+            raise ParameterError(f"{key}: unit {quantity.unit!r} should be {spec.metadata['unit']!r}")
+        values[spec.name] = _bounded(quantity.value, spec.metadata["length"], spec.metadata["bound"], key)
+    return cls(**values)
+
+
+def _bounded(value: Value, length: int, bound: str, key: str) -> Value:
+    entries = value if isinstance(value, tuple) else (value,)
+    if isinstance(value, tuple) != bool(length) or (length and len(entries) != length):
+        wanted = f"{length} numbers" if length else "one number"
+        raise ParameterError(f"{key}: {value!r} should be {wanted}")
+    impossible = {
+        "any": False,
+        "positive": min(entries) <= 0.0,
+        "nonnegative": min(entries) < 0.0,
+        "fraction": min(entries) < 0.0 or max(entries) > 1.0,
+    }
+    if impossible[bound]:
+        wanted = {"positive": "positive", "nonnegative": "zero or positive", "fraction": "between 0 and 1"}[bound]
+        raise ParameterError(f"{key}: {value!r} is impossible; it should be {wanted}")
+    return value
+
+
+def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:
+    word = parameters.words.get(path)
+    if word not in valid:
+        raise ParameterError(f"{parameters.origin}: {path} = {word!r}; it should be one of {', '.join(valid)}")
+    return str(word)
+
+
+def _count(parameters: Parameters, component: str, kind: str) -> int:
+    path = f"{component}.valves" if f"{component}.valves" in parameters.words else f"{kind}.valves"
+    count = parameters.words.get(path, 1)
+    if not isinstance(count, int) or count < 1:
+        raise ParameterError(f"{parameters.origin}: {path} = {count!r}; it should be a whole number of open servovalves")
+    return count
+
+
+def _check_names(parameters: Parameters, components: list[str], kinds: set[str]) -> None:
+    """Refuse keys that nothing reads: a misspelt key must not be silently ignored."""
+    known = {
+        "platen": {f.name for f in fields(Platen)},
+        "hydraulics": {f.name for f in fields(Hydraulics)},
+        "machine": set(),
+    }
+    both = {f.name for f in fields(Actuator)} | {f.name for f in fields(Strut)}
+    known |= {name: both for name in (*components, *kinds)}
+    for path in parameters:
+        section, _, key = path.partition(".")
+        if section in known and key not in known[section]:
+            raise ParameterError(
+                f"{parameters.origin}: unknown key {path}; valid: {', '.join(sorted(known[section]))}"
+            )
+
+
+def _check_actuator(actuator: Actuator, origin: str) -> None:
+    needed = {"4-way": ("area_b", "chamber_b"), "3-way": ()}[actuator.valve]
+    needed += {"bearing": ("pad_friction", "pad_yield", "pad_shape"), "swivel": ()}[actuator.mount]
+    for key in needed:
+        if getattr(actuator, key) is None:
+            why = f"{actuator.valve} valve on a {actuator.mount}"
+            raise ParameterError(f"{origin}: {actuator.kind}.{key} is missing; a {why} needs it")
+    if actuator.valve == "3-way" and actuator.area_b is not None:
+        raise ParameterError(f"{origin}: {actuator.kind}.area_b is given, but a 3-way valve has chamber A only")
+    room = min(c for c in (actuator.chamber_a, actuator.chamber_b) if c is not None)
+    if room <= actuator.stroke:
+        raise ParameterError(
+            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of {room:g} m; "
+            "make the chamber longer or the stroke shorter"
+        )
+
+
+def _check_machine(machine: Machine) -> None:
+    origin = machine.parameters.origin
+    if machine.hydraulics.return_pressure >= machine.hydraulics.supply_pressure:
+        raise ParameterError(f"{origin}: hydraulics.return_pressure is not below hydraulics.supply_pressure")
+    for component in (*machine.actuators, *machine.struts):
+        if component.platen_point == component.base_point:
+            raise ParameterError(f"{origin}: {component.name}: platen_point and base_point coincide")
+        bearing = isinstance(component, Actuator) and component.mount == "bearing"
+        if bearing and component.platen_point[:2] != component.base_point[:2]:
+            raise ParameterError(f"{origin}: {component.name}: a bearing actuator must be vertical in the zero-position")
+        if bearing and abs(component.platen_point[2] - machine.platen.bearing_plane[2]) > 1e-9:
+            raise ParameterError(f"{origin}: {component.name}.platen_point must lie in platen.bearing_plane")
+    n_platen = machine.platen.bearing_plane
+    if n_platen[0] != 0.0 or n_platen[1] != 0.0 or n_platen[2] == 0.0:
+        raise ParameterError(f"{origin}: platen.bearing_plane must lie straight below C: [0, 0, z]")

@@ -1,0 +1,258 @@
+"""Numbers with unit, evidence and source, read from TOML and checked; overrides give a changed copy.
+
+A machine file is a tree of sections (``[platen]``, ``[kind.horizontal]``, ``[component.H1]``, ...). Here it becomes
+one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or ``H1.base_point`` to a `Quantity`;
+`machine.py` gives the paths their meaning.
+"""
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from .errors import ParameterError, UnknownNameError
+from .files import models_folder
+
+__all__ = ["EVIDENCE", "Parameters", "Quantity", "Value", "load_parameters", "override_parameters", "to_unit"]
+
+Value: TypeAlias = float | tuple[float, ...]
+
+EVIDENCE = ("report", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
+"""How well a number is known, strongest claim first; `override` is what a user set by hand."""
+
+_QUANTITY_KEYS = {"value", "unit", "evidence", "source", "printed", "rel_sd", "sd"}
+_GROUPS = ("kind", "component", "estimates")
+"""Sections that hold named sub-sections; the sub-section's name is the path's first part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number (or vector) with its unit and where it comes from.
+
+    `sd` is one standard deviation in `unit` (None where no uncertainty is stated).
+    """
+
+    value: Value
+    unit: str
+    evidence: str
+    source: str
+    sd: Value | None = None
+    printed: str | None = None
+
+    @property
+    def assumed(self) -> bool:
+        """True if nobody has published this number."""
+        return self.evidence == "assumed"
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters(Mapping[str, Quantity]):
+    """All quantities of a machine by path, and the plain words (kinds, mounts, options) beside them."""
+
+    quantities: Mapping[str, Quantity]
+    words: Mapping[str, str | int]
+    origin: str
+
+    def __getitem__(self, path: str) -> Quantity:
+        """Return the quantity at `path`; raises UnknownNameError that lists the section's paths."""
+        try:
+            return self.quantities[path]
+        except KeyError:
+            near = [p for p in self.quantities if p.split(".")[0] == path.split(".")[0]]
+            raise UnknownNameError("parameter", path, near or list(self.quantities)) from None
+
+    def __contains__(self, path: object) -> bool:
+        """True if there is a quantity at `path`."""
+        return path in self.quantities
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over paths in file order."""
+        return iter(self.quantities)
+
+    def __len__(self) -> int:
+        """Count quantities."""
+        return len(self.quantities)
+
+
+def load_parameters(name_or_path: str | Path) -> Parameters:
+    """Read a machine file by shipped name (``lhpost6``) or by path.
+
+    Raises ParameterError that names file and key for anything that is not a complete quantity.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        shipped = {p.stem: p for p in sorted(models_folder().glob("*.toml"))}
+        if str(name_or_path) not in shipped:
+            raise UnknownNameError("machine", str(name_or_path), list(shipped))
+        path = shipped[str(name_or_path)]
+    return _flatten(_read_toml(path), path.name)
+
+
+def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str | Path) -> Parameters:
+    """Return a copy with some values replaced.
+
+    `changes` maps a path to a number in the file's unit, or to a table ``{value, unit, source, ...}``; or it is
+    the path of a small TOML file of such tables. A component's path (``H3.seal_friction``) may be new if its kind
+    has that key; anything else must exist. Raises ParameterError naming the key, or UnknownNameError.
+    """
+    if isinstance(changes, str | Path):
+        path = Path(changes)
+        flat = _flatten(_read_toml(path), path.name)
+        entries: dict[str, Any] = {**flat.quantities, **flat.words}
+        origin = path.name
+    else:
+        entries, origin = dict(changes), "given by hand"
+    quantities, words = dict(parameters.quantities), dict(parameters.words)
+    for key, entry in entries.items():
+        if isinstance(entry, str) or key in words:
+            if key not in words:
+                raise UnknownNameError("option", key, list(words))
+            words[key] = entry
+            continue
+        base = quantities.get(key) or _kind_quantity(parameters, key)
+        if base is None:
+            parameters[key]  # raises with the valid names
+            raise AssertionError
+        quantities[key] = _changed(base, entry, key, origin)
+    return Parameters(quantities, words, f"{parameters.origin} + {origin}")
+
+
+def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
+    """Convert `value` from `unit` to `wanted`; raises ParameterError naming `key` if the dimensions differ."""
+    if unit == wanted:
+        return value
+    import pint  # slow to import and needed only where a unit is not the SI one
+
+    registry: Any = pint.UnitRegistry()
+    try:
+        factor = registry.Quantity(1.0, _pint_spelling(unit)).to(_pint_spelling(wanted)).magnitude
+    except Exception as error:  # pint raises a dozen types for a bad unit
+        raise ParameterError(f"{key}: unit {unit!r} cannot be converted to {wanted!r}; give it in {wanted}") from error
+    if isinstance(value, tuple):
+        return tuple(float(v) * factor for v in value)
+    return float(value) * factor
+
+
+def _pint_spelling(unit: str) -> str:
+    """Spell a unit such as ``m3/s/Pa`` or ``kg m2`` the way pint reads it."""
+    words = unit.replace("·", " ").replace("/", " / ").split()
+    spelled: list[str] = []
+    for word in words:
+        if spelled and word != "/" and spelled[-1] != "/":
+            spelled.append("*")
+        stem = word.rstrip("0123456789")
+        spelled.append(f"{stem}**{word[len(stem) :]}" if stem and stem != word else word)
+    return " ".join(spelled)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as handle:
+            return tomllib.load(handle)
+    except FileNotFoundError:
+        raise ParameterError(f"{path}: no such machine file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path}: not a TOML file: {error}") from None
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:
+    quantities: dict[str, Quantity] = {}
+    words: dict[str, str | int] = {}
+    for section, table in _sections(tree, file):
+        for key, entry in table.items():
+            path = f"{section}.{key}"
+            if path in quantities or path in words:
+                raise ParameterError(f"{file}: {path} is given twice; kinds, components and sections share names")
+            if isinstance(entry, dict):
+                quantities[path] = _quantity(entry, f"{file}: {path}")
+            elif isinstance(entry, str | int) and not isinstance(entry, bool):
+                words[path] = entry
+            else:
+                raise ParameterError(
+                    f"{file}: {path} = {entry!r} has no unit; write {path.split('.')[-1]} = "
+                    '{ value = ..., unit = "...", evidence = "...", source = "..." }'
+                )
+    return Parameters(quantities, words, file)
+
+
+def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for name, table in tree.items():
+        if not isinstance(table, dict):
+            raise ParameterError(f"{file}: {name} stands outside any section; put it under [machine] or [platen]")
+        if name not in _GROUPS:
+            yield name, table
+            continue
+        for sub, inner in table.items():
+            if not isinstance(inner, dict):
+                raise ParameterError(f"{file}: {name}.{sub} must be a section [{name}.{sub}]")
+            yield (f"{name}.{sub}" if name == "estimates" else sub), inner
+
+
+def _number(value: object, key: str) -> Value:
+    if isinstance(value, list | tuple):
+        return tuple(float(_scalar(v, key)) for v in value)
+    return _scalar(value, key)
+
+
+def _scalar(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(f"{key}: value {value!r} is not a number")
+    if not math.isfinite(value):
+        raise ParameterError(f"{key}: value {value!r} is not finite")
+    return float(value)
+
+
+def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
+    for needed in ("value", "unit", "evidence", "source"):
+        if needed not in entry:
+            raise ParameterError(f"{key}: {needed} is missing")
+    unknown = set(entry) - _QUANTITY_KEYS
+    if unknown:
+        raise ParameterError(f"{key}: unknown {', '.join(sorted(unknown))}; valid: {', '.join(sorted(_QUANTITY_KEYS))}")
+    if entry["evidence"] not in EVIDENCE:
+        raise ParameterError(f"{key}: evidence {entry['evidence']!r} is not one of {', '.join(EVIDENCE)}")
+    for text in ("unit", "source", "printed"):
+        if not isinstance(entry.get(text, ""), str):
+            raise ParameterError(f"{key}: {text} must be text")
+    value = _number(entry["value"], key)
+    return Quantity(value, entry["unit"], entry["evidence"], entry["source"], _sd(entry, value, key), entry.get("printed"))
+
+
+def _sd(entry: Mapping[str, Any], value: Value, key: str) -> Value | None:
+    if "sd" in entry:
+        sd: Value = _number(entry["sd"], f"{key}.sd")
+    elif "rel_sd" in entry:
+        fraction = _scalar(entry["rel_sd"], f"{key}.rel_sd")
+        sd = tuple(abs(v) * fraction for v in value) if isinstance(value, tuple) else abs(value) * fraction
+    else:
+        return None
+    if min(sd if isinstance(sd, tuple) else (sd,)) < 0.0:
+        raise ParameterError(f"{key}: standard deviation {sd!r} is negative")
+    return sd
+
+
+def _kind_quantity(parameters: Parameters, key: str) -> Quantity | None:
+    """Quantity that component key ``H3.seal_friction`` inherits from its kind, if any."""
+    component, _, name = key.partition(".")
+    kind = parameters.words.get(f"{component}.kind")
+    return parameters.quantities.get(f"{kind}.{name}") if kind is not None else None
+
+
+def _changed(base: Quantity, entry: Any, key: str, origin: str) -> Quantity:
+    if isinstance(entry, Quantity):
+        new = entry
+    elif isinstance(entry, Mapping):
+        new = _quantity({"unit": base.unit, "evidence": "override", "source": origin, **entry}, key)
+    else:
+        new = Quantity(_number(entry, key), base.unit, "override", f"{origin}; was {base.value!r} ({base.source})")
+    value = to_unit(new.value, new.unit, base.unit, key)
+    if isinstance(value, tuple) != isinstance(base.value, tuple) or (
+        isinstance(value, tuple) and isinstance(base.value, tuple) and len(value) != len(base.value)
+    ):
+        raise ParameterError(f"{key}: {new.value!r} has not the shape of {base.value!r}")
+    sd = base.sd if new.sd is None else to_unit(new.sd, new.unit, base.unit, key)
+    return replace(new, value=value, unit=base.unit, sd=sd)

@@ -1,0 +1,220 @@
+"""Ports: where a force can act on the platen, with its coordinate, rate and force direction.
+
+A port is a named coordinate s(q) [m or rad] with rate s' = J v [m/s or rad/s] and a force column B: a force f on the
+port is a wrench B f on the platen. Usually B = J^T; two known exceptions do not conserve energy (see `Ports`).
+v = (v_B, omega) is the platen's twist in its own axes at B, linear first (Pinocchio's free-flyer velocity).
+
+Compiled code keeps the platen in one array, frame (8, 3): rows 0 to 2 the rotation s_R_b, 3 the position of B in {s},
+4 and 5 the twist (v_B, omega) in platen axes, 6 and 7 the wrench (f, m) at B in platen axes.
+
+One compiled function evaluates all ports of a pose. It is written in body axes, where a bearing's plane is constant;
+`kinematics.py` writes the same rows as the report does, and tests hold the two together.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compiled import compiled
+
+if TYPE_CHECKING:
+    from .machine import Machine
+
+__all__ = ["BODY", "LEG", "PLATEN_PORTS", "body_table", "evaluate_ports", "leg_table", "platen_pose", "port_names"]
+
+LEG = np.dtype(
+    [
+        ("bearing", np.int64),  # 1: the leg stays vertical and the platen slides on it; 0: swivels at both ends
+        ("pad", np.int64),  # number of the first of its two pad ports, -1 without
+        ("rho", np.float64, 3),  # platen point from B, body axes, control zero-position [m]
+        ("base", np.float64, 3),  # base point in {s} [m]
+        ("zero_length", np.float64),  # length in the control zero-position [m]
+        ("stroke", np.float64),  # largest |s| [m]
+        ("normal_thrust", np.float64),  # bearing: 0 thrust along the vertical (Eq. 4-23), 1 along the normal (3-27)
+    ]
+)
+"""Table row of a leg: an actuator or a strut."""
+
+BODY = np.dtype(
+    [
+        ("rho_c", np.float64, 3),  # C from B, body axes [m]
+        ("plane", np.float64),  # height of the bearing plane above B, along the platen normal [m]
+        ("mass_extra", np.float64, 3),  # directional mass beyond the Inertia's, dM [kg]
+        ("weight_extra", np.float64),  # weight beyond the Inertia's, (m_z - m_0) g [N]
+    ]
+)
+"""Table (one row) of the platen."""
+
+PLATEN_PORTS = ("platen.x", "platen.y", "platen.z", "platen.roll", "platen.pitch", "platen.yaw")
+"""Platen ports: displacement of C along {s}, and rotation; their forces are the wrench at C in {c}."""
+
+
+def port_names(machine: "Machine") -> tuple[str, ...]:
+    """Names of all ports in table order: actuators, struts, pads (``V1.x``, ``V1.y``), the six platen ports."""
+    pads = [f"{a.name}.{d}" for a in machine.actuators if a.mount == "bearing" for d in "xy"]
+    return (*machine.actuator_names, *machine.strut_names, *pads, *PLATEN_PORTS)
+
+
+def leg_table(machine: "Machine") -> NDArray[np.void]:
+    """Table of actuators, then struts, as `evaluate_ports` reads it."""
+    centre = np.array(machine.platen.centre_of_gravity)
+    legs = np.zeros(len(machine.actuators) + len(machine.struts), LEG)
+    components: Sequence = (*machine.actuators, *machine.struts)
+    pad = len(legs)
+    for row, component in zip(legs, components, strict=True):
+        row["rho"] = np.array(component.platen_point) - centre
+        row["base"] = component.base_point
+        row["zero_length"] = math.dist(component.platen_point, component.base_point)
+        row["stroke"] = getattr(component, "stroke", math.inf)
+        row["pad"] = -1
+        if getattr(component, "mount", "swivel") == "bearing":
+            row["bearing"], row["pad"] = 1, pad
+            row["normal_thrust"] = float(machine.thrust == "normal")
+            pad += 2
+    return legs
+
+
+def body_table(machine: "Machine") -> NDArray[np.void]:
+    """Table (one row) of the platen: C, bearing plane, and what an Inertia cannot hold (see `rigid_body`)."""
+    platen = machine.platen
+    body = np.zeros(1, BODY)
+    base_mass = min(platen.mass)
+    body["rho_c"] = -np.array(platen.centre_of_gravity)
+    body["plane"] = platen.bearing_plane[2] - platen.centre_of_gravity[2]
+    body["mass_extra"] = np.array(platen.mass) - base_mass
+    body["weight_extra"] = (platen.mass[2] - base_mass) * platen.gravity
+    return body
+
+
+@compiled
+def platen_pose(q, axes, body, frame):  # type: ignore[no-untyped-def]
+    """Fill rows 0 to 3 of frame from q: the rotation s_R_b and the position of B in {s} [m].
+
+    With six free axes q starts with the position of B and a unit quaternion (x, y, z, w); a guided platen has q[0],
+    its displacement [m] along axes[0], and does not turn.
+    """
+    if axes.size == 6:
+        x, y, z, w = q[3], q[4], q[5], q[6]
+        frame[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+        frame[0, 1] = 2.0 * (x * y - z * w)
+        frame[0, 2] = 2.0 * (x * z + y * w)
+        frame[1, 0] = 2.0 * (x * y + z * w)
+        frame[1, 1] = 1.0 - 2.0 * (x * x + z * z)
+        frame[1, 2] = 2.0 * (y * z - x * w)
+        frame[2, 0] = 2.0 * (x * z - y * w)
+        frame[2, 1] = 2.0 * (y * z + x * w)
+        frame[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+        for k in range(3):
+            frame[3, k] = q[k]
+    else:
+        for k in range(3):
+            for j in range(3):
+                frame[k, j] = 1.0 if k == j else 0.0
+            frame[3, k] = -body[0].rho_c[k]
+        frame[3, axes[0]] += q[0]
+
+
+@compiled
+def _row(out, i, fx, fy, fz, rx, ry, rz):  # type: ignore[no-untyped-def]
+    """Row of a unit force (fx, fy, fz) at r from B, body axes: (f, r x f)."""
+    out[i, 0] = fx
+    out[i, 1] = fy
+    out[i, 2] = fz
+    out[i, 3] = ry * fz - rz * fy
+    out[i, 4] = rz * fx - rx * fz
+    out[i, 5] = rx * fy - ry * fx
+
+
+@compiled
+def evaluate_ports(frame, legs, body, s, J, B):  # type: ignore[no-untyped-def]
+    """Fill s (n,), J (n, 6) and B (n, 6) of all ports at the pose in rows 0 to 3 of frame.
+
+    Swivel leg (Eqs. 3-20 to 3-22): s the elongation, J its rate. Bearing leg (Eqs. 3-24, 3-27): the same with the
+    leg vertical and the platen sliding over it; B is the thrust direction, vertical (Eq. 4-23) or normal. Pads: slip
+    of the platen over the plate in the axes of {n_i} (Eqs. 4-13 to 4-15); J is slip relative to the rising plate, B
+    the force on the platen alone (Eq. 4-24); s is the displacement of the platen point of the zero-position.
+    Platen ports: J = B^T, displacement of C, Euler angles (whose rates are not omega), wrench at C in {c}.
+    """
+    r00, r01, r02 = frame[0, 0], frame[0, 1], frame[0, 2]
+    r10, r11, r12 = frame[1, 0], frame[1, 1], frame[1, 2]
+    r20, r21, r22 = frame[2, 0], frame[2, 1], frame[2, 2]
+    bx, by, bz = frame[3, 0], frame[3, 1], frame[3, 2]
+    plane = body[0].plane
+    # {n}: same for all pads, z along the platen normal (r02, r12, r22), no rotation about it (Eq. 4-13)
+    cos_a = math.sqrt(1.0 - r12 * r12)
+    sin_b = r02 / cos_a
+    cos_b = r22 / cos_a
+    # its x and y axes in {s}, then in body axes (their body z components vanish)
+    yx, yy, yz = -sin_b * r12, cos_a, -cos_b * r12
+    xbx = r00 * cos_b - r20 * sin_b
+    xby = r01 * cos_b - r21 * sin_b
+    ybx = r00 * yx + r10 * yy + r20 * yz
+    yby = r01 * yx + r11 * yy + r21 * yz
+    for i in range(legs.size):
+        leg = legs[i]
+        px, py, pz = leg.rho[0], leg.rho[1], leg.rho[2]
+        ax, ay, az = leg.base[0], leg.base[1], leg.base[2]
+        if leg.bearing == 0:
+            dx = bx + r00 * px + r01 * py + r02 * pz - ax
+            dy = by + r10 * px + r11 * py + r12 * pz - ay
+            dz = bz + r20 * px + r21 * py + r22 * pz - az
+            length = math.sqrt(dx * dx + dy * dy + dz * dz)
+            s[i] = length - leg.zero_length
+            dx /= length
+            dy /= length
+            dz /= length
+            _row(
+                J,
+                i,
+                r00 * dx + r10 * dy + r20 * dz,
+                r01 * dx + r11 * dy + r21 * dz,
+                r02 * dx + r12 * dy + r22 * dz,
+                px,
+                py,
+                pz,
+            )
+            for k in range(6):
+                B[i, k] = J[i, k]
+            continue
+        # bearing: the vertical through A meets the plane through N with normal n
+        ex, ey, ez = bx - ax, by - ay, bz - az
+        length = (ex * r02 + ey * r12 + ez * r22 + plane) / r22
+        s[i] = length - leg.zero_length
+        # P from B, in body axes; its body z is the plane's height
+        hx, hy, hz = -ex, -ey, length - ez
+        cx = r00 * hx + r10 * hy + r20 * hz
+        cy = r01 * hx + r11 * hy + r21 * hz
+        _row(J, i, 0.0, 0.0, 1.0 / r22, cx, cy, plane)
+        share = leg.normal_thrust
+        lateral = 1.0 - share
+        _row(B, i, lateral * r20, lateral * r21, lateral * r22 + share / r22, cx, cy, plane)
+        k = leg.pad
+        _row(B, k, xbx, xby, 0.0, cx, cy, plane)
+        _row(B, k + 1, ybx, yby, 0.0, cx, cy, plane)
+        for j in range(6):
+            J[k, j] = B[k, j] + sin_b * J[i, j]
+            J[k + 1, j] = B[k + 1, j] - yz * J[i, j]
+        gx, gy = px - cx, py - cy
+        s[k] = xbx * gx + xby * gy
+        s[k + 1] = ybx * gx + yby * gy
+    first = s.size - 6
+    rho = body[0].rho_c
+    ox, oy, oz = rho[0], rho[1], rho[2]
+    for k in range(3):
+        fx, fy, fz = frame[k, 0], frame[k, 1], frame[k, 2]
+        _row(B, first + k, fx, fy, fz, ox, oy, oz)
+        s[first + k] = frame[3, k] + fx * ox + fy * oy + fz * oz
+        for j in range(3):
+            B[first + 3 + k, j] = 0.0
+        B[first + 3 + k, 3] = fx
+        B[first + 3 + k, 4] = fy
+        B[first + 3 + k, 5] = fz
+    for k in range(first, s.size):
+        for j in range(6):
+            J[k, j] = B[k, j]
+    s[first + 3] = math.atan2(r21, r22)
+    s[first + 4] = -math.asin(min(1.0, max(-1.0, r20)))
+    s[first + 5] = math.atan2(r10, r00)

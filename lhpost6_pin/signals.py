@@ -1,0 +1,225 @@
+"""Comparing and conditioning sampled signals: errors, delays, shifts, interpolation, filters, derivatives.
+
+Time runs along the first axis; every column is treated by itself. `x` is (n,) or (n, k), what is returned per
+column is () or (k,). `dt` is the sample interval [s]. A delay is positive where the signal is late.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "align",
+    "correlation",
+    "delay",
+    "differentiate",
+    "drift_rate",
+    "hold",
+    "lowpass_zero_phase",
+    "peak_ratio",
+    "resample_band_limited",
+    "rrmse",
+]
+
+Array = NDArray[np.float64]
+
+
+def rrmse(reference: ArrayLike, signal: ArrayLike) -> Array:
+    """Relative root-mean-square error per column [1], sqrt(sum (signal - reference)² / sum reference²).
+
+    Where the reference is zero throughout it is 0 for an equally silent signal and infinite otherwise.
+    """
+    ref, sig = _pair(reference, signal)
+    return _ratio(np.sqrt(np.sum((sig - ref) ** 2, axis=0)), np.sqrt(np.sum(ref**2, axis=0)))
+
+
+def peak_ratio(reference: ArrayLike, signal: ArrayLike) -> Array:
+    """Largest magnitude of the signal over that of the reference, per column [1]."""
+    ref, sig = _pair(reference, signal)
+    return _ratio(np.abs(sig).max(axis=0), np.abs(ref).max(axis=0))
+
+
+def correlation(reference: ArrayLike, signal: ArrayLike) -> Array:
+    """Pearson's correlation coefficient per column [1]; 0 where either does not vary."""
+    ref, sig = (x - x.mean(axis=0) for x in _pair(reference, signal))
+    scale = np.sqrt(np.sum(ref**2, axis=0) * np.sum(sig**2, axis=0))
+    return np.divide(np.sum(ref * sig, axis=0), scale, out=np.zeros_like(scale), where=scale > 0)
+
+
+def drift_rate(error: ArrayLike, dt: float) -> Array:
+    """Least-squares slope of an error per column [unit of the error / s]."""
+    x = np.asarray(error, dtype=float)
+    t = dt * (np.arange(len(x)) - (len(x) - 1) / 2)
+    return np.tensordot(t, x, axes=(0, 0)) / np.sum(t**2)
+
+
+def delay(reference: ArrayLike, signal: ArrayLike, dt: float, max_delay: float = 0.1) -> Array:
+    """Delay of the signal behind the reference per column [s], at most ±`max_delay`; NaN if one is silent.
+
+    It maximises the normalised correlation N(τ) / sqrt(D(τ)), N = sum w r(t) s(t + τ), D = sum w s(t + τ)²,
+    under a Hann window w that stays `max_delay` clear of both ends: every delay is judged on the same stretch
+    of the reference and nothing is lost at the ends. The best whole sample is refined by Newton steps on the
+    Fourier sums of N and D, exact for band-limited signals. Means are taken out first. Raises `ValueError` if
+    the record is shorter than four times `max_delay`.
+    """
+    ref, sig = _pair(reference, signal)
+    margin = int(np.ceil(max_delay / dt)) + 1
+    if len(ref) < 4 * margin:
+        raise ValueError(f"max_delay {max_delay} s needs a record of at least {4 * margin * dt:g} s")
+    columns = [_delay_samples(r, s, margin) for r, s in zip(_columns(ref).T, _columns(sig).T, strict=True)]
+    return np.clip(dt * np.reshape(columns, ref.shape[1:]), -max_delay, max_delay)
+
+
+def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
+    """Delay of one signal in samples, at most `margin` either way."""
+    from scipy import fft
+
+    n = len(ref)
+    ref, sig = ref - ref.mean(), sig - sig.mean()
+    w = np.zeros(n)
+    w[margin : n - margin] = np.hanning(n - 2 * margin + 2)[1:-1]
+    if not (np.any(w * ref) and np.any(w * sig)):
+        return float("nan")
+    size = fft.next_fast_len(n + 2 * margin, real=True)
+    omega = 2 * np.pi * np.arange(size // 2 + 1) / size
+    cross = np.stack(  # spectra of N and D over the non-negative frequencies
+        [
+            np.conj(fft.rfft(w * ref, size)) * fft.rfft(sig, size),
+            np.conj(fft.rfft(w, size)) * fft.rfft(sig**2, size),
+        ]
+    )
+    num, den = np.roll(fft.irfft(cross, size), margin, axis=1)[:, : 2 * margin + 1]
+    tau = float(np.argmax(num / np.sqrt(np.maximum(den, 1e-12 * den.max())))) - margin
+    whole = tau
+    cross[:, 1 : (size + 1) // 2] *= 2.0
+    for _ in range(20):
+        term = cross * np.exp(1j * omega * tau)
+        (n0, n1, n2), (d0, d1, d2) = np.array(
+            [term.real.sum(axis=1), -(term.imag @ omega), -(term.real @ omega**2)]
+        ).T
+        slope = n1 / n0 - d1 / (2 * d0)
+        curvature = n2 / n0 - (n1 / n0) ** 2 - (d2 / d0 - (d1 / d0) ** 2) / 2
+        if not curvature < 0:
+            break
+        step = float(np.clip(-slope / curvature, -0.5, 0.5))
+        tau = float(np.clip(tau + step, whole - 1, whole + 1))
+        if abs(step) < 1e-9:
+            break
+    return tau
+
+
+def align(signal: ArrayLike, delay: ArrayLike, dt: float) -> Array:
+    """Signal advanced by its `delay` [s], one or one per column: y(t) = x(t + delay), laid over its reference.
+
+    A phase shift in the Fourier domain, exact for band-limited signals but for about ten samples at an end
+    where the signal is curved. Samples from outside the record hold its end value: nothing wraps around.
+    """
+    x = np.asarray(signal, dtype=float)
+    tau = np.broadcast_to(np.asarray(delay, dtype=float), x.shape[1:])
+    ends = np.stack([x[0], x[-1]])
+    rise = (ends[1] - ends[0]) / ((len(x) - 1) * dt)
+    shifted = _filtered(x, dt, lambda f: np.exp(2j * np.pi * np.multiply.outer(f, tau)))
+    shifted = shifted + rise * tau
+    t = np.add.outer(dt * np.arange(len(x)), tau)
+    shifted = np.where(t < 0, ends[0], shifted)
+    return np.where(t > (len(x) - 1) * dt, ends[1], shifted)
+
+
+def lowpass_zero_phase(x: ArrayLike, dt: float, cutoff: float, order: int = 8) -> Array:
+    """Butterworth low-pass run forwards and backwards: gain 1 / (1 + (f / cutoff)^order), no phase.
+
+    `cutoff` [Hz] is where the gain is one half. `order` (even) is that of both passes together.
+    """
+    from scipy import signal
+
+    x = np.asarray(x, dtype=float)
+    sos = signal.butter(order // 2, cutoff, fs=1 / dt, output="sos")
+    return signal.sosfiltfilt(sos, x, axis=0, padlen=min(len(x) - 1, int(np.ceil(order / (cutoff * dt)))))
+
+
+def differentiate(x: ArrayLike, dt: float, cutoff: float | None = None, order: int = 8) -> Array:
+    """Time derivative [unit of x / s] by the Fourier transform, low-passed without phase at `cutoff` [Hz].
+
+    Exact for band-limited signals but near an end where the signal is curved. It amplifies noise: white noise
+    of standard deviation sigma becomes 2 pi fc sigma sqrt(2 fc dt / 3) with a sharp cutoff at fc; without
+    `cutoff` fc is 1 / (2 dt), and the low-pass used, 1 / (1 + (f / cutoff)^order), lets a little more through.
+    """
+    x = np.asarray(x, dtype=float)
+
+    def response(f: Array) -> NDArray[Any]:
+        low_pass = 1.0 if cutoff is None else 1 / (1 + (f / cutoff) ** order)
+        return (2j * np.pi * f * low_pass).reshape(-1, *[1] * (x.ndim - 1))
+
+    return _filtered(x, dt, response, keep_chord=False) + (x[-1] - x[0]) / ((len(x) - 1) * dt)
+
+
+def resample_band_limited(x: ArrayLike, t_old: ArrayLike, t_new: ArrayLike, half_width: int = 24) -> Array:
+    """Values of a uniformly sampled band-limited signal at other times, by a Kaiser-windowed sinc.
+
+    Good to 1e-7 of the amplitude for content below 0.8 of the old Nyquist frequency, `half_width` samples away
+    from the ends; nearer, the signal is continued by odd reflection, which costs accuracy where it is curved.
+    Times outside the record get its end values. Going to a lower rate it does not guard against aliasing.
+
+    Parameters: `x` (n, ...), `t_old` (n,) uniform [s], `t_new` (m,) [s]. Returns (m, ...).
+    """
+    from scipy.special import i0
+
+    beta = 14.5  # 140 dB: what 2 x 24 taps give with a transition from 0.8 to 1.2 of the Nyquist frequency
+    x, t_old = np.asarray(x, dtype=float), np.asarray(t_old, dtype=float)
+    dt = (t_old[-1] - t_old[0]) / (len(t_old) - 1)
+    if len(t_old) != len(x) or np.abs(np.diff(t_old) - dt).max() > 0.01 * dt:
+        raise ValueError("t_old must be uniform, one time per sample")
+    place = np.clip((np.asarray(t_new, dtype=float) - t_old[0]) / dt, 0, len(x) - 1)
+    first = np.minimum(place.astype(int), len(x) - 2)
+    extended = np.pad(x, [(half_width, half_width)] + [(0, 0)] * (x.ndim - 1), "reflect", reflect_type="odd")
+    result, total = np.zeros((len(place), *x.shape[1:])), np.zeros(len(place))
+    for k in range(1 - half_width, half_width + 1):
+        u = place - (first + k)
+        weight = np.sinc(u) * i0(beta * np.sqrt(np.maximum(1 - (u / half_width) ** 2, 0))) / i0(beta)
+        total += weight
+        result += weight.reshape(-1, *[1] * (x.ndim - 1)) * extended[first + k + half_width]
+    return result / total.reshape(-1, *[1] * (x.ndim - 1))
+
+
+def hold(x: ArrayLike, rate_old: float, rate_new: float) -> Array:
+    """Zero-order hold to another rate [Hz]: sample j holds over [j, j + 1) / `rate_old`."""
+    x = np.asarray(x, dtype=float)
+    count = int(np.floor(len(x) * rate_new / rate_old + 1e-9))
+    held = np.floor(np.arange(count) * (rate_old / rate_new) + 1e-9).astype(int)
+    return x[np.minimum(held, len(x) - 1)]
+
+
+# ---------------------------------------------------------------------------------------------- helpers
+def _filtered(
+    x: Array, dt: float, response: Callable[[Array], NDArray[Any]], keep_chord: bool = True
+) -> Array:
+    """Apply a frequency response to x less its chord, continued by odd reflection; put the chord back.
+
+    The chord joins the first and last value. What is left vanishes at both ends, so its odd reflection is
+    periodic with period 2 (n - 1) samples, continuous and with continuous slope: no wrap-around jump.
+    """
+    from scipy import fft
+
+    chord = np.linspace(x[0], x[-1], len(x))
+    rest = x - chord
+    odd = np.concatenate([rest, -rest[-2:0:-1]])
+    spectrum = fft.rfft(odd, axis=0) * response(fft.rfftfreq(len(odd), dt))
+    return fft.irfft(spectrum, len(odd), axis=0)[: len(x)] + chord * keep_chord
+
+
+def _pair(reference: ArrayLike, signal: ArrayLike) -> tuple[Array, Array]:
+    ref, sig = np.asarray(reference, dtype=float), np.asarray(signal, dtype=float)
+    if ref.shape != sig.shape:
+        raise ValueError(f"reference {ref.shape} and signal {sig.shape} differ in shape")
+    return ref, sig
+
+
+def _columns(x: Array) -> Array:
+    return x.reshape(len(x), -1)
+
+
+def _ratio(above: Array, below: Array) -> Array:
+    unlike = np.where(above > 0, np.inf, 0.0)
+    return np.divide(above, below, out=unlike, where=below > 0)

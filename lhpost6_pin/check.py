@@ -1,11 +1,12 @@
 """What is in a record and what is wrong with it, as a list of findings.
 
-What breaks the layout (`layout_faults`) is an error; values that a valid record may hold but a sound test does
-not are warnings. Limits are relative to the record's own motion and resolution (its smallest step), not to a
-machine; the few absolute ones only tell a forgotten unit from a real value.
+What breaks the layout (`layout_faults`) is an error; values that a valid record may hold but a sound test
+does not are warnings. Limits are relative to the record's own motion and resolution (its smallest step), not
+to a machine; the few absolute ones only tell a forgotten unit from a real value.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +29,17 @@ STILL = 2e-5  # of that span: a channel that moved by more each sample does not 
 SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike cannot be told from a kink
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
 GAIN_TOLERANCE = 0.1  # between a channel and the derivative of another; calibration errors are far smaller
+LIKE_AXES = tuple((j, k) for k in range(6) for j in range(6) if j // 3 == k // 3)  # of one unit
 USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
-    -1.0: "opposite signs", 1 / 9.80665: "g for m/s2", 1e3: "mm for m", 1e-3: "m for mm", 1 / 0.0254: "in for m",
-    180 / np.pi: "deg for rad", np.pi / 180: "rad for deg", 9.80665: "g counted twice",
-}  # fmt: skip
+    -1.0: "opposite signs",
+    1 / 9.80665: "in g",
+    1e3: "in mm",
+    1 / 0.0254: "in inches",
+    180 / np.pi: "in degrees",
+    1e-3: "the other in mm",
+    0.0254: "the other in inches",
+    np.pi / 180: "the other in degrees",
+}
 LIKELY_UNITS = {  # variable: least and greatest believable peak, and what lies outside
     "displacement": (0.0, 3.0, "mm or in for m"),
     "angle": (0.0, 1.0, "deg for rad"),
@@ -62,12 +70,17 @@ def check_dataset(
         return errors + contents  # nothing can be said about signals on a broken time axis
     known = [name for name in LAYOUT if name in dataset and not {name, *LAYOUT[name].dims} & broken]
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
-    rules: list[Callable[[xr.Dataset], Iterator[_Warning]]] = [
-        _unlikely_units, _unquiet_start, _saturated_spools, _frozen, _spikes, _odd_rates, _inconsistent_motion,
-    ]  # fmt: skip
-    warnings = [Finding("warning", *fault) for rule in rules for fault in rule(sound)]
-    warnings += [Finding("warning", *fault) for fault in _inconsistent_forces(sound, areas or {})]
-    return errors + warnings + contents
+    faults = chain(
+        _unlikely_units(sound),
+        _unquiet_start(sound),
+        _saturated_spools(sound),
+        _frozen(sound),
+        _spikes(sound),
+        _odd_rates(sound),
+        _inconsistent_motion(sound),
+        _inconsistent_forces(sound, areas or {}),
+    )
+    return errors + [Finding("warning", *fault) for fault in faults] + contents
 
 
 # -------------------------------------------------------------------------------------------- contents
@@ -104,6 +117,10 @@ def _columns(dataset: xr.Dataset, *names: str) -> Iterator[tuple[str, Array, flo
                 yield channel_name(dataset[name], k), x, float(max(alike.max(), 1e-6 * spans.max()))
 
 
+def _interval(dataset: xr.Dataset) -> float:
+    return float(dataset["time"][-1] - dataset["time"][0]) / (dataset.sizes["time"] - 1)
+
+
 def _resolution(x: Array) -> float:
     """Smallest step of a channel: its digital resolution, or nearly nothing for a computed one."""
     steps = np.abs(np.diff(x))
@@ -129,8 +146,9 @@ def _unquiet_start(dataset: xr.Dataset) -> Iterator[_Warning]:
     motions = ("platen_displacement", "platen_velocity", "platen_acceleration", "actuator_displacement")
     for channel, x, span in _columns(dataset, *motions, "reference_displacement"):
         noise = 1.4826 * float(np.median(np.abs(np.diff(x, n=3)))) if len(x) > 3 else 0.0  # motion cancels
-        if np.ptp(x) > 0 and abs(x[0]) > START * span + START_NOISE * noise + 2 * _resolution(x):
-            what = f"starts at {x[0]:.4g}, not at rest in the zero pose"
+        start = float(np.median(x[:8]))  # the very first sample bears the filter's edge
+        if np.ptp(x) > 0 and abs(start) > START * span + START_NOISE * noise + 2 * _resolution(x):
+            what = f"starts at {start:.4g}, not at rest in the zero pose"
             yield channel, 0, what, "begin the record before the motion; take out the offset"
 
 
@@ -175,18 +193,18 @@ def _frozen(dataset: xr.Dataset) -> Iterator[_Warning]:
 
 
 def _spikes(dataset: xr.Dataset) -> Iterator[_Warning]:
-    """Find single samples off the smooth curve through their neighbours, among calm ones."""
+    """Find single samples off the smooth curve through their neighbours, but for three at either end."""
     from scipy.ndimage import maximum_filter1d
 
     taps = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20  # x less its sixth-order interpolation
     for channel, x, span in _columns(dataset):
         if channel.split("[")[0] in COMMANDS or len(x) < 64:
             continue
-        rough = np.pad(np.convolve(x, taps, mode="valid"), 3)
+        rough = np.convolve(np.pad(x, 3, "reflect", reflect_type="odd"), taps, mode="valid")
         size = np.abs(rough)
         beside = maximum_filter1d(np.stack([np.roll(size, s) for s in (-10, 10)]), 13, axis=1).max(axis=0)
         least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * _resolution(x), STILL * span)
-        for k in np.flatnonzero((size > 4 * beside) & (size > least)):
+        for k in np.flatnonzero(((size > 4 * beside) & (size > least))[3:-3]) + 3:
             alone = rough[k] * taps  # what a lone sample leaves; a step or a kink leaves something else
             if np.sum((rough[k - 3 : k + 4] - alone) ** 2) < 0.01 * np.sum(alone**2):
                 yield (
@@ -202,8 +220,7 @@ def _spikes(dataset: xr.Dataset) -> Iterator[_Warning]:
 def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
     from scipy.signal import welch
 
-    count, length = dataset.sizes["time"], float(dataset["time"][-1] - dataset["time"][0])
-    rate = (count - 1) / length
+    count, rate = dataset.sizes["time"], 1 / _interval(dataset)
     if not 200 <= rate <= 1e5:
         yield (
             "time",
@@ -227,36 +244,39 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
 
 # -------------------------------------------------------------------------------------------- consistency
 def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
-    """Compare each of displacement, velocity and acceleration with the derivative of the others."""
-    dt = float(dataset["time"][-1] - dataset["time"][0]) / (dataset.sizes["time"] - 1)
+    """Compare each of displacement, velocity and acceleration with the derivative of those before it."""
+    dt = _interval(dataset)
     if dataset.sizes["time"] * dt < 2:
         return
     cutoff = min(40.0, 0.2 / dt)
-    orders = {"platen_displacement": 0, "platen_velocity": 1, "platen_acceleration": 2}
-    for low, high in (
-        ("displacement", "velocity"),
-        ("velocity", "acceleration"),
-        ("displacement", "acceleration"),
-    ):
-        low, high = f"platen_{low}", f"platen_{high}"
-        if not {low, high} <= set(dataset.data_vars):
+    motions = ("platen_displacement", "platen_velocity", "platen_acceleration")
+    for low, high in ((0, 1), (1, 2), (0, 2)):
+        if not {motions[low], motions[high]} <= set(dataset.data_vars):
             continue
-        expected = dataset[low].values
-        for _ in range(orders[high] - orders[low]):
+        expected = dataset[motions[low]].values
+        for _ in range(high - low):
             expected = differentiate(expected, dt, cutoff)
-        found = lowpass_zero_phase(dataset[high].values, dt, cutoff)
-        for k in range(expected.shape[1]):
-            gain = _coherent_gain(expected[:, k], found[:, k], dt)
-            if gain is not None and abs(gain - 1) > GAIN_TOLERANCE:
+        found = lowpass_zero_phase(dataset[motions[high]].values, dt, cutoff)
+        gains = {(j, k): _coherent_gain(expected[:, j], found[:, k], dt) for j, k in LIKE_AXES}
+        for (j, k), gain in gains.items():
+            right = gain is not None and abs(gain - 1) <= GAIN_TOLERANCE
+            place, source = channel_name(dataset[motions[high]], k), channel_name(dataset[motions[low]], j)
+            if j == k and gain is not None and not right:
                 reason = next(
                     (f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), ""
                 )
-                what = f"is {gain:.3g} times the derivative of {low}{reason}"
-                yield channel_name(dataset[high], k), None, what, "check unit and sign of both"
+                yield (
+                    place,
+                    None,
+                    f"is {gain:.3g} times that derived from {source}{reason}",
+                    "check unit and sign",
+                )
+            elif j != k and right and gains[k, k] is None:
+                yield place, None, f"is the derivative of {source}", "the two channels may be swapped"
 
 
 def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
-    """Median real gain found / expected over the frequencies where the two are coherent; None if there are few."""
+    """Median real gain found / expected where the two are coherent; None if that is almost nowhere."""
     from scipy.signal import csd, welch
 
     each = {"fs": 1 / dt, "nperseg": int(min(len(found) // 4, round(2 / dt)))}

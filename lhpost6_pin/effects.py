@@ -116,7 +116,7 @@ class Effect:
 def standard_effects(
     actuators: "Sequence[Actuator]", struts: "Sequence[Strut]", oil: "Hydraulics"
 ) -> tuple[Effect, ...]:
-    """The report's effects (Chapter 4) for these components, in ledger order."""
+    """The report's effects (Chapter 4) for these components, in ledger order; friction of zero has no row."""
     found = []
     for law, valve in (("hydraulic_double", "4-way"), ("hydraulic_single", "3-way")):
         fed = [(i, a) for i, a in enumerate(actuators) if a.valve == valve]
@@ -134,10 +134,11 @@ def standard_effects(
     if struts:
         gas = tuple((s.pressure, s.area, s.gas_length, s.polytropic_index) for s in struts)
         found.append(Effect("hold_down", "nitrogen_strut", tuple(s.name for s in struts), gas, "Eq. 4-8"))
-    legs = (*actuators, *struts)
-    seals = tuple((c.seal_friction, c.seal_yield, c.seal_shape) for c in legs)
-    found.append(Effect("seal_friction", "bouc_wen_1d", tuple(c.name for c in legs), seals, "Eq. 4-18"))
-    pads = [a for a in actuators if a.mount == "bearing"]
+    rubbing = [c for c in (*actuators, *struts) if c.seal_friction > 0.0]
+    if rubbing:
+        seals = tuple((c.seal_friction, c.seal_yield, c.seal_shape) for c in rubbing)
+        found.append(Effect("seal_friction", "bouc_wen_1d", tuple(c.name for c in rubbing), seals, "Eq. 4-18"))
+    pads = [a for a in actuators if a.mount == "bearing" and a.pad_friction]
     if pads:
         slip = tuple((a.pad_friction, a.pad_yield, a.pad_shape) for a in pads)
         found.append(Effect("pad_friction", "bouc_wen_2d", tuple(a.name for a in pads), slip, "Eqs. 4-12 to 4-17"))

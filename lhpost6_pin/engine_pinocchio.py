@@ -13,7 +13,7 @@ from .plant import Plant
 from .schemes import DQ, TAU, V_SEEN, A, V, kick, open_step, rates_stage, staggered_stage
 from .workspace import Workspace
 
-__all__ = ["make_stepper", "settle"]
+__all__ = ["Stepper", "evaluate", "make_stepper", "settle"]
 
 Array = NDArray[np.float64]
 Stepper = Callable[[Workspace, Array], int]
@@ -22,11 +22,16 @@ Stepper = Callable[[Workspace, Array], int]
 
 def settle(plant: Plant, ws: Workspace, spool: Array) -> int:
     """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
-    ws.motion[V_SEEN] = ws.motion[V]
-    status = int(_rates(plant, ws, ws.q, ws.z, spool))
+    status = evaluate(plant, ws, spool)
     if status == 0:
         ws.motion[A] = pin.aba(plant.model, plant.model.createData(), ws.q, ws.motion[V], ws.motion[TAU])
     return status
+
+
+def evaluate(plant: Plant, ws: Workspace, spool: Array) -> int:
+    """Ports, forces and rates at the state in `ws`; returns the stage status."""
+    ws.motion[V_SEEN] = ws.motion[V]
+    return int(_rates(plant, ws, ws.q, ws.z, spool))
 
 
 def _rates(plant: Plant, ws: Workspace, q: Array, z: Array, spool: Array) -> int:

@@ -5,13 +5,14 @@ plain floats; where each comes from stays in `Machine.parameters` under the same
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from .effects import Effect, standard_effects
 from .errors import ParameterError, UnknownNameError
-from .parameters import Parameters, Value, load_parameters, override_parameters
+from .parameters import Parameters, load_parameters, override_parameters
+from .schema import build_section, quantity_field
 from .specimen import Specimen
 
 __all__ = ["Actuator", "Hydraulics", "Limits", "Machine", "Platen", "Strut", "load_machine"]
@@ -22,33 +23,27 @@ AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 Vec3 = tuple[float, float, float]
 
 
-def _q(unit: str, *, length: int = 0, bound: str = "any", optional: bool = False) -> Any:
-    """Dataclass field that holds a quantity: its unit, vector length (0 for a scalar) and bound."""
-    meta = {"unit": unit, "length": length, "bound": bound, "optional": optional}
-    return field(metadata=meta, default=None) if optional else field(metadata=meta)
-
-
 @dataclass(frozen=True)
 class Platen:
     """Effective rigid body: platen and the moving parts lumped to it (Table 4.1), frame {b} at B."""
 
-    mass: Vec3 = _q("kg", length=3, bound="positive")
-    inertia: Vec3 = _q("kg m2", length=3, bound="positive")
-    centre_of_gravity: Vec3 = _q("m", length=3)
-    bearing_plane: Vec3 = _q("m", length=3)
-    size: tuple[float, float] = _q("m", length=2, bound="positive")
-    gravity: float = _q("m/s2", bound="nonnegative")
+    mass: Vec3 = quantity_field("kg", length=3, bound="positive")
+    inertia: Vec3 = quantity_field("kg m2", length=3, bound="positive")
+    centre_of_gravity: Vec3 = quantity_field("m", length=3)
+    bearing_plane: Vec3 = quantity_field("m", length=3)
+    size: tuple[float, float] = quantity_field("m", length=2, bound="positive")
+    gravity: float = quantity_field("m/s2", bound="nonnegative")
 
 
 @dataclass(frozen=True)
 class Hydraulics:
     """Oil and supply shared by all actuators."""
 
-    supply_pressure: float = _q("Pa", bound="positive")
-    return_pressure: float = _q("Pa", bound="nonnegative")
-    rated_pressure: float = _q("Pa", bound="positive")
-    bulk_modulus: float = _q("Pa", bound="positive")
-    root_regularisation: float = _q("Pa", bound="positive")
+    supply_pressure: float = quantity_field("Pa", bound="positive")
+    return_pressure: float = quantity_field("Pa", bound="nonnegative")
+    rated_pressure: float = quantity_field("Pa", bound="positive")
+    bulk_modulus: float = quantity_field("Pa", bound="positive")
+    root_regularisation: float = quantity_field("Pa", bound="positive")
 
 
 @dataclass(frozen=True)
@@ -65,26 +60,26 @@ class Actuator:
     mount: str
     valve: str
     valves: int
-    platen_point: Vec3 = _q("m", length=3)
-    base_point: Vec3 = _q("m", length=3)
-    area_a: float = _q("m2", bound="positive")
-    flow: float = _q("m3/s", bound="positive")
-    flow_curve: float = _q("1", bound="positive")
-    leakage: float = _q("m3/s/Pa", bound="nonnegative")
-    chamber_a: float = _q("m", bound="positive")
-    stroke: float = _q("m", bound="positive")
-    valve_delay: float = _q("s", bound="nonnegative")
-    seal_friction: float = _q("N", bound="nonnegative")
-    seal_yield: float = _q("m", bound="positive")
-    seal_shape: float = _q("1", bound="fraction")
-    viscous: float = _q("N s/m", bound="nonnegative")
-    mass_along: float = _q("kg", bound="nonnegative")
-    mass_across: float = _q("kg", bound="nonnegative")
-    area_b: float = _q("m2", bound="positive", optional=True)
-    chamber_b: float = _q("m", bound="positive", optional=True)
-    pad_friction: float = _q("N", bound="nonnegative", optional=True)
-    pad_yield: float = _q("m", bound="positive", optional=True)
-    pad_shape: float = _q("1", bound="fraction", optional=True)
+    platen_point: Vec3 = quantity_field("m", length=3)
+    base_point: Vec3 = quantity_field("m", length=3)
+    area_a: float = quantity_field("m2", bound="positive")
+    flow: float = quantity_field("m3/s", bound="positive")
+    flow_curve: float = quantity_field("1", bound="positive")
+    leakage: float = quantity_field("m3/s/Pa", bound="nonnegative")
+    chamber_a: float = quantity_field("m", bound="positive")
+    stroke: float = quantity_field("m", bound="positive")
+    valve_delay: float = quantity_field("s", bound="nonnegative")
+    seal_friction: float = quantity_field("N", bound="nonnegative")
+    seal_yield: float = quantity_field("m", bound="positive")
+    seal_shape: float = quantity_field("1", bound="fraction")
+    viscous: float = quantity_field("N s/m", bound="nonnegative")
+    mass_along: float = quantity_field("kg", bound="nonnegative")
+    mass_across: float = quantity_field("kg", bound="nonnegative")
+    area_b: float = quantity_field("m2", bound="positive", optional=True)
+    chamber_b: float = quantity_field("m", bound="positive", optional=True)
+    pad_friction: float = quantity_field("N", bound="nonnegative", optional=True)
+    pad_yield: float = quantity_field("m", bound="positive", optional=True)
+    pad_shape: float = quantity_field("1", bound="fraction", optional=True)
 
 
 @dataclass(frozen=True)
@@ -93,27 +88,27 @@ class Strut:
 
     name: str
     kind: str
-    platen_point: Vec3 = _q("m", length=3)
-    base_point: Vec3 = _q("m", length=3)
-    area: float = _q("m2", bound="positive")
-    pressure: float = _q("Pa", bound="nonnegative")
-    gas_length: float = _q("m", bound="positive")
-    polytropic_index: float = _q("1", bound="positive")
-    seal_friction: float = _q("N", bound="nonnegative")
-    seal_yield: float = _q("m", bound="positive")
-    seal_shape: float = _q("1", bound="fraction")
-    mass_along: float = _q("kg", bound="nonnegative")
-    mass_across: float = _q("kg", bound="nonnegative")
+    platen_point: Vec3 = quantity_field("m", length=3)
+    base_point: Vec3 = quantity_field("m", length=3)
+    area: float = quantity_field("m2", bound="positive")
+    pressure: float = quantity_field("Pa", bound="nonnegative")
+    gas_length: float = quantity_field("m", bound="positive")
+    polytropic_index: float = quantity_field("1", bound="positive")
+    seal_friction: float = quantity_field("N", bound="nonnegative")
+    seal_yield: float = quantity_field("m", bound="positive")
+    seal_shape: float = quantity_field("1", bound="fraction")
+    mass_along: float = quantity_field("kg", bound="nonnegative")
+    mass_across: float = quantity_field("kg", bound="nonnegative")
 
 
 @dataclass(frozen=True)
 class Limits:
     """What the machine is said to give (Table 2.2), axis order x y z roll pitch yaw."""
 
-    displacement: tuple[float, ...] = _q("m | rad", length=6, bound="nonnegative")
-    velocity: tuple[float, ...] = _q("m/s | rad/s", length=6, bound="nonnegative")
-    acceleration: tuple[float, ...] = _q("m/s2 | rad/s2", length=6, bound="nonnegative")
-    bandwidth: float = _q("Hz", bound="positive")
+    displacement: tuple[float, ...] = quantity_field("m | rad", length=6, bound="nonnegative")
+    velocity: tuple[float, ...] = quantity_field("m/s | rad/s", length=6, bound="nonnegative")
+    acceleration: tuple[float, ...] = quantity_field("m/s2 | rad/s2", length=6, bound="nonnegative")
+    bandwidth: float = quantity_field("Hz", bound="positive")
 
 
 @dataclass(frozen=True)
@@ -197,9 +192,6 @@ def load_machine(name_or_path: str | Path = "lhpost6", override: Mapping[str, An
     return build_machine(parameters)
 
 
-_T = TypeVar("_T")
-
-
 def build_machine(
     parameters: Parameters, added_effects: tuple[Effect, ...] = (), specimen: Specimen | None = None
 ) -> Machine:
@@ -216,9 +208,9 @@ def build_machine(
         kind = str(words[f"{name}.kind"])
         role = _word(parameters, f"{kind}.role", ("actuator", "strut"))
         if role == "strut":
-            struts.append(_build(Strut, parameters, (name, kind), name=name, kind=kind))
+            struts.append(build_section(Strut, parameters, (name, kind), name=name, kind=kind))
             continue
-        actuator = _build(
+        actuator = build_section(
             Actuator,
             parameters,
             (name, kind),
@@ -236,11 +228,11 @@ def build_machine(
         name=str(words.get("machine.name", "unnamed")),
         title=str(words.get("machine.title", "")),
         **options,
-        platen=_build(Platen, parameters, ("platen",)),
-        hydraulics=_build(Hydraulics, parameters, ("hydraulics",)),
+        platen=build_section(Platen, parameters, ("platen",)),
+        hydraulics=build_section(Hydraulics, parameters, ("hydraulics",)),
         actuators=tuple(actuators),
         struts=tuple(struts),
-        limits=_build(Limits, parameters, ("limits",)),
+        limits=build_section(Limits, parameters, ("limits",)),
         parameters=parameters,
         added_effects=added_effects,
         specimen=specimen,
@@ -248,42 +240,6 @@ def build_machine(
     _check_names(parameters, components, kinds)
     _check_machine(machine)
     return machine
-
-
-def _build(cls: type[_T], parameters: Parameters, sections: tuple[str, ...], **given: Any) -> _T:
-    """Fill a dataclass from the first section that has each key."""
-    values = dict(given)
-    for spec in fields(cls):  # type: ignore[arg-type]
-        if spec.name in given:
-            continue
-        path = next((f"{s}.{spec.name}" for s in sections if f"{s}.{spec.name}" in parameters), None)
-        if path is None:
-            if spec.metadata["optional"]:
-                continue
-            raise ParameterError(f"{parameters.origin}: {sections[-1]}.{spec.name} is missing")
-        quantity = parameters[path]
-        key = f"{parameters.origin}: {path}"
-        if quantity.unit != spec.metadata["unit"]:
-            raise ParameterError(f"{key}: unit {quantity.unit!r} should be {spec.metadata['unit']!r}")
-        values[spec.name] = _bounded(quantity.value, spec.metadata["length"], spec.metadata["bound"], key)
-    return cls(**values)
-
-
-def _bounded(value: Value, length: int, bound: str, key: str) -> Value:
-    entries = value if isinstance(value, tuple) else (value,)
-    if isinstance(value, tuple) != bool(length) or (length and len(entries) != length):
-        wanted = f"{length} numbers" if length else "one number"
-        raise ParameterError(f"{key}: {value!r} should be {wanted}")
-    impossible = {
-        "any": False,
-        "positive": min(entries) <= 0.0,
-        "nonnegative": min(entries) < 0.0,
-        "fraction": min(entries) < 0.0 or max(entries) > 1.0,
-    }
-    if impossible[bound]:
-        wanted = {"positive": "positive", "nonnegative": "zero or positive", "fraction": "between 0 and 1"}[bound]
-        raise ParameterError(f"{key}: {value!r} is impossible; it should be {wanted}")
-    return value
 
 
 def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:

@@ -151,7 +151,7 @@ def make_record(
 
     Parameters: `time` (n,) [s]; `channels` arrays by name of the layout, or `(dims, values, attributes)` for
     any further variable; `labels` of the dimensions in use (`axis` is known); `attrs` global attributes, to
-    which `sample_rate_hz` and `layout_version` are added. Raises `RecordError` if the result breaks the layout and
+    which `sample_rate_hz` and `layout_version` are added. Raises `RecordError` if that breaks the layout,
     `UnknownNameError` for a plain array under a name that the layout does not have.
     """
     time = np.asarray(time, dtype=float)

@@ -58,11 +58,10 @@ def drift_rate(error: ArrayLike, dt: float) -> Array:
 def delay(reference: ArrayLike, signal: ArrayLike, dt: float, max_delay: float = 0.1) -> Array:
     """Delay of the signal behind the reference per column [s], at most ±`max_delay`; NaN if one is silent.
 
-    It maximises the normalised correlation N(τ) / sqrt(D(τ)), N = sum w r(t) s(t + τ), D = sum w s(t + τ)²,
-    under a Hann window w that stays `max_delay` clear of both ends: every delay is judged on the same stretch
-    of the reference and nothing is lost at the ends. The best whole sample is refined by Newton steps on the
-    Fourier sums of N and D, exact for band-limited signals. Means are taken out first. Raises `ValueError` if
-    the record is shorter than four times `max_delay`.
+    It maximises Pearson's correlation of r(t) with s(t + τ) under a Hann window that stays `max_delay` clear
+    of both ends, so that every delay is judged on the same stretch of the reference, whatever the gain and
+    offset. The best whole sample is refined by Newton steps on Fourier sums, exact for band-limited signals.
+    Raises `ValueError` if the record is shorter than four times `max_delay`.
     """
     ref, sig = _pair(reference, signal)
     margin = int(np.ceil(max_delay / dt)) + 1
@@ -77,30 +76,30 @@ def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
     from scipy import fft
 
     n = len(ref)
-    ref, sig = ref - ref.mean(), sig - sig.mean()
     w = np.zeros(n)
     w[margin : n - margin] = np.hanning(n - 2 * margin + 2)[1:-1]
+    w /= w.sum()
+    ref, sig = ref - w @ ref, sig - w @ sig
     if not (np.any(w * ref) and np.any(w * sig)):
         return float("nan")
     size = fft.next_fast_len(n + 2 * margin, real=True)
     omega = 2 * np.pi * np.arange(size // 2 + 1) / size
-    cross = np.stack(  # spectra of N and D over the non-negative frequencies
-        [
-            np.conj(fft.rfft(w * ref, size)) * fft.rfft(sig, size),
-            np.conj(fft.rfft(w, size)) * fft.rfft(sig**2, size),
-        ]
-    )
-    num, den = np.roll(fft.irfft(cross, size), margin, axis=1)[:, : 2 * margin + 1]
-    tau = float(np.argmax(num / np.sqrt(np.maximum(den, 1e-12 * den.max())))) - margin
-    whole = tau
-    cross[:, 1 : (size + 1) // 2] *= 2.0
+    # spectra over lag τ of the windowed covariance, mean square and mean: sums of w r s, w s², w s at t + τ
+    spectra = np.conj(fft.rfft([w * ref, w, w], size)) * fft.rfft([sig, sig**2, sig], size) / size
+    cov, square, mean = size * np.roll(fft.irfft(spectra, size), margin, axis=1)[:, : 2 * margin + 1]
+    variance = square - mean**2
+    tau = whole = float(np.argmax(cov / np.sqrt(np.maximum(variance, 1e-12 * variance.max())))) - margin
+    spectra[:, 1 : (size + 1) // 2] *= 2.0  # for the negative frequencies
     for _ in range(20):
-        term = cross * np.exp(1j * omega * tau)
-        (n0, n1, n2), (d0, d1, d2) = np.array(
-            [term.real.sum(axis=1), -(term.imag @ omega), -(term.real @ omega**2)]
-        ).T
-        slope = n1 / n0 - d1 / (2 * d0)
-        curvature = n2 / n0 - (n1 / n0) ** 2 - (d2 / d0 - (d1 / d0) ** 2) / 2
+        term = spectra * np.exp(1j * omega * tau)
+        (c, s, m), (c1, s1, m1), (c2, s2, m2) = (
+            term.real.sum(axis=1),
+            -(term.imag @ omega),
+            -(term.real @ omega**2),
+        )
+        v, v1, v2 = s - m**2, s1 - 2 * m * m1, s2 - 2 * (m1**2 + m * m2)
+        slope = c1 / c - v1 / (2 * v)  # of the logarithm of cov / sqrt(variance)
+        curvature = c2 / c - (c1 / c) ** 2 - (v2 / v - (v1 / v) ** 2) / 2
         if not curvature < 0:
             break
         step = float(np.clip(-slope / curvature, -0.5, 0.5))
@@ -111,7 +110,7 @@ def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
 
 
 def align(signal: ArrayLike, delay: ArrayLike, dt: float) -> Array:
-    """Signal advanced by its `delay` [s], one or one per column: y(t) = x(t + delay), laid over its reference.
+    """Signal advanced by its `delay` [s], one or one per column: y(t) = x(t + delay).
 
     A phase shift in the Fourier domain, exact for band-limited signals but for about ten samples at an end
     where the signal is curved. Samples from outside the record hold its end value: nothing wraps around.
@@ -144,7 +143,7 @@ def differentiate(x: ArrayLike, dt: float, cutoff: float | None = None, order: i
 
     Exact for band-limited signals but near an end where the signal is curved. It amplifies noise: white noise
     of standard deviation sigma becomes 2 pi fc sigma sqrt(2 fc dt / 3) with a sharp cutoff at fc; without
-    `cutoff` fc is 1 / (2 dt), and the low-pass used, 1 / (1 + (f / cutoff)^order), lets a little more through.
+    `cutoff` fc is 1 / (2 dt). The low-pass used, 1 / (1 + (f / cutoff)^order), leaves 0.89 of it at order 8.
     """
     x = np.asarray(x, dtype=float)
 
@@ -158,8 +157,8 @@ def differentiate(x: ArrayLike, dt: float, cutoff: float | None = None, order: i
 def resample_band_limited(x: ArrayLike, t_old: ArrayLike, t_new: ArrayLike, half_width: int = 24) -> Array:
     """Values of a uniformly sampled band-limited signal at other times, by a Kaiser-windowed sinc.
 
-    Good to 1e-7 of the amplitude for content below 0.8 of the old Nyquist frequency, `half_width` samples away
-    from the ends; nearer, the signal is continued by odd reflection, which costs accuracy where it is curved.
+    Good to 1e-7 of the amplitude for content below 0.8 of the old Nyquist frequency, `half_width` samples
+    away from the ends; nearer, the signal is continued by odd reflection, less accurate where it is curved.
     Times outside the record get its end values. Going to a lower rate it does not guard against aliasing.
 
     Parameters: `x` (n, ...), `t_old` (n,) uniform [s], `t_new` (m,) [s]. Returns (m, ...).

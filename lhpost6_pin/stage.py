@@ -11,6 +11,7 @@ port [N or N m], port_force (n_ports,) their sum per port.
 from .compiled import compiled
 from .effects import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, VISCOUS
 from .laws.bouc_wen import advance as bouc_wen_advance
+from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
 from .laws.bouc_wen import friction_force
 from .laws.bouc_wen import rate as bouc_wen_rate
 from .laws.chamber import advance_double, advance_single, chamber_rate, flows_double, flows_single, piston_force
@@ -64,7 +65,7 @@ def advance_states(rows, s, ds, dt, spool, supply, z):  # type: ignore[no-untype
         p = row.p
         a = row.port
         if law == BOUC_WEN_1D:
-            z[k], _ = bouc_wen_advance(ds[a], 0.0, z[k], 0.0, p[1], p[2])
+            z[k] = bouc_wen_advance_1d(ds[a], z[k], p[1], p[2])
         elif law == BOUC_WEN_2D:
             z[k], z[k + 1] = bouc_wen_advance(ds[a], ds[row.port_2], z[k], z[k + 1], p[1], p[2])
         elif law == HYDRAULIC_DOUBLE:

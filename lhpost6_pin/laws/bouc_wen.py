@@ -11,7 +11,7 @@ import math
 
 from ..compiled import compiled
 
-__all__ = ["advance", "friction_force", "rate"]
+__all__ = ["advance", "advance_1d", "friction_force", "rate"]
 
 
 _SEGMENTS = 12
@@ -86,8 +86,9 @@ def advance(
     and Z agree and (2 tau - 1) a_i where they oppose. Z = p/w with p' = a w and w' = b.p makes it linear:
     w'' = (a.b) w. A component that opposes the slip is followed to its zero first, where the piece ends.
     """
-    a_x = dx / yield_slip
-    a_y = dy / yield_slip
+    scale = 1.0 / yield_slip
+    a_x = dx * scale
+    a_y = dy * scale
     left = 1.0
     for _ in range(_SEGMENTS):
         b_x = a_x if a_x * z_x >= 0.0 else (2.0 * shape - 1.0) * a_x
@@ -111,9 +112,27 @@ def advance(
                 cross = 2
         if cross != 0:
             w, total = _growth(curvature, slope, t)
-        z_x = 0.0 if cross == 1 else (z_x + a_x * total) / w
-        z_y = 0.0 if cross == 2 else (z_y + a_y * total) / w
+        scale = 1.0 / w
+        z_x = 0.0 if cross == 1 else (z_x + a_x * total) * scale
+        z_y = 0.0 if cross == 2 else (z_y + a_y * total) * scale
         left -= t
         if left <= 0.0:
             break
     return z_x, z_y
+
+
+@compiled
+def advance_1d(dx: float, z: float, yield_slip: float, shape: float) -> float:
+    """Z after a slip dx [m] along one direction: `advance` with dy = Z_y = 0, faster (a test holds them together).
+
+    Where slip and Z agree, dZ/dx = (1 - Z^2)/Y adds the slip inside a hyperbolic tangent.
+    """
+    a = dx / yield_slip
+    if a * z < 0.0:
+        return advance(dx, 0.0, z, 0.0, yield_slip, shape)[0]
+    if abs(a) < 0.03:  # Taylor series of tanh: the next term is below 1e-15
+        x = a * a
+        t = a * (1.0 - x * (1.0 / 3.0 - x * (2.0 / 15.0 - x * (17.0 / 315.0))))
+    else:
+        t = math.tanh(a)
+    return (z + t) / (1.0 + z * t)

@@ -126,19 +126,19 @@ def advance_double(
     )
     stiff_a = bulk / (length_a + 0.5 * stroke)
     stiff_b = bulk / (length_b - 0.5 * stroke)
-    rise_a = stiff_a * (dt * q_a / area_a - stroke)
-    rise_b = stiff_b * (dt * q_b / area_b + stroke)
     half_a = 0.5 * dt * stiff_a / area_a
     half_b = 0.5 * dt * stiff_b / area_b
+    rise_a = 2.0 * half_a * q_a - stiff_a * stroke
+    rise_b = 2.0 * half_b * q_b + stiff_b * stroke
     # (I - dt/2 J) rise = dt rate, J = d(rates)/d(pressures)
     m_aa = 1.0 - half_a * (slope_a - leakage)
     m_ab = -half_a * leakage
     m_ba = -half_b * leakage
     m_bb = 1.0 - half_b * (slope_b - leakage)
-    det = m_aa * m_bb - m_ab * m_ba
+    scale = 1.0 / (m_aa * m_bb - m_ab * m_ba)
     return (
-        pressure_a + (m_bb * rise_a - m_ab * rise_b) / det,
-        pressure_b + (m_aa * rise_b - m_ba * rise_a) / det,
+        pressure_a + scale * (m_bb * rise_a - m_ab * rise_b),
+        pressure_b + scale * (m_aa * rise_b - m_ba * rise_a),
     )
 
 
@@ -161,5 +161,5 @@ def advance_single(
     """Pressure of the only chamber one step on [Pa]; the step rule of `advance_double` with P_B = 0."""
     q_a, slope = flows_single(opened, pressure_a, k_pa, k_at, leakage, supply, back, linear_below)
     stiff = bulk / (length_a + 0.5 * stroke)
-    rise = stiff * (dt * q_a / area_a - stroke)
-    return pressure_a + rise / (1.0 - 0.5 * dt * stiff / area_a * (slope - leakage))
+    half = 0.5 * dt * stiff / area_a
+    return pressure_a + (2.0 * half * q_a - stiff * stroke) / (1.0 - half * (slope - leakage))

@@ -11,27 +11,22 @@ import math
 
 from ..compiled import compiled
 
-__all__ = ["opening", "port_flow", "signed_root", "width_ratios"]
+__all__ = ["opening", "port_flow", "signed_root", "spool_for_opening", "width_ratios"]
 
 
 @compiled
-def signed_root(x: float, linear_below: float) -> float:
-    """Signed square root of `x`; below `linear_below` a cubic that meets it in value and slope [sqrt(Pa)]."""
+def signed_root(x: float, linear_below: float) -> tuple[float, float]:
+    """Signed square root of `x` [sqrt(Pa)] and its slope [1/sqrt(Pa)].
+
+    Below `linear_below` [Pa] an odd cubic that meets the root in value and slope.
+    """
     size = abs(x)
     if size >= linear_below:
-        return math.copysign(math.sqrt(size), x)
+        root = math.sqrt(size)
+        return math.copysign(root, x), 0.5 / root
     ratio = size / linear_below
-    return x / math.sqrt(linear_below) * (1.25 - 0.25 * ratio * ratio)
-
-
-@compiled
-def signed_root_slope(x: float, linear_below: float) -> float:
-    """Derivative of `signed_root` with respect to `x` [1/sqrt(Pa)]."""
-    size = abs(x)
-    if size >= linear_below:
-        return 0.5 / math.sqrt(size)
-    ratio = size / linear_below
-    return (1.25 - 0.75 * ratio * ratio) / math.sqrt(linear_below)
+    scale = 1.0 / math.sqrt(linear_below)
+    return x * scale * (1.25 - 0.25 * ratio * ratio), scale * (1.25 - 0.75 * ratio * ratio)
 
 
 @compiled
@@ -50,17 +45,22 @@ def port_flow(
     [m3/s/sqrt(Pa)]; supply, back, chamber are pressures [Pa].
     """
     if opened >= 0.0:
+        root, slope = signed_root(supply - chamber, linear_below)
         k = opened * k_supply
-        drop = supply - chamber
     else:
-        k = -opened * k_return
-        drop = chamber - back
-    slope = -k * signed_root_slope(drop, linear_below)
-    flow = k * signed_root(drop, linear_below)
-    return (flow if opened >= 0.0 else -flow), slope
+        root, slope = signed_root(chamber - back, linear_below)
+        k = opened * k_return
+    return k * root, -abs(k) * slope
 
 
 def width_ratios(area_a: float, area_b: float) -> tuple[float, float, float, float]:
     """Port widths w1, w2, w3, w4 over w3 of a 4-way valve on a single-ended piston (Eq. 4-1)."""
     ratio = area_b / area_a
     return ratio**0.5, ratio**1.5, 1.0, ratio
+
+
+@compiled
+def spool_for_opening(opened: float, flow_curve: float) -> float:
+    """Spool [1] that opens the valve by `opened`, the inverse of `opening`; beyond full stroke it exceeds 1."""
+    size = min(abs(opened), 1.0 - 1e-12)
+    return math.copysign(-math.log1p(-size) / flow_curve, opened)

@@ -1,0 +1,146 @@
+"""Motions compatible with the required response spectrum of ICC-ES AC156, the shake-table test of components.
+
+The spectrum, for 5 % damping, is straight in log-log between four knees (0.1, 1.3, 8.3, 33.3 Hz): it rises to
+A_FLX, holds, and falls to A_RIG. Horizontal: A_FLX = S_DS (1 + 2 z/h) <= 1.6 S_DS and A_RIG = 0.4 S_DS
+(1 + 2 z/h) <= 1.2 S_DS; vertical: 0.67 S_DS and 0.27 S_DS whatever z/h. All numbers are in
+`models/ground_motions/tests.toml`.
+"""
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+
+from lhpost6_pin.errors import MotionError
+from lhpost6_pin.motions.motion import GroundMotion, make_motion
+from lhpost6_pin.motions.process import smooth_step
+from lhpost6_pin.motions.spectra import response_spectrum
+
+__all__ = ["ac156", "required_spectrum"]
+
+_log = logging.getLogger(__name__)
+_ITERATIONS = 12
+_DRAWS = 5
+_SHARPNESS = 12  # of the rounding of peaks: even, and high enough to leave the rest alone
+_MARGIN = 0.75  # part of the tolerance the match may use; the rest is for the processing that follows
+_PER_OCTAVE = 12  # matching frequencies: twice as dense as AC156's check at sixths of an octave
+
+
+def required_spectrum(
+    frequency: np.ndarray, flexible: float, rigid: float, knees: Sequence[float], lowest_ratio: float
+) -> np.ndarray:
+    """Return the required spectral acceleration (m,) [unit of `flexible`] at `frequency` (m,) [Hz].
+
+    Constant beyond the outer knees.
+    """
+    levels = np.log([lowest_ratio * flexible, flexible, flexible, rigid])
+    return np.exp(np.interp(np.log(frequency), np.log(knees), levels))
+
+
+def ac156(
+    *,
+    name: str,
+    sds: float,
+    height_ratio: float,
+    knees: Sequence[float],
+    lowest_ratio: float,
+    flexible_cap: float,
+    rigid_ratio: float,
+    rigid_cap: float,
+    vertical_flexible: float,
+    vertical_rigid: float,
+    tolerance_below: float,
+    tolerance_above: float,
+    damping: float,
+    rise: float,
+    hold: float,
+    decay: float,
+    high_pass: "Sequence[float] | float",
+    highest: float,
+    time_step: float,
+    seed: int,
+) -> GroundMotion:
+    """Tri-axial acceleration [m/s^2] whose response spectra match AC156 from the second to the last knee.
+
+    `sds` [m/s^2] and `height_ratio` z/h set the level. Below `high_pass` [Hz] (one, or one for each axis)
+    nothing is left, which keeps the displacement within a table's stroke; the spectrum is then not met far
+    below the second knee. The axes are independent: each has its own noise, drawn with `seed`.
+
+    Raises MotionError for impossible levels.
+    """
+    corners = np.broadcast_to(np.asarray(high_pass, dtype=float), (3,))
+    if not (sds > 0 and 0 <= height_ratio <= 1 and (corners > 0).all() and (corners < knees[1]).all()):
+        raise MotionError(
+            f"{name}: S_DS {sds:g} m/s^2, z/h {height_ratio:g}, high-pass {high_pass} Hz; need S_DS > 0, "
+            f"0 <= z/h <= 1 and corners between 0 and {knees[1]} Hz"
+        )
+    factor = 1 + 2 * height_ratio
+    horizontal = sds * min(factor, flexible_cap), sds * min(rigid_ratio * factor, rigid_cap)
+    levels = (horizontal, horizontal, (vertical_flexible * sds, vertical_rigid * sds))
+    duration = rise + hold + decay
+    time = np.arange(round(duration / time_step) + 1) * time_step
+    envelope = smooth_step(time / rise)[0] * smooth_step((duration - time) / decay)[0]
+    octaves = np.log2(knees[-1] / knees[1])
+    matched = knees[1] * 2 ** np.linspace(0, octaves, int(np.ceil(octaves * _PER_OCTAVE)) + 1)
+    middle = np.sqrt((1 - tolerance_below) * (1 + tolerance_above))
+    tolerance = np.log((1 + tolerance_above) / middle)
+    generators = np.random.default_rng(seed).spawn(3)
+    channels = {}
+    for axis, (flexible, rigid), corner, generator in zip("xyz", levels, corners, generators, strict=True):
+        wanted = middle * required_spectrum(matched, flexible, rigid, knees, lowest_ratio)
+        channels[axis], deviation = _matched_noise(
+            time, envelope, matched, wanted, damping, (corner, highest), _MARGIN * tolerance, generator
+        )
+        if deviation > tolerance:
+            _log.warning(
+                "%s, axis %s: spectrum is up to %.2f times off the middle of AC156's tolerance; "
+                "try another seed",
+                name,
+                axis,
+                np.exp(deviation),
+            )
+    source = f"ICC-ES AC156 spectrum, S_DS {sds:.4g} m/s^2, z/h {height_ratio:g}, seed {seed}"
+    return make_motion(name, time_step, channels, "acceleration", source)
+
+
+def _matched_noise(
+    time: np.ndarray,
+    envelope: np.ndarray,
+    matched: np.ndarray,
+    wanted: np.ndarray,
+    damping: float,
+    band: tuple[float, float],
+    close: float,
+    generator: np.random.Generator,
+) -> tuple[np.ndarray, float]:
+    """Noise under the envelope (n,) whose response spectrum is `wanted` at the frequencies `matched`.
+
+    Amplitudes of the Fourier components, of fixed random phase, are corrected by the ratio of wanted to
+    found spectrum (Gasparini and Vanmarcke 1976) until the largest deviation, as the logarithm of that
+    ratio, is at most `close`. Peaks above the rigid level, which would rule the spectrum's rigid end, are
+    rounded off before the band-pass. Where the deviation stays larger, new phases are drawn. Returns the best
+    motion and its deviation.
+    """
+    step = time[1] - time[0]
+    count = 2 * len(time)  # zeros behind the motion keep the filter from wrapping round
+    frequency = np.fft.rfftfreq(count, step)
+    ratio = (frequency / band[0]) ** 8
+    gain = ratio / (1 + ratio) / (1 + (frequency / band[1]) ** 16)
+    inside = np.log(np.clip(frequency, matched[0], matched[-1]))
+    best, smallest = np.zeros(len(time)), np.inf
+    for _draw in range(_DRAWS):
+        phases = np.exp(2j * np.pi * generator.random(len(frequency)))
+        amplitude = np.interp(inside, np.log(matched), wanted / np.sqrt(matched)) * phases
+        for _ in range(_ITERATIONS):
+            noise = envelope * np.fft.irfft(amplitude, count)[: len(time)]
+            noise /= (1 + (noise / wanted[-1]) ** _SHARPNESS) ** (1 / _SHARPNESS)
+            motion = np.fft.irfft(gain * np.fft.rfft(noise, count), count)[: len(time)]
+            found = response_spectrum(motion, step, 1 / matched, damping).pseudo_acceleration
+            correction = wanted / found
+            deviation = float(np.abs(np.log(correction)).max())
+            if deviation < smallest:
+                best, smallest = motion, deviation
+            if smallest <= close:
+                return best, smallest
+            amplitude *= np.interp(inside, np.log(matched), correction)
+    return best, smallest

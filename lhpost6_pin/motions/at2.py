@@ -1,0 +1,106 @@
+"""PEER strong-motion files `.AT2`: one acceleration component a file, four header lines, values in g."""
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lhpost6_pin.errors import MotionError
+from lhpost6_pin.motions.motion import GroundMotion, make_motion
+from lhpost6_pin.motions.text import parse_numbers, read_text
+from lhpost6_pin.motions.units import to_si
+
+__all__ = ["is_at2", "load_at2"]
+
+_log = logging.getLogger(__name__)
+_NUMBER = r"(\d*\.?\d+(?:[eE][-+]?\d+)?)"
+_COUNT_AND_STEP = (
+    re.compile(rf"NPTS\s*=\s*(\d{{1,9}})\D*?DT\s*=\s*{_NUMBER}", re.IGNORECASE),
+    re.compile(rf"^\s*(\d{{1,9}})\s+{_NUMBER}\s+NPTS\s*,\s*DT", re.IGNORECASE),
+)
+_WIDEST = 200  # characters of a header line that are looked at
+_UNITS = re.compile(r"ACCELERATION\b.*\bUNITS\s+OF\s+(\S+)", re.IGNORECASE)
+
+
+def is_at2(text: str) -> bool:
+    """Whether the text has the point count and time step of a PEER file in its first lines."""
+    return any(
+        pattern.search(line[:_WIDEST]) for line in text.splitlines()[:6] for pattern in _COUNT_AND_STEP
+    )
+
+
+def load_at2(
+    paths: "Path | str | Sequence[Path | str] | Mapping[str, Path | str]", *, name: str | None = None
+) -> GroundMotion:
+    """Read one to three PEER files into one motion.
+
+    A sequence of paths goes to x, y, z in that order; a mapping says the axis of each, as in
+    ``{"y": "NIS090.AT2"}``. Components that differ by a few samples are cut to the shortest, with a warning.
+
+    Raises MotionError naming the file and line when a file cannot be understood, or when the time steps of
+    the files differ.
+    """
+    if isinstance(paths, str | Path):
+        paths = [paths]
+    if not isinstance(paths, Mapping):
+        if not 1 <= len(paths) <= 3:
+            raise MotionError(f"{len(paths)} PEER files given; give one, two or three, for x, y, z")
+        paths = dict(zip("xyz", paths, strict=False))
+    if not paths:
+        raise MotionError("no PEER file given; give one to three, for x, y, z")
+    steps: dict[str, float] = {}
+    channels: dict[str, np.ndarray] = {}
+    for axis, path in paths.items():
+        steps[axis], channels[axis] = _parse_at2(read_text(path), str(path))
+    if len(set(steps.values())) > 1:
+        listed = ", ".join(f"{paths[axis]} {step:g} s" for axis, step in steps.items())
+        raise MotionError(f"time steps differ: {listed}; give components of one record")
+    shortest = min(map(len, channels.values()))
+    if any(len(channel) > shortest for channel in channels.values()):
+        _log.warning(
+            "%s: components differ in length; cut to %d samples",
+            ", ".join(map(str, paths.values())),
+            shortest,
+        )
+    first = next(iter(paths.values()))
+    return make_motion(
+        name or Path(first).stem,
+        next(iter(steps.values())),
+        {axis: channel[:shortest] for axis, channel in channels.items()},
+        "acceleration",
+        "PEER files " + ", ".join(Path(path).name for path in paths.values()),
+    )
+
+
+def _parse_at2(text: str, where: str) -> tuple[float, np.ndarray]:
+    """Time step [s] and accelerations (n,) [m/s^2] of one component."""
+    lines = text.splitlines()
+    head = [line[:_WIDEST] for line in lines[:6]]
+    matches = ((i, pattern.search(line)) for i, line in enumerate(head) for pattern in _COUNT_AND_STEP)
+    number, match = next(((i, match) for i, match in matches if match), (0, None))
+    if match is None:
+        raise MotionError(f"{where}: no 'NPTS= .., DT= .. SEC' in the first lines; is this a PEER .AT2 file?")
+    unit = _UNITS.search(" ".join(head[: number + 1]))
+    if unit is None:
+        raise MotionError(
+            f"{where}: header does not say 'ACCELERATION TIME SERIES IN UNITS OF G'; velocity (.VT2) and "
+            "displacement (.DT2) files are not read: use the .AT2 file"
+        )
+    count, step = int(match[1]), float(match[2])
+    values = parse_numbers(lines[number + 1 :], where, number + 2)
+    if len(values) != count:
+        raise MotionError(
+            f"{where}: header says {count} points, the file has {len(values)}; "
+            "it is cut short or damaged: fetch it again"
+        )
+    try:
+        values, quantity = to_si(values, unit[1], "x")
+    except MotionError as error:
+        raise MotionError(f"{where}, line {number}: {error}") from None
+    if quantity != "acceleration":
+        raise MotionError(
+            f"{where}, line {number}: unit {unit[1]} is no acceleration; use the .AT2 file in g"
+        )
+    return step, values

@@ -1,0 +1,97 @@
+"""Ground motions by name: shipped records, tests made from a few numbers, records of an optional package."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+from lhpost6_pin.errors import MotionError, UnknownNameError
+from lhpost6_pin.files import models_folder
+from lhpost6_pin.motions.ac156 import ac156
+from lhpost6_pin.motions.csv import load_csv
+from lhpost6_pin.motions.motion import GroundMotion
+from lhpost6_pin.motions.pulse_records import load_pulse_record, missing_package
+from lhpost6_pin.motions.synthetic import sine, six_axial, triangle, white_noise
+from lhpost6_pin.motions.toml import load_toml, values_of
+
+__all__ = ["MotionEntry", "find_motion", "list_motions"]
+
+_GENERATORS: dict[str, Callable[..., GroundMotion]] = {
+    "ac156": ac156,
+    "sine": sine,
+    "six_axial": six_axial,
+    "triangle": triangle,
+    "white_noise": white_noise,
+}
+
+
+class MotionEntry(NamedTuple):
+    """A line of the table of motions."""
+
+    name: str
+    kind: str  # "record", "package" or the kind of generator
+    title: str
+    aliases: tuple[str, ...]
+    available: bool
+    remedy: str  # what to install where not available
+    options: tuple[str, ...]  # what `find_motion` takes for it
+
+
+@cache
+def _tables() -> tuple[dict[str, Any], dict[str, Any]]:
+    folder = models_folder() / "ground_motions"
+    return load_toml(folder / "index.toml"), load_toml(folder / "tests.toml")
+
+
+def list_motions() -> tuple[MotionEntry, ...]:
+    """Every motion known by name, with what is needed to have it."""
+    index, tests = _tables()
+    entries = [
+        MotionEntry(name, "record", record["title"], tuple(record["aliases"]), True, "", ())
+        for name, record in index["records"].items()
+    ]
+    for name, test in tests.items():
+        if name != "processing":
+            options = tuple(key for key in test if key not in ("kind", "title"))
+            entries.append(MotionEntry(name, test["kind"], test["title"], (), True, "", options))
+    package = index["package"]
+    remedy = "pip install 'lhpost6-pin[records]'" if missing_package(package["module"]) else ""
+    for name, record in package["records"].items():
+        aliases = tuple(record.get("aliases", ()))
+        entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, ()))
+    return tuple(entries)
+
+
+def find_motion(name: str, **options: Any) -> GroundMotion:
+    """Ground motion by name or alias, as `list_motions` shows them.
+
+    `options` replace numbers of a test made by name, in SI, as in ``find_motion("ac156", sds=5.0, seed=2)``.
+
+    Raises UnknownNameError for a name that does not exist, MotionError for an option the motion does not
+    take or a package that is not installed.
+    """
+    entries = {key: entry for entry in list_motions() for key in (entry.name, *entry.aliases)}
+    entry = entries.get(name.lower())
+    if entry is None:
+        raise UnknownNameError("ground motion", name, list(entries))
+    unknown = sorted(set(options) - set(entry.options))
+    if unknown:
+        takes = ", ".join(entry.options) or "none"
+        raise MotionError(f"{name}: no option {unknown[0]!r}; options of this motion: {takes}")
+    index, tests = _tables()
+    if entry.kind == "record":
+        record = index["records"][entry.name]
+        motion = load_csv(models_folder() / "ground_motions" / record["file"], name=entry.name)
+        source = f"{record['title']}; {record['source']}; {record['licence']}"
+        return GroundMotion(motion.name, motion.time_step, motion.samples, motion.quantity, source)
+    if entry.kind == "package":
+        package = index["package"]
+        number = package["records"][entry.name]["number"]
+        return load_pulse_record(
+            package["module"], package["file"], number, name=entry.name, title=entry.title
+        )
+    numbers = values_of(tests, entry.name)
+    del numbers["kind"], numbers["title"]
+    try:
+        return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **options})
+    except (TypeError, ValueError) as error:
+        raise MotionError(f"{name}: options {options}: {error}") from error

@@ -1,0 +1,268 @@
+"""From a ground motion to what the table is asked to do: displacement, velocity and acceleration targets.
+
+One Fourier series carries all three: with the motion's spectrum A(f), a zero-phase band-pass
+H(f) = 1 / (1 + (f_high/f)^2n) / (1 + (f/f_low)^2m) and D = -H A / (2 pi f)^2, the series for D, 2 pi i f D
+and -(2 pi f)^2 D are evaluated on the controller's time grid, so the three are derivatives of each other to
+rounding and the resampling is exact for a band-limited motion. A window w(t) of a polynomial with two
+continuous derivatives then brings the displacement to rest at both ends; velocity and acceleration follow by
+the product rule, (w d)' and (w d)'', so they stay consistent.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+
+from lhpost6_pin.errors import MotionError
+from lhpost6_pin.files import models_folder
+from lhpost6_pin.motions.motion import AXES, GroundMotion
+from lhpost6_pin.motions.toml import load_toml, values_of
+
+__all__ = ["Reference", "Target", "axes_map", "make_target", "smooth_step", "with_scale"]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What was done to the motion to make a target of it."""
+
+    motion: str
+    source: str
+    scale: float
+    axes: tuple[tuple[str, str], ...]  # (axis of the table, channel of the motion)
+    high_pass: float  # corner [Hz]; 0 is none
+    low_pass: float  # corner [Hz]
+    start: float  # time of the target's first sample on the motion's clock [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A motion for the table at the controller's rate, at rest in the zero position at both ends."""
+
+    time: np.ndarray  # (n,) [s]
+    displacement: np.ndarray  # (n, 6) [m, rad]
+    velocity: np.ndarray  # (n, 6) [m/s, rad/s]
+    acceleration: np.ndarray  # (n, 6) [m/s^2, rad/s^2]
+    reference: Reference
+
+    @property
+    def time_step(self) -> float:
+        """Sampling interval [s]."""
+        return float(self.time[1] - self.time[0])
+
+
+@cache
+def _settings() -> dict[str, float]:
+    table = load_toml(models_folder() / "ground_motions" / "tests.toml")
+    return values_of(table, "processing")
+
+
+def axes_map(text: str) -> tuple[tuple[str, str], ...]:
+    """Pairs (axis of the table, channel of the motion) from a text.
+
+    Letters (``"xyz"``, ``"x"``) or names separated by commas (``"x,roll"``) keep these axes; ``"x=y"`` moves
+    the table's x by the motion's y, as in ``"x=y,y=x,z"``. Raises MotionError for anything else.
+    """
+    items = [item.strip() for item in text.split(",")]
+    if len(items) == 1 and items[0] not in AXES and "=" not in items[0]:
+        items = list(items[0])
+    pairs = []
+    for item in items:
+        axis, equals, channel = (part.strip() for part in item.partition("="))
+        pairs.append((axis, channel if equals else axis))
+    for name in (name for pair in pairs for name in pair):
+        if name not in AXES:
+            raise MotionError(
+                f"axes {text!r}: no axis {name!r}; write such as xyz, x, x=y or x,roll of {', '.join(AXES)}"
+            )
+    if not pairs or len({axis for axis, _ in pairs}) < len(pairs):
+        raise MotionError(f"axes {text!r}: name each axis of the table once")
+    return tuple(pairs)
+
+
+def make_target(
+    motion: GroundMotion,
+    *,
+    scale: float = 1.0,
+    axes: str | None = None,
+    window: tuple[float, float] | None = None,
+    high_pass: float | None = None,
+    low_pass: float | None = None,
+    pad: float | None = None,
+    rate: float = 2048.0,
+) -> Target:
+    """Target for the table from a ground motion.
+
+    `scale` multiplies it, `axes` selects and permutes (see `axes_map`; all axes by default), `window`
+    (begin, end) [s] cuts a part of it. Corners [Hz] of the zero-phase band-pass default to the values in
+    `models/ground_motions/tests.toml`; a displacement motion is not high-passed unless asked. The record is
+    extended by `pad` [s] at both ends, over which the target comes from and goes to rest. `rate` is the
+    controller's [1/s].
+
+    Raises MotionError for a window, corner or scale that makes no sense.
+    """
+    settings = _settings()
+    acceleration_given = motion.quantity == "acceleration"
+    if high_pass is None:
+        high_pass = settings["high_pass"] if acceleration_given else 0.0
+    low_pass = settings["low_pass"] if low_pass is None else low_pass
+    pad = settings["pad"] if pad is None else pad
+    pairs = axes_map(axes) if axes is not None else tuple((axis, axis) for axis in AXES)
+    if not np.isfinite(scale):
+        raise MotionError(f"{motion.name}: scale is {scale}; give a finite number")
+    if not (0 <= high_pass < low_pass < rate / 2 and pad > 0):
+        raise MotionError(
+            f"{motion.name}: corners {high_pass} and {low_pass} Hz and pad {pad} s; "
+            f"need 0 <= high_pass < low_pass < {rate / 2:g} Hz and a positive pad"
+        )
+    if acceleration_given and high_pass <= 0:
+        raise MotionError(f"{motion.name}: an acceleration needs a positive high-pass corner to integrate")
+    first, last = _cut(motion, window)
+    channels = np.zeros((last - first, len(AXES)))
+    for axis, channel in pairs:
+        channels[:, AXES.index(axis)] = scale * motion.samples[first:last, AXES.index(channel)]
+    step = Fraction(motion.time_step * rate).limit_denominator(10_000)  # in samples of the target
+    memory = max(settings["memory"] / high_pass if high_pass else 0.0, 2 * pad)
+    # both the record's first sample and the period fall on samples of the target
+    ends = _multiple(round(memory / motion.time_step) + 1, step.denominator)
+    total = _multiple(len(channels) + 2 * ends, step.denominator)
+    if acceleration_given:
+        extended = _extend_acceleration(channels, ends, total, round(settings["taper"] / motion.time_step))
+    else:
+        extended = _extend_displacement(channels, ends, total)
+    series = _filtered_displacement(
+        extended, motion.time_step, acceleration_given, high_pass, low_pass, settings
+    )
+    begin = int(ends * step) - round(pad * rate)
+    count = round((len(channels) - 1) * float(step)) + 2 * round(pad * rate) + 1
+    size = int(total * step)
+    angular = 2 * np.pi * np.fft.rfftfreq(total, motion.time_step)[:, None]
+    d, v, a = (
+        _evaluate(series * factor, total, size)[begin : begin + count]
+        for factor in (1.0, 1j * angular, -(angular**2))
+    )
+    w, w1, w2 = _rest_window(count, round(pad * rate), rate)
+    moved = np.isin(AXES, [axis for axis, _ in pairs])
+    reference = Reference(
+        motion.name,
+        motion.source,
+        scale,
+        pairs,
+        high_pass,
+        low_pass,
+        first * motion.time_step - round(pad * rate) / rate,
+    )
+    return Target(
+        np.arange(count) / rate,
+        np.where(moved, w * d, 0.0),
+        np.where(moved, w1 * d + w * v, 0.0),
+        np.where(moved, w2 * d + 2 * w1 * v + w * a, 0.0),
+        reference,
+    )
+
+
+def with_scale(target: Target, scale: float) -> Target:
+    """Copy of a target at another `scale` of its motion (the processing is linear)."""
+    factor = scale / target.reference.scale
+    reference = Reference(**{**target.reference.__dict__, "scale": scale})
+    return Target(
+        target.time,
+        factor * target.displacement,
+        factor * target.velocity,
+        factor * target.acceleration,
+        reference,
+    )
+
+
+def smooth_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rise from 0 to 1 over x in [0, 1] with two continuous derivatives, and these derivatives by x."""
+    x = np.clip(x, 0.0, 1.0)
+    rest = 1.0 - x
+    return x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * rest**2, 60 * x * rest * (1 - 2 * x)
+
+
+def _multiple(count: int, of: int) -> int:
+    """Smallest multiple of `of` that is at least `count`."""
+    return -(-count // of) * of
+
+
+def _cut(motion: GroundMotion, window: tuple[float, float] | None) -> tuple[int, int]:
+    """First sample and one past the last of the part asked for."""
+    if window is None:
+        return 0, len(motion.samples)
+    begin, end = window
+    if not 0 <= begin < end <= motion.duration + motion.time_step / 2:
+        raise MotionError(
+            f"{motion.name}: window {begin:g} to {end:g} s does not lie in the record, "
+            f"0 to {motion.duration:g} s"
+        )
+    first, last = round(begin / motion.time_step), round(end / motion.time_step) + 1
+    last = min(last, len(motion.samples))
+    if last - first < 2:
+        raise MotionError(
+            f"{motion.name}: window {begin:g} to {end:g} s holds fewer than 2 samples; widen it"
+        )
+    return first, last
+
+
+def _extend_acceleration(channels: np.ndarray, ends: int, total: int, taper: int) -> np.ndarray:
+    """Straight line removed, ends tapered, zeros on both sides (total, 6)."""
+    place = np.linspace(-1.0, 1.0, len(channels))
+    design = np.stack([np.ones_like(place), place], axis=1)
+    straight = design @ np.linalg.lstsq(design, channels, rcond=None)[0]
+    taper = min(taper, len(channels) // 4)
+    ramp = smooth_step(np.arange(len(channels)) / max(taper, 1))[0]
+    extended = np.zeros((total, channels.shape[1]))
+    extended[ends : ends + len(channels)] = (channels - straight) * (ramp * ramp[::-1])[:, None]
+    return extended
+
+
+def _extend_displacement(channels: np.ndarray, ends: int, total: int) -> np.ndarray:
+    """End values held, then led smoothly from the last to the first, so that the series is periodic."""
+    extended = np.empty((total, channels.shape[1]))
+    extended[:ends] = channels[0]
+    extended[ends : ends + len(channels)] = channels
+    after = total - ends - len(channels)
+    back = smooth_step((np.arange(after) - after / 2) / (after / 2))[0][:, None]
+    extended[ends + len(channels) :] = (1 - back) * channels[-1] + back * channels[0]
+    return extended
+
+
+def _filtered_displacement(
+    extended: np.ndarray,
+    time_step: float,
+    acceleration_given: bool,
+    high_pass: float,
+    low_pass: float,
+    settings: dict[str, float],
+) -> np.ndarray:
+    """Fourier coefficients of the displacement (total//2 + 1, 6)."""
+    frequency = np.fft.rfftfreq(len(extended), time_step)[:, None]
+    gain = 1 / (1 + (frequency / low_pass) ** (2 * settings["low_pass_order"]))
+    if high_pass:
+        ratio = (frequency / high_pass) ** (2 * settings["high_pass_order"])
+        gain = gain * ratio / (1 + ratio)
+    spectrum = np.fft.rfft(extended, axis=0) * gain
+    if len(extended) % 2 == 0:
+        spectrum[-1] = 0  # the highest frequency has no derivative in a real series
+    if acceleration_given:
+        frequency[0] = np.inf
+        spectrum = -spectrum / (2 * np.pi * frequency) ** 2
+    return spectrum
+
+
+def _evaluate(series: np.ndarray, total: int, size: int) -> np.ndarray:
+    """Fourier series of `total` samples, evaluated at `size` samples over the same time (size, 6)."""
+    return np.fft.irfft(series[: size // 2 + 1], size, axis=0) * (size / total)
+
+
+def _rest_window(count: int, pad: int, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Window (count, 1) that is zero at both ends, with its time derivatives [1/s, 1/s^2]."""
+    pad = min(pad, (count - 1) // 2)
+    x = np.arange(count) / pad
+    rise, rise1, rise2 = smooth_step(x)
+    per_second = rate / pad
+    w = rise * rise[::-1]
+    w1 = (rise1 - rise1[::-1]) * per_second
+    w2 = (rise2 + rise2[::-1]) * per_second**2
+    return w[:, None], w1[:, None], w2[:, None]

@@ -1,0 +1,48 @@
+"""Reading a ground-motion file of any kind the package knows."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from lhpost6_pin.errors import MotionError
+from lhpost6_pin.motions.at2 import is_at2, load_at2
+from lhpost6_pin.motions.csv import load_csv
+from lhpost6_pin.motions.motion import GroundMotion
+from lhpost6_pin.motions.text import read_text
+from lhpost6_pin.motions.v1 import is_v1, load_v1
+
+__all__ = ["load_motion"]
+
+
+def load_motion(
+    paths: "Path | str | Sequence[Path | str] | Mapping[str, Path | str]", **options: Any
+) -> GroundMotion:
+    """Read a motion from a PEER .AT2, COSMOS/CSMIP V1 or CSV file, told apart by what is in it.
+
+    Several paths (a sequence for x, y, z or a mapping by axis) are components in PEER files. `options` go to
+    the reader of the kind found: `load_at2`, `load_v1` or `load_csv`.
+
+    Raises MotionError naming the file and what to do.
+    """
+    if not isinstance(paths, str | Path):
+        return _call(load_at2, paths, options)
+    text = read_text(paths)
+    suffix = Path(paths).suffix.lower()  # where the content is not enough, its reader says what is missing
+    if is_at2(text) or suffix == ".at2":
+        return _call(load_at2, paths, options)
+    if is_v1(text) or suffix in (".v1", ".raw"):
+        return _call(load_v1, paths, options)
+    return _call(load_csv, paths, options)
+
+
+def _call(reader: Any, paths: Any, options: dict[str, Any]) -> GroundMotion:
+    """Read, or say which options this kind of file takes."""
+    known = set(reader.__kwdefaults__)
+    unknown = sorted(set(options) - known)
+    if unknown:
+        raise MotionError(
+            f"{paths}: option {unknown[0]!r} does not apply to this kind of file; "
+            f"options are {', '.join(sorted(known))}"
+        )
+    motion: GroundMotion = reader(paths, **options)
+    return motion

@@ -1,0 +1,168 @@
+"""Sections of a run report on the machine's components: actuators, chambers, servovalves, struts."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from lhpost6_pin.report.page import Markup, bar, figure, missing, number, table
+from lhpost6_pin.report.plots import SCALES, SUPPLY, Row, Scale, Trace, palette, time_figure
+from lhpost6_pin.report.run_metrics import SpoolUse, channel, peaks, sampling
+
+__all__ = [
+    "Limits",
+    "draw_over_time",
+    "force_blocks",
+    "pressure_blocks",
+    "share_of_limit",
+    "spool_blocks",
+    "strut_blocks",
+]
+
+Limits = Mapping[str, NDArray[np.float64]]
+
+OFF_SCALE = 0.4  # share of the supply below which pressures get a scale of their own, without the supply line
+
+
+def force_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
+    """Return forces over time and the table of forces and strokes used."""
+    names = ("actuator_force", "actuator_displacement")
+    absent = [name for name in names if name not in record]
+    blocks = [missing(absent, "Forces and strokes are shown as far as they were recorded.")] if absent else []
+    if "actuator_force" in record:
+        words = "Chamber pressures times piston areas, P_A A₁ − P_B A₂; positive pushes the actuator longer."
+        rows = _group_rows(record, "Force", "actuator_force", "actuator", SCALES["force"])
+        blocks.append(draw_over_time(record, "force", "Actuator forces over time", words, rows))
+    if len(absent) < len(names):
+        blocks.append(_use_of_actuators(record, limits))
+    return blocks
+
+
+def pressure_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
+    """Return the pressures of both chambers with the supply."""
+    absent = [name for name in ("chamber_pressure_a", "chamber_pressure_b") if name not in record]
+    blocks = [missing(absent, "These chambers are not drawn.")] if absent else []
+    n, supply = record.sizes["time"], None
+    if "supply_pressure" in record:
+        supply = np.asarray(record["supply_pressure"].values, dtype=np.float64)
+    elif "supply_pressure" in limits:
+        supply = np.full(n, limits["supply_pressure"][0])
+    else:
+        blocks.append(missing(["supply_pressure"], "The supply line is not drawn."))
+    rows = []
+    for side, dim in (("a", "actuator"), ("b", "horizontal")):
+        name = f"chamber_pressure_{side}"
+        if name in record:
+            rows += _group_rows(record, f"Chamber {side.upper()},", name, dim, SCALES["pressure"])
+    if rows:
+        words = "Pressure in each chamber."
+        if supply is not None:
+            rows = [_with_supply(row, supply) for row in rows]
+            words += " The dashed line is the supply; where all stay far below it, the legend switches it on."
+        blocks.append(draw_over_time(record, "pressure", "Chamber pressures over time", words, rows))
+    return blocks
+
+
+def spool_blocks(record: xr.Dataset, spools: Sequence[SpoolUse]) -> list[Markup]:
+    """Return the utilisation of the valves and their spools over time against the limits ±1."""
+    names = ("spool_position", "spool_command")
+    shown = [name for name in names if name in record]
+    if not shown:
+        return [missing(names, "Servovalves are not drawn.")]
+    blocks = (
+        [missing([n for n in names if n not in record], "Only the other is drawn.")]
+        if len(shown) == 1
+        else []
+    )
+    rows = _group_rows(record, "Spool", shown[0], "actuator", SCALES["ratio"])
+    words = "Fourth-stage spool as a share of its stroke, against its limits ±1."
+    if len(shown) == 2:
+        commands = _group_rows(record, "Spool", shown[1], "actuator", SCALES["ratio"])
+        rows = [
+            replace(f, traces=[*f.traces, *map(_command, c.traces)])
+            for f, c in zip(rows, commands, strict=True)
+        ]
+        words += " Lines are feedback; dotted commands can be switched on in the legend."
+    rows = [replace(row, lines={"+1": 1.0, "−1": -1.0}, span=(-1.25, 1.25)) for row in rows]
+    used = [
+        [s.actuator, bar(s.peak), f"{number(100 * s.rms)} %", f"{number(100 * s.saturated)} %"]
+        for s in spools
+    ]
+    header = ("Actuator", "Largest opening", "RMS opening", "Time at the limit")
+    drawing = draw_over_time(record, "spool", "Servovalve spools over time", words, rows)
+    return [*blocks, table("Valve utilisation", header, used), drawing]
+
+
+def strut_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
+    """Return the struts' gas pressure and, where their area is known, their pull."""
+    if "strut_pressure" not in record:
+        return [missing(["strut_pressure"], "Hold-down struts are not drawn.")]
+    rows = _group_rows(record, "Gas pressure", "strut_pressure", "strut", SCALES["pressure"])
+    areas = limits.get("strut_area", np.array([]))
+    words = "Nitrogen pressure in each hold-down strut."
+    if len(areas) == record.sizes["strut"]:
+        record = record.assign(strut_pull=record["strut_pressure"] * xr.DataArray(areas, dims="strut"))
+        rows += _group_rows(record, "Pull on the platen", "strut_pull", "strut", SCALES["force"])
+        words += " The pull is pressure times area."
+    else:
+        words += " The pull is not drawn: the area of the struts was not given."
+    return [draw_over_time(record, "strut", "Hold-down struts over time", words, rows)]
+
+
+def draw_over_time(record: xr.Dataset, name: str, title: str, words: str, rows: Sequence[Row]) -> Markup:
+    """Return a figure over the record's time."""
+    start, step = sampling(record)
+    return figure(time_figure(f"plot-{name}", title, words, rows, start=start, step=step))
+
+
+def share_of_limit(peak: float, limits: Limits, name: str, k: int) -> float:
+    """Return peak over limit; not-a-number where no limit was given."""
+    bounds = limits.get(name, np.array([]))
+    return float(peak / bounds[k]) if k < len(bounds) else float("nan")
+
+
+def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Markup:
+    columns: list[list[object]] = [list(record["actuator"].values)]
+    header = ["Actuator"]
+    for name, bound, scale, title in (
+        ("actuator_force", "actuator_force", SCALES["force"], "Peak force"),
+        ("actuator_displacement", "actuator_stroke", SCALES["displacement"], "Peak displacement"),
+    ):
+        if name not in record:
+            continue
+        largest = peaks(channel(record, name, "actuator"))
+        header.append(f"{title} [{scale.unit}]")
+        columns.append([number(peak * scale.factor) for peak in largest])
+        if bound in limits:
+            header.append("of its stroke" if bound == "actuator_stroke" else "of its limit")
+            columns.append([bar(share_of_limit(peak, limits, bound, k)) for k, peak in enumerate(largest)])
+    return table("Forces and strokes used", header, zip(*columns, strict=True))
+
+
+def _with_supply(row: Row, supply: NDArray[np.float64]) -> Row:
+    far = max(np.nanmax(trace.values, initial=0.0) for trace in row.traces) < OFF_SCALE * np.nanmax(
+        supply, initial=0.0
+    )
+    return replace(row, traces=[*row.traces, Trace("supply", supply, SUPPLY, folded="supply" if far else "")])
+
+
+def _command(trace: Trace) -> Trace:
+    return replace(trace, line={**trace.line, "dash": "dot"}, folded="commands")
+
+
+def _group_rows(record: xr.Dataset, title: str, name: str, dim: str, scale: Scale) -> list[Row]:
+    """One row per kind of component: H1 to H4 in one, V1 to V6 in the next."""
+    values = channel(record, name, dim)
+    labels = [str(label) for label in record[dim].values]
+    rows = []
+    for kind, members in groupby(range(len(labels)), key=lambda k: re.sub(r"\d+$", "", labels[k])):
+        own = list(members)
+        lines = palette(len(own))
+        traces = [Trace(labels[k], values[:, k], line) for k, line in zip(own, lines, strict=True)]
+        span = kind if len(own) == 1 else f"{labels[own[0]]}–{labels[own[-1]]}"
+        rows.append(Row(f"{title} {span}", traces, scale))
+    return rows

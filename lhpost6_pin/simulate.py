@@ -1,0 +1,340 @@
+"""Simulation: a plant, driven by recorded spools or by a controller, by a scheme at a rate, in one of two engines.
+
+    plant = make_plant(load_machine())
+    run = simulate(plant, ClosedLoop(controller, reference), duration=10.0)
+
+The controller's samples are the clock: each is divided into equal model steps. A run that leaves a stroke or diverges
+stops; what was computed is kept, and `Run.trouble` says when, which component, and what to try.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .control import Controller
+from .control.loop import ACTUATOR, AXIS, control_step
+from .engine_fused import inertia_table, run_fused
+from .engine_pinocchio import evaluate, make_stepper, settle
+from .equilibrium import Equilibrium, hydraulic_rows
+from .errors import SimulationError
+from .plant import Plant, State
+from .schemes import SCHEMES, A, S, V, spool_windows
+from .workspace import Workspace, make_workspace
+
+__all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "OpenLoop", "Run", "simulate"]
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+"""Called now and then with the share of the run that is done, 0..1."""
+
+ENGINES = ("pinocchio", "fused")
+"""Engine names; the first is the default."""
+
+SAMPLE_RATE = 2048
+"""Rate of controller samples [Hz] (report, Chapter 5)."""
+
+_CHUNK = 1024
+"""Controller samples between two progress reports."""
+
+
+class OpenLoop(NamedTuple):
+    """Drive by spool positions as the ports see them (already delayed): spool (n * k, n_actuators), -1..1.
+
+    k = 1 holds each row over one controller sample; k = steps per sample gives one row a model step.
+    """
+
+    spool: Array
+    start: State
+
+
+class ClosedLoop(NamedTuple):
+    """Drive by a controller that follows `reference` (n, 12): displacement and velocity of C and Euler angles."""
+
+    controller: Controller
+    reference: Array
+    rest: Equilibrium
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a simulation leaves, sampled at `rate` [Hz]: rows of time (n,)."""
+
+    plant: Plant
+    time: Array
+    q: Array  # (n, nq)
+    v: Array  # (n, nv)
+    a: Array  # (n, nv)
+    z: Array  # (n, n_states)
+    spool: Array  # (n, n_actuators) position that the ports see
+    command: Array | None  # (n, n_actuators), closed loop only
+    rate: float
+    scheme: str
+    steps_per_second: int
+    engine: str
+    clipped: int
+    trouble: str | None
+
+    @property
+    def state(self) -> State:
+        """State at the last sample."""
+        return State(self.q[-1], self.v[-1], self.z[-1])
+
+
+def simulate(
+    plant: Plant,
+    drive: OpenLoop | ClosedLoop,
+    *,
+    samples: int,
+    scheme: str = SCHEMES[0],
+    steps_per_second: int = 4 * SAMPLE_RATE,
+    engine: str = ENGINES[0],
+    record_every: int = 1,
+    progress: Progress | None = None,
+) -> Run:
+    """Run `samples` controller samples and return the motion, every `record_every`-th sample.
+
+    Raises SimulationError for a scheme, engine, rate or drive that cannot be. A run that goes wrong on the way does
+    not raise: see `Run.trouble`.
+    """
+    steps = _check(plant, drive, samples, scheme, steps_per_second, engine)
+    dt = 1.0 / steps_per_second
+    closed = isinstance(drive, ClosedLoop)
+    start = drive.rest.state if isinstance(drive, ClosedLoop) else drive.start
+    ws = make_workspace(plant, start)
+    spool, clipped = _clip(drive.spool) if isinstance(drive, OpenLoop) else (np.zeros((1, plant.spools)), 0)
+    first = drive.rest.spool if isinstance(drive, ClosedLoop) else spool[0]
+    log_ = _Log(plant, -(-samples // record_every))
+    command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
+    status = settle(plant, ws, np.ascontiguousarray(first))
+    runner = _run_fused if engine == "fused" else _run_pinocchio
+    done = 0
+    if status == 0:
+        status, done, more = runner(
+            plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress
+        )
+        clipped += more
+    kept = -(-done // record_every)
+    trouble = None if status == 0 else _diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
+    if trouble:
+        log.warning(trouble)
+    if clipped:
+        log.warning("%d spool values beyond full stroke were clipped to it: the motion asks for more flow", clipped)
+    q, v, a, z = (x[:kept] for x in (log_.q, log_.v, log_.a, log_.z))
+    if scheme != "semi_implicit":  # their A belongs to the start of the last step
+        a = _accelerations(plant, q, v, z)
+    return Run(
+        plant=plant,
+        time=np.arange(kept) * record_every / SAMPLE_RATE,
+        q=q,
+        v=v,
+        a=a,
+        z=z,
+        spool=log_.spool[:kept],
+        command=command[:done:record_every][:kept] if closed else None,
+        rate=SAMPLE_RATE / record_every,
+        scheme=scheme,
+        steps_per_second=steps_per_second,
+        engine=engine,
+        clipped=clipped,
+        trouble=trouble,
+    )
+
+
+class _Log:
+    """Arrays that a run fills, one row a recorded sample."""
+
+    def __init__(self, plant: Plant, n: int) -> None:
+        self.q = np.zeros((n, plant.model.nq))
+        self.v = np.zeros((n, plant.model.nv))
+        self.a = np.zeros((n, plant.model.nv))
+        self.z = np.zeros((n, len(plant.states)))
+        self.spool = np.zeros((n, plant.spools))
+
+    def take(self, at: int, ws: Workspace, spool: Array) -> None:
+        self.q[at], self.v[at], self.a[at], self.z[at] = ws.q, ws.motion[V], ws.motion[A], ws.z
+        self.spool[at] = spool
+
+
+def _check(plant: Plant, drive: OpenLoop | ClosedLoop, samples: int, scheme: str, rate: int, engine: str) -> int:
+    if scheme not in SCHEMES:
+        raise SimulationError(f"no scheme named {scheme!r}; valid names: {', '.join(SCHEMES)}")
+    if engine not in ENGINES:
+        raise SimulationError(f"no engine named {engine!r}; valid names: {', '.join(ENGINES)}")
+    if rate < SAMPLE_RATE or rate % SAMPLE_RATE:
+        raise SimulationError(f"{rate} model steps a second do not divide the controller's 1/{SAMPLE_RATE} s; use a multiple")
+    if samples < 1:
+        raise SimulationError("nothing to simulate: the drive has no sample")
+    steps = rate // SAMPLE_RATE
+    if isinstance(drive, OpenLoop):
+        if drive.spool.ndim != 2 or drive.spool.shape[1] != plant.spools:
+            raise SimulationError(f"spool has shape {drive.spool.shape}; this machine takes (n, {plant.spools})")
+        if len(drive.spool) not in (samples, samples * steps):
+            raise SimulationError(f"spool has {len(drive.spool)} rows; {samples} or {samples * steps} are needed")
+        if not np.all(np.isfinite(drive.spool)):
+            at, which = np.argwhere(~np.isfinite(drive.spool))[0]
+            raise SimulationError(f"spool of {plant.machine.actuator_names[which]} is not finite at row {at}")
+    elif drive.reference.shape != (samples, 12):
+        raise SimulationError(f"reference has shape {drive.reference.shape}; ({samples}, 12) is needed")
+    return steps
+
+
+def _clip(spool: Array) -> tuple[Array, int]:
+    beyond = int(np.count_nonzero(np.abs(spool) > 1.0))
+    return np.ascontiguousarray(np.clip(spool, -1.0, 1.0), float), beyond
+
+
+def _run_pinocchio(
+    plant: Plant,
+    drive: OpenLoop | ClosedLoop,
+    ws: Workspace,
+    log_: _Log,
+    scheme: str,
+    samples: int,
+    steps: int,
+    dt: float,
+    spool: Array,
+    command: Array,
+    every: int,
+    progress: Progress | None,
+) -> tuple[int, int, int]:
+    """Run all samples step by step; returns (status, samples done, commands clipped)."""
+    advance = make_stepper(plant, scheme, dt)
+    window = np.zeros((steps, plant.spools))
+    fed = hydraulic_rows(plant)
+    memory = drive.controller.fresh_memory() if isinstance(drive, ClosedLoop) else np.zeros((1, 1))
+    per_sample = len(spool) // samples
+    clipped = 0
+    for sample in range(samples):
+        if isinstance(drive, ClosedLoop):
+            if scheme != "semi_implicit":
+                evaluate(plant, ws, window[0])
+            loop = drive.controller
+            clipped += control_step(
+                sample,
+                drive.reference,
+                ws.port[S],
+                ws.force[fed, 0],
+                plant.legs,
+                plant.body,
+                plant.axes,
+                loop.axis,
+                loop.actuator,
+                loop.balance,
+                memory,
+                command[sample],
+            )
+            spool_windows(command, 0, sample, plant.delays, float(SAMPLE_RATE), window)
+        elif per_sample == 1:
+            window[:] = spool[sample]
+        else:
+            window = spool[sample * steps : (sample + 1) * steps]
+        if sample % every == 0:
+            log_.take(sample // every, ws, window[0])
+        status = advance(ws, window)
+        if status:
+            return status, sample + 1, clipped
+        if progress is not None and sample % _CHUNK == 0:
+            progress(sample / samples)
+    if progress is not None:
+        progress(1.0)
+    return 0, samples, clipped
+
+
+def _run_fused(
+    plant: Plant,
+    drive: OpenLoop | ClosedLoop,
+    ws: Workspace,
+    log_: _Log,
+    scheme: str,
+    samples: int,
+    steps: int,
+    dt: float,
+    spool: Array,
+    command: Array,
+    every: int,
+    progress: Progress | None,
+) -> tuple[int, int, int]:
+    """Run all samples in compiled chunks; returns (status, samples done, commands clipped)."""
+    inertia = inertia_table(plant)
+    damping = np.array(plant.model.damping)
+    fed = hydraulic_rows(plant)
+    if isinstance(drive, ClosedLoop):
+        loop = drive.controller
+        tables = (True, loop.axis, loop.actuator, loop.balance, loop.fresh_memory(), drive.reference)
+    else:
+        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 12)))
+    clipped = 0
+    for first in range(0, samples, _CHUNK):
+        last = min(first + _CHUNK, samples)
+        status, done, more = run_fused(
+            SCHEMES.index(scheme),
+            first,
+            last,
+            steps,
+            dt,
+            plant.axes,
+            plant.legs,
+            plant.body,
+            plant.rows,
+            damping,
+            plant.supply,
+            plant.delays,
+            inertia,
+            ws.q,
+            ws.z,
+            ws.zd,
+            ws.motion,
+            ws.port,
+            ws.JB,
+            ws.frame,
+            ws.force,
+            fed,
+            *tables,
+            command,
+            spool,
+            every,
+            log_.q,
+            log_.v,
+            log_.a,
+            log_.z,
+            log_.spool,
+        )
+        clipped += more
+        if status:
+            return status, done, clipped
+        if progress is not None:
+            progress(last / samples)
+    return 0, samples, clipped
+
+
+def _diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:
+    if status > 0:
+        leg = (*plant.machine.actuator_names, *plant.machine.strut_names)[status - 1]
+        stroke = plant.legs["stroke"][status - 1]
+        return (
+            f"stopped at {time:.4f} s: {leg} left its stroke of +-{stroke:g} m; "
+            "scale the motion down, or start from the record's own pose and pressures"
+        )
+    hint = "use --scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"
+    return f"stopped at {time:.4f} s: the run diverged with {scheme} at {rate} steps a second; {hint} or raise --rate"
+
+
+def _accelerations(plant: Plant, q: Array, v: Array, z: Array) -> Array:
+    """Accelerations (n, nv) at states of a run."""
+    out = np.zeros_like(v)
+    spool = np.zeros(plant.spools)  # forces do not depend on the spools, only pressure rates do
+    ws = make_workspace(plant, plant.zero_state())
+    for k in range(len(q)):
+        ws.q[:], ws.z[:], ws.motion[V] = q[k], z[k], v[k]
+        if settle(plant, ws, spool):
+            out[k:] = np.nan
+            break
+        out[k] = ws.motion[A]
+    return out
+

@@ -59,9 +59,7 @@ def check_record(path: Path | str, areas: Mapping[str, tuple[float, float]] | No
         return [Finding("error", "", None, str(error))]
 
 
-def check_dataset(
-    dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] | None = None
-) -> list[Finding]:
+def check_dataset(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] | None = None) -> list[Finding]:
     """List errors, then warnings, then the contents of a record in memory; see `check_record`."""
     errors = layout_faults(dataset)
     broken = {finding.channel.split("[")[0] for finding in errors}
@@ -130,11 +128,7 @@ def _resolution(x: Array) -> float:
 def _unlikely_units(dataset: xr.Dataset) -> Iterator[_Warning]:
     for channel, x, _ in _columns(dataset):
         rotation = channel.endswith(("[roll]", "[pitch]", "[yaw]"))
-        kind = (
-            channel.split("[")[0]
-            .rsplit("_", 1)[-1]
-            .replace("displacement", "angle" if rotation else "displacement")
-        )
+        kind = channel.split("[")[0].rsplit("_", 1)[-1].replace("displacement", "angle" if rotation else "displacement")
         kind = "pressure" if "pressure" in channel else "spool" if "spool" in channel else kind
         least, most, guess = LIKELY_UNITS.get(kind, (0.0, np.inf, ""))
         peak = float(np.abs(x).max())
@@ -262,9 +256,7 @@ def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
             right = gain is not None and abs(gain - 1) <= GAIN_TOLERANCE
             place, source = channel_name(dataset[motions[high]], k), channel_name(dataset[motions[low]], j)
             if j == k and gain is not None and not right:
-                reason = next(
-                    (f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), ""
-                )
+                reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
                 yield (
                     place,
                     None,

@@ -1,15 +1,16 @@
 """The `compiled` decorator: numba with a disk cache that is private, always fresh and optional.
 
-The cache folder is keyed by the package's own source text and by the versions of numba and Python, so an edit never
-meets stale machine code, not even in a function that calls the edited one. It belongs to one user (numba's cache is
-pickles: reading another user's would run his code). Where none can be written, functions compile in memory and a
-warning says so.
+The cache folder is keyed by the text of every module that compiled code is made of, and by the versions of numba and
+Python, so an edit never meets stale machine code, not even in a function that calls the edited one. It belongs to one
+user (numba's cache is pickles: reading another user's would run his code). Where none can be written, functions
+compile in memory and a warning says so.
 """
 
 import hashlib
 import logging
 import os
 import platform
+import re
 import shutil
 import stat
 import tempfile
@@ -25,21 +26,36 @@ __all__ = ["cache_folder", "compiled"]
 log = logging.getLogger(__name__)
 
 _F = TypeVar("_F", bound=Callable[..., Any])
+_RELATIVE_IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 _KEEP = 4
 """Cache folders of older sources that are kept, newest first."""
 
 
 @cache
 def source_key() -> str:
-    """Digest of every source file of the package and of the compiler's and interpreter's versions."""
-    digest = hashlib.sha256()
+    """Digest of the source that compiled code is made of, and of the compiler's and interpreter's versions."""
     package = Path(__file__).parent
-    for source in sorted(package.rglob("*.py")):
+    digest = hashlib.sha256()
+    for source in sorted(_compiled_sources(package)):
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())
-    versions = f"{numba.__version__} {platform.python_version()} {platform.machine()}"
-    digest.update(versions.encode())
+    digest.update(f"{numba.__version__} {platform.python_version()} {platform.machine()}".encode())
     return digest.hexdigest()[:16]
+
+
+def _compiled_sources(package: Path) -> set[Path]:
+    """Modules with a compiled function, and all that they import from the package, however indirectly."""
+    found: set[Path] = set()
+    open_ = [p for p in package.rglob("*.py") if b"@compiled" in p.read_bytes()]
+    while open_:
+        source = open_.pop()
+        if source in found:
+            continue
+        found.add(source)
+        for dots, name in _RELATIVE_IMPORT.findall(source.read_text(encoding="utf-8")):
+            stem = source.parents[len(dots) - 1].joinpath(*filter(None, name.split(".")))
+            open_ += [p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()]
+    return found
 
 
 @cache

@@ -18,7 +18,15 @@ from .laws.orifice import width_ratios
 if TYPE_CHECKING:
     from .machine import Actuator, Hydraulics, Strut
 
-__all__ = ["BOUC_WEN_1D", "BOUC_WEN_2D", "HYDRAULIC_DOUBLE", "HYDRAULIC_SINGLE", "LAWS", "NITROGEN_STRUT", "ROW"]
+__all__ = [
+    "BOUC_WEN_1D",
+    "BOUC_WEN_2D",
+    "HYDRAULIC_DOUBLE",
+    "HYDRAULIC_SINGLE",
+    "LAWS",
+    "NITROGEN_STRUT",
+    "ROW",
+]
 __all__ += ["VISCOUS", "Effect", "Law", "effect_table", "standard_effects"]
 
 MAX_PARAMS = 12
@@ -110,7 +118,9 @@ class Effect:
             if not np.all(np.isfinite(numbers)):
                 raise ParameterError(f"{self.name} on {port}: {numbers!r} is not finite")
         if law.takes_spool != bool(self.spools) or (self.spools and len(self.spools) != len(self.ports)):
-            raise ParameterError(f"{self.name}: a {self.law} law takes {'one spool' if law.takes_spool else 'no spool'}")
+            raise ParameterError(
+                f"{self.name}: a {self.law} law takes {'one spool' if law.takes_spool else 'no spool'}"
+            )
 
 
 def standard_effects(
@@ -134,7 +144,8 @@ def standard_effects(
     if struts:
         gas = tuple((s.pressure, s.area, s.gas_length, s.polytropic_index) for s in struts)
         found.append(Effect("hold_down", "nitrogen_strut", tuple(s.name for s in struts), gas, "Eq. 4-8"))
-    rubbing = [c for c in (*actuators, *struts) if c.seal_friction > 0.0]
+    legs: list[Actuator | Strut] = [*actuators, *struts]
+    rubbing = [c for c in legs if c.seal_friction > 0.0]
     if rubbing:
         seals = tuple((c.seal_friction, c.seal_yield, c.seal_shape) for c in rubbing)
         found.append(Effect("seal_friction", "bouc_wen_1d", tuple(c.name for c in rubbing), seals, "Eq. 4-18"))
@@ -183,8 +194,10 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
                     raise UnknownNameError("port", name, list(ports))
             row = rows[i]
             row["law"], row["effect"] = law.code, ledger
-            row["port"], row["port_2"] = number[names[0]], number[names[1]] if law.ports == 2 else -1
-            row["state"], row["input"] = state if law.states else -1, effect.spools[k] if effect.spools else -1
+            row["port"] = number[names[0]]
+            row["port_2"] = number[names[-1]] if law.ports == 2 else -1
+            row["state"] = state if law.states else -1
+            row["input"] = effect.spools[k] if effect.spools else -1
             row["p"][: len(law.params)] = effect.params[k]
             i, state = i + 1, state + len(law.states)
     return rows

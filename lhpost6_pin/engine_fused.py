@@ -61,7 +61,7 @@ def inertia_table(plant: Plant) -> NDArray[np.void]:
 
 
 @compiled
-def platen_acceleration(inertia, axes, frame, tau, work, a):  # type: ignore[no-untyped-def]
+def platen_acceleration(inertia, axes, frame, tau, work, a):
     """Forward dynamics of the platen body: fill a (n_axes,) from tau at the pose and twist in frame (ABA's oracle).
 
     M a = tau + I g_b - v x* (I v), g_b gravity in platen axes, I the Inertia's part of M. work (2, 6) is scratch.
@@ -102,7 +102,7 @@ def platen_acceleration(inertia, axes, frame, tau, work, a):  # type: ignore[no-
 
 
 @compiled
-def integrate_platen(q, dq, axes, out):  # type: ignore[no-untyped-def]
+def integrate_platen(q, dq, axes, out):
     """Pose after the body displacement dq: q exp(dq) on SE(3), quaternion kept unit (pin.integrate's oracle)."""
     if axes.size != 6:
         out[0] = q[0] + dq[0]
@@ -143,11 +143,28 @@ def integrate_platen(q, dq, axes, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _euler_step(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion, inertia, work):  # type: ignore[no-untyped-def]  # noqa: E501
+def _euler_step(
+    q,
+    dt,
+    axes,
+    legs,
+    body,
+    rows,
+    damping,
+    spool,
+    supply,
+    frame,
+    port,
+    JB,
+    z,
+    zd,
+    force,
+    motion,
+    inertia,
+    work,
+):
     motion[V_SEEN] = motion[V]
-    status = rates_stage(
-        q, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion
-    )
+    status = rates_stage(q, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion)
     if status != 0:
         return status
     platen_acceleration(inertia, axes, frame, motion[TAU], work, motion[A])
@@ -161,7 +178,26 @@ def _euler_step(q, dt, axes, legs, body, rows, damping, spool, supply, frame, po
 
 
 @compiled
-def _rk4_step(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion, inertia, work):  # type: ignore[no-untyped-def]  # noqa: E501
+def _rk4_step(
+    q,
+    dt,
+    axes,
+    legs,
+    body,
+    rows,
+    damping,
+    spool,
+    supply,
+    frame,
+    port,
+    JB,
+    z,
+    zd,
+    force,
+    motion,
+    inertia,
+    work,
+):
     n = motion.shape[1]
     v0, z0, q_at = motion[V].copy(), z.copy(), q.copy()
     z_at = z.copy()
@@ -244,7 +280,7 @@ def run_fused(
     out_a,
     out_z,
     out_spool,
-):  # type: ignore[no-untyped-def]
+):
     """Run controller samples first..last (exclusive) of `steps` model steps each.
 
     scheme 0 semi_implicit, 1 euler, 2 rk4. closed: the controller (axis, actuator, balance, memory) fills command
@@ -266,12 +302,37 @@ def run_fused(
             if scheme != 0:  # the other schemes leave the ports of their last stage behind
                 motion[V_SEEN] = motion[V]
                 rates_stage(
-                    q, axes, legs, body, rows, damping, window[0], supply, frame, port, JB, z, zd, force, motion
+                    q,
+                    axes,
+                    legs,
+                    body,
+                    rows,
+                    damping,
+                    window[0],
+                    supply,
+                    frame,
+                    port,
+                    JB,
+                    z,
+                    zd,
+                    force,
+                    motion,
                 )
             for i in range(nu):
                 measured[i] = force[fed[i], 0]
             clipped += control_step(
-                sample, reference, port[S], measured, legs, body, axes, axis, actuator, balance, memory, command[sample]
+                sample,
+                reference,
+                port[S],
+                measured,
+                legs,
+                body,
+                axes,
+                axis,
+                actuator,
+                balance,
+                memory,
+                command[sample],
             )
             spool_windows(command, 0, sample, delays, 1.0 / (steps * dt), window)
         else:
@@ -291,7 +352,21 @@ def run_fused(
             if scheme == 0:
                 integrate_platen(q, motion[DQ], axes, q)
                 status = staggered_stage(
-                    q, dt, axes, legs, body, rows, damping, window[j], supply, frame, port, JB, z, force, motion
+                    q,
+                    dt,
+                    axes,
+                    legs,
+                    body,
+                    rows,
+                    damping,
+                    window[j],
+                    supply,
+                    frame,
+                    port,
+                    JB,
+                    z,
+                    force,
+                    motion,
                 )
                 if status != 0:
                     break

@@ -14,7 +14,7 @@ from .plant import Plant, State
 from .schemes import TAU, forces_stage, pose_stage
 from .workspace import make_workspace
 
-__all__ = ["Equilibrium", "find_equilibrium", "hydraulic_rows", "rest_pressures"]
+__all__ = ["Equilibrium", "find_equilibrium", "hydraulic_rows", "rest_pressures", "unloaded_speeds"]
 
 Array = NDArray[np.float64]
 
@@ -57,13 +57,17 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
         ws.motion,
     )
     free = plant.axes.size
-    gravity = pin.rnea(plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv))
+    gravity = pin.rnea(
+        plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)
+    )
     needed = gravity[:free] - ws.motion[TAU][:free]
     columns = ws.JB[1][: plant.spools, plant.axes].T  # (free, n_actuators)
     force, *_ = np.linalg.lstsq(columns, needed, rcond=None)
     miss = np.abs(columns @ force - needed).max()
     if miss > 1e-6 * max(1.0, float(np.abs(needed).max())):
-        raise SimulationError(f"the actuators cannot hold the platen in the zero-position: {miss:.3g} N or N m is left over")
+        raise SimulationError(
+            f"the actuators cannot hold the platen in the zero-position: {miss:.3g} N or N m is left over"
+        )
     z, spool = ws.z.copy(), np.zeros(plant.spools)
     for i, row in enumerate(plant.rows[hydraulic_rows(plant)]):
         pressures, spool[i] = rest_pressures(row, float(force[i]), plant.supply)
@@ -105,3 +109,21 @@ def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[flo
             opened = leakage * abs(a - b) / (out * math.sqrt(max(drop, np.finfo(float).tiny)))
             return (float(a), float(b)), float(spool_for_opening(sign * opened, curve))
     raise SimulationError(f"no chamber pressures give {force:.4g} N at rest")
+
+
+def unloaded_speeds(row: np.void, force: float, supply: Array) -> tuple[float, float]:
+    """Steady piston speeds [m/s] at full opening under the rest force: extending, retracting (Eqs. 4-2, 4-5)."""
+    area_a, area_b, k_pa, k_bt, k_at, k_pb = (float(v) for v in row["p"][:6])
+    high, low = supply
+    if row["law"] != HYDRAULIC_DOUBLE:
+        pressure = force / area_a
+        return k_pa * math.sqrt(high - pressure) / area_a, k_at * math.sqrt(pressure - low) / area_a
+    speeds = []
+    for sign, a_in, b_in in ((1.0, k_pa, k_bt), (-1.0, k_at, k_pb)):
+        # speed^2 = (a_in/A_1)^2 drop_A = (b_in/A_2)^2 drop_B and P_A A_1 - P_B A_2 = force
+        a, b = (a_in / area_a) ** 2, (b_in / area_b) ** 2
+        source_a, source_b = (high, low) if sign > 0.0 else (low, high)
+        matrix = np.array([[a, b], [area_a, -area_b]])
+        pressure_a, _ = np.linalg.solve(matrix, np.array([a * source_a + b * source_b, force]))
+        speeds.append(float(math.sqrt(a * abs(source_a - pressure_a))))
+    return speeds[0], speeds[1]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .effects import Effect, standard_effects
-from .errors import ParameterError, UnknownNameError
+from .errors import ParameterError
 from .parameters import Parameters, load_parameters, override_parameters
 from .schema import build_section, quantity_field
 from .specimen import Specimen
@@ -137,6 +137,11 @@ class Machine:
         return (*standard_effects(self.actuators, self.struts, self.hydraulics), *self.added_effects)
 
     @property
+    def components(self) -> "tuple[Actuator | Strut, ...]":
+        """Actuators, then struts: the order of legs."""
+        return (*self.actuators, *self.struts)
+
+    @property
     def actuator_names(self) -> tuple[str, ...]:
         """Names of actuators in file order."""
         return tuple(a.name for a in self.actuators)
@@ -171,7 +176,12 @@ class Machine:
         return replace(self, added_effects=(*self.added_effects, effect))
 
     def with_specimen(
-        self, urdf: str | Path, position: Vec3 = (0.0, 0.0, 0.0), rpy: Vec3 = (0.0, 0.0, 0.0), *, locked: bool = False
+        self,
+        urdf: str | Path,
+        position: Vec3 = (0.0, 0.0, 0.0),
+        rpy: Vec3 = (0.0, 0.0, 0.0),
+        *,
+        locked: bool = False,
     ) -> "Machine":
         """Return a copy with the specimen of a URDF bolted to the platen.
 
@@ -181,7 +191,9 @@ class Machine:
         return replace(self, specimen=Specimen(Path(urdf), position, rpy, locked))
 
 
-def load_machine(name_or_path: str | Path = "lhpost6", override: Mapping[str, Any] | str | Path | None = None) -> Machine:
+def load_machine(
+    name_or_path: str | Path = "lhpost6", override: Mapping[str, Any] | str | Path | None = None
+) -> Machine:
     """Read a machine file by shipped name or path, with an optional override file or mapping.
 
     Raises ParameterError that names file and key for a missing, unknown, ill-dimensioned or impossible value.
@@ -253,7 +265,9 @@ def _count(parameters: Parameters, component: str, kind: str) -> int:
     path = f"{component}.valves" if f"{component}.valves" in parameters.words else f"{kind}.valves"
     count = parameters.words.get(path, 1)
     if not isinstance(count, int) or count < 1:
-        raise ParameterError(f"{parameters.origin}: {path} = {count!r}; it should be a whole number of open servovalves")
+        raise ParameterError(
+            f"{parameters.origin}: {path} = {count!r}; it should be a whole number of open servovalves"
+        )
     return count
 
 
@@ -269,9 +283,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str])
     for path in parameters:
         section, _, key = path.partition(".")
         if section in known and key not in known[section]:
-            raise ParameterError(
-                f"{parameters.origin}: unknown key {path}; valid: {', '.join(sorted(known[section]))}"
-            )
+            raise ParameterError(f"{parameters.origin}: unknown key {path}; valid: {', '.join(sorted(known[section]))}")
 
 
 def _check_actuator(actuator: Actuator, origin: str) -> None:
@@ -295,12 +307,14 @@ def _check_machine(machine: Machine) -> None:
     origin = machine.parameters.origin
     if machine.hydraulics.return_pressure >= machine.hydraulics.supply_pressure:
         raise ParameterError(f"{origin}: hydraulics.return_pressure is not below hydraulics.supply_pressure")
-    for component in (*machine.actuators, *machine.struts):
+    for component in machine.components:
         if component.platen_point == component.base_point:
             raise ParameterError(f"{origin}: {component.name}: platen_point and base_point coincide")
         bearing = isinstance(component, Actuator) and component.mount == "bearing"
         if bearing and component.platen_point[:2] != component.base_point[:2]:
-            raise ParameterError(f"{origin}: {component.name}: a bearing actuator must be vertical in the zero-position")
+            raise ParameterError(
+                f"{origin}: {component.name}: a bearing actuator must be vertical in the zero-position"
+            )
         if bearing and abs(component.platen_point[2] - machine.platen.bearing_plane[2]) > 1e-9:
             raise ParameterError(f"{origin}: {component.name}.platen_point must lie in platen.bearing_plane")
     n_platen = machine.platen.bearing_plane

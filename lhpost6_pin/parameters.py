@@ -63,6 +63,20 @@ class Parameters(Mapping[str, Quantity]):
             near = [p for p in self.quantities if p.split(".")[0] == path.split(".")[0]]
             raise UnknownNameError("parameter", path, near or list(self.quantities)) from None
 
+    def number(self, path: str) -> float:
+        """Scalar at `path`; raises UnknownNameError, or ParameterError if it is a vector."""
+        value = self[path].value
+        if isinstance(value, tuple):
+            raise ParameterError(f"{self.origin}: {path} is a vector, not a number")
+        return value
+
+    def vector(self, path: str) -> tuple[float, ...]:
+        """Vector at `path`; raises UnknownNameError, or ParameterError if it is a scalar."""
+        value = self[path].value
+        if not isinstance(value, tuple):
+            raise ParameterError(f"{self.origin}: {path} is a number, not a vector")
+        return value
+
     def __contains__(self, path: object) -> bool:
         """True if there is a quantity at `path`."""
         return path in self.quantities
@@ -219,7 +233,9 @@ def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
         if not isinstance(entry.get(text, ""), str):
             raise ParameterError(f"{key}: {text} must be text")
     value = _number(entry["value"], key)
-    return Quantity(value, entry["unit"], entry["evidence"], entry["source"], _sd(entry, value, key), entry.get("printed"))
+    return Quantity(
+        value, entry["unit"], entry["evidence"], entry["source"], _sd(entry, value, key), entry.get("printed")
+    )
 
 
 def _sd(entry: Mapping[str, Any], value: Value, key: str) -> Value | None:

@@ -12,7 +12,6 @@ One compiled function evaluates all ports of a pose. It is written in body axes,
 """
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,17 +22,32 @@ from .compiled import compiled
 if TYPE_CHECKING:
     from .machine import Machine
 
-__all__ = ["BODY", "LEG", "PLATEN_PORTS", "body_table", "evaluate_ports", "leg_table", "platen_pose", "port_names"]
+__all__ = [
+    "BODY",
+    "LEG",
+    "PLATEN_PORTS",
+    "body_table",
+    "evaluate_ports",
+    "leg_table",
+    "platen_pose",
+    "port_names",
+]
 
 LEG = np.dtype(
     [
-        ("bearing", np.int64),  # 1: the leg stays vertical and the platen slides on it; 0: swivels at both ends
+        (
+            "bearing",
+            np.int64,
+        ),  # 1: the leg stays vertical and the platen slides on it; 0: swivels at both ends
         ("pad", np.int64),  # number of the first of its two pad ports, -1 without
         ("rho", np.float64, 3),  # platen point from B, body axes, control zero-position [m]
         ("base", np.float64, 3),  # base point in {s} [m]
         ("zero_length", np.float64),  # length in the control zero-position [m]
         ("stroke", np.float64),  # largest |s| [m]
-        ("normal_thrust", np.float64),  # bearing: 0 thrust along the vertical (Eq. 4-23), 1 along the normal (3-27)
+        (
+            "normal_thrust",
+            np.float64,
+        ),  # bearing: 0 thrust along the vertical (Eq. 4-23), 1 along the normal (3-27)
     ]
 )
 """Table row of a leg: an actuator or a strut."""
@@ -62,9 +76,8 @@ def leg_table(machine: "Machine") -> NDArray[np.void]:
     """Table of actuators, then struts, as `evaluate_ports` reads it."""
     centre = np.array(machine.platen.centre_of_gravity)
     legs = np.zeros(len(machine.actuators) + len(machine.struts), LEG)
-    components: Sequence = (*machine.actuators, *machine.struts)
     pad = len(legs)
-    for row, component in zip(legs, components, strict=True):
+    for row, component in zip(legs, machine.components, strict=True):
         row["rho"] = np.array(component.platen_point) - centre
         row["base"] = component.base_point
         row["zero_length"] = math.dist(component.platen_point, component.base_point)
@@ -90,7 +103,7 @@ def body_table(machine: "Machine") -> NDArray[np.void]:
 
 
 @compiled
-def platen_pose(q, axes, body, frame):  # type: ignore[no-untyped-def]
+def platen_pose(q, axes, body, frame):
     """Fill rows 0 to 3 of frame from q: the rotation s_R_b and the position of B in {s} [m].
 
     With six free axes q starts with the position of B and a unit quaternion (x, y, z, w); a guided platen has q[0],
@@ -118,7 +131,7 @@ def platen_pose(q, axes, body, frame):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _row(out, i, fx, fy, fz, rx, ry, rz):  # type: ignore[no-untyped-def]
+def _row(out, i, fx, fy, fz, rx, ry, rz):
     """Row of a unit force (fx, fy, fz) at r from B, body axes: (f, r x f)."""
     out[i, 0] = fx
     out[i, 1] = fy
@@ -129,7 +142,7 @@ def _row(out, i, fx, fy, fz, rx, ry, rz):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def evaluate_ports(frame, legs, body, s, J, B):  # type: ignore[no-untyped-def]
+def evaluate_ports(frame, legs, body, s, J, B):
     """Fill s (n,), J (n, 6) and B (n, 6) of all ports at the pose in rows 0 to 3 of frame.
 
     Swivel leg (Eqs. 3-20 to 3-22): s the elongation, J its rate. Bearing leg (Eqs. 3-24, 3-27): the same with the

@@ -15,7 +15,14 @@ from .errors import RecordError
 from .plant import Plant
 from .ports import evaluate_ports
 
-__all__ = ["PlatenMotion", "forward_kinematics", "leg_displacements", "plant_motion", "platen_motion", "rotation"]
+__all__ = [
+    "PlatenMotion",
+    "forward_kinematics",
+    "leg_displacements",
+    "plant_motion",
+    "platen_motion",
+    "rotation",
+]
 
 Array = NDArray[np.float64]
 
@@ -89,14 +96,19 @@ def platen_motion(plant: Plant, q: Array, v: Array, a: Array) -> PlatenMotion:
     r[:, 1, 0], r[:, 1, 1], r[:, 1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
     r[:, 2, 0], r[:, 2, 1], r[:, 2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
     euler = np.stack(
-        [np.arctan2(r[:, 2, 1], r[:, 2, 2]), -np.arcsin(np.clip(r[:, 2, 0], -1, 1)), np.arctan2(r[:, 1, 0], r[:, 0, 0])],
+        [
+            np.arctan2(r[:, 2, 1], r[:, 2, 2]),
+            -np.arcsin(np.clip(r[:, 2, 0], -1, 1)),
+            np.arctan2(r[:, 1, 0], r[:, 0, 0]),
+        ],
         axis=1,
     )
     rho = plant.body[0]["rho_c"]
     linear, omega = v[:, :3], v[:, 3:6]
     euler_map = _euler_map(euler)
-    rates = np.linalg.solve(euler_map, omega[..., None])[..., 0]
-    seconds = np.linalg.solve(euler_map, (a[:, 3:6] - _turn(_euler_map_rate(euler, rates), rates))[..., None])[..., 0]
+    rates = np.asarray(np.linalg.solve(euler_map, omega[..., None])[..., 0], np.float64)
+    turning = a[:, 3:6] - _turn(_euler_map_rate(euler, rates), rates)
+    seconds = np.linalg.solve(euler_map, turning[..., None])[..., 0]
     velocity_c = linear + np.cross(omega, rho)
     acceleration_c = a[:, :3] + np.cross(a[:, 3:6], rho) + np.cross(omega, velocity_c)
     return PlatenMotion(
@@ -143,7 +155,7 @@ def _quaternion(euler: Array) -> Array:
 
 
 @compiled
-def frame_of_pose(pose, body, frame):  # type: ignore[no-untyped-def]
+def frame_of_pose(pose, body, frame):
     """Rows 0 to 3 of frame from pose (6,): displacement of C and Euler angles (Eqs. 3-5, 3-12)."""
     ca, cb, cg = np.cos(pose[3]), np.cos(pose[4]), np.cos(pose[5])
     sa, sb, sg = np.sin(pose[3]), np.sin(pose[4]), np.sin(pose[5])
@@ -158,7 +170,7 @@ def frame_of_pose(pose, body, frame):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def pose_jacobian(pose, body, frame, J, out):  # type: ignore[no-untyped-def]
+def pose_jacobian(pose, body, frame, J, out):
     """Rates of legs per rate of pose, out (n_legs, 6) (Eq. 3-33), from their rows J per body twist (in frame)."""
     ca, sa, cb, sb = np.cos(pose[3]), np.sin(pose[3]), np.cos(pose[4]), np.sin(pose[4])
     rho = body[0].rho_c
@@ -175,7 +187,7 @@ def pose_jacobian(pose, body, frame, J, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def leg_jacobian(pose, legs, body, s, J, B, frame, out):  # type: ignore[no-untyped-def]
+def leg_jacobian(pose, legs, body, s, J, B, frame, out):
     """Ports s at a pose and the legs' pose Jacobian out (n_legs, 6); J, B, frame are scratch."""
     frame_of_pose(pose, body, frame)
     evaluate_ports(frame, legs, body, s, J, B)
@@ -183,45 +195,52 @@ def leg_jacobian(pose, legs, body, s, J, B, frame, out):  # type: ignore[no-unty
 
 
 @compiled
-def gauss_newton(displacement, pose, axes, legs, body, n_ports, steps, tolerance):  # type: ignore[no-untyped-def]
+def gauss_newton_step(displacement, s, K, axes, pose):
+    """Improve pose (6,) in place by one step towards legs of `displacement` (n,), from their s and K there (Eq. 3-34).
+
+    Only the components in axes move. Returns the largest component of the step [m, rad].
+    """
+    free = axes.size
+    normal = np.zeros((free, free))
+    right = np.zeros(free)
+    for i in range(displacement.size):
+        miss = s[i] - displacement[i]
+        for a in range(free):
+            right[a] += K[i, axes[a]] * miss
+            for b in range(free):
+                normal[a, b] += K[i, axes[a]] * K[i, axes[b]]
+    step = np.linalg.solve(normal, right)
+    largest = 0.0
+    for a in range(free):
+        pose[axes[a]] -= step[a]
+        largest = max(largest, abs(step[a]))
+    return largest
+
+
+@compiled
+def gauss_newton(displacement, pose, axes, legs, body, n_ports, steps, tolerance):
     """Improve pose (6,) in place until its legs fit displacement (n,) (Eqs. 3-29, 3-34); returns the residual norm [m].
 
-    Only the components in axes move. Stops after `steps`, or when a step is below `tolerance` [m, rad].
+    Stops after `steps`, or when a step is below `tolerance` [m, rad].
     """
-    n = displacement.size
     frame = np.zeros((8, 3))
     s = np.zeros(n_ports)
     J = np.zeros((n_ports, 6))
     B = np.zeros((n_ports, 6))
     K = np.zeros((legs.size, 6))
-    free = axes.size
     for _ in range(steps):
         leg_jacobian(pose, legs, body, s, J, B, frame, K)
-        normal = np.zeros((free, free))
-        right = np.zeros(free)
-        for i in range(n):
-            miss = s[i] - displacement[i]
-            for a in range(free):
-                right[a] += K[i, axes[a]] * miss
-                for b in range(free):
-                    normal[a, b] += K[i, axes[a]] * K[i, axes[b]]
-        step = np.linalg.solve(normal, right)
-        largest = 0.0
-        for a in range(free):
-            pose[axes[a]] -= step[a]
-            largest = max(largest, abs(step[a]))
-        if largest < tolerance:
+        if gauss_newton_step(displacement, s, K, axes, pose) < tolerance:
             break
-    frame_of_pose(pose, body, frame)
-    evaluate_ports(frame, legs, body, s, J, B)
+    leg_jacobian(pose, legs, body, s, J, B, frame, K)
     norm = 0.0
-    for i in range(n):
+    for i in range(displacement.size):
         norm += (s[i] - displacement[i]) ** 2
     return np.sqrt(norm)
 
 
 @compiled
-def _track(displacement, axes, legs, body, n_ports, steps, tolerance, pose, residual):  # type: ignore[no-untyped-def]
+def _track(displacement, axes, legs, body, n_ports, steps, tolerance, pose, residual):
     at = np.zeros(6)
     for k in range(displacement.shape[0]):
         residual[k] = gauss_newton(displacement[k], at, axes, legs, body, n_ports, steps, tolerance)
@@ -248,7 +267,7 @@ def forward_kinematics(
 
 
 @compiled
-def _lengths(pose, legs, body, n_ports, out, rates, velocity):  # type: ignore[no-untyped-def]
+def _lengths(pose, legs, body, n_ports, out, rates, velocity):
     frame = np.zeros((8, 3))
     s = np.zeros(n_ports)
     J = np.zeros((n_ports, 6))

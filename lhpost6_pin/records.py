@@ -40,9 +40,7 @@ LAYOUT_VERSION = 1
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 STEP_TOLERANCE = 0.01  # of one sample: how far a time stamp may be from its place
 RATE_TOLERANCE = 1e-4  # relative: 2 ms over 20 s, the least that would spoil a comparison of two records
-DEFLATE_LIMIT = (
-    5000  # no compressed netCDF unpacks to more than this (deflate 1032:1, times int16 to float64)
-)
+DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 1032:1, times int16 to float64)
 
 
 class Channel(NamedTuple):
@@ -90,9 +88,7 @@ class Finding:
 
     def __str__(self) -> str:
         """`channel, sample 12: message (remedy)`."""
-        place = ", ".join(
-            [self.channel] * bool(self.channel) + [f"sample {self.sample}"] * (self.sample is not None)
-        )
+        place = ", ".join([self.channel] * bool(self.channel) + [f"sample {self.sample}"] * (self.sample is not None))
         return f"{place}: " * bool(place) + self.message + f" ({self.remedy})" * bool(self.remedy)
 
 
@@ -136,9 +132,7 @@ def save_record(dataset: xr.Dataset, path: Path | str) -> None:
     _refuse(layout_faults(dataset), str(path))
     plain = dataset.drop_encoding()
     with write_whole(path) as beside:
-        plain.to_netcdf(
-            beside, engine="h5netcdf", encoding={name: {"_FillValue": None} for name in plain.data_vars}
-        )
+        plain.to_netcdf(beside, engine="h5netcdf", encoding={name: {"_FillValue": None} for name in plain.data_vars})
 
 
 def make_record(
@@ -185,9 +179,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     missing = [name for name in names if name not in dataset.variables]
     if missing:
         file = dataset.encoding.get("source", "the record")
-        raise RecordError(
-            f"{file}: has no {', '.join(missing)}; it has {', '.join(map(str, dataset.data_vars))}"
-        )
+        raise RecordError(f"{file}: has no {', '.join(missing)}; it has {', '.join(map(str, dataset.data_vars))}")
 
 
 def _refuse(faults: Sequence[Finding], source: str) -> None:
@@ -281,10 +273,10 @@ def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault
 def _attribute_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
     valves = dataset.attrs.get("valves_per_horizontal_actuator", 1)
     if not (_is_number(valves) and valves in (1, 2)):
-        yield "", None, f"attribute valves_per_horizontal_actuator is {valves!r}", "it must be 1 or 2"
+        yield "", None, f"attribute valves_per_horizontal_actuator is {valves}", "it must be 1 or 2"
     version = dataset.attrs.get("layout_version", LAYOUT_VERSION)
     if not (_is_number(version) and 1 <= version <= LAYOUT_VERSION):
-        yield "", None, f"attribute layout_version is {version!r}", f"known are 1 to {LAYOUT_VERSION}: update"
+        yield "", None, f"attribute layout_version is {version}", f"known are 1 to {LAYOUT_VERSION}: update"
 
 
 def channel_name(variable: xr.DataArray, column: int) -> str:
@@ -297,8 +289,10 @@ def channel_name(variable: xr.DataArray, column: int) -> str:
 
 def same_unit(units: object, wanted: str) -> bool:
     """Whether two unit strings mean the same: `m/s2`, `m s-2`, `meter/second**2` do, `mm` and `m` do not."""
-    if not isinstance(units, str) or units == wanted:
-        return units == wanted
+    if not isinstance(units, str):
+        return False
+    if units == wanted:
+        return True
     ours, theirs = ([_spelled(part) for part in text.split(",")] for text in (units, wanted))
     if len(ours) != len(theirs) or not all(ours):
         return False

@@ -100,7 +100,7 @@ def lumped_inertia(
     centre = np.array(machine.platen.centre_of_gravity)
     alone = pin.Inertia(float(platen_mass[0]), np.zeros(3), np.diag(np.asarray(platen_inertia, float)))
     parts = {"platen": np.array(alone.matrix())}
-    for component in (*machine.actuators, *machine.struts):
+    for component in machine.components:
         lever = np.array(component.platen_point) - centre
         along = np.array(component.platen_point) - np.array(component.base_point)
         along /= np.linalg.norm(along)

@@ -32,7 +32,7 @@ S, SD, DS, FORCE = range(4)
 
 
 @compiled
-def set_twist(v, axes, frame):  # type: ignore[no-untyped-def]
+def set_twist(v, axes, frame):
     """Scatter the platen's free velocities into the twist, rows 4 and 5 of frame."""
     for k in range(3):
         frame[4, k] = 0.0
@@ -43,7 +43,7 @@ def set_twist(v, axes, frame):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def port_rates(J, frame, out):  # type: ignore[no-untyped-def]
+def port_rates(J, frame, out):
     """Port rates J v of the twist in frame."""
     v0, v1, v2 = frame[4, 0], frame[4, 1], frame[4, 2]
     w0, w1, w2 = frame[5, 0], frame[5, 1], frame[5, 2]
@@ -52,7 +52,7 @@ def port_rates(J, frame, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def leg_out_of_stroke(legs, s):  # type: ignore[no-untyped-def]
+def leg_out_of_stroke(legs, s):
     """Number (from 1) of the first leg out of its stroke, -1 if not finite, else 0."""
     for i in range(legs.size):
         if not abs(s[i]) <= legs[i].stroke:
@@ -63,7 +63,7 @@ def leg_out_of_stroke(legs, s):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, motion):  # type: ignore[no-untyped-def]
+def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, motion):
     """Forces at the pose and ports in place, for the velocity V_SEEN; fills port[SD], port[FORCE], force, TAU."""
     set_twist(motion[V_SEEN], axes, frame)
     port_rates(JB[0], frame, port[SD])
@@ -77,7 +77,7 @@ def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, mot
 
 
 @compiled
-def pose_stage(q, axes, legs, body, frame, port, JB):  # type: ignore[no-untyped-def]
+def pose_stage(q, axes, legs, body, frame, port, JB):
     """Ports at the pose q; returns the stage's status."""
     platen_pose(q, axes, body, frame)
     evaluate_ports(frame, legs, body, port[S], JB[0], JB[1])
@@ -85,7 +85,7 @@ def pose_stage(q, axes, legs, body, frame, port, JB):  # type: ignore[no-untyped
 
 
 @compiled
-def open_step(motion, dt):  # type: ignore[no-untyped-def]
+def open_step(motion, dt):
     """Semi-implicit, start of a run: V_MID half a kick on from V, and the drift DQ."""
     for k in range(motion.shape[1]):
         motion[V_MID, k] = motion[V, k] + 0.5 * dt * motion[A, k]
@@ -93,7 +93,7 @@ def open_step(motion, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def kick(motion, acceleration, dt):  # type: ignore[no-untyped-def]
+def kick(motion, acceleration, dt):
     """Semi-implicit: close the step with the acceleration at its end (V, A), open the next (V_MID, DQ)."""
     for k in range(motion.shape[1]):
         a = acceleration[k]
@@ -105,7 +105,7 @@ def kick(motion, acceleration, dt):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def staggered_stage(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, force, motion):  # type: ignore[no-untyped-def]
+def staggered_stage(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, force, motion):
     """Semi-implicit, after the drift to q: hidden states over the step, then forces at its end.
 
     On entry JB and port[S] are those of the step's start. Each port's slip is the mean of
@@ -129,7 +129,7 @@ def staggered_stage(q, dt, axes, legs, body, rows, damping, spool, supply, frame
 
 
 @compiled
-def rates_stage(q, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion):  # type: ignore[no-untyped-def]
+def rates_stage(q, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion):
     """Euler, RK4: forces and rates of hidden states at (q, V_SEEN, z)."""
     status = pose_stage(q, axes, legs, body, frame, port, JB)
     if status != 0:
@@ -140,7 +140,7 @@ def rates_stage(q, axes, legs, body, rows, damping, spool, supply, frame, port, 
 
 
 @compiled
-def spool_windows(command, first, sample, delays, rate, spool):  # type: ignore[no-untyped-def]
+def spool_windows(command, first, sample, delays, rate, spool):
     """Spools over the model steps of one controller sample: the command delayed, averaged over each step.
 
     command (n, nu) is held over each controller sample; row 0 is controller sample `first`, earlier ones repeat it.
@@ -162,7 +162,7 @@ def spool_windows(command, first, sample, delays, rate, spool):  # type: ignore[
 
 
 @compiled
-def dexp_inverse(step, v, out):  # type: ignore[no-untyped-def]
+def dexp_inverse(step, v, out):
     """Rate of the local coordinates `step` whose pose moves with body twist v; six components, linear first.
 
     The series of the right-trivialised inverse differential of the exponential on SE(3): v + [x, v]/2 + [x, [x, v]]/12;
@@ -177,7 +177,7 @@ def dexp_inverse(step, v, out):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _bracket(x, y, out):  # type: ignore[no-untyped-def]
+def _bracket(x, y, out):
     """Lie bracket of twists, linear first: (w_x x v_y + v_x x w_y, w_x x w_y)."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3

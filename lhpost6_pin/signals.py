@@ -191,9 +191,7 @@ def hold(x: ArrayLike, rate_old: float, rate_new: float) -> Array:
 
 
 # ---------------------------------------------------------------------------------------------- helpers
-def _filtered(
-    x: Array, dt: float, response: Callable[[Array], NDArray[Any]], keep_chord: bool = True
-) -> Array:
+def _filtered(x: Array, dt: float, response: Callable[[Array], NDArray[Any]], keep_chord: bool = True) -> Array:
     """Apply a frequency response to x less its chord, continued by odd reflection; put the chord back.
 
     The chord joins the first and last value. What is left vanishes at both ends, so its odd reflection is

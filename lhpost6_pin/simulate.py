@@ -167,7 +167,9 @@ def _check(plant: Plant, drive: OpenLoop | ClosedLoop, samples: int, scheme: str
     if engine not in ENGINES:
         raise SimulationError(f"no engine named {engine!r}; valid names: {', '.join(ENGINES)}")
     if rate < SAMPLE_RATE or rate % SAMPLE_RATE:
-        raise SimulationError(f"{rate} model steps a second do not divide the controller's 1/{SAMPLE_RATE} s; use a multiple")
+        raise SimulationError(
+            f"{rate} model steps a second do not divide the controller's 1/{SAMPLE_RATE} s; use a multiple"
+        )
     if samples < 1:
         raise SimulationError("nothing to simulate: the drive has no sample")
     steps = rate // SAMPLE_RATE
@@ -268,7 +270,14 @@ def _run_fused(
         loop = drive.controller
         tables = (True, loop.axis, loop.actuator, loop.balance, loop.fresh_memory(), drive.reference)
     else:
-        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 12)))
+        tables = (
+            False,
+            np.zeros(1, AXIS),
+            np.zeros(1, ACTUATOR),
+            np.zeros((1, 1)),
+            np.zeros((1, 1)),
+            np.zeros((1, 12)),
+        )
     clipped = 0
     for first in range(0, samples, _CHUNK):
         last = min(first + _CHUNK, samples)
@@ -337,4 +346,3 @@ def _accelerations(plant: Plant, q: Array, v: Array, z: Array) -> Array:
             break
         out[k] = ws.motion[A]
     return out
-

@@ -14,7 +14,14 @@ from .laws.bouc_wen import advance as bouc_wen_advance
 from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
 from .laws.bouc_wen import friction_force
 from .laws.bouc_wen import rate as bouc_wen_rate
-from .laws.chamber import advance_double, advance_single, chamber_rate, flows_double, flows_single, piston_force
+from .laws.chamber import (
+    advance_double,
+    advance_single,
+    chamber_rate,
+    flows_double,
+    flows_single,
+    piston_force,
+)
 from .laws.orifice import opening
 from .laws.strut import strut_force
 from .laws.viscous import viscous_force
@@ -23,7 +30,7 @@ __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
 
 
 @compiled
-def state_rates(rows, s, sd, spool, supply, z, zd):  # type: ignore[no-untyped-def]
+def state_rates(rows, s, sd, spool, supply, z, zd):
     """Fill zd (n_states,) with the rates of all hidden states (schemes `euler` and `rk4`)."""
     for i in range(rows.size):
         row = rows[i]
@@ -51,7 +58,7 @@ def state_rates(rows, s, sd, spool, supply, z, zd):  # type: ignore[no-untyped-d
 
 
 @compiled
-def advance_states(rows, s, ds, dt, spool, supply, z):  # type: ignore[no-untyped-def]
+def advance_states(rows, s, ds, dt, spool, supply, z):
     """Advance z in place over one step in which the ports move by ds from s (scheme `semi_implicit`).
 
     This is the one-step rule that inverse dynamics marches along a measured motion, too.
@@ -93,12 +100,24 @@ def advance_states(rows, s, ds, dt, spool, supply, z):  # type: ignore[no-untype
         elif law == HYDRAULIC_SINGLE:
             opened = opening(spool[row.input], p[6])
             z[k] = advance_single(
-                opened, z[k], p[8] + s[a], ds[a], dt, p[0], p[2], p[4], p[7], p[10], supply[0], supply[1], p[11]
+                opened,
+                z[k],
+                p[8] + s[a],
+                ds[a],
+                dt,
+                p[0],
+                p[2],
+                p[4],
+                p[7],
+                p[10],
+                supply[0],
+                supply[1],
+                p[11],
             )
 
 
 @compiled
-def apply_forces(rows, s, sd, z, force, port_force):  # type: ignore[no-untyped-def]
+def apply_forces(rows, s, sd, z, force, port_force):
     """Fill the ledger force (n_rows, 2) and its sum per port."""
     port_force[:] = 0.0
     for i in range(rows.size):
@@ -130,7 +149,7 @@ def apply_forces(rows, s, sd, z, force, port_force):  # type: ignore[no-untyped-
 
 
 @compiled
-def wrench_on_platen(frame, body, B, port_force):  # type: ignore[no-untyped-def]
+def wrench_on_platen(frame, body, B, port_force):
     """Fill rows 6 and 7 of frame: total wrench at B in platen axes [N, N m] (Eq. 4-24 less the Inertia's weight).
 
     Sum of the ports, the weight beyond the Inertia's, (m_z - m_0) R^T (0, 0, -g), and the bias of the directional

@@ -5,17 +5,17 @@ Per degree of freedom a velocity is asked for,
     u = Kvf vr + Kx (xr - xf) + sat(Ki int (xr - xf)) - KF HP(f)
 
 xr, vr reference displacement and velocity [m, rad and per s], xf the platen's displacement from the actuators' by
-forward kinematics, f the actuators' force on that degree of freedom, HP a first-order high-pass. The actuators' rates
-follow by the kinematic Jacobian at xf (Eq. 3-33). In the directions of force that do not move the platen a velocity
-lets internal forces decay. Each rate becomes a spool by the inverse of the valve's flow curve (Eq. 4-2) and its
-unloaded speed; a bias feeds the leak at rest.
+forward kinematics (one Gauss-Newton step a sample), f the actuators' force on that degree of freedom, HP a first-order
+high-pass. The actuators' rates follow by the kinematic Jacobian at xf (Eq. 3-33). In the directions of force that do
+not move the platen a velocity lets internal forces decay. Each rate becomes a spool by the inverse of the valve's flow
+curve (Eq. 4-2) and its unloaded speed; a bias feeds the leak at rest.
 """
 
 import numpy as np
 
 from ..compiled import compiled
 from ..laws.orifice import spool_for_opening
-from ..pose import gauss_newton, leg_jacobian
+from ..pose import gauss_newton_step, leg_jacobian
 
 __all__ = ["ACTUATOR", "AXIS", "MEMORY_ROWS", "control_step"]
 
@@ -48,7 +48,7 @@ _POSE, _RESET, _FORCE, _HIGH_PASSED = range(MEMORY_ROWS)
 
 
 @compiled
-def control_step(sample, reference, displacement, force, legs, body, axes, axis, actuator, balance, memory, command):  # type: ignore[no-untyped-def]
+def control_step(sample, reference, displacement, force, legs, body, axes, axis, actuator, balance, memory, command):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
     reference (n, 12): displacement and velocity of C and Euler angles per sample; displacement (n_ports,) the ports,
@@ -57,13 +57,13 @@ def control_step(sample, reference, displacement, force, legs, body, axes, axis,
     n = command.size
     ports = displacement.size
     pose = memory[_POSE]
-    gauss_newton(displacement[:n], pose[:6], axes, legs, body, ports, 2, 1e-12)
     s = np.empty(ports)
     J = np.empty((ports, 6))
     B = np.empty((ports, 6))
     K = np.empty((legs.size, 6))
     frame = np.empty((8, 3))
     leg_jacobian(pose, legs, body, s, J, B, frame, K)
+    gauss_newton_step(displacement[:n], s, K, axes, pose)
     rate = np.zeros(n)
     for a in range(axes.size):
         k = axes[a]

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equilibrium import Equilibrium, hydraulic_rows
-from ..errors import ParameterError
 from ..effects import HYDRAULIC_DOUBLE
+from ..equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
+from ..errors import ParameterError
 from ..files import models_folder
 from ..parameters import Parameters, load_parameters
 from ..plant import Plant
@@ -87,7 +87,7 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: LoopSettings) -> 
     rows = plant.rows[hydraulic_rows(plant)]
     actuator = np.zeros(n, ACTUATOR)
     for row, out, force, spool in zip(rows, actuator, rest.force, rest.spool, strict=True):
-        out["extend"], out["retract"] = _unloaded_speeds(row, float(force), plant.supply)
+        out["extend"], out["retract"] = unloaded_speeds(row, float(force), plant.supply)
         out["flow_curve"], out["bias"], out["force"] = row["p"][6], spool, force
     oil = np.array([_oil_stiffness(row) for row in rows])
     stiffness = (jacobian.T * oil) @ jacobian
@@ -112,24 +112,6 @@ def _oil_stiffness(row: np.void) -> float:
     area_a, area_b, chamber_a, chamber_b, bulk = (float(row["p"][i]) for i in (0, 1, 8, 9, 10))
     stiffness = bulk * area_a / chamber_a
     return stiffness + (bulk * area_b / chamber_b if row["law"] == HYDRAULIC_DOUBLE else 0.0)
-
-
-def _unloaded_speeds(row: np.void, force: float, supply: Array) -> tuple[float, float]:
-    """Steady piston speeds [m/s] at full opening under the rest force: extending, retracting (Eqs. 4-2, 4-5)."""
-    area_a, area_b, k_pa, k_bt, k_at, k_pb = (float(v) for v in row["p"][:6])
-    high, low = supply
-    if row["law"] != HYDRAULIC_DOUBLE:
-        pressure = force / area_a
-        return k_pa * np.sqrt(high - pressure) / area_a, k_at * np.sqrt(pressure - low) / area_a
-    speeds = []
-    for sign, a_in, b_in in ((1.0, k_pa, k_bt), (-1.0, k_at, k_pb)):
-        # speed^2 = (a_in/A_1)^2 drop_A = (b_in/A_2)^2 drop_B and P_A A_1 - P_B A_2 = force
-        a, b = (a_in / area_a) ** 2, (b_in / area_b) ** 2
-        source_a, source_b = (high, low) if sign > 0.0 else (low, high)
-        matrix = np.array([[a, b], [area_a, -area_b]])
-        pressure_a, _ = np.linalg.solve(matrix, np.array([a * source_a + b * source_b, force]))
-        speeds.append(float(np.sqrt(a * abs(source_a - pressure_a))))
-    return speeds[0], speeds[1]
 
 
 def _mass_about_c(plant: Plant) -> Array:

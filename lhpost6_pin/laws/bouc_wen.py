@@ -77,9 +77,7 @@ def _crossing(z: float, a: float, curvature: float, slope: float, t: float) -> f
 
 
 @compiled
-def advance(
-    dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, shape: float
-) -> tuple[float, float]:
+def advance(dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, shape: float) -> tuple[float, float]:
     """Z_x and Z_y after a straight slip (dx, dy) [m]: the exact solution of Eq. 4-9, whatever the step.
 
     While no product v_i Z_i changes sign H is linear in Z, dZ/dt = a - (b.Z) Z, a = slip/Y, b_i = a_i where slip

@@ -37,7 +37,13 @@ def opening(spool: float, flow_curve: float) -> float:
 
 @compiled
 def port_flow(
-    opened: float, k_supply: float, k_return: float, supply: float, back: float, chamber: float, linear_below: float
+    opened: float,
+    k_supply: float,
+    k_return: float,
+    supply: float,
+    back: float,
+    chamber: float,
+    linear_below: float,
 ) -> tuple[float, float]:
     """Flow from the valve into one chamber [m3/s] and its slope with the chamber's pressure [m3/s/Pa] (Eq. 4-2).
 

@@ -93,8 +93,7 @@ def ac156(
         )
         if deviation > tolerance:
             _log.warning(
-                "%s, axis %s: spectrum is up to %.2f times off the middle of AC156's tolerance; "
-                "try another seed",
+                "%s, axis %s: spectrum is up to %.2f times off the middle of AC156's tolerance; try another seed",
                 name,
                 axis,
                 np.exp(deviation),
@@ -121,8 +120,10 @@ def _matched_noise(
     rounded off before the band-pass. Where the deviation stays larger, new phases are drawn. Returns the best
     motion and its deviation.
     """
+    from scipy.fft import next_fast_len
+
     step = time[1] - time[0]
-    count = 2 * len(time)  # zeros behind the motion keep the filter from wrapping round
+    count = next_fast_len(2 * len(time), real=True)  # zeros behind the motion keep the filter from wrapping round
     frequency = np.fft.rfftfreq(count, step)
     ratio = (frequency / band[0]) ** 8
     gain = ratio / (1 + ratio) / (1 + (frequency / band[1]) ** 16)

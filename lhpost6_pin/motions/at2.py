@@ -26,9 +26,7 @@ _UNITS = re.compile(r"ACCELERATION\b.*\bUNITS\s+OF\s+(\S+)", re.IGNORECASE)
 
 def is_at2(text: str) -> bool:
     """Whether the text has the point count and time step of a PEER file in its first lines."""
-    return any(
-        pattern.search(line[:_WIDEST]) for line in text.splitlines()[:6] for pattern in _COUNT_AND_STEP
-    )
+    return any(pattern.search(line[:_WIDEST]) for line in text.splitlines()[:6] for pattern in _COUNT_AND_STEP)
 
 
 def load_at2(
@@ -100,7 +98,5 @@ def _parse_at2(text: str, where: str) -> tuple[float, np.ndarray]:
     except MotionError as error:
         raise MotionError(f"{where}, line {number}: {error}") from None
     if quantity != "acceleration":
-        raise MotionError(
-            f"{where}, line {number}: unit {unit[1]} is no acceleration; use the .AT2 file in g"
-        )
+        raise MotionError(f"{where}, line {number}: unit {unit[1]} is no acceleration; use the .AT2 file in g")
     return step, values

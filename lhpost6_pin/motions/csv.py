@@ -51,9 +51,7 @@ def load_csv(
     """
     where = str(path)
     lines = read_text(path).splitlines()
-    start = next(
-        (i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), None
-    )
+    start = next((i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), None)
     if start is None:
         raise MotionError(f"{where}: no header row; the first line that is no comment must name the columns")
     separator = next((mark for mark in ";\t" if mark in lines[start]), ",")
@@ -69,9 +67,7 @@ def load_csv(
     quantities: dict[str, str] = {}
     for channel in chosen:
         try:
-            data[channel.axis], quantities[channel.axis] = to_si(
-                table[:, channel.column], channel.unit, channel.axis
-            )
+            data[channel.axis], quantities[channel.axis] = to_si(table[:, channel.column], channel.unit, channel.axis)
         except MotionError as error:
             raise MotionError(f"{where}, column {names[channel.column]!r}: {error}") from None
     if len(set(quantities.values())) > 1:
@@ -94,9 +90,7 @@ def _channels(
             if axis not in AXES:
                 raise MotionError(f"{where}: columns= names axis {axis!r}; axes are {', '.join(AXES)}")
             if column not in names:
-                raise MotionError(
-                    f"{where}: no column {column!r} for axis {axis}; columns are {', '.join(names)}"
-                )
+                raise MotionError(f"{where}: no column {column!r} for axis {axis}; columns are {', '.join(names)}")
             match = _COLUMN.fullmatch(column)
             chosen.append(_Channel(axis, names.index(column), _unit(match, axis, units)))
     else:
@@ -111,9 +105,7 @@ def _channels(
                 )
             axis = _AXIS_NAMES[match["axis"].lower()]
             if axis in (channel.axis for channel in chosen):
-                raise MotionError(
-                    f"{where}: two columns for axis {axis}; choose with columns={{axis: column}}"
-                )
+                raise MotionError(f"{where}: two columns for axis {axis}; choose with columns={{axis: column}}")
             chosen.append(_Channel(axis, index, _unit(match, axis, units)))
     if not chosen:
         raise MotionError(f"{where}: no column for any axis; call them such as x_m_s2, ay_g, z_m, roll_rad")
@@ -137,9 +129,7 @@ def _unit(match: "re.Match[str] | None", axis: str, units: "str | Mapping[str, s
 def _table(lines: list[str], start: int, separator: str, names: list[str], where: str) -> np.ndarray:
     """All rows (n, columns); the slow reading of a faulty file only serves to name the place."""
     numbered = [
-        (i + 1, line)
-        for i, line in enumerate(lines[start:], start)
-        if line.strip() and line.lstrip()[0] != "#"
+        (i + 1, line) for i, line in enumerate(lines[start:], start) if line.strip() and line.lstrip()[0] != "#"
     ]
     if len(numbered) < 2:
         raise MotionError(f"{where}: {len(numbered)} row(s) of numbers; a motion needs at least 2")
@@ -152,9 +142,7 @@ def _table(lines: list[str], start: int, separator: str, names: list[str], where
     for number, line in numbered:
         fields = line.split(separator)
         if len(fields) != len(names):
-            raise MotionError(
-                f"{where}, line {number}: {len(fields)} fields, the header has {len(names)}; correct it"
-            )
+            raise MotionError(f"{where}, line {number}: {len(fields)} fields, the header has {len(names)}; correct it")
         for column, field in zip(names, fields, strict=True):
             try:
                 value = float(field)
@@ -165,8 +153,7 @@ def _table(lines: list[str], start: int, separator: str, names: list[str], where
                 ) from None
             if not np.isfinite(value):
                 raise MotionError(
-                    f"{where}, line {number}, column {column!r}: value is {value}; "
-                    "fill the gap or cut the record there"
+                    f"{where}, line {number}, column {column!r}: value is {value}; fill the gap or cut the record there"
                 )
     raise MotionError(f"{where}: cannot be read as a table of numbers; check the separator")
 

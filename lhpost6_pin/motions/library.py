@@ -86,9 +86,7 @@ def find_motion(name: str, **options: Any) -> GroundMotion:
     if entry.kind == "package":
         package = index["package"]
         number = package["records"][entry.name]["number"]
-        return load_pulse_record(
-            package["module"], package["file"], number, name=entry.name, title=entry.title
-        )
+        return load_pulse_record(package["module"], package["file"], number, name=entry.name, title=entry.title)
     numbers = values_of(tests, entry.name)
     del numbers["kind"], numbers["title"]
     try:

@@ -57,11 +57,7 @@ class LimitsSummary:
     def highest(self) -> tuple[str, str, float]:
         """Quantity, axis or leg, and value of the highest utilisation."""
         return max(
-            (
-                (quantity, name, value)
-                for quantity, row in self.utilisation.items()
-                for name, value in row.items()
-            ),
+            ((quantity, name, value) for quantity, row in self.utilisation.items() for name, value in row.items()),
             key=lambda item: item[2],
         )
 
@@ -85,8 +81,7 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
     over = sorted((peak for peak in peaks if peak.utilisation > _FULL), key=lambda peak: -peak.utilisation)
     if over:
         lines = "; ".join(
-            f"{peak.name} {peak.quantity} {peak.text} "
-            f"at t = {target.time[peak.sample]:.3f} s (sample {peak.sample})"
+            f"{peak.name} {peak.quantity} {peak.text} at t = {target.time[peak.sample]:.3f} s (sample {peak.sample})"
             for peak in over
         )
         raise OutOfRangeError(

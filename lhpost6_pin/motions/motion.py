@@ -34,9 +34,7 @@ class GroundMotion:
     def __post_init__(self) -> None:
         """Refuse what cannot be a motion."""
         if self.quantity not in QUANTITIES:
-            raise MotionError(
-                f"{self.name}: quantity is {self.quantity!r}; use one of {', '.join(QUANTITIES)}"
-            )
+            raise MotionError(f"{self.name}: quantity is {self.quantity!r}; use one of {', '.join(QUANTITIES)}")
         if not (np.isfinite(self.time_step) and self.time_step > 0):
             raise MotionError(f"{self.name}: time step is {self.time_step} s; it must be positive")
         samples = np.array(self.samples, dtype=float)

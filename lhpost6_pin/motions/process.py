@@ -130,16 +130,13 @@ def make_target(
         extended = _extend_acceleration(channels, ends, total, round(settings["taper"] / motion.time_step))
     else:
         extended = _extend_displacement(channels, ends, total)
-    series = _filtered_displacement(
-        extended, motion.time_step, acceleration_given, high_pass, low_pass, settings
-    )
+    series = _filtered_displacement(extended, motion.time_step, acceleration_given, high_pass, low_pass, settings)
     begin = int(ends * step) - round(pad * rate)
     count = round((len(channels) - 1) * float(step)) + 2 * round(pad * rate) + 1
     size = int(total * step)
     angular = 2 * np.pi * np.fft.rfftfreq(total, motion.time_step)[:, None]
     d, v, a = (
-        _evaluate(series * factor, total, size)[begin : begin + count]
-        for factor in (1.0, 1j * angular, -(angular**2))
+        _evaluate(series * factor, total, size)[begin : begin + count] for factor in (1.0, 1j * angular, -(angular**2))
     )
     w, w1, w2 = _rest_window(count, round(pad * rate), rate)
     moved = np.isin(AXES, [axis for axis, _ in pairs])
@@ -193,15 +190,12 @@ def _cut(motion: GroundMotion, window: tuple[float, float] | None) -> tuple[int,
     begin, end = window
     if not 0 <= begin < end <= motion.duration + motion.time_step / 2:
         raise MotionError(
-            f"{motion.name}: window {begin:g} to {end:g} s does not lie in the record, "
-            f"0 to {motion.duration:g} s"
+            f"{motion.name}: window {begin:g} to {end:g} s does not lie in the record, 0 to {motion.duration:g} s"
         )
     first, last = round(begin / motion.time_step), round(end / motion.time_step) + 1
     last = min(last, len(motion.samples))
     if last - first < 2:
-        raise MotionError(
-            f"{motion.name}: window {begin:g} to {end:g} s holds fewer than 2 samples; widen it"
-        )
+        raise MotionError(f"{motion.name}: window {begin:g} to {end:g} s holds fewer than 2 samples; widen it")
     return first, last
 
 

@@ -14,9 +14,7 @@ from lhpost6_pin.motions.v1 import is_v1, load_v1
 __all__ = ["load_motion"]
 
 
-def load_motion(
-    paths: "Path | str | Sequence[Path | str] | Mapping[str, Path | str]", **options: Any
-) -> GroundMotion:
+def load_motion(paths: "Path | str | Sequence[Path | str] | Mapping[str, Path | str]", **options: Any) -> GroundMotion:
     """Read a motion from a PEER .AT2, COSMOS/CSMIP V1 or CSV file, told apart by what is in it.
 
     Several paths (a sequence for x, y, z or a mapping by axis) are components in PEER files. `options` go to

@@ -65,8 +65,7 @@ def sine(
     duration = (cycles + 2 * ramp_cycles) * period
     time = np.arange(round(duration / time_step) + 1) * time_step
     envelope = (
-        smooth_step(time / (ramp_cycles * period))[0]
-        * smooth_step((duration - time) / (ramp_cycles * period))[0]
+        smooth_step(time / (ramp_cycles * period))[0] * smooth_step((duration - time) / (ramp_cycles * period))[0]
     )
     displacement = amplitude * envelope * np.sin(2 * np.pi * time / period)
     return make_motion(name, time_step, {axis: displacement}, "displacement", "sine wave")
@@ -104,9 +103,7 @@ def white_noise(
         noise = np.fft.irfft(np.where(band, np.fft.rfft(generator.standard_normal(len(time))), 0), len(time))
         level = np.sqrt(np.mean(noise[envelope == 1] ** 2))
         channels[axis] = (rms if axis in "xyz" else rotation_rms) / level * envelope * noise
-    return make_motion(
-        name, time_step, channels, "acceleration", f"white noise {low:g} to {high:g} Hz, seed {seed}"
-    )
+    return make_motion(name, time_step, channels, "acceleration", f"white noise {low:g} to {high:g} Hz, seed {seed}")
 
 
 def six_axial(
@@ -137,15 +134,12 @@ def six_axial(
         ]
     )  # (6, 3)
     channels = {
-        axis: _with_peaks(time, row, generator, f"{name}, axis {axis}")
-        for axis, row in zip(AXES, peaks, strict=True)
+        axis: _with_peaks(time, row, generator, f"{name}, axis {axis}") for axis, row in zip(AXES, peaks, strict=True)
     }
     return make_motion(name, time_step, channels, "displacement", f"six-axial synthetic, seed {seed}")
 
 
-def _with_peaks(
-    time: np.ndarray, peaks: np.ndarray, generator: np.random.Generator, where: str
-) -> np.ndarray:
+def _with_peaks(time: np.ndarray, peaks: np.ndarray, generator: np.random.Generator, where: str) -> np.ndarray:
     """Displacement (n,) with the given peaks (3,) of displacement, velocity and acceleration."""
     from scipy.optimize import least_squares
 
@@ -153,10 +147,7 @@ def _with_peaks(
     slow, fast = velocity / displacement, acceleration / velocity  # [rad/s]
     for _attempt in range(20):
         waves = np.stack(
-            [
-                _wavelet(time, angular, generator)
-                for angular in (0.8 * slow, np.sqrt(slow * fast), 1.25 * fast)
-            ],
+            [_wavelet(time, angular, generator) for angular in (0.8 * slow, np.sqrt(slow * fast), 1.25 * fast)],
             axis=-1,
         )  # (3 derivatives, n, 3 wavelets)
 
@@ -167,9 +158,7 @@ def _with_peaks(
         found = least_squares(misfit, start, xtol=1e-12, ftol=1e-12)
         if np.abs(found.fun).max() < 1e-6:
             return waves[0] @ np.exp(found.x)
-    raise MotionError(
-        f"{where}: no motion found with peaks {peaks}; peak velocity is too large or too small for them"
-    )
+    raise MotionError(f"{where}: no motion found with peaks {peaks}; peak velocity is too large or too small for them")
 
 
 def _wavelet(time: np.ndarray, angular: float, generator: np.random.Generator) -> np.ndarray:

@@ -50,6 +50,4 @@ def _number(token: str, where: str, line: int) -> float:
     try:
         return float(token)
     except ValueError:
-        raise MotionError(
-            f"{where}, line {line}: {token.strip()[:40]!r} is not a number; correct it"
-        ) from None
+        raise MotionError(f"{where}, line {line}: {token.strip()[:40]!r} is not a number; correct it") from None

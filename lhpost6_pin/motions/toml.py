@@ -27,9 +27,7 @@ def values_of(table: dict[str, Any], section: str) -> dict[str, Any]:
         try:
             found[key] = _si(entry["value"], entry["unit"])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise MotionError(
-                f"tests.toml, [{section}] {key}: {error!r}; write {{ value, unit, source }}"
-            ) from error
+            raise MotionError(f"tests.toml, [{section}] {key}: {error!r}; write {{ value, unit, source }}") from error
     return found
 
 

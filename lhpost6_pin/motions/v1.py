@@ -8,6 +8,7 @@ the announcement; the COSMOS form (v01.20) gives the interval in the real header
 import logging
 import re
 from collections.abc import Iterator, Mapping
+from itertools import takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,9 +27,7 @@ _FORMAT = r"Format\s*[:=]?\s*\(\s*(?P<per_line>\d{1,3})[FIEfie](?P<width>\d{1,2}
 _HEADER = re.compile(
     rf"^\s*(\d{{1,9}})\s+(Integer|Real)-header values follow on\s+(\d{{1,9}})\s+lines.*?{_FORMAT}", re.I
 )
-_DATA = re.compile(
-    rf"^\s*(?P<count>\d{{1,9}})\s+.*?(?:accel\w*).*?(?:points|pts)\b(?P<about>.*?){_FORMAT}", re.I
-)
+_DATA = re.compile(rf"^\s*(?P<count>\d{{1,9}})\s+.*?(?:accel\w*).*?(?:points|pts)\b(?P<about>.*?){_FORMAT}", re.I)
 _RATE = re.compile(r"at\s+(\d*\.?\d+)\s*pts/sec", re.I)
 _UNIT = re.compile(r"units\s*(?:of|=)\s*([^\s,(]+?)\.?(?=[\s,(]|$)", re.I)
 _CHANNEL = re.compile(r"Chan\s+(\d{1,9}):\s*(\d{1,4}\s*deg|up|down|[^()]*?)\s*(?:\(|Location|$)", re.I)
@@ -75,9 +74,7 @@ def make_v1_motion(
     by_axis: dict[str, np.ndarray] = {}
     steps = {channel.time_step for channel in found}
     if len(steps) != 1:
-        raise MotionError(
-            f"{where}: channels have different time steps {sorted(steps)} s; give channels of one rate"
-        )
+        raise MotionError(f"{where}: channels have different time steps {sorted(steps)} s; give channels of one rate")
     if channels:
         missing = sorted(set(channels) - {channel.number for channel in found})
         if missing:
@@ -126,9 +123,7 @@ def _channels(lines: "list[str]", where: str) -> Iterator[V1Channel]:
         at += 1
         if block := _HEADER.match(line):
             end = at + int(block[3])
-            headers[block[2].lower()] = parse_fixed_width(
-                lines[at:end], _width(block, where, at), where, at + 1
-            )
+            headers[block[2].lower()] = parse_fixed_width(lines[at:end], _width(block, where, at), where, at + 1)
             at = min(end, len(lines))
         elif data := _DATA.match(line):
             found += 1
@@ -137,8 +132,8 @@ def _channels(lines: "list[str]", where: str) -> Iterator[V1Channel]:
             per_line, count = int(data["per_line"]), int(data["count"])
             if not per_line or not count:
                 raise MotionError(f"{here}, line {at}: announces no data; leave this channel out")
-            end = at + -(-count // per_line)
-            values = parse_fixed_width(lines[at:end], _width(data, here, at), here, at + 1)
+            rows = list(takewhile(_is_data, lines[at : at + -(-count // per_line)]))
+            values = parse_fixed_width(rows, _width(data, here, at), here, at + 1)
             if len(values) != count:
                 raise MotionError(
                     f"{here}, line {at}: announces {count} points, {len(values)} follow; "
@@ -150,9 +145,14 @@ def _channels(lines: "list[str]", where: str) -> Iterator[V1Channel]:
                 _step(data, headers, here, at),
                 _si(values, data, here, at),
             )
-            at, headers, label = end, {}, None
+            at, headers, label = at + len(rows), {}, None
         elif channel := _CHANNEL.search(line):
             label = label or channel
+
+
+def _is_data(line: str) -> bool:
+    """Whether the line is not yet the one that ends the channel."""
+    return not line.lower().startswith(("/&", "end"))
 
 
 def _width(match: "re.Match[str]", where: str, line: int) -> int:
@@ -171,9 +171,7 @@ def _step(data: "re.Match[str]", headers: "dict[str, np.ndarray]", where: str, l
         return float(real[61]) / 1000  # [ms] in the file
     if len(real) > 33 and real[33] > 0:
         return float(real[33])
-    raise MotionError(
-        f"{where}, line {line}: no sampling rate here nor in the real header; convert the file to CSV"
-    )
+    raise MotionError(f"{where}, line {line}: no sampling rate here nor in the real header; convert the file to CSV")
 
 
 def _si(values: np.ndarray, data: "re.Match[str]", where: str, line: int) -> np.ndarray:
@@ -183,9 +181,7 @@ def _si(values: np.ndarray, data: "re.Match[str]", where: str, line: int) -> np.
     try:
         values, quantity = to_si(values, unit[1], "x")
     except MotionError as error:
-        raise MotionError(
-            f"{where}, line {line}: {error}; raw counts need a V1 file in g or cm/s^2"
-        ) from None
+        raise MotionError(f"{where}, line {line}: {error}; raw counts need a V1 file in g or cm/s^2") from None
     if quantity != "acceleration":
         raise MotionError(f"{where}, line {line}: unit {unit[1]!r} is no acceleration")
     return values

@@ -1,7 +1,7 @@
 """Self-contained HTML reports: one page design for every command that reports something.
 
-`page` knows how a report looks, `plots` turns channels into light interactive figures, `run_metrics` and
-`run_report` say what a simulated or measured test is judged by.
+`page` knows how a report looks and `plots` turns channels into light interactive figures; the `run_*` modules
+say what one test is judged by. A report of another kind is another set of sections on the same `Page`.
 """
 
 from lhpost6_pin.report.run_report import write_run_report

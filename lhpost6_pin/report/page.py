@@ -158,9 +158,7 @@ def table(caption: str, header: Sequence[str], rows: Iterable[Sequence[object]])
     """Return a table whose first column heads its rows; it scrolls sideways inside its own box."""
     head = "".join(f'<th scope="col">{text(name)}</th>' for name in header)
     body = "".join(
-        f'<tr><th scope="row">{text(row[0])}</th>'
-        + "".join(f"<td>{text(cell)}</td>" for cell in row[1:])
-        + "</tr>"
+        f'<tr><th scope="row">{text(row[0])}</th>' + "".join(f"<td>{text(cell)}</td>" for cell in row[1:]) + "</tr>"
         for row in rows
     )
     return Markup(
@@ -264,9 +262,7 @@ def _repeat(page: Page) -> list[Markup]:
     blocks = []
     if page.command:
         blocks.append(
-            Markup(
-                f"<pre tabindex='0' aria-label='Command to repeat'><code>{text(page.command)}</code></pre>"
-            )
+            Markup(f"<pre tabindex='0' aria-label='Command to repeat'><code>{text(page.command)}</code></pre>")
         )
     blocks.append(table("Versions", ("Software", "Version"), page.versions.items()))
     return blocks

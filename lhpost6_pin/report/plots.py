@@ -91,9 +91,7 @@ class Trace:
     name: str
     values: NDArray[np.float64]
     line: Mapping[str, Any]
-    folded: str = (
-        ""  # not drawn until this entry of the legend, shared by all of the row with the same, is switched on
-    )
+    folded: str = ""  # not drawn until this entry of the legend, shared by all of the row with the same, is switched on
 
 
 @dataclass(frozen=True)

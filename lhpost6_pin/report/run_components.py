@@ -73,25 +73,15 @@ def spool_blocks(record: xr.Dataset, spools: Sequence[SpoolUse]) -> list[Markup]
     shown = [name for name in names if name in record]
     if not shown:
         return [missing(names, "Servovalves are not drawn.")]
-    blocks = (
-        [missing([n for n in names if n not in record], "Only the other is drawn.")]
-        if len(shown) == 1
-        else []
-    )
+    blocks = [missing([n for n in names if n not in record], "Only the other is drawn.")] if len(shown) == 1 else []
     rows = _group_rows(record, "Spool", shown[0], "actuator", SCALES["ratio"])
     words = "Fourth-stage spool as a share of its stroke, against its limits ±1."
     if len(shown) == 2:
         commands = _group_rows(record, "Spool", shown[1], "actuator", SCALES["ratio"])
-        rows = [
-            replace(f, traces=[*f.traces, *map(_command, c.traces)])
-            for f, c in zip(rows, commands, strict=True)
-        ]
+        rows = [replace(f, traces=[*f.traces, *map(_command, c.traces)]) for f, c in zip(rows, commands, strict=True)]
         words += " Lines are feedback; dotted commands can be switched on in the legend."
     rows = [replace(row, lines={"+1": 1.0, "−1": -1.0}, span=(-1.25, 1.25)) for row in rows]
-    used = [
-        [s.actuator, bar(s.peak), f"{number(100 * s.rms)} %", f"{number(100 * s.saturated)} %"]
-        for s in spools
-    ]
+    used = [[s.actuator, bar(s.peak), f"{number(100 * s.rms)} %", f"{number(100 * s.saturated)} %"] for s in spools]
     header = ("Actuator", "Largest opening", "RMS opening", "Time at the limit")
     drawing = draw_over_time(record, "spool", "Servovalve spools over time", words, rows)
     return [*blocks, table("Valve utilisation", header, used), drawing]
@@ -144,9 +134,7 @@ def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Markup:
 
 
 def _with_supply(row: Row, supply: NDArray[np.float64]) -> Row:
-    far = max(np.nanmax(trace.values, initial=0.0) for trace in row.traces) < OFF_SCALE * np.nanmax(
-        supply, initial=0.0
-    )
+    far = max(np.nanmax(trace.values, initial=0.0) for trace in row.traces) < OFF_SCALE * np.nanmax(supply, initial=0.0)
     return replace(row, traces=[*row.traces, Trace("supply", supply, SUPPLY, folded="supply" if far else "")])
 
 

@@ -78,9 +78,7 @@ def channel(record: xr.Dataset, name: str, dim: str) -> NDArray[np.float64]:
 def sampling(record: xr.Dataset) -> tuple[float, float]:
     """Return first time and sample interval [s]; raise `RecordError` if time is missing or not uniform."""
     if "time" not in record.coords or record.sizes["time"] < 2:
-        raise RecordError(
-            "the record holds no time series: it needs a coordinate `time` of two samples or more"
-        )
+        raise RecordError("the record holds no time series: it needs a coordinate `time` of two samples or more")
     time = np.asarray(record["time"].values, dtype=np.float64)
     step = (time[-1] - time[0]) / (len(time) - 1)
     uneven = np.flatnonzero(~(np.abs(np.diff(time) - step) <= 0.01 * abs(step)))  # catches NaN as well
@@ -99,9 +97,7 @@ def asked_axes(record: xr.Dataset) -> list[str]:
         return []
     motion = channel(record, name, "axis")
     size = np.nan_to_num(peaks(motion - motion[0]))
-    return [
-        str(axis) for axis, peak in zip(record["axis"].values, size, strict=True) if peak > ASKED * size.max()
-    ]
+    return [str(axis) for axis, peak in zip(record["axis"].values, size, strict=True) if peak > ASKED * size.max()]
 
 
 def track(record: xr.Dataset, quantity: str) -> list[Tracking]:
@@ -136,8 +132,7 @@ def spool_use(record: xr.Dataset) -> list[SpoolUse]:
     x = np.where(np.isfinite(x), x, 0.0)
     columns = peaks(x), np.sqrt(np.mean(x**2, axis=0)), np.mean(np.abs(x) >= 1.0, axis=0)
     return [
-        SpoolUse(str(name), *map(float, row))
-        for name, *row in zip(record["actuator"].values, *columns, strict=True)
+        SpoolUse(str(name), *map(float, row)) for name, *row in zip(record["actuator"].values, *columns, strict=True)
     ]
 
 
@@ -149,9 +144,7 @@ def drift(record: xr.Dataset) -> Drift | None:
     error = channel(record, "platen_displacement", "axis") - channel(record, "reference_displacement", "axis")
     if not np.isfinite(error).all():
         return None
-    cutoff = min(
-        max(DRIFT_BAND, 2.0 / (len(error) * step)), 0.4 / step
-    )  # two periods at least fit in the record
+    cutoff = min(max(DRIFT_BAND, 2.0 / (len(error) * step)), 0.4 / step)  # two periods at least fit in the record
     slow = lowpass_zero_phase(error, step, cutoff, order=4)
     end = error[-max(int(END / step), 1) :]
     return Drift(slow, cutoff, peaks(slow), end.mean(axis=0))

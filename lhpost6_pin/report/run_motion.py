@@ -42,12 +42,12 @@ def axis_scale(axis: str, quantity: str) -> Scale:
 
 def percent(fraction: float) -> str:
     """Return a share in per cent; an en dash where it is not finite."""
-    return f"{number(100 * fraction)} %" if np.isfinite(fraction) else "–"
+    return f"{number(100 * fraction)}\N{NO-BREAK SPACE}%" if np.isfinite(fraction) else "–"
 
 
 def shown_as(value: float, scale: Scale) -> str:
     """Return an SI value in the unit it is shown in."""
-    return f"{number(value * scale.factor)} {scale.unit}"
+    return f"{number(value * scale.factor)}\N{NO-BREAK SPACE}{scale.unit}"
 
 
 def tracking_blocks(record: xr.Dataset, found: Sequence[Tracking]) -> list[Markup]:
@@ -113,9 +113,7 @@ def drift_blocks(record: xr.Dataset) -> list[Markup]:
     rows = []
     for kind, title in (("displacement", "Slow error"), ("rotation", "Slow rotation error")):
         own = [k for k, scale in enumerate(scales) if scale is SCALES[kind]]
-        traces = [
-            Trace(axes[k], slow.error[:, k], line) for k, line in zip(own, palette(len(own)), strict=True)
-        ]
+        traces = [Trace(axes[k], slow.error[:, k], line) for k, line in zip(own, palette(len(own)), strict=True)]
         rows += [Row(title, traces, SCALES[kind])] if own else []
     words = f"Achieved minus target displacement below {number(slow.cutoff, 2)} Hz (zero-phase low-pass)."
     summary = [
@@ -137,7 +135,7 @@ def _axis_figure(
         rows += [Row(quantity.capitalize(), traces, axis_scale(axis, quantity))] if traces else []
         row = _tracked(found, axis, quantity)
         if row:
-            after = f"{percent(row.rrmse_aligned)} after removing {number(1e3 * row.delay)} ms"
+            after = f"{percent(row.rrmse_aligned)} after removing {shown_as(row.delay, SCALES['time'])}"
             words.append(f"{quantity} RRMSE {percent(row.rrmse)} as recorded, {after}")
     said = "; ".join(words) or untracked
     said = f"{said[0].upper()}{said[1:]}."
@@ -155,7 +153,7 @@ def _close_up(record: xr.Dataset, found: Sequence[Tracking], axis: str, window: 
     words = f"{quantity.capitalize()} around its peak, every sample."
     if row and row.aligned is not None:
         traces.append(Trace("delay removed", row.aligned[part], SHIFTED))
-        words += f" The dotted line is the achieved motion {number(1e3 * row.delay)} ms earlier."
+        words += f" The dotted line is the achieved motion {shown_as(row.delay, SCALES['time'])} earlier."
     return time_figure(
         f"close-{axis}",
         f"{_title(axis)}, close-up",

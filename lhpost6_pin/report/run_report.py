@@ -100,9 +100,7 @@ def write_run_report(
         versions=versions(),
     )
     absent = tuple(name for name in EXPECTED if name not in record)
-    return RunSummary(
-        save_page(page, path), verdict, level, tuple(page.headlines), tuple(found), tuple(spools), absent
-    )
+    return RunSummary(save_page(page, path), verdict, level, tuple(page.headlines), tuple(found), tuple(spools), absent)
 
 
 def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
@@ -133,9 +131,7 @@ def _asked(record: xr.Dataset, found: Sequence[Tracking]) -> str:
     peaks = [row for row in found if row.quantity == "displacement" and row.axis in asked]
     if "reference_displacement" not in record:
         return f"{length}; the record does not say what was asked."
-    words = ", ".join(
-        f"{row.axis} {shown_as(row.peak_target, axis_scale(row.axis, 'displacement'))}" for row in peaks
-    )
+    words = ", ".join(f"{row.axis} {shown_as(row.peak_target, axis_scale(row.axis, 'displacement'))}" for row in peaks)
     specimen = str(record.attrs.get("specimen", "none"))
     load = "bare table" if specimen == "none" else f"specimen {specimen}"
     count = f"{len(asked)} of {record.sizes['axis']} axes"

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from lhpost6_pin.report.page import Markup, Section, bar, details, missing, number, paragraph, table
+from lhpost6_pin.report.plots import SCALES
 from lhpost6_pin.report.run_components import (
     Limits,
     force_blocks,
@@ -16,7 +17,14 @@ from lhpost6_pin.report.run_components import (
     strut_blocks,
 )
 from lhpost6_pin.report.run_metrics import QUANTITIES, SpoolUse, Tracking
-from lhpost6_pin.report.run_motion import axis_scale, drift_blocks, percent, spectrum_blocks, tracking_blocks
+from lhpost6_pin.report.run_motion import (
+    axis_scale,
+    drift_blocks,
+    percent,
+    shown_as,
+    spectrum_blocks,
+    tracking_blocks,
+)
 
 __all__ = ["run_sections"]
 
@@ -58,7 +66,7 @@ def _metrics(found: Sequence[Tracking], limits: Limits) -> Markup:
                 number(row.peak_achieved * scale.factor),
                 bar(used),
                 percent(row.rrmse),
-                f"{number(1e3 * row.delay)} ms" if np.isfinite(row.delay) else "–",
+                shown_as(row.delay, SCALES["time"]) if np.isfinite(row.delay) else "–",
                 percent(row.rrmse_aligned),
             )
         )
@@ -81,9 +89,7 @@ def _assumptions(rows: Sequence[Sequence[Any]]) -> list[Markup]:
     header = ("Quantity", "Value", "Unit", "Source")
     assumed = [(name, _shown(value), unit, source) for name, value, unit, source, guess in rows if guess]
     known = [(name, _shown(value), unit, source) for name, value, unit, source, guess in rows if not guess]
-    blocks = [
-        paragraph(f"{len(assumed)} of the {len(rows)} numbers of this machine are assumed, not published.")
-    ]
+    blocks = [paragraph(f"{len(assumed)} of the {len(rows)} numbers of this machine are assumed, not published.")]
     if assumed:
         blocks.append(table("Assumed", header, assumed))
     if known:

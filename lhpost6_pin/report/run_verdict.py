@@ -50,9 +50,7 @@ def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str],
         worst = _worst(found, quantity)
         if worst:
             good &= worst.rrmse_aligned <= allowed
-            words.append(
-                f"{quantity} {percent(worst.rrmse_aligned)} ({worst.axis}, allowed {100 * allowed:.0f} %)"
-            )
+            words.append(f"{quantity} {percent(worst.rrmse_aligned)} ({worst.axis}, allowed {100 * allowed:.0f} %)")
     if not words:
         lacking = [n for n in ("platen_displacement", "reference_displacement") if n not in record]
         why = f"the record has no {' and no '.join(lacking)}" if lacking else "no motion was asked for"
@@ -61,9 +59,7 @@ def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str],
     return [f"{start}: worst RRMSE, delay removed, {' and '.join(words)}."], "good" if good else "attention"
 
 
-def _beyond(
-    record: xr.Dataset, found: Sequence[Tracking], spools: Sequence[SpoolUse], limits: Limits
-) -> list[str]:
+def _beyond(record: xr.Dataset, found: Sequence[Tracking], spools: Sequence[SpoolUse], limits: Limits) -> list[str]:
     uses = [(f"{row.axis} {row.quantity}", _used(row, limits)) for row in found]
     for name, bound in (("actuator_displacement", "actuator_stroke"), ("actuator_force", "actuator_force")):
         if name in record and bound in limits:
@@ -72,9 +68,7 @@ def _beyond(
             shares = [share_of_limit(peak, limits, bound, k) for k, peak in enumerate(largest)]
             uses += zip(names, shares, strict=True)
     beyond = [f"{name} ({percent(use)} of its limit)" for name, use in uses if use > 1.0]
-    full = [
-        f"spool {s.actuator} ({percent(s.saturated)} of the time at its limit)" for s in spools if s.saturated
-    ]
+    full = [f"spool {s.actuator} ({percent(s.saturated)} of the time at its limit)" for s in spools if s.saturated]
     return beyond + full
 
 
@@ -85,9 +79,7 @@ def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
             late = shown_as(worst.delay, SCALES["time"])
             note = f"axis {worst.axis}; {percent(worst.rrmse)} as recorded, delay {late}"
             level: Level = "attention" if worst.rrmse_aligned > FOLLOWED.get(quantity, np.inf) else "good"
-            return Headline(
-                percent(worst.rrmse_aligned), f"Worst {quantity} RRMSE, delay removed", note, level
-            )
+            return Headline(percent(worst.rrmse_aligned), f"Worst {quantity} RRMSE, delay removed", note, level)
     return Headline("–", "Worst acceleration RRMSE", "no target and achieved motion in the record")
 
 

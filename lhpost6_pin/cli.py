@@ -1,0 +1,258 @@
+"""The command line `lhpost6`.
+
+Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the input cannot be used.
+"""
+
+import logging
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .errors import LhpostError, MotionError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .machine import Machine
+    from .motions import GroundMotion
+    from .simulate import Run
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    help="The UC San Diego LHPOST6 shake table, modelled from first principles on Pinocchio.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+MachineName = Annotated[str, typer.Option("--machine", help="Shipped machine name, or a TOML file.")]
+Override = Annotated[Path | None, typer.Option("--override", help="TOML file with parameters to replace.")]
+Scheme = Annotated[str, typer.Option(help="Integration scheme: semi_implicit, euler or rk4.")]
+Rate = Annotated[int, typer.Option(help="Model steps per second, a multiple of 2048.")]
+EngineName = Annotated[str, typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).")]
+Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
+
+
+def main() -> None:
+    """Entry point: errors that a user can act on are printed without a traceback."""
+    from rich.console import Console
+    from rich.logging import RichHandler
+
+    handler = RichHandler(console=Console(stderr=True), show_path=False, show_time=False)
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
+    try:
+        app()
+    except LhpostError as error:
+        Console(stderr=True, soft_wrap=True).print("[bold red]error:[/]", str(error), markup=True, highlight=False)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        Console(stderr=True).print("interrupted; nothing half-written is left behind")
+        sys.exit(130)
+
+
+@app.command()
+def doctor() -> None:
+    """Say what is installed, whether compiled code is kept, and which optional parts are there."""
+    from .doctor import print_doctor
+
+    print_doctor()
+
+
+@app.command()
+def info(machine: MachineName = "lhpost6", override: Override = None) -> None:
+    """Print a machine as a table: every number with unit and source, assumed values marked."""
+    from .tables import print_machine
+
+    print_machine(_machine(machine, override))
+
+
+@app.command()
+def capacity(machine: MachineName = "lhpost6", override: Override = None) -> None:
+    """Compare what the model can give with Table 2.2, and print the oil-column modes."""
+    from .tables import print_capacity, print_modes
+
+    table = _machine(machine, override)
+    if table.motion == "free":
+        print_capacity(table)
+    print_modes(table)
+
+
+@app.command()
+def motions() -> None:
+    """List the ground motions and tests known by name."""
+    from .tables import print_motions
+
+    print_motions()
+
+
+@app.command()
+def check(file: Annotated[Path, typer.Argument(help="Record to look into.")]) -> None:
+    """Say what is in a record and what is wrong with it."""
+    from .check import check_record
+    from .tables import print_findings
+
+    findings = check_record(file)
+    print_findings(str(file), findings)
+    if any(f.severity == "error" for f in findings):
+        raise typer.Exit(1)
+
+
+@app.command()
+def run(
+    motion: Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`) or file(s) of a motion.")],
+    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
+    axes: Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")] = None,
+    scheme: Scheme = "semi_implicit",
+    rate: Rate = 8192,
+    engine: EngineName = "pinocchio",
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: Annotated[str | None, typer.Option(help="Controller settings: name or TOML file.")] = None,
+    valves: Annotated[int, typer.Option(help="Open servovalves on each horizontal actuator; 0: as the machine says.")] = 0,
+    specimen: Annotated[Path | None, typer.Option(help="URDF of a specimen bolted to the platen.")] = None,
+    locked: Annotated[bool, typer.Option(help="Lock the specimen's joints: one rigid body.")] = False,
+    high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None,
+    low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None,
+    set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None,
+) -> None:
+    """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
+    from .control import load_controller
+    from .motions import make_target
+    from .rehearse import rehearse, with_valves
+    from .simulate import SAMPLE_RATE
+
+    table = with_valves(_machine(machine, override), valves)
+    if specimen is not None:
+        table = table.with_specimen(specimen, locked=locked)
+    ground = _motion(motion, set_ or [])
+    target = make_target(
+        ground,
+        scale=scale,
+        axes=axes or (None if table.motion == "free" else table.motion),
+        high_pass=high_pass,
+        low_pass=low_pass,
+        rate=float(SAMPLE_RATE),
+    )
+    settings = load_controller(controller or (machine if Path(machine).suffix != ".toml" else "lhpost6"))
+    name = ground.name.replace("/", "_")
+    folder = out or Path("out") / name
+    with _progress(f"{name} on {table.name}") as progress:
+        run_, record = rehearse(
+            table,
+            target,
+            settings,
+            attrs={"test": name, "title": f"{name} x {scale:g} on {table.name}"},
+            scheme=scheme,
+            steps_per_second=rate,
+            engine=engine,
+            progress=progress,
+        )
+    _save(table, run_, record, folder, report=True)
+
+
+@app.command("open-loop")
+def open_loop(
+    record: Annotated[Path, typer.Argument(help="Record whose spool positions drive the plant.")],
+    scheme: Scheme = "semi_implicit",
+    rate: Rate = 8192,
+    engine: EngineName = "pinocchio",
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+) -> None:
+    """Drive the plant with a record's spools from its first sample's pressures; leaves record.nc."""
+    from .records import load_record
+    from .rehearse import replay
+    from .tables import print_comparison
+
+    table = _machine(machine, override)
+    measured = load_record(record, {"actuator": table.actuator_names})
+    name = f"{record.stem}_open_loop"
+    with _progress(f"{name} on {table.name}") as progress:
+        run_, simulated = replay(
+            table,
+            measured,
+            attrs={"test": name, "title": f"{record.stem}, open loop", "source": f"spools of {record.name}"},
+            scheme=scheme,
+            steps_per_second=rate,
+            engine=engine,
+            progress=progress,
+        )
+    print_comparison(measured, simulated)
+    _save(table, run_, simulated, out or Path("out") / name, report=False)
+
+
+def _machine(name: str, override: Path | None) -> "Machine":
+    from .machine import load_machine
+
+    return load_machine(name, override)
+
+
+def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
+    """Motion by name, or from one file or three component files."""
+    from .motions import find_motion, load_motion
+
+    options: dict[str, Any] = {}
+    for item in settings:
+        key, equals, value = item.partition("=")
+        if not equals:
+            raise MotionError(f"--set {item}: write key=value")
+        options[key.strip()] = _number_or_text(value.strip())
+    if any(Path(n).suffix or Path(n).exists() for n in names):
+        return load_motion(names[0] if len(names) == 1 else names, **options)
+    if len(names) > 1:
+        raise MotionError(f"one motion at a time; got {', '.join(names)}")
+    return find_motion(names[0], **options)
+
+
+def _number_or_text(text: str) -> int | float | str:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, report: bool) -> None:
+    from .records import save_record
+    from .tables import machine_rows, print_saved, report_limits
+
+    save_record(record, folder / "record.nc")
+    summary = None
+    if report:
+        from .report import write_run_report
+
+        notes = [run_.trouble] if run_.trouble else []
+        if run_.clipped:
+            notes.append(f"{run_.clipped} spool commands beyond full stroke were clipped: the motion asks for more flow.")
+        summary = write_run_report(
+            record,
+            folder / "report.html",
+            limits=report_limits(run_.plant),
+            notes=notes,
+            command=shlex.join(["lhpost6", *sys.argv[1:]]),
+            machine_table=machine_rows(table),
+        )
+    print_saved(folder, run_, summary)
+    if run_.trouble:
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar with remaining time on stderr; yields what to call with the share done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

@@ -1,0 +1,106 @@
+"""What a run hands out: its record, in the layout that measured tests have, too."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .equilibrium import hydraulic_rows
+from .laws.strut import gas_pressure
+from .pose import PlatenMotion, leg_displacements, platen_motion
+from .records import make_record
+from .simulate import Run
+
+__all__ = ["record_of_run"]
+
+Array = NDArray[np.float64]
+
+
+def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | None = None) -> xr.Dataset:
+    """Record of a simulated test.
+
+    attrs are global attributes beside those that follow from the run (`test`, `title`, ...); reference, if any, is what
+    was asked for at the run's samples, with its velocity and acceleration as extra variables. Beyond the layout it
+    holds the hidden friction states and the joints of an articulated specimen.
+    """
+    plant, machine = run.plant, run.plant.machine
+    motion = platen_motion(plant, run.q, run.v, run.a)
+    legs, _ = leg_displacements(plant, motion.displacement)
+    rows = plant.rows[hydraulic_rows(plant)]
+    states = rows["state"]
+    double = np.array([name in machine.double_acting for name in machine.actuator_names])
+    pressure_a = run.z[:, states]
+    pressure_b = run.z[:, states[double] + 1]
+    force = pressure_a * rows["p"][:, 0]
+    force[:, double] -= pressure_b * rows["p"][double, 1]
+    channels: dict[str, Any] = {
+        "platen_displacement": motion.displacement,
+        "platen_velocity": motion.velocity,
+        "platen_acceleration": motion.acceleration,
+        "actuator_displacement": legs[:, : plant.spools],
+        "actuator_force": force,
+        "chamber_pressure_a": pressure_a,
+        "spool_position": run.spool,
+        "supply_pressure": np.full(len(run.time), plant.supply[0]),
+    }
+    labels = {"actuator": machine.actuator_names}
+    if double.any():
+        channels["chamber_pressure_b"] = pressure_b
+        labels["horizontal"] = machine.double_acting
+    if machine.struts:
+        channels["strut_pressure"] = _strut_pressure(run, legs[:, plant.spools :])
+        labels["strut"] = machine.strut_names
+    if run.command is not None:
+        channels["spool_command"] = run.command
+    if reference is not None:
+        channels["reference_displacement"] = reference.displacement
+        for name, values, unit in (
+            ("velocity", reference.velocity, "m/s, rad/s"),
+            ("acceleration", reference.acceleration, "m/s2, rad/s2"),
+        ):
+            about = {"units": unit, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
+            channels[f"reference_{name}"] = (("time", "axis"), values, about)
+    channels |= _hidden_states(run)
+    if plant.model.nv > plant.axes.size:
+        about = {"units": "m or rad", "long_name": "configuration of the specimen's joints, Pinocchio order"}
+        platen_q = 7 if plant.axes.size == 6 else 1
+        channels["specimen_joint_position"] = (("time", "specimen_joint"), run.q[:, platen_q:], about)
+    valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
+    facts = {
+        "kind": "simulated",
+        "machine": machine.name,
+        "specimen": machine.specimen.name if machine.specimen else "none",
+        "valves_per_horizontal_actuator": int(valves[0]) if valves else 0,
+        "scheme": run.scheme,
+        "steps_per_second": run.steps_per_second,
+        "engine": run.engine,
+        "spool_values_clipped": run.clipped,
+        "trouble": run.trouble or "none",
+    }
+    return make_record(run.time, channels, labels, {**facts, **attrs})
+
+
+def _strut_pressure(run: Run, elongation: Array) -> Array:
+    pressures = np.empty_like(elongation)
+    for i, strut in enumerate(run.plant.machine.struts):
+        law = np.vectorize(lambda x, s=strut: gas_pressure(x, s.pressure, s.gas_length, s.polytropic_index))
+        pressures[:, i] = law(elongation[:, i])
+    return pressures
+
+
+def _hidden_states(run: Run) -> dict[str, Any]:
+    """Friction states as extra variables, by effect, with their ports as coordinate-like names in `states`."""
+    found: dict[str, Any] = {}
+    names = run.plant.states
+    for effect in dict.fromkeys(name.split(".")[0] for name in names):
+        columns = [i for i, name in enumerate(names) if name.startswith(f"{effect}.") and "pressure" not in name]
+        if columns:
+            about = {
+                "units": "1",
+                "long_name": f"hidden states of {effect}",
+                "states": " ".join(names[i].split(".", 1)[1] for i in columns),
+            }
+            found[f"hidden_{effect}"] = (("time", f"{effect}_state"), run.z[:, columns], about)
+    return found

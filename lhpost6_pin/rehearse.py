@@ -1,0 +1,144 @@
+"""Two things to do with a machine: rehearse a motion in closed loop, and replay a record's spools in open loop."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .capacity import make_leg_check
+from .control import LoopSettings, make_controller
+from .equilibrium import find_equilibrium, hydraulic_rows
+from .errors import OutOfRangeError, SimulationError
+from .machine import AXES, Machine
+from .motions import LimitsSummary, MotionLimits, Target, check_limits
+from .outputs import record_of_run
+from .plant import Plant, State, make_plant
+from .pose import PlatenMotion
+from .records import require
+from .signals import resample_band_limited
+from .simulate import SAMPLE_RATE, ClosedLoop, OpenLoop, Progress, Run, simulate
+
+__all__ = ["SimulatedTest", "rehearse", "replay", "target_within_limits", "with_valves"]
+
+Array = NDArray[np.float64]
+
+
+class SimulatedTest(NamedTuple):
+    """A simulated test: the run and its record."""
+
+    run: Run
+    record: xr.Dataset
+
+
+def target_within_limits(plant: Plant, target: Target) -> LimitsSummary:
+    """Utilisation of the machine by a target: Table 2.2's limits, strokes, valve flow.
+
+    Raises OutOfRangeError that names each limit exceeded and the scale that fits; for a guided machine also where the
+    target moves an axis that the machine has not.
+    """
+    limits, axes = plant.machine.limits, plant.axes
+    blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
+    if blocked:
+        free = ",".join(AXES[k] for k in axes)
+        raise OutOfRangeError(
+            f"{target.reference.motion}: {plant.machine.name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
+        )
+
+    def six(values: tuple[float, ...]) -> Array:
+        return np.array([values[k] if k in axes else math.inf for k in range(6)])
+
+    bounds = MotionLimits(six(limits.displacement), six(limits.velocity), six(limits.acceleration))
+    return check_limits(target, bounds, make_leg_check(plant))
+
+
+def rehearse(
+    machine: Machine,
+    target: Target,
+    settings: LoopSettings,
+    *,
+    attrs: Mapping[str, Any],
+    record_every: int = 1,
+    progress: Progress | None = None,
+    **options: Any,
+) -> SimulatedTest:
+    """Reproduce a target in closed loop from rest; options go to `simulate` (scheme, steps_per_second, engine).
+
+    Raises OutOfRangeError if the machine cannot follow the target, SimulationError for options that cannot be.
+    """
+    plant = make_plant(machine)
+    target_within_limits(plant, target)
+    if settings.rate != SAMPLE_RATE:
+        raise SimulationError(f"controller rate {settings.rate:g} Hz is not the samples' {SAMPLE_RATE} Hz")
+    rest = find_equilibrium(plant)
+    reference = np.hstack([target.displacement, target.velocity])
+    run = simulate(
+        plant,
+        ClosedLoop(make_controller(plant, rest, settings), reference, rest),
+        samples=len(reference),
+        record_every=record_every,
+        progress=progress,
+        **options,
+    )
+    asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in target_motion(target)))
+    facts = {"scale": target.reference.scale, "motion": target.reference.motion, "source": target.reference.source}
+    return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, asked))
+
+
+def target_motion(target: Target) -> PlatenMotion:
+    """The target's displacement, velocity and acceleration."""
+    return PlatenMotion(target.displacement, target.velocity, target.acceleration)
+
+
+def replay(
+    machine: Machine,
+    record: xr.Dataset,
+    *,
+    attrs: Mapping[str, Any],
+    progress: Progress | None = None,
+    **options: Any,
+) -> SimulatedTest:
+    """Drive the plant with a record's spool positions, from rest with its first sample's pressures.
+
+    A simulated record at the controller's rate is held over each sample (as it was made); any other is band-limited
+    and interpolated smoothly to the model's steps. Raises RecordError naming missing channels.
+    """
+    require(record, "spool_position", "chamber_pressure_a")
+    machine = with_valves(machine, int(record.attrs.get("valves_per_horizontal_actuator", 0)))
+    if machine.double_acting:
+        require(record, "chamber_pressure_b")
+    plant = make_plant(machine)
+    names = list(machine.actuator_names)
+    recorded = record["spool_position"].sel(actuator=names).transpose("time", "actuator").values
+    rate = (len(recorded) - 1) / float(record["time"][-1] - record["time"][0])
+    steps = options.get("steps_per_second", 4 * SAMPLE_RATE)
+    held = record.attrs.get("kind") == "simulated" and abs(rate - SAMPLE_RATE) < 1e-6 * SAMPLE_RATE
+    if held:
+        spool, samples = recorded, len(recorded)
+    else:
+        t_old = np.arange(len(recorded)) / rate
+        samples = math.floor(t_old[-1] * SAMPLE_RATE)
+        middle = (np.arange(samples * (steps // SAMPLE_RATE)) + 0.5) / steps
+        spool = resample_band_limited(recorded, t_old, np.minimum(middle, t_old[-1]))
+    run = simulate(plant, OpenLoop(spool, _start(plant, record)), samples=samples, progress=progress, **options)
+    return SimulatedTest(run, record_of_run(run, {"spool_interpolation": "held" if held else "band-limited", **attrs}))
+
+
+def with_valves(machine: Machine, valves: int) -> Machine:
+    """Copy of a machine with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""
+    if valves == 0:
+        return machine
+    return machine.with_params({f"{a.kind}.valves": valves for a in machine.actuators if a.area_b is not None})
+
+
+def _start(plant: Plant, record: xr.Dataset) -> State:
+    """Zero pose at rest with the chamber pressures of the record's first sample."""
+    zero = plant.zero_state()
+    z = zero.z.copy()
+    for name, row in zip(plant.machine.actuator_names, plant.rows[hydraulic_rows(plant)], strict=True):
+        z[row["state"]] = float(record["chamber_pressure_a"].sel(actuator=name)[0])
+        if name in plant.machine.double_acting:
+            z[row["state"] + 1] = float(record["chamber_pressure_b"].sel(horizontal=name)[0])
+    return State(zero.q, zero.v, z)

@@ -1,0 +1,207 @@
+"""What the command line prints: machine, capacity, motions, findings, results; and their rows for reports."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from .machine import AXES, Machine
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .plant import Plant
+    from .records import Finding
+    from .report import RunSummary
+    from .simulate import Run
+
+__all__ = [
+    "machine_rows",
+    "print_capacity",
+    "print_comparison",
+    "print_findings",
+    "print_machine",
+    "print_modes",
+    "print_motions",
+    "print_saved",
+    "report_limits",
+]
+
+
+def _console() -> Console:
+    return Console()
+
+
+def _text(value: float | tuple[float, ...]) -> str:
+    return ", ".join(f"{v:.6g}" for v in value) if isinstance(value, tuple) else f"{value:.6g}"
+
+
+def machine_rows(machine: Machine) -> list[tuple[str, str, str, str, bool]]:
+    """Rows (path, value, unit, source, assumed) of every quantity of a machine."""
+    return [
+        (path, _text(q.value), q.unit, f"{q.evidence}: {q.source}", q.assumed)
+        for path, q in machine.parameters.quantities.items()
+    ]
+
+
+def report_limits(plant: "Plant") -> dict[str, Any]:
+    """Limits that a run report draws: Table 2.2, strokes, actuator forces, supply, strut areas."""
+    from .equilibrium import hydraulic_rows
+
+    machine = plant.machine
+    rows = plant.rows[hydraulic_rows(plant)]
+    return {
+        "displacement": machine.limits.displacement,
+        "velocity": machine.limits.velocity,
+        "acceleration": machine.limits.acceleration,
+        "actuator_stroke": [a.stroke for a in machine.actuators],
+        "actuator_force": plant.supply[0] * rows["p"][:, 0] - plant.supply[1] * rows["p"][:, 1],
+        "supply_pressure": plant.supply[0],
+        "strut_area": [s.area for s in machine.struts],
+    }
+
+
+def print_machine(machine: Machine) -> None:
+    """Print every quantity with unit, evidence and source; assumed ones are marked."""
+    console = _console()
+    console.print(f"[bold]{machine.name}[/]: {machine.title}")
+    console.print(
+        f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
+        f"platen motion {machine.motion}, bearing thrust {machine.thrust}"
+    )
+    table = Table("quantity", "value", "unit", "sd", "evidence", "source")
+    for path, q in machine.parameters.quantities.items():
+        evidence = f"[bold yellow]{q.evidence} *[/]" if q.assumed else q.evidence
+        sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)
+        table.add_row(path, _text(q.value), q.unit, sd, evidence, q.source)
+    console.print(table)
+    console.print("* assumed: nobody has published this number; change it with --override")
+    effects = Table("effect", "law", "acts on", "source", title="Force effects, in ledger order")
+    for effect in machine.effects:
+        effects.add_row(effect.name, effect.law, " ".join(effect.ports), effect.source)
+    console.print(effects)
+    if "estimates.platen_alone.mass" in machine.parameters:
+        console.print(_inertia_table(machine))
+
+
+def _inertia_table(machine: Machine) -> Table:
+    """Table 4.1: lumped masses composed at the connection points, beside the printed contributions."""
+    from .rigid_body import lumped_inertia
+
+    par = machine.parameters
+    parts = lumped_inertia(par.vector("estimates.platen_alone.mass"), par.vector("estimates.platen_alone.inertia"), machine)
+    table = Table("part", *(f"{q} {a} [{u}]" for q, u in (("mass", "t"), ("inertia", "t m2")) for a in "XYZ"))
+    table.title = "Effective inertia about B, composed from the parts (printed in Table 4.1)"
+    printed = {"platen": "platen_alone", **{k: k for k in parts if k != "platen"}}
+    for kind, matrix in (*parts.items(), ("sum, M_eff,1", sum(parts.values()))):
+        name = f"estimates.{printed.get(kind, 'first')}"
+        values = (*par.vector(f"{name}.mass"), *par.vector(f"{name}.inertia"))
+        computed = np.diag(matrix)
+        table.add_row(kind, *(f"{c / 1e3:.2f} ({v / 1e3:.2f})" for c, v in zip(computed, values, strict=True)))
+    return table
+
+
+def print_capacity(machine: Machine) -> None:
+    """Print what the model can give beside Table 2.2, with each deviation."""
+    from .capacity import capacity_table
+
+    table = Table("capacity", "model", "Table 2.2", "unit", "deviation", "how", title="Capacity, all servovalves open")
+    for line in capacity_table(machine):
+        deviation = f"{100 * line.deviation:+.1f} %"
+        table.add_row(line.name, f"{line.model:.4g}", f"{line.printed:.4g}", line.unit, deviation, line.how)
+    _console().print(table)
+
+
+def print_modes(machine: Machine) -> None:
+    """Print the oil-column modes of the linearised plant, without and with friction and leakage."""
+    from .linearize import oil_column_modes
+
+    table = Table("axis", "undamped [Hz]", "with friction stuck and leaks [Hz]", "damping [%]", title="Oil-column modes")
+    full = {m.axis: m for m in oil_column_modes(machine, undamped=False)}
+    for mode in oil_column_modes(machine):
+        other = full.get(mode.axis)
+        cells = (f"{other.frequency:.2f}", f"{100 * other.damping:.2f}") if other else ("", "")
+        table.add_row(mode.axis, f"{mode.frequency:.2f}", *cells)
+    _console().print(table)
+
+
+def print_motions() -> None:
+    """Print the motions known by name and what each needs."""
+    from .motions import list_motions
+
+    table = Table("name", "also", "kind", "what it is", "options", "needs")
+    for m in list_motions():
+        table.add_row(m.name, " ".join(m.aliases), m.kind, m.title, " ".join(m.options), m.remedy or "[green]ready[/]")
+    _console().print(table)
+
+
+def print_findings(file: str, findings: "Sequence[Finding]") -> None:
+    """Print what is in a record and what is wrong with it."""
+    table = Table("", "channel", "sample", "finding", "what to do", title=file)
+    colour = {"error": "[bold red]error[/]", "warning": "[yellow]warning[/]", "info": "info"}
+    for f in findings:
+        sample = "" if f.sample is None else str(f.sample)
+        table.add_row(colour[f.severity], f.channel, sample, f.message, f.remedy)
+    console = _console()
+    console.print(table)
+    counts = {s: sum(f.severity == s for f in findings) for s in ("error", "warning")}
+    console.print(f"{counts['error']} errors, {counts['warning']} warnings")
+
+
+def print_comparison(measured: "xr.Dataset", simulated: "xr.Dataset") -> None:
+    """Print how far a replayed motion is from the recorded one, per axis, on common samples."""
+    from .signals import drift_rate, rrmse
+
+    if "platen_displacement" not in measured:
+        return
+    t = measured["time"].values - float(measured["time"][0])
+    t = t[t <= simulated["time"].values[-1]]
+    if len(t) < 2:
+        return
+    recorded = measured["platen_displacement"].transpose("time", "axis").values[: len(t)]
+    model = simulated["platen_displacement"].interp(time=t).values
+    ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
+    peak = np.abs(model - recorded).max(axis=0)
+    table = Table("axis", "peak recorded", "largest difference", "RRMSE", "drift [1/s]", title="Displacement, model against record")
+    for k, axis in enumerate(AXES):
+        unit = "m" if k < 3 else "rad"
+        asked = f"{np.abs(recorded[:, k]).max():.4g} {unit}"
+        table.add_row(axis, asked, f"{peak[k]:.3g} {unit}", f"{ratio[k]:.3g}", f"{drift[k]:.3g} {unit}")
+    _console().print(table)
+
+
+def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
+    """Print where results are and what they say first."""
+    console = _console()
+    if summary is not None:
+        console.print(f"[bold]{summary.verdict}[/]")
+        table = Table("axis", "what", "peak asked", "peak achieved", "RRMSE", "delay [ms]", "RRMSE, delay removed")
+        for row in summary.tracking:
+            if row.peak_target:
+                table.add_row(*tracking_cells(row))
+        console.print(table)
+    for name in ("record.nc", "report.html"):
+        if (folder / name).exists():
+            console.print(f"wrote {folder / name}")
+    console.print(f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")
+
+
+def tracking_cells(row: Any) -> Sequence[str]:
+    """Cells of one tracked axis and quantity."""
+    return (
+        row.axis,
+        row.quantity,
+        f"{row.peak_target:.4g}",
+        f"{row.peak_achieved:.4g}",
+        f"{row.rrmse:.3f}",
+        f"{1e3 * row.delay:.1f}",
+        f"{row.rrmse_aligned:.3f}",
+    )
+
+
+def counts(values: Mapping[str, int]) -> str:
+    """Words such as ``3 errors, 1 warning``."""
+    return ", ".join(f"{n} {name}{'s' if n != 1 else ''}" for name, n in values.items())

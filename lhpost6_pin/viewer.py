@@ -1,0 +1,424 @@
+"""A record to look at: the machine's bodies follow it in a browser, from a file that plays off line or from loopback.
+
+The URDF gives bodies and joints (`urdf`), kinematics the joint positions of every frame, meshcat draws. Scene and
+animation are meshcat commands sent to a "window": `Recorder` keeps them for a page, `loopback.LoopbackWindow` hands
+them to the browsers that look. Neither starts meshcat's own server, which listens on all network interfaces.
+"""
+
+import base64
+import html
+import json
+import logging
+import math
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+import xarray as xr
+from numpy.typing import NDArray
+
+from .errors import ParameterError, RecordError
+from .files import write_whole
+from .machine import Machine
+from .records import require
+from .urdf import drawing_colour, urdf_text
+
+__all__ = [
+    "Bodies",
+    "Frames",
+    "Recorder",
+    "Window",
+    "body_poses",
+    "draw_animation",
+    "draw_scene",
+    "joint_positions",
+    "load_bodies",
+    "make_frames",
+    "record_frames",
+    "render_page",
+    "save_animation",
+]
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+ROOT = "table"
+LOOP_FOR_EVER = 1_000_000_000  # repetitions
+FIELD_OF_VIEW = 36.0  # [deg]
+CAMERA = (-0.5, 1.1, 2.05)  # camera's place in its own axes, x right, y up, z to the viewer, over the machine's radius
+LIGHTS = (("FillLight", "position", [-3.0, -6.0, 10.0]), ("FillLight", "intensity", 0.55), ("AmbientLight", "intensity", 0.5))
+BACKGROUND = {"top_color": [0.93, 0.95, 0.97], "bottom_color": [0.80, 0.84, 0.88]}
+FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
+
+
+class Window(Protocol):
+    """What meshcat's `Visualizer` needs of a window: somewhere to send its commands."""
+
+    def send(self, command: Any) -> None:
+        """Take one meshcat command."""
+
+
+class Bodies(NamedTuple):
+    """A machine's URDF in Pinocchio: joints, and primitive shapes to draw."""
+
+    model: Any  # pin.Model
+    shapes: Any  # pin.GeometryModel
+
+
+class Frames(NamedTuple):
+    """Platen motion of an animation at a uniform frame rate."""
+
+    rate: float  # [1/s]
+    displacement: Array  # (n, 6) of C in {s} and Euler angles [m, rad]
+    reference: Array | None  # (n, 6) the same, as asked for
+    amplify: float  # factor on both
+
+
+# -------------------------------------------------------------------------------------------- kinematics
+def load_bodies(machine: Machine) -> Bodies:
+    """Read the machine's URDF with Pinocchio."""
+    text = urdf_text(machine)
+    model = pin.buildModelFromXML(text)
+    return Bodies(model, pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL))
+
+
+def joint_positions(machine: Machine, model: Any, displacement: Array) -> Array:
+    """Positions q (n, nq) of the URDF's joints at which every leg ends at the platen (Eqs. 3-20, 3-24, 4-13, 4-14).
+
+    displacement (n, 6): of C in {s} and Euler angles [m, rad]. A guided platen uses its own axis only.
+    """
+    pose = np.array(np.atleast_2d(displacement), float)
+    if machine.motion != "free":
+        pose[:, np.arange(6) != "xyz".index(machine.motion)] = 0.0
+    turn = _rotation(pose[:, 3:])
+    q = np.zeros((len(pose), model.nq))
+
+    def put(joint: str, values: Array) -> None:
+        index = model.getJointId(joint)
+        start = model.idx_qs[index]
+        q[:, start : start + model.nqs[index]] = values.reshape(len(pose), -1)
+
+    if machine.motion == "free":
+        centre = np.array(machine.platen.centre_of_gravity)
+        put("platen_motion", np.hstack([pose[:, :3] + turn @ centre - centre, _quaternions(turn)]))
+    else:
+        put("platen_motion", pose[:, "xyz".index(machine.motion)])
+    normal = turn[:, :, 2]
+    foot = pose[:, :3] + turn @ np.array(machine.platen.bearing_plane)
+    for leg in (*machine.actuators, *machine.struts):
+        base, point = np.array(leg.base_point), np.array(leg.platen_point)
+        zero_length = np.linalg.norm(point - base)
+        if getattr(leg, "mount", "swivel") == "bearing":
+            length = np.einsum("ni,ni->n", foot - base, normal) / normal[:, 2]
+            put(f"{leg.name}_plate_y", np.arctan2(normal[:, 0], normal[:, 2]))
+            put(f"{leg.name}_plate_x", -np.arcsin(normal[:, 1]))
+        else:
+            reach = pose[:, :3] + turn @ point - base
+            length = np.linalg.norm(reach, axis=1)
+            at_zero = model.jointPlacements[model.getJointId(f"{leg.name}_swivel_x")].rotation
+            x, y, z = (reach @ at_zero / length[:, None]).T
+            put(f"{leg.name}_swivel_x", np.arctan2(-y, z))
+            put(f"{leg.name}_swivel_y", np.arcsin(x))
+        put(f"{leg.name}_extension", length - zero_length)
+    return q
+
+
+def body_poses(model: Any, q: Array) -> Array:
+    """Poses (n, n_joints, 7) of the bodies in {s}: position [m] and quaternion x y z w, joint 0 being the world."""
+    data = model.createData()
+    poses = np.zeros((len(q), model.njoints, 7))
+    for k, position in enumerate(q):
+        pin.forwardKinematics(model, data, position)
+        for joint in range(model.njoints):
+            poses[k, joint] = pin.SE3ToXYZQUAT(data.oMi[joint])
+    return poses
+
+
+def _rotation(euler: Array) -> Array:
+    from .pose import rotation  # imports numba
+
+    return rotation(euler)
+
+
+def _quaternions(turn: Array) -> Array:
+    return np.array([pin.Quaternion(r).coeffs() for r in turn])
+
+
+# ------------------------------------------------------------------------------------------------ frames
+def make_frames(
+    time: Array,
+    displacement: Array,
+    reference: Array | None = None,
+    *,
+    rate: float = 30.0,
+    amplify: float = 1.0,
+) -> Frames:
+    """Sample a platen motion (n, 6) over time (n,) [s] at `rate` frames a second, enlarged `amplify` times.
+
+    Raises RecordError for a motion that cannot be drawn, ParameterError for a rate or factor that makes no sense.
+    """
+    for name, value in (("rate", rate), ("amplify", amplify)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ParameterError(f"{name} is {value:g}; it must be a positive number")
+    time = np.asarray(time, float)
+    moments = time[0] + np.arange(int((time[-1] - time[0]) * rate * (1.0 + 1e-12)) + 1) / rate
+
+    def sampled(motion: Array, name: str) -> Array:
+        motion = np.asarray(motion, float)
+        if motion.shape != (time.size, 6) or not np.isfinite(motion).all():
+            raise RecordError(f"{name} must be {time.size} samples of six finite numbers; it is {motion.shape}")
+        return amplify * np.stack([np.interp(moments, time, column) for column in motion.T], axis=1)
+
+    asked = None if reference is None else sampled(reference, "reference_displacement")
+    frames = Frames(rate, sampled(displacement, "platen_displacement"), asked, amplify)
+    if np.abs(frames.displacement[:, 3:5]).max() >= 0.5 * math.pi:
+        raise ParameterError(f"amplified {amplify:g} times the platen turns over; amplify less")
+    return frames
+
+
+def record_frames(machine: Machine, record: xr.Dataset, *, rate: float = 30.0, amplify: float = 1.0) -> Frames:
+    """Frames of a record; a record without platen displacement is drawn from its actuator displacements.
+
+    Raises RecordError if it has neither.
+    """
+    if "platen_displacement" in record:
+        motion = record["platen_displacement"].values
+    else:
+        require(record, "actuator_displacement")
+        from .plant import make_plant
+        from .pose import forward_kinematics
+
+        motion, _ = forward_kinematics(make_plant(machine), record["actuator_displacement"].values)
+    reference = record["reference_displacement"].values if "reference_displacement" in record else None
+    return make_frames(record["time"].values, motion, reference, rate=rate, amplify=amplify)
+
+
+# --------------------------------------------------------------------------------------------- drawing
+class Recorder:
+    """A window that keeps the commands it is sent, packed as meshcat's page reads them."""
+
+    def __init__(self) -> None:
+        """Begin with no commands."""
+        self.commands: list[bytes] = []
+
+    def send(self, command: Any) -> None:
+        """Keep one command."""
+        self.commands.append(pack_command(command))
+
+
+def pack_command(command: Any) -> bytes:
+    """Pack one meshcat command as its page reads it."""
+    import umsgpack
+
+    packed: bytes = umsgpack.packb(command.lower())
+    return packed
+
+
+def draw_scene(window: Window, machine: Machine, bodies: Bodies, reference: bool = False) -> None:
+    """Send the machine in its control zero-position, the camera and the light; with the reference's outline."""
+    import meshcat
+    from meshcat import geometry
+
+    vis = meshcat.Visualizer(window=window)
+    poses = body_poses(bodies.model, joint_positions(machine, bodies.model, np.zeros((1, 6))))[0]
+    table = vis[ROOT]
+    for shape in bodies.shapes.geometryObjects:
+        body = table[_body_name(bodies.model, shape.parentJoint)]
+        body.set_transform(pin.XYZQUATToSE3(poses[shape.parentJoint]).homogeneous)
+        primitive, upright = _primitive(shape.geometry)
+        red, green, blue, opacity = (float(c) for c in shape.meshColor)
+        colour = sum(round(255.0 * c) << s for c, s in ((red, 16), (green, 8), (blue, 0)))
+        material = geometry.MeshLambertMaterial(color=colour, opacity=opacity, depthWrite=opacity == 1.0)
+        body[shape.name].set_object(primitive, material)
+        body[shape.name].set_transform(shape.placement.homogeneous @ upright)
+    if reference:
+        corners = _box_edges(np.array([*machine.platen.size, -machine.platen.bearing_plane[2]]))
+        lines = geometry.LineBasicMaterial(color=int(drawing_colour("reference").lstrip("#"), 16), linewidth=2.0)
+        outline = geometry.LineSegments(geometry.PointsGeometry(corners.T.astype(np.float32)), lines)
+        table["reference"].set_object(outline)
+    _set_stage(vis, machine)
+
+
+def _set_stage(vis: Any, machine: Machine) -> None:
+    """Camera that sees the whole table from -Y, +X to the right; light from above; no grid through the platen."""
+    from meshcat import geometry
+
+    points = np.array([p for leg in (*machine.actuators, *machine.struts) for p in (leg.base_point, leg.platen_point)])
+    points = np.vstack([points, 0.5 * np.array([[*machine.platen.size, 0.0]]) * [[1, 1, 1], [-1, -1, 1]]])
+    middle, radius = 0.5 * (points.max(0) + points.min(0)), 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
+    vis[ROOT].set_transform(pin.SE3(np.eye(3), -middle).homogeneous)  # meshcat's camera turns about the origin
+    camera = vis["/Cameras/default/rotated"]
+    camera.set_object(geometry.PerspectiveCamera(fov=FIELD_OF_VIEW, near=0.05 * radius, far=20.0 * radius))
+    camera["<object>"].set_property("position", [radius * x for x in CAMERA])
+    for light, property, value in LIGHTS:
+        vis[f"/Lights/{light}/<object>"].set_property(property, value)
+    for end, colour in BACKGROUND.items():
+        vis["/Background"].set_property(end, colour)
+    for thing in ("/Grid", "/Axes"):
+        vis[thing].set_property("visible", False)
+
+
+def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Frames) -> None:
+    """Send the frames as one animation that loops; bodies that stand still are left out."""
+    from meshcat.path import Path as MeshcatPath
+
+    _warn_of_strokes(machine, bodies.model, frames)
+    poses = body_poses(bodies.model, joint_positions(machine, bodies.model, frames.displacement))
+    moving = {_body_name(bodies.model, joint): poses[:, joint] for joint in range(1, bodies.model.njoints)}
+    if frames.reference is not None:
+        middle = np.array([0.0, 0.0, 0.5 * machine.platen.bearing_plane[2]])
+        turn = _rotation(frames.reference[:, 3:])
+        moving["reference"] = np.hstack([frames.reference[:, :3] + turn @ middle, _quaternions(turn)])
+    clips = []
+    for name, pose in moving.items():
+        tracks = [
+            {"name": f".{key}", "type": kind, "times": _packed(np.arange(len(pose))), "values": _packed(part)}
+            for key, kind, part in (("position", "vector3", pose[:, :3]), ("quaternion", "quaternion", pose[:, 3:]))
+            if np.ptp(part, axis=0).max() > 1e-9  # [m, 1]: nobody sees less
+        ]
+        path = MeshcatPath(("meshcat", ROOT, name)).lower()
+        clips.append({"path": path, "clip": {"fps": frames.rate, "name": name, "tracks": tracks}})
+    window.send(_Animation([clip for clip in clips if clip["clip"]["tracks"]]))
+
+
+class _Animation:
+    """A `set_animation` command whose tracks are packed arrays: a tenth of the size of meshcat's lists of keys."""
+
+    def __init__(self, clips: list[dict[str, Any]]) -> None:
+        self.clips = clips
+
+    def lower(self) -> dict[str, Any]:
+        options = {"play": True, "repetitions": LOOP_FOR_EVER}
+        return {"type": "set_animation", "animations": self.clips, "options": options, "path": ""}
+
+
+def _warn_of_strokes(machine: Machine, model: Any, frames: Frames) -> None:
+    q = joint_positions(machine, model, frames.displacement)
+    for actuator in machine.actuators:
+        extension = q[:, model.idx_qs[model.getJointId(f"{actuator.name}_extension")]]
+        most = float(np.abs(extension).max())
+        if most > actuator.stroke:
+            log.warning(
+                "drawn %g times, %s moves %.3f m, beyond its stroke of %.3f m: its rod leaves the barrel",
+                frames.amplify,
+                actuator.name,
+                most,
+                actuator.stroke,
+            )
+
+
+def _packed(values: Array) -> Any:
+    import umsgpack
+
+    return umsgpack.Ext(FLOAT_ARRAY, np.ascontiguousarray(values, "<f4").tobytes())
+
+
+def _body_name(model: Any, joint: int) -> str:
+    """Link that moves with a joint; its name in the scene."""
+    kinds = pin.FrameType.BODY
+    return next(f.name for f in model.frames if f.parentJoint == joint and f.type == kinds)
+
+
+def _primitive(shape: Any) -> tuple[Any, Array]:
+    """Meshcat's geometry for a URDF primitive, and the turn (4, 4) that brings its axis to z."""
+    from meshcat import geometry
+
+    upright = np.eye(4)
+    if hasattr(shape, "halfSide"):
+        return geometry.Box([2.0 * float(s) for s in shape.halfSide]), upright
+    if hasattr(shape, "halfLength"):
+        upright[:3, :3] = pin.rpy.rpyToMatrix(0.5 * math.pi, 0.0, 0.0)
+        return geometry.Cylinder(2.0 * float(shape.halfLength), float(shape.radius)), upright
+    return geometry.Sphere(float(shape.radius)), upright
+
+
+def _box_edges(size: Array) -> Array:
+    """Ends (24, 3) of the twelve edges of a box around the origin."""
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(signs[a] - signs[b]).sum() == 2]
+    return np.array([0.5 * size * signs[k] for pair in pairs for k in pair])
+
+
+# ------------------------------------------------------------------------------------------------- page
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; \
+style-src 'unsafe-inline'; img-src data: blob:; {connect}">
+<title>{title}</title>
+<style>
+body {{ margin:0; }}
+#meshcat-pane {{ width:100vw; height:100vh; overflow:hidden; }}
+#caption {{ position:absolute; left:0; top:0; margin:1rem; padding:.5rem .8rem; max-width:calc(100vw - 300px); border-radius:.3rem;
+  background:rgba(255,255,255,.85); color:#1b1f24; font:14px/1.45 system-ui,"Liberation Sans",sans-serif; }}
+#caption b {{ font-size:1.1em; }}
+.kind {{ white-space:nowrap; margin-right:.8em; }}
+.mark {{ display:inline-block; width:.75em; height:.75em; margin-right:.3em; border-radius:2px; }}
+</style>
+</head>
+<body>
+<div id="meshcat-pane"></div>
+<div id="caption"><b>{title}</b><br>{note}<br>{legend}<br>
+<small>Drag to turn, wheel to zoom; "Open Controls" has play, pause, time and speed.</small></div>
+<script>{library}</script>
+<script>
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+for (const packed of {commands})
+  viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
+{connection}
+</script>
+</body>
+</html>
+"""
+
+
+def render_page(title: str, note: str, commands: list[bytes], *, reference: bool = False, live: bool = False) -> str:
+    """Return a page that draws `commands` and loads nothing; a live one then asks its own server for more."""
+    import meshcat
+
+    library = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
+    kinds = ["platen", "swivel", "bearing", "strut", *(["reference"] if reference else [])]
+    words = {"swivel": "horizontal actuators", "bearing": "vertical actuators", "strut": "hold-down struts"}
+    marks = (
+        f'<span class="kind"><span class="mark" style="background:{drawing_colour(kind)}"></span>'
+        f"{words.get(kind, kind)}</span> "
+        for kind in kinds
+    )
+    return PAGE.format(
+        connect="connect-src 'self'" if live else "",
+        title=html.escape(title),
+        note=html.escape(note),
+        legend="".join(marks),
+        library=library.read_text(encoding="utf-8").replace("</script", "<\\/script"),
+        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in commands]),
+        connection="viewer.connect();" if live else "",
+    )
+
+
+def save_animation(
+    machine: Machine, record: xr.Dataset, path: Path | str, *, rate: float = 30.0, amplify: float = 1.0
+) -> None:
+    """Write one HTML file that shows a record and plays off line; no server is started.
+
+    Raises RecordError or ParameterError as `record_frames`.
+    """
+    frames = record_frames(machine, record, rate=rate, amplify=amplify)
+    bodies, recorder = load_bodies(machine), Recorder()
+    reference = frames.reference is not None
+    draw_scene(recorder, machine, bodies, reference)
+    draw_animation(recorder, machine, bodies, frames)
+    page = render_page(*page_words(machine, record, frames), recorder.commands, reference=reference)
+    with write_whole(path) as beside:
+        beside.write_text(page, encoding="utf-8")
+
+
+def page_words(machine: Machine, record: xr.Dataset, frames: Frames) -> tuple[str, str]:
+    """Title and note of a record's page."""
+    size = "drawn to scale" if frames.amplify == 1.0 else f"motion drawn {frames.amplify:g} times as large"
+    seconds = (len(frames.displacement) - 1) / frames.rate
+    kind = str(record.attrs.get("kind", "record"))
+    note = f"{machine.name}, {kind}, {seconds:.1f} s at {frames.rate:g} frames/s, {size}; +X to the right"
+    return str(record.attrs.get("title", record.attrs.get("test", "record"))), note

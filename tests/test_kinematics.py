@@ -1,0 +1,339 @@
+"""The report's Chapter 3 against Pinocchio and against finite differences, over the whole travel range."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from machine_cases import FREE_MACHINES, MACHINES, machine_named, platen_se3, random_poses
+
+from lhpost6_pin import kinematics as kin
+from lhpost6_pin.errors import SimulationError
+from lhpost6_pin.rigid_body import make_model
+
+LHPOST6 = machine_named("lhpost6")
+POSES = random_poses(LHPOST6, 24)
+ROUNDING = 1e-13  # some ten operations on numbers below 10 in double precision
+H = 1e-5  # step of central differences: truncation h^2/6 L''' ~ 1e-11, rounding eps/h ~ 1e-11
+DIFFERENCE = 2e-9  # their sum with a margin for L''' up to 100 (lengths of some m, angles of a few degrees)
+
+angles = st.tuples(
+    st.floats(-3.1, 3.1),
+    st.floats(-1.5, 1.5),  # Eq. 3-3: pitch stays within a quarter turn
+    st.floats(-3.1, 3.1),
+)
+vectors = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
+
+
+def central(function, pose, direction):
+    """Directional derivative of function(pose) by central differences."""
+    return (np.asarray(function(pose + H * direction)) - np.asarray(function(pose - H * direction))) / (2.0 * H)
+
+
+def twists(count, seed=1):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1.0, 1.0, (count, 6)) * [0.3, 0.3, 0.5, 3.0, 2.0, 0.5]
+
+
+def motion_of(twist):
+    """pin.Motion of a twist in the report's order."""
+    return pin.Motion(kin.to_pinocchio_order(twist))
+
+
+def force_of(wrench):
+    return pin.Force(kin.to_pinocchio_order(wrench))
+
+
+def se3_of(frame):
+    return pin.SE3(frame.rotation, frame.origin)
+
+
+def all_frames(machine, pose):
+    """One frame of every kind of the report's Table 3.1."""
+    swivel = [c for c in machine.components if not kin.is_bearing(c)]
+    bearing = [c for c in machine.components if kin.is_bearing(c)]
+    frames = [kin.frame_s(), kin.frame_c(pose), kin.frame_b(machine, pose)]
+    frames += [kin.frame_p(machine, pose, c) for c in (swivel[0], swivel[-1], *bearing[:1])]
+    return frames + [kin.frame_n(machine, pose, c) for c in bearing[1:2]]
+
+
+# Order ---------------------------------------------------------------------------------------------------------------
+
+
+def test_report_order_is_angular_first_and_pinocchio_order_linear_first():
+    omega, v = np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])
+    twist = kin.to_pinocchio_order(np.concatenate([omega, v]))
+    motion = pin.Motion(v, omega)
+    assert np.array_equal(twist, motion.vector)
+    assert np.array_equal(kin.to_report_order(motion.vector), np.concatenate([omega, v]))
+    rows = np.arange(12.0).reshape(2, 6)
+    assert np.array_equal(kin.to_report_order(kin.to_pinocchio_order(rows)), rows)
+
+
+# Rotations -----------------------------------------------------------------------------------------------------------
+
+
+@given(st.floats(-7.0, 7.0))
+def test_elementary_rotations_are_pinocchios(angle):
+    for axis, rotation in zip("xyz", (kin.rotation_x, kin.rotation_y, kin.rotation_z), strict=True):
+        assert np.allclose(rotation(angle), pin.utils.rotate(axis, angle), rtol=0.0, atol=1e-15)
+
+
+@given(angles)
+def test_rotation_is_yaw_times_pitch_times_roll_as_pinocchio_has_it(euler):
+    assert np.allclose(kin.rotation(euler), pin.rpy.rpyToMatrix(*euler), rtol=0.0, atol=1e-15)
+
+
+@given(angles)
+def test_euler_rate_jacobians_are_pinocchios(euler):
+    rpy = np.array(euler)
+    fixed = pin.rpy.computeRpyJacobian(rpy, pin.LOCAL_WORLD_ALIGNED)
+    body = pin.rpy.computeRpyJacobian(rpy, pin.LOCAL)
+    assert np.allclose(kin.s_J_E(euler), fixed, rtol=0.0, atol=1e-15)
+    assert np.allclose(kin.b_J_E(euler), body, rtol=0.0, atol=1e-15)
+
+
+@given(angles, vectors)
+def test_angular_velocity_is_what_turns_the_rotation_matrix(euler, rates):
+    euler, rates = np.array(euler), np.array(rates) / 10.0
+    turn = kin.rotation(euler)
+    rate = central(kin.rotation, euler, rates)
+    assert np.allclose(rate, kin.skew(kin.s_J_E(euler) @ rates) @ turn, atol=DIFFERENCE)  # Eq. 3-7
+    assert np.allclose(rate, turn @ kin.skew(kin.b_J_E(euler) @ rates), atol=DIFFERENCE)  # Eq. 3-9
+    # Eq. 3-11: {b}'s components are {s}'s, turned back
+    assert np.allclose(kin.b_J_E(euler), turn.T @ kin.s_J_E(euler), atol=ROUNDING)
+
+
+@given(vectors, vectors)
+def test_skew_matrix_is_the_cross_product(x, y):
+    assert np.array_equal(kin.skew(x), pin.skew(np.array(x)))
+    assert np.allclose(kin.skew(x) @ y, np.cross(x, y), rtol=0.0, atol=1e-13)
+
+
+# Twists and wrenches between frames ----------------------------------------------------------------------------------
+
+
+@given(angles, vectors, angles, vectors)
+def test_twist_jacobian_between_any_frames_is_pinocchios_action(euler_f, at_f, euler_g, at_g):
+    f = kin.Frame(kin.rotation(euler_f), np.array(at_f))
+    g = kin.Frame(kin.rotation(euler_g), np.array(at_g))
+    placement = se3_of(f).actInv(se3_of(g))  # f_M_g
+    jacobian = kin.f_J_g(f, g)
+    action = placement.toActionMatrix()
+    reordered = kin.to_pinocchio_order(kin.to_pinocchio_order(jacobian).T).T
+    assert np.allclose(reordered, action, rtol=0.0, atol=1e-13)
+    assert np.allclose(jacobian @ kin.f_J_g(g, f), np.eye(6), rtol=0.0, atol=1e-12)  # Eq. 3-16; |r| <= 35 m, squared
+    wrench = kin.to_pinocchio_order(kin.to_pinocchio_order(kin.wrench_transform(f, g)).T).T
+    assert np.allclose(wrench, placement.toDualActionMatrix(), rtol=0.0, atol=1e-13)
+    assert np.allclose(kin.wrench_transform(f, g), np.linalg.inv(jacobian).T, rtol=0.0, atol=1e-11)  # Eq. 4-22
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_twists_in_all_frames_are_one_motion_to_pinocchio(name):
+    machine = machine_named(name)
+    for pose, twist in zip(random_poses(machine, 12), twists(12), strict=True):
+        b = kin.frame_b(machine, pose)
+        assert np.allclose(se3_of(b).homogeneous, platen_se3(machine, pose).homogeneous, atol=ROUNDING)
+        in_world = se3_of(b).act(motion_of(twist))  # {s}
+        for frame in all_frames(machine, pose):
+            mine = kin.f_J_g(frame, b) @ twist
+            assert np.allclose(mine, kin.to_report_order(se3_of(frame).actInv(in_world).vector), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_power_is_the_same_in_every_frame(name):
+    machine = machine_named(name)
+    for pose, twist, wrench in zip(random_poses(machine, 12), twists(12), twists(12, seed=2), strict=True):
+        b = kin.frame_b(machine, pose)
+        for frame in all_frames(machine, pose):
+            power = (kin.f_J_g(frame, b) @ twist) @ (kin.wrench_transform(frame, b) @ wrench)  # Eq. 4-20
+            assert power == pytest.approx(twist @ wrench, abs=1e-12)
+            theirs = motion_of(kin.f_J_g(frame, b) @ twist).dot(force_of(kin.wrench_transform(frame, b) @ wrench))
+            assert theirs == pytest.approx(power, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_special_jacobians_are_the_general_one_between_their_frames(name):
+    machine = machine_named(name)
+    for pose in random_poses(machine, 12):
+        b, c = kin.frame_b(machine, pose), kin.frame_c(pose)
+        assert np.allclose(kin.c_J_b(machine, pose), kin.f_J_g(c, b), atol=ROUNDING)  # Eq. 3-18
+        for component in machine.components:
+            p = kin.frame_p(machine, pose, component)
+            assert np.allclose(kin.p_J_c(p.origin - c.origin), kin.f_J_g(p, c), atol=ROUNDING)  # Eqs. 3-14, 3-17
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_platen_jacobians_are_pinocchios_frame_jacobians(name):
+    machine = machine_named(name)
+    model = make_model(machine)
+    joint = model.getJointId("platen")
+    for component in machine.components:
+        lever = np.array(component.platen_point) - machine.platen.centre_of_gravity
+        model.addFrame(pin.Frame(component.name, joint, pin.SE3(np.eye(3), lever), pin.FrameType.OP_FRAME))
+    data = model.createData()
+    for pose in random_poses(machine, 12):
+        q = pin.SE3ToXYZQUAT(platen_se3(machine, pose))
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+
+        def theirs(frame, reference=pin.LOCAL_WORLD_ALIGNED):
+            raw = pin.getFrameJacobian(model, data, model.getFrameId(frame), reference)  # noqa: B023
+            return kin.to_report_order(kin.to_report_order(raw).T).T  # rows and columns
+
+        assert np.allclose(kin.c_J_b(machine, pose), theirs("platen_top"), atol=ROUNDING)
+        for component in machine.components:
+            r_CP = kin.rotation(pose[3:]) @ component.platen_point
+            mine = kin.p_J_c(r_CP) @ kin.c_J_b(machine, pose)
+            assert np.allclose(mine, theirs(component.name), atol=ROUNDING)
+            if not kin.is_bearing(component):  # Eq. 3-22 from Pinocchio's Jacobian of the swivel alone
+                vector = data.oMf[model.getFrameId(component.name)].translation - component.base_point
+                row = vector / np.linalg.norm(vector) @ theirs(component.name)[3:]
+                assert np.allclose(kin.swivel_jacobian(pose, component) @ kin.c_J_b(machine, pose), row, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_twist_of_c_is_the_rate_of_the_pose(name):
+    machine = machine_named(name)
+    for pose, rate in zip(random_poses(machine, 8), twists(8)[:, ::-1], strict=True):
+        twist = kin.twist_c(pose, rate)
+        for component in machine.components:  # Eq. 3-13: velocity of the platen's particle, by finite differences
+            particle = kin.rotation(pose[3:]).T @ (kin.frame_p(machine, pose, component).origin - pose[:3])
+            speed = central(lambda p, at=particle: p[:3] + kin.rotation(p[3:]) @ at, pose, rate)
+            r_CP = kin.rotation(pose[3:]) @ particle
+            assert np.allclose((kin.p_J_c(r_CP) @ twist)[3:], speed, atol=DIFFERENCE)
+
+
+# Components ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_lengths_in_the_zero_position_are_the_distances_of_the_end_points(name):
+    machine = machine_named(name)
+    for component in machine.components:
+        apart = np.subtract(component.platen_point, component.base_point)
+        assert np.allclose(kin.component_vector(machine, np.zeros(6), component), apart, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_length_jacobians_are_finite_differences_of_the_lengths(name):
+    machine = machine_named(name)
+    free = np.ones(6) if machine.motion == "free" else np.eye(6)["xyz".index(machine.motion)]
+    for pose, rate in zip(random_poses(machine, 24), twists(24)[:, ::-1] * free, strict=True):
+        for component in machine.components:
+            speed = central(lambda p, c=component: np.linalg.norm(kin.component_vector(machine, p, c)), pose, rate)
+            row = kin.length_jacobian(machine, pose, component)
+            assert row @ kin.twist_c(pose, rate) == pytest.approx(speed, abs=DIFFERENCE)
+        speeds = central(lambda p: kin.inverse_kinematics(machine, p), pose, rate)
+        assert np.allclose(kin.pose_jacobian(machine, pose) @ rate, speeds, atol=DIFFERENCE)  # Eqs. 3-31 to 3-33
+
+
+def test_bearing_end_is_where_its_vertical_meets_the_sliding_plane():
+    bearings = [a for a in LHPOST6.actuators if kin.is_bearing(a)]
+    for pose in POSES:
+        placement = pin.SE3(pin.rpy.rpyToMatrix(*pose[3:]), np.array(pose[:3]))
+        for bearing in bearings:
+            end = bearing.base_point + kin.bearing_vector(LHPOST6, pose, bearing)
+            assert np.array_equal(end[:2], bearing.base_point[:2])  # stays vertical, exactly
+            on_platen = placement.actInv(end)
+            assert on_platen[2] == pytest.approx(LHPOST6.platen.bearing_plane[2], abs=ROUNDING)
+
+
+def test_bearing_rises_as_fast_as_the_platen_under_it_moves_along_its_normal():
+    bearings = [a for a in LHPOST6.actuators if kin.is_bearing(a)]
+    for pose, twist in zip(POSES, twists(len(POSES)), strict=True):
+        placement = platen_se3(LHPOST6, pose)
+        normal = placement.rotation[:, 2]
+        for bearing in bearings:
+            end = bearing.base_point + kin.bearing_vector(LHPOST6, pose, bearing)
+            at_end = pin.SE3(np.eye(3), end).actInv(placement.act(motion_of(twist)))
+            rise = normal @ at_end.linear / normal[2]
+            c_V = kin.c_J_b(LHPOST6, pose) @ twist
+            assert kin.bearing_jacobian(LHPOST6, pose, bearing) @ c_V == pytest.approx(rise, abs=ROUNDING)
+
+
+def test_plate_lies_in_the_sliding_plane_and_does_not_turn_about_its_normal():
+    for pose in POSES:
+        turn = kin.rotation(pose[3:])
+        plate = kin.plate_rotation(turn)
+        assert np.allclose(plate @ plate.T, np.eye(3), atol=ROUNDING)
+        assert np.linalg.det(plate) == pytest.approx(1.0, abs=ROUNDING)
+        assert np.allclose(plate[:, 2], turn[:, 2], atol=ROUNDING)  # Eq. 4-13
+        assert plate[1, 0] == 0.0  # Eq. 4-14: two rotations only, none about the vertical
+        # without yaw it is the platen's own rotation
+        level = [pose[3], pose[4], 0.0]
+        assert np.allclose(kin.plate_rotation(kin.rotation(level)), kin.rotation(level), atol=ROUNDING)
+
+
+def test_slip_is_how_fast_the_contact_point_walks_over_the_platen():
+    bearings = [a for a in LHPOST6.actuators if kin.is_bearing(a)]
+    for pose, rate in zip(POSES, twists(len(POSES))[:, ::-1], strict=True):
+        c_V = kin.twist_c(pose, rate)
+        turn = kin.rotation(pose[3:])
+        plate = kin.plate_rotation(turn)
+        for bearing in bearings:
+            slip = kin.slip_velocity(LHPOST6, pose, bearing, c_V)
+            assert slip[2] == pytest.approx(0.0, abs=ROUNDING)  # stated below Eq. 4-15
+
+            def contact(p, bearing=bearing):
+                """Contact point in platen axes, from C."""
+                end = kin.frame_p(LHPOST6, p, bearing).origin
+                return kin.rotation(p[3:]).T @ (end - p[:3])
+
+            walk = central(contact, pose, rate)  # the plate over the platen: the other way round
+            assert np.allclose(slip, -plate.T @ turn @ walk, atol=DIFFERENCE)
+
+
+# Inverse and forward kinematics --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_forward_kinematics_undoes_inverse_kinematics_to_1e12(name):
+    machine = machine_named(name)
+    for pose in random_poses(machine, 24):
+        found = kin.forward_kinematics(machine, kin.inverse_kinematics(machine, pose))
+        assert np.abs(found - pose).max() < 1e-12
+
+
+def test_forward_kinematics_from_the_pose_before_needs_few_steps():
+    for pose in POSES[:6]:
+        near = pose + 1e-4  # a sample later at 0.2 m/s
+        found = kin.forward_kinematics(LHPOST6, kin.inverse_kinematics(LHPOST6, near), pose, steps=4)
+        assert np.abs(found - near).max() < 1e-12
+
+
+def test_ten_lengths_with_errors_give_the_least_squares_pose():
+    rng = np.random.default_rng(3)
+    measured = kin.inverse_kinematics(LHPOST6, POSES[0]) + 1e-4 * rng.standard_normal(10)
+    pose = kin.forward_kinematics(LHPOST6, measured)
+    miss = kin.inverse_kinematics(LHPOST6, pose) - measured
+    assert np.linalg.norm(miss) > 1e-5  # six numbers cannot fit ten
+    # at the minimum the gradient vanishes: residual 1e-4 times the last step 1e-13 and rounding
+    assert np.abs(kin.pose_jacobian(LHPOST6, pose).T @ miss).max() < 1e-13
+
+
+@pytest.mark.parametrize("length", [np.full(10, np.nan), np.full(10, 1e9)])
+def test_lengths_that_fit_no_pose_are_refused(length):
+    with pytest.raises(SimulationError, match="no pose found"):
+        kin.forward_kinematics(LHPOST6, length)
+
+
+# Thrust --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_normal_thrust_conserves_power_and_the_reports_vertical_thrust_does_not(name):
+    lost = {"normal": 0.0, "report": 0.0}
+    for thrust in lost:
+        machine = machine_named(name, thrust)
+        for pose, twist in zip(random_poses(machine, 12), twists(12), strict=True):
+            c_V = kin.c_J_b(machine, pose) @ twist
+            for component in machine.components:
+                force = kin.component_force(machine, pose, component, 1.0)
+                p = kin.frame_p(machine, pose, component)
+                delivered = force @ (kin.f_J_g(p, kin.frame_c(pose)) @ c_V)[3:]
+                spent = kin.length_jacobian(machine, pose, component) @ c_V
+                lost[thrust] = max(lost[thrust], abs(delivered - spent))
+    assert lost["normal"] < ROUNDING
+    has_bearings = name == "lhpost6"
+    assert (lost["report"] > 1e-3) == has_bearings  # tilt of 0.04 rad times slip of m/s

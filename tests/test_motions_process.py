@@ -1,0 +1,235 @@
+"""Targets: consistent derivatives, exact resampling, rest at both ends, and refusal of what does not fit."""
+
+import numpy as np
+import pytest
+
+from lhpost6_pin.errors import MotionError, OutOfRangeError
+from lhpost6_pin.motions import (
+    AXES,
+    GroundMotion,
+    LegUtilisation,
+    MotionLimits,
+    check_limits,
+    find_motion,
+    largest_scale,
+    make_motion,
+    make_target,
+    with_scale,
+)
+
+RATE = 2048.0
+WIDE = MotionLimits(np.full(6, 1e6), np.full(6, 1e6), np.full(6, 1e6))
+# eighth-order central difference: its error at 33 Hz is (w dt)^8 / 630 = 2e-11
+STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+
+
+def derivative(samples: np.ndarray) -> np.ndarray:
+    return np.stack([np.correlate(column, STENCIL, mode="valid") for column in samples.T], axis=1) * RATE
+
+
+def pulse(step: float, frequency: float = 5.0, duration: float = 10.0):
+    """Acceleration of a smooth burst and its exact displacement, as functions of time."""
+    middle, spread = duration / 2, duration / 14
+
+    def displacement(time):
+        s = time - middle
+        return np.exp(-0.5 * (s / spread) ** 2) * np.sin(2 * np.pi * frequency * s)
+
+    def acceleration(time):
+        s = time - middle
+        w = 2 * np.pi * frequency
+        wave = np.exp(-0.5 * (s / spread) ** 2 + 1j * w * s)
+        return (((-s / spread**2 + 1j * w) ** 2 - 1 / spread**2) * wave).imag
+
+    time = np.arange(round(duration / step) + 1) * step
+    return time, displacement, acceleration
+
+
+@pytest.mark.parametrize("name", ["ridgecrest", "ridgecrest-clc", "tx5", "sxh1", "sfu-like"])
+def test_velocity_and_acceleration_are_the_derivatives_of_the_displacement(name):
+    target = make_target(find_motion(name))
+    inside = slice(4, -4)
+    for integral, rate in ((target.displacement, target.velocity), (target.velocity, target.acceleration)):
+        # the rest window's third derivative jumps where the pad ends, which costs the stencil a few 1e-6
+        error = np.abs(derivative(integral) - rate[inside]).max(axis=0)
+        assert (error <= 1e-5 * np.abs(rate).max(axis=0)).all()
+
+
+@pytest.mark.parametrize("name", ["ridgecrest", "ac156", "tz4", "white-noise"])
+def test_a_target_starts_and_ends_at_rest_in_the_zero_position(name):
+    target = make_target(find_motion(name))
+    for quantity in (target.displacement, target.velocity, target.acceleration):
+        assert not quantity[[0, -1]].any()
+    assert target.time[0] == 0 and target.time_step == 1 / RATE
+
+
+@pytest.mark.parametrize("step", [0.005, 0.01, 0.0024, 1 / 256, 1 / 2048, 0.02 / 3])
+def test_resampling_to_the_control_rate_is_exact_for_a_band_limited_motion(step):
+    time, displacement, acceleration = pulse(step)
+    motion = make_motion("pulse", step, {"y": acceleration(time)}, "acceleration", "closed form")
+    # corners far from 5 Hz: gain there is 1 - (0.02/5)^4 - (500/5)^-8 = 1 - 3e-10
+    target = make_target(motion, high_pass=0.02, low_pass=500)
+    clock = target.time + target.reference.start
+    # the burst's spectrum at 25 Hz, the nearest Nyquist frequency, and its ends are below 1e-9 of the peak
+    for found, exact in ((target.displacement, displacement), (target.acceleration, acceleration)):
+        wanted = exact(clock)
+        np.testing.assert_allclose(found[:, 1], wanted, atol=2e-8 * np.abs(wanted).max())
+    assert not target.displacement[:, [0, 2, 3, 4, 5]].any()
+
+
+def test_a_displacement_motion_is_differentiated_exactly():
+    time, displacement, acceleration = pulse(1 / RATE)
+    motion = make_motion("pulse", 1 / RATE, {"x": displacement(time)}, "displacement", "closed form")
+    target = make_target(motion, low_pass=900)
+    wanted = acceleration(target.time + target.reference.start)
+    # gain at 5 Hz is 1 - (5/900)^8; the burst's ends are 2e-11 of its peak
+    np.testing.assert_allclose(target.acceleration[:, 0], wanted, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_a_displacement_that_does_not_begin_at_zero_is_led_there_smoothly():
+    motion = make_motion("offset", 0.01, {"x": np.linspace(0.3, 0.2, 500)}, "displacement", "test")
+    target = make_target(motion)
+    assert not target.displacement[[0, -1]].any()
+    # quintic over 4 s from 0 to 0.3 m: peak velocity 1.875 d/T; plus the record's own
+    assert np.abs(target.velocity).max() < 1.875 * 0.3 / 4 + 0.03
+    inside = (target.time > 4.5) & (target.time < 8.5)
+    clock = target.time[inside] + target.reference.start
+    # the record's ends are kinks, smoothed by the low-pass within 0.5 s
+    np.testing.assert_allclose(target.displacement[inside, 0], 0.3 - 0.1 * clock / 4.99, atol=1e-5)
+
+
+@pytest.mark.parametrize(("corner", "low_pass"), [(1.0, 500.0), (2.0, 500.0), (0.1, 1.0), (0.1, 0.8)])
+def test_the_band_pass_has_zero_phase_and_its_stated_gain(corner, low_pass):
+    step = 0.01
+    time = np.arange(20_001) * step  # long: the ends do not matter in the middle
+    motion = make_motion("tone", step, {"x": np.sin(2 * np.pi * time)}, "acceleration", "closed form")
+    target = make_target(motion, high_pass=corner, low_pass=low_pass)
+    middle = slice(len(target.time) // 3, 2 * len(target.time) // 3)
+    gain = 1 / (1 + corner**4) / (1 + (1 / low_pass) ** 8)  # at 1 Hz, orders 2 and 4 of the data file
+    wanted = gain * np.sin(2 * np.pi * (target.time[middle] + target.reference.start))
+    # transients of the ends and the straight line taken off have died out here
+    np.testing.assert_allclose(target.acceleration[middle, 0], wanted, atol=1e-5)
+
+
+def test_scale_and_axes_act_linearly_on_the_channels():
+    motion = find_motion("ridgecrest-clc")
+    whole = make_target(motion)
+    turned = make_target(motion, scale=-0.5, axes="x=y,y=x,roll=z")
+    np.testing.assert_allclose(turned.displacement[:, 0], -0.5 * whole.displacement[:, 1], atol=1e-14)
+    np.testing.assert_allclose(turned.acceleration[:, 3], -0.5 * whole.acceleration[:, 2], atol=1e-11)
+    assert not turned.velocity[:, [2, 4, 5]].any()
+    assert turned.reference.axes == (("x", "y"), ("y", "x"), ("roll", "z")) and turned.reference.scale == -0.5
+    single = make_target(motion, axes="z")
+    assert single.displacement[:, 2].any() and not single.displacement[:, [0, 1, 3, 4, 5]].any()
+    doubled = with_scale(turned, 1.0)
+    np.testing.assert_allclose(doubled.velocity, -2 * turned.velocity, rtol=1e-14)
+    assert doubled.reference.scale == 1.0
+
+
+def test_a_window_cuts_the_record():
+    motion = find_motion("ridgecrest")
+    target = make_target(motion, window=(10.0, 30.0))
+    assert target.time[-1] == pytest.approx(20.0 + 2 * 4.0, abs=1e-9)
+    assert target.reference.start == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"axes": "q"},
+        {"axes": ""},
+        {"axes": "xx"},
+        {"axes": "x=w"},
+        {"scale": np.nan},
+        {"window": (5.0, 1.0)},
+        {"window": (0.0, 900.0)},
+        {"high_pass": 50.0},
+        {"high_pass": 0.0},
+        {"low_pass": 5000.0},
+        {"pad": 0.0},
+    ],
+)
+def test_processing_that_makes_no_sense_is_refused(options):
+    with pytest.raises(MotionError):
+        make_target(find_motion("ridgecrest"), **options)
+
+
+def test_a_triangular_wave_has_its_amplitude_velocity_and_corner_acceleration():
+    target = make_target(find_motion("triangle", axis="y", amplitude=0.2, velocity=0.25, corner_acceleration=2.0))
+    peaks = [np.abs(q).max() for q in (target.displacement, target.velocity, target.acceleration)]
+    # the 33 Hz low-pass rounds the kinks where the half-sine acceleration sets in
+    np.testing.assert_allclose(peaks, [0.2, 0.25, 2.0], rtol=2e-3)
+    speed = np.abs(target.velocity[:, 1])
+    share = np.mean(np.abs(speed[speed > 1e-3] - 0.25) < 1e-3)
+    assert share > 0.5  # most of the time at constant velocity
+
+
+def test_sxh1_asks_for_the_velocity_of_the_report():
+    target = make_target(find_motion("sxh1"))
+    w = 2 * np.pi / 2.0
+    np.testing.assert_allclose(target.displacement[:, 0].max(), 0.89, rtol=1e-6)
+    # between the ramps it is a pure sine: A w and A w^2, to the nearest sample
+    full = (target.time > 10.5) & (target.time < 19.5)
+    np.testing.assert_allclose(np.abs(target.velocity[full, 0]).max(), 0.89 * w, rtol=1e-5)
+    np.testing.assert_allclose(np.abs(target.acceleration[full, 0]).max(), 0.89 * w**2, rtol=1e-5)
+
+
+def limited(**changes: tuple[str, float]) -> MotionLimits:
+    arrays = {name: np.full(6, 1e6) for name in ("displacement", "velocity", "acceleration")}
+    for quantity, (axis, value) in changes.items():
+        arrays[quantity][AXES.index(axis)] = value
+    return MotionLimits(**arrays)
+
+
+def test_an_over_range_target_names_axis_value_limit_time_and_the_scale_that_fits():
+    target = make_target(find_motion("sine", amplitude=0.5, period=2.0), scale=2.0)
+    limits = limited(displacement=("x", 0.3), velocity=("x", 1.0))
+    with pytest.raises(OutOfRangeError) as caught:
+        check_limits(target, limits)
+    message = str(caught.value)
+    # velocity is 1 m pi/s against 1, displacement 1 m against 0.3: scale 2 x 0.3 = 0.6
+    for part in (
+        "x displacement 1 m against 0.3 m",
+        "x velocity 3.142 m/s against 1 m/s",
+        "(sample ",
+        "fits is 0.6",
+    ):
+        assert part in message
+    fitting = with_scale(target, largest_scale(target, limits))
+    assert check_limits(fitting, limits).highest[2] == pytest.approx(1.0, abs=0.02)
+    with pytest.raises(OutOfRangeError):
+        check_limits(with_scale(target, 0.61), limits)
+
+
+def test_a_target_at_exactly_its_limit_passes():
+    target = make_target(find_motion("sxh1"))
+    summary = check_limits(target, limited(displacement=("x", 0.89)))
+    assert summary.largest_scale == 1.0
+    assert summary.highest[:2] == ("displacement", "x")
+    assert summary.utilisation["velocity"]["y"] == 0
+
+
+def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
+    target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
+
+    def legs(displacement: np.ndarray, velocity: np.ndarray) -> LegUtilisation:
+        length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0  # a leg across the motion, 3 m long
+        return LegUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 0.02)
+
+    with pytest.raises(OutOfRangeError, match="H1 leg stroke") as caught:
+        check_limits(target, WIDE, legs)
+    # closed form: (0.5 s)^2 = 3.02^2 - 9, so s = 0.6940, rounded down
+    assert "fits is 0.694" in str(caught.value) or "fits is 0.693" in str(caught.value)
+    fits = largest_scale(target, WIDE, legs)
+    assert check_limits(with_scale(target, fits), WIDE, legs).utilisation["leg stroke"]["H1"] <= 1
+
+
+def test_a_still_target_fits_at_any_scale():
+    still = GroundMotion("still", 0.01, np.zeros((500, 6)), "displacement", "test")
+    assert largest_scale(make_target(still), WIDE) == np.inf
+
+
+@pytest.mark.parametrize("bad", [np.zeros(6), np.ones(3), np.full(6, np.nan), -np.ones(6)])
+def test_limits_that_are_no_limits_are_refused(bad):
+    with pytest.raises(ValueError, match="six positive numbers"):
+        MotionLimits(np.ones(6), bad, np.ones(6))

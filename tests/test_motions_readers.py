@@ -1,0 +1,254 @@
+"""Ground-motion files: what is in them comes out in SI, and no content gives an error that is not ours."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from motions_files import at2_text, cosmos_text, csmip_text
+
+from lhpost6_pin.errors import MotionError
+from lhpost6_pin.motions import AXES, GroundMotion, load_at2, load_csv, load_motion, load_v1
+from lhpost6_pin.motions.units import to_si
+
+GRAVITY = 9.80665
+WAVE = 0.3 * np.sin(np.arange(203) / 7)
+CSV = "# a comment\ntime_s,ax_g,z [mm/s^2],roll_deg_s2\n0.00,0.1,1000,180\n0.01,0.2,2000,0\n0.02,-0.1,0,-180\n"
+PRINTED = 1e-6  # [g] digits of the formats: 8 significant (AT2), 6 decimals (V1)
+
+
+def written(folder: Path, name: str, text: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+@pytest.mark.parametrize("old", [False, True])
+def test_a_peer_file_is_read_in_both_of_its_header_forms(tmp_path, old):
+    motion = load_motion(written(tmp_path, "A.AT2", at2_text(WAVE, 0.005, old=old)))
+    assert motion.time_step == 0.005 and motion.quantity == "acceleration" and motion.axes == ("x",)
+    np.testing.assert_allclose(motion.samples[:, 0], WAVE * GRAVITY, atol=PRINTED * GRAVITY)
+
+
+def test_three_peer_files_go_to_x_y_z_and_are_cut_to_the_shortest(tmp_path):
+    paths = [written(tmp_path, f"{i}.AT2", at2_text((i + 1) * WAVE[: 200 - i])) for i in range(3)]
+    motion = load_motion(paths)
+    assert motion.samples.shape == (198, 6)
+    for i in range(3):
+        np.testing.assert_allclose(motion.samples[:, i], (i + 1) * WAVE[:198] * GRAVITY, atol=PRINTED * GRAVITY)
+    assert load_motion({"z": paths[0]}).axes == ("z",)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("NPTS=  203", "NPTS=  204"), "204 points, the file has 203"),
+        (("UNITS OF G", "UNITS OF CM"), "no acceleration"),
+        (("ACCELERATION", "VELOCITY"), r"use the \.AT2 file"),
+        (("NPTS=", "POINTS="), "NPTS"),
+        (("DT=   0.0050", "DT=   0.0000"), "time step"),
+        (("  0.0000000E+00", "  0.00x0000E+00"), "line 5.*0.00x0000E.00"),
+        (("  0.0000000E+00", "  nan            "), "channel x, sample 0"),
+    ],
+)
+def test_a_damaged_peer_file_is_refused_with_the_place(tmp_path, change, message):
+    path = written(tmp_path, "bad.AT2", at2_text(WAVE).replace(*change))
+    with pytest.raises(MotionError, match=message) as caught:
+        load_motion(path)
+    assert "bad" in str(caught.value)
+
+
+def test_peer_files_of_different_time_steps_are_refused(tmp_path):
+    paths = [written(tmp_path, f"{step}.AT2", at2_text(WAVE, step)) for step in (0.005, 0.01)]
+    with pytest.raises(MotionError, match="time steps differ"):
+        load_at2(paths)
+
+
+def test_csmip_orientations_become_axes_with_their_sign(tmp_path):
+    text = csmip_text([("270 Deg", WAVE - 1.5), (" 360 Deg", 2 * WAVE), ("Up", 3 * WAVE)])
+    motion = load_motion(written(tmp_path, "station.RAW", text))
+    assert motion.time_step == 0.01
+    np.testing.assert_allclose(
+        motion.samples[:, :3] / GRAVITY, np.stack([1.5 - WAVE, 2 * WAVE, 3 * WAVE], axis=1), atol=PRINTED
+    )
+
+
+def test_cosmos_headers_give_azimuth_and_interval(tmp_path):
+    path = written(tmp_path, "station.v1", cosmos_text([(90, 10 * WAVE), (0, 20 * WAVE), (401, 30 * WAVE)]))
+    motion = load_motion(path)
+    assert motion.time_step == pytest.approx(0.005, rel=1e-12)
+    # five decimals of cm/s^2
+    np.testing.assert_allclose(motion.samples[:, :3], np.outer(WAVE, [0.1, 0.2, -0.3]), atol=1e-7)
+
+
+def test_a_station_at_another_angle_needs_and_takes_a_channel_mapping(tmp_path):
+    path = written(tmp_path, "station.v1", csmip_text([("35 Deg", WAVE), ("125 Deg", WAVE), ("Up", WAVE)]))
+    with pytest.raises(MotionError, match=r"channel 1: orientation '35'.*channels="):
+        load_motion(path)
+    assert load_v1(path, channels={2: "x", 3: "z"}).axes == ("x", "z")
+    with pytest.raises(MotionError, match="no channel 7"):
+        load_v1(path, channels={7: "x"})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("units of g", "units of counts"), "line 6.*counts"),
+        (("at 100 pts/sec", "at 0 pts/sec"), "line 6.*no sampling rate"),
+        ((" 203 Acc", " 999 Acc"), "channel 1, line 6: announces 999 points"),
+        (("Chan  2: 360", "Chan  2: 90"), "channel 2: a second channel for axis x"),
+        ((" 0.000000", " 0.00?000"), "channel 1, line 7"),
+    ],
+)
+def test_a_damaged_v1_file_is_refused_with_channel_and_line(tmp_path, change, message):
+    text = csmip_text([("90 Deg", WAVE), ("360 Deg", WAVE), ("Up", WAVE)]).replace(*change)
+    with pytest.raises(MotionError, match=message):
+        load_motion(written(tmp_path, "bad.v1", text))
+
+
+def test_csv_columns_carry_axis_and_unit_in_their_names(tmp_path):
+    motion = load_motion(written(tmp_path, "m.csv", CSV))
+    assert motion.time_step == pytest.approx(0.01, rel=1e-12) and motion.quantity == "acceleration"
+    np.testing.assert_allclose(motion.samples[:, 0], [0.1 * GRAVITY, 0.2 * GRAVITY, -0.1 * GRAVITY], rtol=1e-12)
+    np.testing.assert_allclose(motion.samples[:, 2], [1, 2, 0], rtol=1e-12)
+    np.testing.assert_allclose(motion.samples[:, 3], [np.pi, 0, -np.pi], rtol=1e-12)
+    assert not motion.samples[:, [1, 4, 5]].any()
+
+
+def test_csv_columns_and_units_can_be_given(tmp_path):
+    path = written(tmp_path, "m.csv", "n;east;extra\n1;10;5\n2;20;5\n")
+    motion = load_csv(path, columns={"y": "east"}, units="cm", time_step=0.5)
+    assert motion.quantity == "displacement" and motion.axes == ("y",) and motion.time_step == 0.5
+    np.testing.assert_allclose(motion.samples[:, 1], [0.1, 0.2], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("0.2,", "nan,"), "line 4, column 'ax_g': value is nan"),
+        (("0.2,", ","), "line 4, column 'ax_g': '' is not a number; fill the gap"),
+        (("0.2,2000", "0.2"), "line 4: 3 fields, the header has 4"),
+        (("0.02,", "0.05,"), "before sample 1"),
+        (("0.02,", "-9,"), "must increase"),
+        (("ax_g", "ax_kg"), "column 'ax_kg': unit 'kg' does not fit axis x"),
+        (("ax_g", "ax_m"), "mixed"),
+        (("ax_g", "ax"), "has no unit"),
+        (("ax_g", "q_g"), "'q_g' names no axis"),
+        (("roll_deg_s2", "roll_m_s2"), "does not fit axis roll"),
+        (("z [mm/s^2]", "x_g"), "two columns for axis x"),
+        (("time_s", "y_g"), "no time column"),
+        (("0.01,0.2,2000,0\n0.02,-0.1,0,-180\n", ""), "at least 2"),
+        (("0.2,", "1e308,"), "channel x, sample 1"),
+    ],
+)
+def test_a_damaged_csv_is_refused_with_the_place_and_a_remedy(tmp_path, change, message):
+    with pytest.raises(MotionError, match=message) as caught:
+        load_motion(written(tmp_path, "bad.csv", CSV.replace(*change)))
+    assert "bad" in str(caught.value)
+
+
+def test_a_missing_column_asked_for_is_named(tmp_path):
+    with pytest.raises(MotionError, match=r"no column 'up_g' for axis z; columns are time_s, ax_g"):
+        load_motion(written(tmp_path, "m.csv", CSV), columns={"z": "up_g"})
+
+
+def test_an_option_of_another_reader_is_refused(tmp_path):
+    with pytest.raises(MotionError, match="option 'columns' does not apply"):
+        load_motion(written(tmp_path, "A.AT2", at2_text(WAVE)), columns={"x": "a"})
+
+
+def test_a_missing_or_binary_file_is_a_motion_error(tmp_path):
+    for path in (tmp_path / "none.csv", tmp_path, written(tmp_path, "b.csv", b"time\0x")):
+        with pytest.raises(MotionError):
+            load_motion(path)
+
+
+@pytest.mark.parametrize("unit", ["m_s2", "m/s2", "m/s^2", "m/s**2", "m/s/s", "M/SEC2", "m/sec/sec"])
+def test_spellings_of_one_unit_mean_the_same(unit):
+    assert to_si(np.ones(1), unit, "x") == (1.0, "acceleration")
+
+
+@pytest.mark.parametrize(
+    ("unit", "axis", "factor", "quantity"),
+    [
+        ("g", "z", 9.80665, "acceleration"),
+        ("gal", "x", 0.01, "acceleration"),
+        ("cm/sec2", "y", 0.01, "acceleration"),
+        ("mm", "x", 0.001, "displacement"),
+        ("in", "x", 0.0254, "displacement"),
+        ("deg", "yaw", np.pi / 180, "displacement"),
+        ("mrad/s^2", "roll", 0.001, "acceleration"),
+    ],
+)
+def test_units_have_their_size(unit, axis, factor, quantity):
+    found, kind = to_si(np.ones(1), unit, axis)
+    assert found[0] == pytest.approx(factor, rel=1e-12) and kind == quantity
+
+
+def test_a_time_column_may_be_in_milliseconds(tmp_path):
+    motion = load_csv(written(tmp_path, "m.csv", "time [ms],z_m\n0,0\n5,1\n10,2\n"))
+    assert motion.time_step == pytest.approx(0.005, rel=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 3), (1, 6)])
+def test_samples_of_a_wrong_shape_are_no_motion(shape):
+    with pytest.raises(MotionError):
+        GroundMotion("m", 0.01, np.zeros(shape), "acceleration", "test")
+
+
+def test_the_samples_of_a_motion_cannot_be_changed():
+    given_samples = np.zeros((4, 6))
+    motion = GroundMotion("m", 0.01, given_samples, "displacement", "test")
+    given_samples[0] = 1
+    assert not motion.samples.any()
+    with pytest.raises(ValueError, match="read-only"):
+        motion.samples[0] = 1
+
+
+TEXTS = {
+    "m.csv": CSV,
+    "m.AT2": at2_text(WAVE[:20]),
+    "m.RAW": csmip_text([("90 Deg", WAVE[:20]), ("Up", WAVE[:20])]),
+    "m.v1": cosmos_text([(90, WAVE[:20])]),
+}
+
+
+@st.composite
+def damaged(draw):
+    """Draw a good file with a few of its bytes replaced, removed or doubled, or any bytes at all."""
+    name = draw(st.sampled_from(sorted(TEXTS)))
+    if draw(st.booleans()):
+        return name, draw(st.binary(max_size=400))
+    data = TEXTS[name].encode()
+    for _ in range(draw(st.integers(1, 4))):
+        at = draw(st.integers(0, len(data)))
+        length = draw(st.integers(0, 12))
+        piece = draw(
+            st.one_of(st.binary(max_size=6), st.sampled_from([b"-", b"9" * 30, b"1e400", b"inf", b"\n", b","]))
+        )
+        data = data[:at] + piece + data[at + length :]
+    return name, data
+
+
+@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(damaged())
+def test_any_bytes_give_a_motion_or_a_motion_error(tmp_path, case):
+    name, data = case
+    path = written(tmp_path, name, data)
+    for reader in (load_motion, load_csv, load_v1, load_at2):
+        try:
+            motion = reader(path)
+        except MotionError:
+            continue
+        assert motion.samples.shape[1] == len(AXES) and np.isfinite(motion.samples).all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.text(max_size=20), st.sampled_from(AXES))
+def test_any_text_is_a_unit_or_a_motion_error(text, axis):
+    try:
+        factor, quantity = to_si(np.ones(1), text, axis)
+    except MotionError:
+        return
+    assert factor[0] > 0 and quantity in ("acceleration", "displacement")

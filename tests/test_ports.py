@@ -1,0 +1,149 @@
+"""The compiled ports against the report's kinematics written by hand, against Pinocchio and finite differences."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from machine_cases import MACHINES, frame_array, machine_named, plant_named, random_poses
+
+from lhpost6_pin import kinematics as kin
+from lhpost6_pin.ports import PLATEN_PORTS, evaluate_ports, platen_pose, port_names
+
+ROUNDING = 1e-13  # some ten operations on numbers below 10 in double precision
+CASES = [(name, thrust) for name in MACHINES for thrust in ("report", "normal")]
+
+
+def ports_at(plant, pose, evaluate=evaluate_ports):
+    """s (n,), J (n, 6), B (n, 6) of all ports at a pose."""
+    n = len(plant.ports)
+    s, J, B = np.full(n, np.nan), np.full((n, 6), np.nan), np.full((n, 6), np.nan)
+    evaluate(frame_array(plant.machine, pose), plant.legs, plant.body, s, J, B)
+    return s, J, B
+
+
+def row_of_force(machine, pose, at, force):
+    """Wrench at B in platen axes, Pinocchio's order, of a force in {s} at a point `at` from C in {s}."""
+    wrench_c = kin.p_J_c(at).T @ np.concatenate([np.zeros(3), force])
+    return kin.to_pinocchio_order(kin.c_J_b(machine, pose).T @ wrench_c)
+
+
+def test_port_names_are_legs_pads_and_platen_in_that_order():
+    names = port_names(machine_named("lhpost6"))
+    assert names[:13] == ("H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6", "S1", "S2", "S3")
+    assert names[13:17] == ("V1.x", "V1.y", "V2.x", "V2.y")
+    assert names[-6:] == PLATEN_PORTS
+    assert len(names) == 13 + 12 + 6
+    assert port_names(machine_named("stewart")) == (*(f"L{i}" for i in range(1, 7)), *PLATEN_PORTS)
+
+
+@pytest.mark.parametrize("name, thrust", CASES)
+def test_leg_rows_are_the_reports_lengths_and_jacobians(name, thrust):
+    machine, plant = machine_named(name, thrust), plant_named(name, thrust)
+    for pose in random_poses(machine, 24):
+        s, J, B = ports_at(plant, pose)
+        c_J_b = kin.c_J_b(machine, pose)
+        for i, component in enumerate(machine.components):
+            vector = kin.component_vector(machine, pose, component)
+            zero = np.linalg.norm(np.subtract(component.platen_point, component.base_point))
+            assert s[i] == pytest.approx(np.linalg.norm(vector) - zero, abs=ROUNDING)
+            row = kin.length_jacobian(machine, pose, component) @ c_J_b
+            assert np.allclose(J[i], kin.to_pinocchio_order(row), rtol=0.0, atol=ROUNDING)
+            at = kin.frame_p(machine, pose, component).origin - pose[:3]
+            column = row_of_force(machine, pose, at, kin.component_force(machine, pose, component, 1.0))
+            assert np.allclose(B[i], column, rtol=0.0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name, thrust", CASES)
+def test_force_columns_are_motion_rows_but_for_the_reports_vertical_thrust_and_pads(name, thrust):
+    machine, plant = machine_named(name, thrust), plant_named(name, thrust)
+    for pose in random_poses(machine, 12):
+        _, J, B = ports_at(plant, pose)
+        for port, row, column in zip(plant.ports, J, B, strict=True):
+            bearing = port.split(".")[0] in {a.name for a in machine.actuators if a.mount == "bearing"}
+            if not bearing or (thrust == "normal" and "." not in port):
+                assert np.allclose(row, column, rtol=0.0, atol=ROUNDING), port
+
+
+def test_pad_rows_are_the_reports_slip_and_friction():
+    machine, plant = machine_named("lhpost6"), plant_named("lhpost6")
+    for pose in random_poses(machine, 24):
+        s, J, B = ports_at(plant, pose)
+        b_J = kin.c_J_b(machine, pose)
+        turn = kin.rotation(pose[3:])
+        for bearing in machine.actuators[4:]:
+            frame = kin.frame_n(machine, pose, bearing)
+            at = frame.origin - pose[:3]
+            # slip is linear in the twist: its matrix, column by column
+            slip = np.array([kin.slip_velocity(machine, pose, bearing, b_J @ unit) for unit in np.eye(6)]).T
+            moved = frame.rotation.T @ (turn @ bearing.platen_point - at)
+            for k, d in enumerate("xy"):
+                i = plant.ports.index(f"{bearing.name}.{d}")
+                assert np.allclose(J[i], kin.to_pinocchio_order(slip[k]), rtol=0.0, atol=ROUNDING)
+                column = row_of_force(machine, pose, at, frame.rotation[:, k])
+                assert np.allclose(B[i], column, rtol=0.0, atol=ROUNDING)
+                assert s[i] == pytest.approx(moved[k], abs=ROUNDING)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_platen_ports_move_with_c_and_carry_the_wrench_there(name):
+    machine, plant = machine_named(name), plant_named(name)
+    for pose in random_poses(machine, 12):
+        s, J, B = ports_at(plant, pose)
+        assert np.allclose(s[-6:], pose, rtol=0.0, atol=ROUNDING)  # displacement of C and Euler angles
+        c_J_b = kin.to_pinocchio_order(kin.to_pinocchio_order(kin.c_J_b(machine, pose)).T).T
+        assert np.allclose(J[-6:], c_J_b, rtol=0.0, atol=ROUNDING)  # twist in {c}: omega, not Euler angle rates
+        assert np.array_equal(J[-6:], B[-6:])
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_leg_coordinates_change_at_the_rate_of_their_rows(name):
+    machine, plant = machine_named(name), plant_named(name)
+    legs = plant.legs.size
+    h = 1e-5  # central difference: truncation and rounding both near 1e-11
+    rng = np.random.default_rng(5)
+    for pose in random_poses(machine, 12):
+        frame = frame_array(machine, pose)
+        placement = pin.SE3(frame[:3], frame[3])
+        twist = np.zeros(6)
+        twist[plant.axes] = rng.uniform(-1.0, 1.0, plant.axes.size)
+        _, J, _ = ports_at(plant, pose)
+        s_at = []
+        for step in (h, -h):
+            moved = placement * pin.exp6(pin.Motion(step * twist))
+            there = frame.copy()
+            there[:3], there[3] = moved.rotation, moved.translation
+            s = np.zeros(len(plant.ports))
+            evaluate_ports(there, plant.legs, plant.body, s, np.zeros((s.size, 6)), np.zeros((s.size, 6)))
+            s_at.append(s)
+        rate = (s_at[0] - s_at[1]) / (2.0 * h)
+        assert np.allclose(rate[:legs], J[:legs] @ twist, rtol=0.0, atol=2e-9)
+        assert np.allclose(rate[-6:-3], J[-6:-3] @ twist, rtol=0.0, atol=2e-9)
+
+
+def test_compiled_ports_are_the_python_they_are_written_in():
+    plant = plant_named("lhpost6")
+    for pose in random_poses(plant.machine, 4):
+        for fast, plain in zip(ports_at(plant, pose), ports_at(plant, pose, _recorded), strict=True):
+            assert np.allclose(fast, plain, rtol=0.0, atol=ROUNDING)
+
+
+def _recorded(frame, legs, body, s, J, B):
+    """The uncompiled original; record arrays give `leg.rho` to Python as they do to numba."""
+    evaluate_ports.py_func(frame, legs.view(np.recarray), body.view(np.recarray), s, J, B)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_pose_of_a_plant_is_pinocchios_placement_of_the_platen(name):
+    plant = plant_named(name)
+    data = plant.model.createData()
+    for pose in random_poses(plant.machine, 12):
+        wanted = frame_array(plant.machine, pose)
+        if plant.machine.motion == "free":
+            q = pin.SE3ToXYZQUAT(pin.SE3(wanted[:3], wanted[3]))
+        else:
+            q = pose[plant.axes]
+        frame = np.zeros((8, 3))
+        platen_pose(q, plant.axes, plant.body, frame)
+        assert np.allclose(frame, wanted, rtol=0.0, atol=ROUNDING)
+        pin.forwardKinematics(plant.model, data, q)
+        assert np.allclose(frame[:3], data.oMi[1].rotation, rtol=0.0, atol=ROUNDING)
+        assert np.allclose(frame[3], data.oMi[1].translation, rtol=0.0, atol=ROUNDING)

@@ -1,0 +1,334 @@
+"""The record layout: what it accepts, what it refuses and with which words, and that nothing else comes out."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from lhpost6_pin.errors import RecordError, UnknownNameError
+from lhpost6_pin.records import (
+    AXES,
+    LAYOUT,
+    channel_name,
+    layout_faults,
+    load_record,
+    make_record,
+    require,
+    same_unit,
+    save_record,
+)
+
+RECORDS = Path(__file__).parent / "data" / "records"
+LABELS = {
+    "actuator": ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"],
+    "horizontal": ["H1", "H2", "H3", "H4"],
+    "strut": ["S1", "S2", "S3"],
+}
+SIZES = {"axis": 6} | {dim: len(labels) for dim, labels in LABELS.items()}
+
+
+def full_record(count: int = 64, rate: float = 2048.0) -> xr.Dataset:
+    """Every channel of the layout, random."""
+    rng = np.random.default_rng(1)
+    channels = {
+        name: rng.standard_normal((count, *(SIZES[dim] for dim in channel.dims[1:])))
+        for name, channel in LAYOUT.items()
+    }
+    return make_record(np.arange(count) / rate, channels, LABELS, {"kind": "simulated", "test": "noise"})
+
+
+def small_record() -> xr.Dataset:
+    """Three channels, quick to write."""
+    return full_record(16)[["platen_displacement", "chamber_pressure_b", "supply_pressure"]]
+
+
+def write_anyway(dataset: xr.Dataset, path: Path) -> Path:
+    """Write whatever it is, valid or not."""
+    dataset.to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+# --------------------------------------------------------------------------------------- what is accepted
+@pytest.mark.parametrize("path", sorted(RECORDS.glob("*.nc")), ids=lambda p: p.stem)
+def test_measured_and_reference_records_are_valid(path: Path) -> None:
+    record = load_record(path, LABELS)
+    assert tuple(record["axis"].values) == AXES
+    assert all(record[name].dtype == np.float64 for name in LAYOUT if name in record)
+
+
+def test_a_record_comes_back_from_disk_as_it_went(tmp_path: Path) -> None:
+    record = full_record()
+    save_record(record, tmp_path / "new" / "record.nc")
+    xr.testing.assert_identical(load_record(tmp_path / "new" / "record.nc"), record)
+
+
+def test_units_names_rate_and_version_are_filled_in() -> None:
+    record = full_record(rate=2048.0)
+    assert record["platen_acceleration"].attrs["units"] == "m/s2, rad/s2"
+    assert all(record[name].attrs["long_name"] for name in LAYOUT)
+    assert record.attrs["sample_rate_hz"] == 2048.0
+    assert record.attrs["layout_version"] == 1
+
+
+def test_a_record_holds_what_was_measured_and_may_hold_more(tmp_path: Path) -> None:
+    time = np.arange(9) / 512
+    channels = {
+        "supply_pressure": np.full(9, 2e7),
+        "oil_temperature": (("time",), np.full(9, 40.0), {"units": "degC"}),
+        "pad_state": (("time", "pad"), np.zeros((9, 12))),
+        "note": ((), "warm"),
+    }
+    save_record(make_record(time, channels, {}, {}), tmp_path / "r.nc")
+    assert set(load_record(tmp_path / "r.nc").data_vars) == set(channels)
+
+
+def test_another_machine_has_other_actuators_and_no_struts(tmp_path: Path) -> None:
+    channels = {"platen_displacement": np.zeros((9, 6)), "chamber_pressure_b": np.ones((9, 1))}
+    one = {"actuator": ["A1"], "horizontal": ["A1"]}
+    save_record(make_record(np.arange(9) / 512, channels, one, {}), tmp_path / "uniaxial.nc")
+    load_record(tmp_path / "uniaxial.nc", one)
+    with pytest.raises(RecordError, match=r"horizontal: has labels A1 \(they must be H1 H2 H3 H4"):
+        load_record(tmp_path / "uniaxial.nc", LABELS)
+
+
+def test_packed_and_single_precision_channels_are_loaded_in_double(tmp_path: Path) -> None:
+    record = full_record()
+    packing = {"dtype": "int16", "scale_factor": 1e-3, "_FillValue": -32768}
+    record.to_netcdf(
+        tmp_path / "p.nc",
+        engine="h5netcdf",
+        encoding={"actuator_force": packing, "strut_pressure": {"dtype": "float32"}},
+    )
+    loaded = load_record(tmp_path / "p.nc")
+    assert loaded["actuator_force"].dtype == loaded["strut_pressure"].dtype == np.float64
+    np.testing.assert_allclose(loaded["actuator_force"], record["actuator_force"], atol=0.5e-3)  # half a step
+
+
+@pytest.mark.parametrize(
+    ("given_", "wanted", "same"),
+    [
+        ("m/s^2, rad/s^2", "m/s2, rad/s2", True),
+        ("m s-2, rad s-2", "m/s2, rad/s2", True),
+        ("meter/second**2, radian/second**2", "m/s2, rad/s2", True),
+        ("N/m^2", "Pa", True),
+        ("pascal", "Pa", True),
+        ("", "1", True),
+        ("dimensionless", "1", True),
+        ("mm, rad", "m, rad", False),
+        ("m, deg", "m, rad", False),
+        ("m", "m, rad", False),
+        ("bar", "Pa", False),
+        ("kN", "N", False),
+        ("percent", "1", False),
+        ("furlongs per fortnight", "m/s", False),
+        ("9**9**9**9", "1", False),
+        ("__import__('os')", "1", False),
+        (1.0, "1", False),
+    ],
+)
+def test_units_are_compared_by_meaning(given_: object, wanted: str, same: bool) -> None:
+    assert same_unit(given_, wanted) is same
+
+
+# ---------------------------------------------------------------------------------------- what is refused
+def _set(name: str, sample: int, column: int, value: float) -> Callable[[xr.Dataset], xr.Dataset]:
+    def change(record: xr.Dataset) -> xr.Dataset:
+        values = record[name].values.copy()
+        values[sample, column] = value
+        return record.assign({name: record[name].copy(data=values)})
+
+    return change
+
+
+def _time(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[xr.Dataset], xr.Dataset]:
+    return lambda record: record.assign_coords(time=change(record["time"].values.copy()))
+
+
+def _at(sample: int, value: float) -> Callable[[np.ndarray], np.ndarray]:
+    def change(time: np.ndarray) -> np.ndarray:
+        time[sample] = value
+        return time
+
+    return change
+
+
+def _units(name: str, units: object) -> Callable[[xr.Dataset], xr.Dataset]:
+    def change(record: xr.Dataset) -> xr.Dataset:
+        record = record.copy()
+        record[name].attrs = {} if units is None else {"units": units}
+        return record
+
+    return change
+
+
+BREAKAGES: dict[str, tuple[Callable[[xr.Dataset], xr.Dataset], str]] = {
+    "no time": (lambda r: r.drop_vars("time"), "time: is missing"),
+    "one sample": (lambda r: r.isel(time=[0]), "time: is not a row of at least two numbers"),
+    "a late sample": (_time(_at(20, 20.3 / 2048)), "time, sample 20: is not uniform"),
+    "a gap": (lambda r: r.drop_isel(time=range(10, 15)), "time, sample 10: .* a gap of 5 missing samples"),
+    "time turning back": (_time(_at(30, 0.0)), "time, sample 30: does not increase"),
+    "time not a number": (_time(_at(7, np.nan)), "time, sample 7: is not a number"),
+    "another rate": (lambda r: r.assign_attrs(sample_rate_hz=2000), "2048 Hz, sample_rate_hz says 2000"),
+    "a rate in words": (lambda r: r.assign_attrs(sample_rate_hz="fast"), "sample_rate_hz says fast"),
+    "not a number": (_set("platen_velocity", 33, 5, np.nan), r"platen_velocity\[yaw\], sample 33: is not finite"),
+    "infinite": (_set("chamber_pressure_b", 3, 2, -np.inf), r"chamber_pressure_b\[H3\], sample 3: is not finite"),
+    "transposed": (lambda r: r.transpose("axis", ...), r"platen_displacement: has dimensions \('axis', 'time'\)"),
+    "another dimension": (
+        lambda r: r.assign(actuator_force=("time", np.zeros(64), {"units": "N"})),
+        "actuator_force: has dimensions",
+    ),
+    "axes out of order": (lambda r: r.isel(axis=[1, 0, 2, 3, 4, 5]), "axis: has labels y x z roll pitch yaw"),
+    "five axes": (lambda r: r.isel(axis=range(5)), "axis: has labels x y z roll pitch .they must be x y z"),
+    "no axis labels": (lambda r: r.drop_vars("axis"), "axis: has no labels"),
+    "actuators out of order": (
+        lambda r: r.isel(actuator=[0, 2, 1, 3, 4, 5, 6, 7, 8, 9]),
+        "actuator: has labels H1 H3 H2 .*they must be H1 H2 H3",
+    ),
+    "an actuator twice": (lambda r: r.isel(strut=[0, 1, 1]), "strut: has labels that repeat"),
+    "an unknown horizontal": (
+        lambda r: r.assign_coords(horizontal=["H1", "H2", "H3", "H5"]),
+        "horizontal: has labels H1 H2 H3 H5",
+    ),
+    "no units": (_units("strut_pressure", None), "strut_pressure: has no units .give it in 'Pa'"),
+    "other units": (_units("platen_displacement", "in, deg"), "platen_displacement: has units 'in, deg'"),
+    "milliseconds": (_units("time", "ms"), "time: has units 'ms'"),
+    "text": (
+        lambda r: r.assign(supply_pressure=("time", ["20 MPa"] * 64, {"units": "Pa"})),
+        "supply_pressure: holds",
+    ),
+    "three valves": (lambda r: r.assign_attrs(valves_per_horizontal_actuator=3), "valves_per_horizontal_actuator is 3"),
+    "a later layout": (lambda r: r.assign_attrs(layout_version=2), "layout_version is 2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BREAKAGES)
+def test_a_broken_record_is_refused_with_file_channel_and_sample(name: str, tmp_path: Path) -> None:
+    breakage, message = BREAKAGES[name]
+    path = write_anyway(breakage(full_record()), tmp_path / "broken.nc")
+    with pytest.raises(RecordError, match=re.escape(str(path)) + ".*" + message):
+        load_record(path)
+
+
+def test_several_faults_are_named_at_once() -> None:
+    record = _units("strut_pressure", None)(_set("platen_velocity", 5, 0, np.nan)(full_record()))
+    assert [fault.channel for fault in layout_faults(record)] == ["platen_velocity[x]", "strut_pressure"]
+
+
+def test_what_is_not_there_or_not_netcdf_is_refused_by_name(tmp_path: Path) -> None:
+    (tmp_path / "table.nc").write_text("time,force\n0,1\n")
+    (tmp_path / "empty.nc").touch()
+    for name, message in (("absent.nc", "no such file"), (".", "no such file"), ("table.nc", "not a netCDF-4")):
+        with pytest.raises(RecordError, match=message):
+            load_record(tmp_path / name)
+    with pytest.raises(RecordError, match=r"empty\.nc: not a netCDF-4"):
+        load_record(tmp_path / "empty.nc")
+
+
+def test_an_invalid_record_is_neither_made_nor_written_over_a_good_one(tmp_path: Path) -> None:
+    good = full_record()
+    save_record(good, tmp_path / "r.nc")
+    with pytest.raises(RecordError, match=r"r\.nc: .*platen_velocity\[x\], sample 5"):
+        save_record(_set("platen_velocity", 5, 0, np.nan)(good), tmp_path / "r.nc")
+    xr.testing.assert_identical(load_record(tmp_path / "r.nc"), good)
+    with pytest.raises(RecordError, match="sample 3"):
+        make_record(np.arange(9.0), {"supply_pressure": np.where(np.arange(9) == 3, np.inf, 1)}, {}, {})
+
+
+def test_arrays_that_do_not_fit_the_layout_are_refused() -> None:
+    time = np.arange(9) / 512
+    with pytest.raises(RecordError, match="platen_velocity: has shape"):
+        make_record(time, {"platen_velocity": np.zeros(9)}, {}, {})
+    with pytest.raises(RecordError, match="do not fit together"):
+        make_record(time, {"platen_velocity": np.zeros((9, 5))}, {}, {})
+    with pytest.raises(RecordError, match="actuator: has no labels"):
+        make_record(time, {"actuator_force": np.zeros((9, 2))}, {}, {})
+    with pytest.raises(UnknownNameError, match="platen_displacement"):
+        make_record(time, {"platten_displacement": np.zeros((9, 6))}, {}, {})
+
+
+def test_a_missing_channel_is_asked_for_by_name(tmp_path: Path) -> None:
+    save_record(full_record().drop_vars(["strut_pressure", "spool_position"]), tmp_path / "r.nc")
+    record = load_record(tmp_path / "r.nc")
+    require(record, "actuator_force", "time")
+    with pytest.raises(RecordError, match=r"r\.nc: has no spool_position, strut_pressure; it has"):
+        require(record, "actuator_force", "spool_position", "strut_pressure")
+
+
+def test_a_column_is_named_by_its_label() -> None:
+    record = full_record()
+    assert channel_name(record["actuator_force"], 4) == "actuator_force[V1]"
+    assert channel_name(record["supply_pressure"], 0) == "supply_pressure"
+    assert channel_name(record["actuator_force"].drop_vars("actuator"), 4) == "actuator_force[4]"
+
+
+# ------------------------------------------------------------------------------------------------- fuzzing
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fuzz")
+
+
+def loads_or_record_error(path: Path) -> None:
+    try:
+        load_record(path)
+    except RecordError as error:
+        assert str(path) in str(error)
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=400), st.sampled_from([b"", b"\x89HDF\r\n\x1a\n", b"CDF\x01"]))
+def test_random_bytes_give_nothing_but_a_record_error(folder: Path, content: bytes, magic: bytes) -> None:
+    path = folder / "bytes.nc"
+    path.write_bytes(magic + content)
+    with pytest.raises(RecordError, match="not a netCDF-4"):
+        load_record(path)
+
+
+def _damageable(content: bytes) -> list[int]:
+    """Places outside HDF5's global heap: with a damaged heap the HDF5 library itself may never return."""
+    heaps = [m.start() for m in re.finditer(b"GCOL", content)]
+    spans = [range(k, k + int.from_bytes(content[k + 8 : k + 16], "little")) for k in heaps]
+    return [k for k in range(len(content)) if not any(k in span for span in spans)]
+
+
+# h5netcdf complains from the destructor of a file that it could not open
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_damaged_bytes_of_a_record_give_a_record_or_a_record_error(folder: Path, data: st.DataObject) -> None:
+    path = folder / "damaged.nc"
+    if not (folder / "sound.nc").exists():
+        save_record(small_record(), folder / "sound.nc")
+    content = bytearray((folder / "sound.nc").read_bytes())
+    for place in data.draw(st.lists(st.sampled_from(_damageable(bytes(content))), min_size=1, max_size=8)):
+        content[place] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.one_of(st.none(), st.integers(0, len(content))))])
+    loads_or_record_error(path)
+
+
+ATTRIBUTES = st.one_of(
+    st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20),
+    st.integers(-(2**31), 2**31),
+    st.floats(),
+    st.lists(st.integers(-9, 9), min_size=1, max_size=3).map(np.array),
+)
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.sampled_from(["units", "sample_rate_hz", "layout_version", "valves_per_horizontal_actuator", "scale_factor"]),
+    ATTRIBUTES,
+    st.lists(st.sampled_from(sorted(SIZES)), max_size=3, unique=True),
+)
+def test_strange_attributes_and_missing_labels_give_a_record_or_a_record_error(
+    folder: Path, key: str, value: object, unlabelled: list[str]
+) -> None:
+    strange = small_record().drop_vars(unlabelled, errors="ignore")
+    strange.attrs[key] = value
+    strange["supply_pressure"].attrs[key] = value
+    strange["time"].attrs["units"] = value
+    loads_or_record_error(write_anyway(strange, folder / "strange.nc"))

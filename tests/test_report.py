@@ -1,0 +1,487 @@
+"""Run reports: complete, self-contained, safe against hostile names, light, and drawn by a real browser."""
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+import zlib
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.constants import g
+
+from lhpost6_pin.errors import RecordError, UnknownNameError
+from lhpost6_pin.report.page import Page, bar, number, render_page, text
+from lhpost6_pin.report.plots import ACHIEVED, SCALES, Row, Trace, envelope, time_figure
+from lhpost6_pin.report.run_report import RunSummary, write_run_report
+
+AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
+ACTUATORS = ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"]
+DELAY = 0.025
+PEAKS = np.array([0.1, 0.08, 0.02, 0.0, 0.0, 0.0])
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def make_record(duration: float = 8.0, rate: float = 512.0) -> xr.Dataset:
+    """Return a record whose platen follows a sine burst exactly, 25 ms late; three axes are asked to move."""
+    t = np.arange(int(duration * rate)) / rate
+
+    def burst(time: np.ndarray) -> list[np.ndarray]:
+        """Displacement, velocity and acceleration of a unit sine of 1.5 Hz under a Gaussian envelope."""
+        w, s, u = 2 * np.pi * 1.5, duration / 12, time - duration / 2
+        bell = np.exp(-(u**2) / (2 * s**2)) * np.exp(1j * w * u)
+        rate_of = 1j * w - u / s**2
+        return [bell.imag, (rate_of * bell).imag, ((rate_of**2 - 1 / s**2) * bell).imag]
+
+    variables = {}
+    for who, late in (("reference", 0.0), ("platen", DELAY)):
+        for quantity, shape in zip(("displacement", "velocity", "acceleration"), burst(t - late), strict=True):
+            variables[f"{who}_{quantity}"] = (("time", "axis"), np.outer(shape, PEAKS))
+    wave = burst(t)[0]
+    by_actuator = np.outer(wave, np.linspace(0.2, 0.6, 10))
+    for name, scale, mean in (
+        ("actuator_displacement", 0.1, 0.0),
+        ("actuator_force", 1e6, 1e5),
+        ("chamber_pressure_a", 2e6, 8e6),
+        ("spool_command", 1.0, 0.0),
+        ("spool_position", 0.99, 0.0),
+    ):
+        variables[name] = (("time", "actuator"), mean + scale * by_actuator)
+    variables["chamber_pressure_b"] = (("time", "horizontal"), 8e6 - 2e6 * by_actuator[:, :4])
+    variables["strut_pressure"] = (("time", "strut"), 15e6 + 1e5 * by_actuator[:, :3])
+    coords = {
+        "time": t,
+        "axis": AXES,
+        "actuator": ACTUATORS,
+        "horizontal": ACTUATORS[:4],
+        "strut": ["S1", "S2", "S3"],
+    }
+    attrs = {"title": "Sine burst", "test": "burst", "kind": "simulated", "specimen": "none"}
+    return xr.Dataset(variables, coords, attrs)
+
+
+LIMITS = {
+    "displacement": [0.89, 0.38, 0.127, 0.04, 0.03, 0.07],
+    "velocity": [3.0, 2.0, 0.45, 0.2, 0.1, 0.3],
+    "acceleration": [36.0, 18.0, 35.0, 13.0, 8.0, 6.0],
+    "actuator_stroke": [0.75] * 4 + [0.127] * 6,
+    "supply_pressure": 20.7e6,
+    "strut_area": [0.15] * 3,
+}
+MACHINE = [
+    ("vertical.chamber_a", 0.3, "m", "dead volume not published", True),
+    ("horizontal.area_a", [0.2, 0.1], "m2", "Table 6.1", False),
+]
+
+
+def report(folder: Path, record: xr.Dataset, **given: object) -> tuple[RunSummary, str]:
+    summary = write_run_report(record, folder / "report.html", **given)  # type: ignore[arg-type]
+    return summary, summary.path.read_text(encoding="utf-8")
+
+
+class Reader(HTMLParser):
+    """Collect the elements of a page, and the figures' data."""
+
+    def __init__(self, page: str) -> None:
+        """Read `page`."""
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.figures: dict[str, dict] = {}
+        self.scripts: list[str] = []
+        self.words: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep the element."""
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        """Keep words, scripts and figures apart."""
+        tag, attributes = self.tags[-1] if self.tags else ("", {})
+        if tag == "script" and "data-for" in attributes:
+            self.figures[str(attributes["data-for"])] = json.loads(data)
+        elif tag == "script":
+            self.scripts.append(data)
+        elif tag != "style":
+            self.words.append(data)
+
+    def attributes(self, name: str) -> list[str]:
+        """Return the values of an attribute over all elements."""
+        return [str(attributes[name]) for _, attributes in self.tags if name in attributes]
+
+
+def numbers(packed: dict[str, str]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}")
+
+
+def curve(trace: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and values of a drawn channel, decoded as the page's script does."""
+    samples = np.cumsum(numbers(trace["x"]).astype(np.int64))
+    return trace["x"]["start"] + trace["x"]["step"] * samples, numbers(trace["y"])
+
+
+# ------------------------------------------------------------------------------------------ decimation
+@given(
+    st.integers(1, 3000),
+    st.integers(1, 400),
+    st.integers(0, 2**32 - 1),
+)
+@settings(deadline=None)
+def test_the_envelope_keeps_both_extremes_and_both_ends_of_any_channel(n, buckets, seed):
+    values = np.random.default_rng(seed).normal(size=n)
+    kept = envelope(values, buckets)
+    assert values[kept].max() == values.max() and values[kept].min() == values.min()
+    assert kept[0] == 0 and kept[-1] == n - 1
+    assert np.all(np.diff(kept) > 0)
+    assert len(kept) <= 2 * buckets + 2  # two extremes a bucket and the two ends
+
+
+def test_a_single_spike_is_drawn_at_its_own_time_and_height():
+    values = np.zeros(81_920)
+    values[31_337] = 2.5
+    row = Row("Force", [Trace("V1", values, ACHIEVED)], SCALES["force"])
+    drawing = time_figure("f", "Force", "", [row], start=1.0, step=1 / 2048)
+    times, drawn = curve(dict(drawing.traces[0]))
+    assert drawn.max() == np.float32(2.5e-6)  # values travel in single precision
+    assert times[drawn.argmax()] == 1.0 + 31_337 / 2048  # a multiple of 1/2048 s: exact in binary
+    assert len(drawn) < 3100
+
+
+def test_every_drawn_point_is_a_recorded_sample():
+    values = np.random.default_rng(1).normal(size=20_000)
+    row = Row("Force", [Trace("V1", values, ACHIEVED)], SCALES["ratio"])
+    times, drawn = curve(dict(time_figure("f", "", "", [row], start=0.0, step=0.5).traces[0]))
+    np.testing.assert_array_equal(drawn, values[(times / 0.5).astype(int)].astype("f4"))
+
+
+def test_samples_that_are_not_numbers_do_not_hide_the_peak_beside_them():
+    values = np.sin(np.arange(9000.0))
+    values[4000:4003], values[4003] = np.nan, 7.0
+    assert 4003 in envelope(values, 100)
+
+
+# ------------------------------------------------------------------------------------------ content
+def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
+    given_notes = ["spool V6 was clipped 3 times"]
+    summary, page = report(
+        tmp_path,
+        make_record(),
+        limits=LIMITS,
+        notes=given_notes,
+        command="lhpost6 run burst",
+        machine_table=MACHINE,
+    )
+    reader = Reader(page)
+    words = " ".join(reader.words)
+    for title in (
+        "Target and achieved",
+        "Response spectra",
+        "Actuator forces",
+        "Chamber pressures",
+        "Servovalve spools",
+        "Hold-down struts",
+        "Drift",
+        "Table of metrics",
+        "Assumptions and sources",
+        "Versions and how to repeat",
+    ):
+        assert title in words
+    for said in (
+        *given_notes,
+        "lhpost6 run burst",
+        "dead volume not published",
+        "Table 6.1",
+        "numpy",
+        "0.2, 0.1",
+    ):
+        assert said in words
+    assert len(summary.headlines) == 3 and all(h.value in words and h.label in words for h in summary.headlines)
+    assert summary.verdict in words
+    assert set(reader.figures) >= {f"axis-{axis}" for axis in AXES}
+    assert {"spectrum-x", "spectrum-y", "spectrum-z", "close-x"} <= set(reader.figures)
+    assert "spectrum-yaw" not in reader.figures  # it was not asked to move
+    drawn = {trace["name"] for name in reader.figures for trace in reader.figures[name]["traces"]}
+    assert drawn >= {"target", "achieved", "delay removed", "supply", "commands", "S3", *ACTUATORS}
+
+
+def test_the_delay_of_the_table_is_found_and_removing_it_removes_the_error(tmp_path):
+    summary, _ = report(tmp_path, make_record())
+    asked = [row for row in summary.tracking if row.axis in "xyz"]
+    assert len(asked) == 9
+    for row in asked:
+        assert row.delay == pytest.approx(DELAY, abs=1e-6)  # the burst is band-limited: the fit is exact to rounding
+        assert row.rrmse > 0.1  # 25 ms of 1.5 Hz is 0.24 rad
+        assert row.rrmse_aligned < 1e-4  # what the ends of the Gaussian leave
+    quiet = [row for row in summary.tracking if row.axis not in "xyz"]
+    assert all(np.isnan(row.rrmse) for row in quiet)
+    assert summary.level == "good"
+
+
+def test_figures_hold_the_recorded_peaks_in_the_unit_they_name(tmp_path):
+    record = make_record()
+    _, page = report(tmp_path, record)
+    figure = Reader(page).figures["axis-x"]
+    titles = [note["text"] for note in figure["layout"]["annotations"]]
+    assert titles == ["<b>Displacement [mm]</b>", "<b>Velocity [m/s]</b>", "<b>Acceleration [g]</b>"]
+    drawn = [curve(trace)[1].max() for trace in figure["traces"] if trace["name"] == "achieved"]
+    peaks = [record[f"platen_{q}"].values[:, 0].max() for q in ("displacement", "velocity", "acceleration")]
+    expected = np.array(peaks) * [1e3, 1.0, 1.0 / g]
+    np.testing.assert_array_equal(np.array(drawn), expected.astype("f4"))
+
+
+def test_a_constant_offset_is_reported_as_drift(tmp_path):
+    record = make_record()
+    record["platen_displacement"] = record["reference_displacement"] + xr.DataArray(
+        [0.0, 0.0, 0.003, 0.0, 0.0, 0.0], dims="axis"
+    )
+    _, page = report(tmp_path, record)
+    row = re.search(r'<th scope="row">z</th><td>mm</td><td>([\d.]+)</td><td>([\d.]+)</td>', page)
+    assert row and row.groups() == ("3.00", "3.00")
+
+
+def test_what_was_exceeded_is_named_in_the_verdict(tmp_path):
+    record = make_record()
+    record["spool_position"][100, 9] = 1.0
+    tight = {"displacement": [0.05, 1, 1, 1, 1, 1], "actuator_stroke": [0.001] + [1.0] * 9}
+    summary, page = report(tmp_path, record, limits=tight)
+    assert summary.level == "bad"
+    for name in ("x displacement", "H1 displacement", "spool V6"):
+        assert name in summary.verdict
+    assert "y displacement" not in summary.verdict
+    assert 'class="bar over"' in page
+
+
+def test_poor_tracking_is_not_called_good(tmp_path):
+    record = make_record()
+    record["platen_acceleration"] = 2.0 * record["platen_acceleration"]  # RRMSE 1
+    summary, _ = report(tmp_path, record)
+    assert summary.level == "attention"
+    assert "did not follow" in summary.verdict
+
+
+def test_a_table_with_one_axis_and_one_actuator_is_reported_too(tmp_path):
+    record = make_record().isel(axis=[0], actuator=[0], horizontal=[0], strut=slice(0))
+    summary, page = report(tmp_path, record.drop_vars("strut_pressure"))
+    assert {row.axis for row in summary.tracking} == {"x"}
+    assert "axis-x" in Reader(page).figures
+
+
+# ------------------------------------------------------------------------------------------ bad input
+@pytest.mark.parametrize("name", sorted(map(str, make_record().data_vars)))
+def test_a_missing_variable_is_named_where_it_would_have_been_shown(tmp_path, name):
+    summary, page = report(tmp_path, make_record().drop_vars(name), limits=LIMITS)
+    assert re.search(rf'class="missing".*<code>{name}</code>', page)
+    assert summary.missing == (name,)
+
+
+def test_a_record_of_nothing_but_time_still_makes_a_page_that_names_what_is_missing(tmp_path):
+    empty = make_record()
+    empty = empty.drop_vars(list(empty.data_vars))
+    summary, page = report(tmp_path, empty)
+    assert set(summary.missing) == set(make_record().data_vars)
+    assert all(f"<code>{name}</code>" in page for name in summary.missing)
+    assert summary.level == "plain" and "cannot be judged" in summary.verdict
+
+
+@pytest.mark.parametrize("samples", [2, 3, 20, 100])
+def test_a_run_that_stopped_after_a_few_samples_is_reported(tmp_path, samples):
+    summary, page = report(tmp_path, make_record().isel(time=slice(samples)), limits=LIMITS)
+    assert "plot-force" in page
+    assert summary.path.exists()
+
+
+@pytest.mark.parametrize("name", ["platen_displacement", "platen_acceleration", "spool_position", "actuator_force"])
+def test_samples_that_are_not_numbers_are_named_with_their_time(tmp_path, name):
+    record = make_record()
+    record[name][512:] = np.nan
+    summary, page = report(tmp_path, record, limits=LIMITS)
+    assert f"{name} holds samples that are not numbers, the first at 1.0000 s" in page
+    assert summary.level != "good"
+    assert "nan" not in " ".join(Reader(page).words).lower()
+
+
+def test_a_record_without_a_single_number_still_makes_a_page(tmp_path):
+    record = make_record()
+    record["supply_pressure"] = ("time", np.full(record.sizes["time"], np.nan))
+    summary, page = report(tmp_path, record * np.nan, limits=LIMITS)
+    assert "cannot be judged" in summary.verdict
+    assert "nan" not in " ".join(Reader(page).words).lower()
+
+
+def test_an_unknown_limit_is_refused_with_the_names_that_exist(tmp_path):
+    with pytest.raises(UnknownNameError, match=r"displacment.*actuator_stroke"):
+        write_run_report(make_record(), tmp_path / "r.html", limits={"displacment": [1.0]})
+
+
+def test_uneven_time_is_refused_with_the_sample(tmp_path):
+    record = make_record()
+    time = record["time"].values.copy()
+    time[40:] += 0.001
+    with pytest.raises(RecordError, match="sample 40"):
+        write_run_report(record.assign_coords(time=time), tmp_path / "r.html")
+    with pytest.raises(RecordError, match="time"):
+        write_run_report(record.isel(time=[0]), tmp_path / "r.html")
+    assert not (tmp_path / "r.html").exists()
+
+
+HOSTILE = '"><img src=x onerror=alert(1)><script>alert(2)</script></script><!--'
+
+
+def test_hostile_names_arrive_as_text_and_nowhere_as_markup(tmp_path):
+    record = make_record().assign_coords(actuator=[HOSTILE, *ACTUATORS[1:]], axis=[HOSTILE, *AXES[1:]])
+    record.attrs = {"title": HOSTILE, "kind": HOSTILE, "specimen": HOSTILE, HOSTILE: HOSTILE}
+    record["platen_velocity"].attrs = {"units": HOSTILE, "long_name": HOSTILE}
+    record = record.assign({HOSTILE: ("time", np.full(record.sizes["time"], np.nan))})
+    rows = [(HOSTILE, HOSTILE, HOSTILE, HOSTILE, True), (HOSTILE, 1.0, HOSTILE, HOSTILE, False)]
+    _, page = report(tmp_path, record, notes=[HOSTILE], command=HOSTILE, machine_table=rows, limits=LIMITS)
+    _, plain = report(tmp_path, make_record(), notes=["n"], command="c", machine_table=MACHINE, limits=LIMITS)
+    assert "<img" not in page and "alert(2)</script>" not in page
+    reader = Reader(page)
+    assert not [attributes for _, attributes in reader.tags if "onerror" in attributes]
+    assert {tag for tag, _ in reader.tags} == {tag for tag, _ in Reader(plain).tags}
+    assert len(reader.scripts) == len(Reader(plain).scripts)
+    for figure in reader.figures.values():  # plotly reads HTML in labels
+        labels = [trace["name"] for trace in figure["traces"]]
+        labels += [note["text"].removeprefix("<b>").removesuffix("</b>") for note in figure["layout"]["annotations"]]
+        assert not any("<" in label for label in labels)
+
+
+# ------------------------------------------------------------------------------------------ the page itself
+def test_the_page_loads_nothing_from_elsewhere(tmp_path):
+    _, page = report(tmp_path, make_record())
+    reader = Reader(page)
+    assert not reader.attributes("src") and not [tag for tag, _ in reader.tags if tag in ("link", "iframe", "object")]
+    assert all(href.startswith("#") for href in reader.attributes("href"))
+    style = page[page.index("<style>") : page.index("</style>")]
+    assert "url(" not in style and "@import" not in style
+    policy = next(value for value in reader.attributes("content") if "default-src" in value)
+    assert "default-src 'none'" in policy and "http" not in policy
+
+
+def test_the_plotting_library_is_inside_whole_and_once(tmp_path):
+    from plotly.offline import get_plotlyjs
+
+    _, page = report(tmp_path, make_record())
+    packed = [script for script in Reader(page).scripts if len(script) > 1_000_000]
+    assert len(packed) == 1
+    assert zlib.decompress(base64.b64decode(packed[0])).decode() == get_plotlyjs()
+
+
+def test_headings_navigation_and_figures_can_be_reached_without_a_mouse(tmp_path):
+    _, page = report(tmp_path, make_record())
+    reader = Reader(page)
+    names = set(reader.attributes("id"))
+    assert len(names) == len(reader.attributes("id"))  # every id is used once
+    assert {href[1:] for href in reader.attributes("href")} <= names
+    assert {name for value in reader.attributes("aria-labelledby") for name in value.split()} <= names
+    plots = [attributes for _, attributes in reader.tags if attributes.get("class") == "plot"]
+    assert plots and all(p["tabindex"] == "0" and p["aria-labelledby"] for p in plots)
+    assert [tag for tag, _ in reader.tags].count("h1") == 1
+    tables = [tag for tag, _ in reader.tags if tag in ("table", "caption")]
+    assert tables.count("table") == tables.count("caption") > 0
+    assert next(a for t, a in reader.tags if t == "a")["class"] == "skip"
+
+
+def test_a_40_second_test_at_2048_hz_stays_below_6_megabytes(tmp_path):
+    rng = np.random.default_rng(2)
+    record = make_record(40.0, 2048.0)
+    for name in record.data_vars:  # noise on every channel: nothing compresses by chance
+        record[name] = record[name] + float(record[name].std()) * rng.normal(size=record[name].shape)
+    summary, _ = report(tmp_path, record, limits=LIMITS, machine_table=MACHINE)
+    assert summary.path.stat().st_size < 6e6
+
+
+def test_a_page_of_another_kind_has_the_same_skeleton():
+    page = render_page(Page("Tuning report", "T", "asked", "verdict", "plain", (), (), command="lhpost6 tune"))
+    assert "Tuning report" in page and "lhpost6 tune" in page and 'id="repeat"' in page
+
+
+@given(st.text())
+def test_escaped_text_holds_no_markup(words):
+    assert not set("<>\"'") & set(text(words))
+
+
+def test_numbers_read_as_an_engineer_writes_them():
+    shown = {
+        0.0: "0",
+        0.0123456: "0.0123",
+        1.0: "1.00",
+        -12.34: "−12.3",
+        123.4: "123",
+        20_700.0: "20,700",
+        3e-7: "3.00e−07",
+    }
+    assert {value: number(value) for value in shown} == shown
+    assert number(float("nan")) == number(float("inf")) == "–"
+
+
+def test_a_bar_never_runs_over_its_box_and_says_its_per_cent():
+    assert "width:100.0%" in bar(1.7) and "170 %" in bar(1.7) and "over" in bar(1.7)
+    assert "width:50.0%" in bar(0.5) and "within" in bar(0.5)
+    assert bar(float("nan")) == "–"
+
+
+PROBE = """<script>
+const frame = () => new Promise((done) => requestAnimationFrame(done));
+const until = async (true_) => { for (let k = 0; k < 5000 && !true_(); k++) await frame(); };
+async function probe() {
+  const drawn = (plot) => Array.from(plot.querySelectorAll(".js-line")).some((l) => l.getTotalLength() > 100);
+  const plots = Array.from(document.querySelectorAll(".plot"));
+  document.querySelector("details").open = true;
+  await until(() => drawn(plots[0]));
+  const found = { plots: plots.length, early: plots.filter(drawn).length };
+  for (const plot of plots) {
+    plot.scrollIntoView({ behavior: "instant" });
+    await until(() => drawn(plot));
+  }
+  found.empty = plots.filter((p) => !drawn(p)).map((p) => p.id);
+  const [first, other] = ["axis-x", "plot-force"].map((id) => document.getElementById(id));
+  const range = async (plot) => {
+    const before = String(plot.layout.xaxis.range);
+    plot.scrollIntoView({ behavior: "instant" });
+    await until(() => String(plot.layout.xaxis.range) !== before);
+    return plot.layout.xaxis.range.slice();
+  };
+  await Plotly.relayout(first, { "xaxis.range": [2, 4] });
+  found.linked = await range(other);
+  other.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+  found.moved = await range(first);
+  first.dispatchEvent(new KeyboardEvent("keydown", { key: "0" }));
+  found.reset = await range(other);
+  document.body.dataset.found = JSON.stringify(found);
+}
+probe();
+</script>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_together(tmp_path):
+    _, page = report(tmp_path, make_record(), limits=LIMITS, machine_table=MACHINE)
+    probed = tmp_path / "probed.html"
+    probed.write_text(page.replace("</body>", f"{PROBE}</body>"), encoding="utf-8")
+    options = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--window-size=1400,1000",
+        "--enable-logging=stderr",
+    ]
+    options += ["--virtual-time-budget=900000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom"]
+    run = subprocess.run([str(CHROMIUM), *options, probed.as_uri()], capture_output=True, text=True, timeout=120)
+    console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
+    assert not console
+    answers = Reader(run.stdout).attributes("data-found")
+    assert answers, f"the probe did not finish: {run.stderr[-2000:]}"
+    found = json.loads(answers[0])
+    assert found["plots"] == 17  # 6 axes, 3 close-ups, 3 spectra, force, pressure, spools, struts, drift
+    assert found["early"] < 6  # those out of sight wait
+    assert found["empty"] == []
+    assert found["linked"] == [2, 4]
+    assert found["moved"] == pytest.approx([2.4, 4.4])  # a fifth of the window
+    assert found["reset"] == pytest.approx([0.0, 8.0 - 1 / 512])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .errors import LhpostError, MotionError
+from .errors import LhpostError, MotionError, SimulationError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +49,9 @@ def main() -> None:
     try:
         app()
     except LhpostError as error:
-        Console(stderr=True, soft_wrap=True).print("[bold red]error:[/]", str(error), markup=True, highlight=False)
+        console = Console(stderr=True, soft_wrap=True)
+        console.print("[bold red]error:[/] ", end="")
+        console.print(str(error), markup=False, highlight=False)
         sys.exit(2)
     except KeyboardInterrupt:
         Console(stderr=True).print("interrupted; nothing half-written is left behind")
@@ -84,11 +86,11 @@ def capacity(machine: MachineName = "lhpost6", override: Override = None) -> Non
 
 
 @app.command()
-def motions() -> None:
+def motions(name: Annotated[str | None, typer.Argument(help="One of them, to see its options.")] = None) -> None:
     """List the ground motions and tests known by name."""
     from .tables import print_motions
 
-    print_motions()
+    print_motions(name)
 
 
 @app.command()
@@ -115,12 +117,18 @@ def run(
     machine: MachineName = "lhpost6",
     override: Override = None,
     controller: Annotated[str | None, typer.Option(help="Controller settings: name or TOML file.")] = None,
-    valves: Annotated[int, typer.Option(help="Open servovalves on each horizontal actuator; 0: as the machine says.")] = 0,
+    valves: Annotated[
+        int, typer.Option(help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+    ] = 0,
     specimen: Annotated[Path | None, typer.Option(help="URDF of a specimen bolted to the platen.")] = None,
     locked: Annotated[bool, typer.Option(help="Lock the specimen's joints: one rigid body.")] = False,
     high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None,
     low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None,
+    beyond: Annotated[
+        bool, typer.Option("--beyond-limits", help="Run a motion that is more than the table can give.")
+    ] = False,
+    record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
 ) -> None:
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
     from .control import load_controller
@@ -140,6 +148,8 @@ def run(
         low_pass=low_pass,
         rate=float(SAMPLE_RATE),
     )
+    if record_rate < 1 or SAMPLE_RATE % record_rate:
+        raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
     settings = load_controller(controller or (machine if Path(machine).suffix != ".toml" else "lhpost6"))
     name = ground.name.replace("/", "_")
     folder = out or Path("out") / name
@@ -152,6 +162,8 @@ def run(
             scheme=scheme,
             steps_per_second=rate,
             engine=engine,
+            record_every=SAMPLE_RATE // record_rate,
+            beyond_limits=beyond,
             progress=progress,
         )
     _save(table, run_, record, folder, report=True)
@@ -232,7 +244,9 @@ def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, 
 
         notes = [run_.trouble] if run_.trouble else []
         if run_.clipped:
-            notes.append(f"{run_.clipped} spool commands beyond full stroke were clipped: the motion asks for more flow.")
+            notes.append(
+                f"{run_.clipped} spool commands beyond full stroke were clipped: the motion asks for more flow."
+            )
         summary = write_run_report(
             record,
             folder / "report.html",
@@ -250,7 +264,14 @@ def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, 
 def _progress(title: str) -> Iterator[Callable[[float], None]]:
     """A progress bar with remaining time on stderr; yields what to call with the share done."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:

@@ -6,6 +6,7 @@ import time
 from importlib import metadata, util
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from . import __version__
@@ -29,7 +30,7 @@ def print_doctor() -> None:
         except metadata.PackageNotFoundError:
             table.add_row(name, "[red]missing[/]")
     for module, remedy in _OPTIONAL.items():
-        table.add_row(module, "there" if util.find_spec(module) else f"not installed; {remedy}")
+        table.add_row(module, "there" if util.find_spec(module) else escape(f"not installed; {remedy}"))
     browser = next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None)
     table.add_row("browser", browser or "none found; reports and views are HTML files")
     table.add_row("machine files", str(models_folder()))

@@ -60,16 +60,19 @@ def rehearse(
     settings: LoopSettings,
     *,
     attrs: Mapping[str, Any],
+    beyond_limits: bool = False,
     record_every: int = 1,
     progress: Progress | None = None,
     **options: Any,
 ) -> SimulatedTest:
     """Reproduce a target in closed loop from rest; options go to `simulate` (scheme, steps_per_second, engine).
 
-    Raises OutOfRangeError if the machine cannot follow the target, SimulationError for options that cannot be.
+    Raises OutOfRangeError if the target is more than the machine can give, unless `beyond_limits` asks to try all the
+    same; SimulationError for options that cannot be.
     """
     plant = make_plant(machine)
-    target_within_limits(plant, target)
+    if not beyond_limits:
+        target_within_limits(plant, target)
     if settings.rate != SAMPLE_RATE:
         raise SimulationError(f"controller rate {settings.rate:g} Hz is not the samples' {SAMPLE_RATE} Hz")
     rest = find_equilibrium(plant)

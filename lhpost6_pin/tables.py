@@ -1,12 +1,13 @@
 """What the command line prints: machine, capacity, motions, findings, results; and their rows for reports."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
+from rich.markup import escape
+from rich.table import Column, Table
 
 from .machine import AXES, Machine
 
@@ -32,7 +33,8 @@ __all__ = [
 
 
 def _console() -> Console:
-    return Console()
+    """Console as wide as the terminal, and wide enough for tables where the output is a file or a pipe."""
+    return Console() if Console().is_terminal else Console(width=140)
 
 
 def _text(value: float | tuple[float, ...]) -> str:
@@ -76,7 +78,7 @@ def print_machine(machine: Machine) -> None:
     for path, q in machine.parameters.quantities.items():
         evidence = f"[bold yellow]{q.evidence} *[/]" if q.assumed else q.evidence
         sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)
-        table.add_row(path, _text(q.value), q.unit, sd, evidence, q.source)
+        table.add_row(path, _text(q.value), q.unit, sd, evidence, escape(q.source))
     console.print(table)
     console.print("* assumed: nobody has published this number; change it with --override")
     effects = Table("effect", "law", "acts on", "source", title="Force effects, in ledger order")
@@ -92,7 +94,9 @@ def _inertia_table(machine: Machine) -> Table:
     from .rigid_body import lumped_inertia
 
     par = machine.parameters
-    parts = lumped_inertia(par.vector("estimates.platen_alone.mass"), par.vector("estimates.platen_alone.inertia"), machine)
+    parts = lumped_inertia(
+        par.vector("estimates.platen_alone.mass"), par.vector("estimates.platen_alone.inertia"), machine
+    )
     table = Table("part", *(f"{q} {a} [{u}]" for q, u in (("mass", "t"), ("inertia", "t m2")) for a in "XYZ"))
     table.title = "Effective inertia about B, composed from the parts (printed in Table 4.1)"
     printed = {"platen": "platen_alone", **{k: k for k in parts if k != "platen"}}
@@ -119,7 +123,9 @@ def print_modes(machine: Machine) -> None:
     """Print the oil-column modes of the linearised plant, without and with friction and leakage."""
     from .linearize import oil_column_modes
 
-    table = Table("axis", "undamped [Hz]", "with friction stuck and leaks [Hz]", "damping [%]", title="Oil-column modes")
+    table = Table(
+        "axis", "undamped [Hz]", "with friction stuck and leaks [Hz]", "damping [%]", title="Oil-column modes"
+    )
     full = {m.axis: m for m in oil_column_modes(machine, undamped=False)}
     for mode in oil_column_modes(machine):
         other = full.get(mode.axis)
@@ -128,14 +134,27 @@ def print_modes(machine: Machine) -> None:
     _console().print(table)
 
 
-def print_motions() -> None:
-    """Print the motions known by name and what each needs."""
+def print_motions(name: str | None = None) -> None:
+    """Print the motions known by name and what each needs; with a name, what can be chosen about that one."""
+    from .errors import UnknownNameError
     from .motions import list_motions
 
-    table = Table("name", "also", "kind", "what it is", "options", "needs")
-    for m in list_motions():
-        table.add_row(m.name, " ".join(m.aliases), m.kind, m.title, " ".join(m.options), m.remedy or "[green]ready[/]")
-    _console().print(table)
+    console, known = _console(), list_motions()
+    if name is None:
+        table = Table(Column("name", no_wrap=True), "kind", "what it is", Column("needs", no_wrap=True))
+        for m in known:
+            table.add_row(" ".join((m.name, *m.aliases)), m.kind, m.title, escape(m.remedy) or "[green]ready[/]")
+        console.print(table)
+        console.print("lhpost6 motions NAME says what can be chosen about one of them")
+        return
+    found = next((m for m in known if name in (m.name, *m.aliases)), None)
+    if found is None:
+        raise UnknownNameError("ground motion", name, [m.name for m in known])
+    console.print(f"[bold]{found.name}[/]: {found.title}")
+    chosen = ", ".join(found.options) or "none"
+    console.print(f"options, each as --set key=value: {chosen}")
+    if found.remedy:
+        console.print(f"not installed: {escape(found.remedy)}", markup=False)
 
 
 def print_findings(file: str, findings: "Sequence[Finding]") -> None:
@@ -144,7 +163,7 @@ def print_findings(file: str, findings: "Sequence[Finding]") -> None:
     colour = {"error": "[bold red]error[/]", "warning": "[yellow]warning[/]", "info": "info"}
     for f in findings:
         sample = "" if f.sample is None else str(f.sample)
-        table.add_row(colour[f.severity], f.channel, sample, f.message, f.remedy)
+        table.add_row(colour[f.severity], escape(f.channel), sample, escape(f.message), escape(f.remedy))
     console = _console()
     console.print(table)
     counts = {s: sum(f.severity == s for f in findings) for s in ("error", "warning")}
@@ -165,7 +184,14 @@ def print_comparison(measured: "xr.Dataset", simulated: "xr.Dataset") -> None:
     model = simulated["platen_displacement"].interp(time=t).values
     ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
     peak = np.abs(model - recorded).max(axis=0)
-    table = Table("axis", "peak recorded", "largest difference", "RRMSE", "drift [1/s]", title="Displacement, model against record")
+    table = Table(
+        "axis",
+        "peak recorded",
+        "largest difference",
+        "RRMSE",
+        "drift [1/s]",
+        title="Displacement, model against record",
+    )
     for k, axis in enumerate(AXES):
         unit = "m" if k < 3 else "rad"
         asked = f"{np.abs(recorded[:, k]).max():.4g} {unit}"
@@ -186,7 +212,9 @@ def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
     for name in ("record.nc", "report.html"):
         if (folder / name).exists():
             console.print(f"wrote {folder / name}")
-    console.print(f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")
+    console.print(
+        f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second"
+    )
 
 
 def tracking_cells(row: Any) -> Sequence[str]:
@@ -200,8 +228,3 @@ def tracking_cells(row: Any) -> Sequence[str]:
         f"{1e3 * row.delay:.1f}",
         f"{row.rrmse_aligned:.3f}",
     )
-
-
-def counts(values: Mapping[str, int]) -> str:
-    """Words such as ``3 errors, 1 warning``."""
-    return ", ".join(f"{n} {name}{'s' if n != 1 else ''}" for name, n in values.items())

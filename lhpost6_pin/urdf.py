@@ -187,9 +187,7 @@ def _add_leg(robot: ET.Element, leg: _Leg) -> None:
         _universal(robot, name, "plate", "yx", (f"{name}_rod", f"{name}_plate"), ORIGIN, ORIGIN)
 
 
-def _universal(
-    robot: ET.Element, name: str, what: str, axes: str, ends: tuple[str, str], xyz: Vec, rpy: Vec
-) -> None:
+def _universal(robot: ET.Element, name: str, what: str, axes: str, ends: tuple[str, str], xyz: Vec, rpy: Vec) -> None:
     """Two revolute joints through one point, first about axes[0], then about axes[1]."""
     between = f"{name}_{what}_cross"
     _link(robot, between)
@@ -229,7 +227,9 @@ def _material(robot: ET.Element, kind: str) -> None:
     colour = drawing_colour(kind).lstrip("#")
     opacity = _size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
     rgba = [int(colour[k : k + 2], 16) / 255.0 for k in (0, 2, 4)]
-    ET.SubElement(ET.SubElement(robot, "material", name=kind), "color", rgba=_text([*(round(c, 4) for c in rgba), opacity]))
+    ET.SubElement(
+        ET.SubElement(robot, "material", name=kind), "color", rgba=_text([*(round(c, 4) for c in rgba), opacity])
+    )
 
 
 def _link(robot: ET.Element, name: str) -> ET.Element:

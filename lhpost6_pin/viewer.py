@@ -5,13 +5,10 @@ animation are meshcat commands sent to a "window": `Recorder` keeps them for a p
 them to the browsers that look. Neither starts meshcat's own server, which listens on all network interfaces.
 """
 
-import base64
-import html
-import json
 import logging
 import math
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -22,7 +19,7 @@ from .errors import ParameterError, RecordError
 from .files import write_whole
 from .machine import Machine
 from .records import require
-from .urdf import drawing_colour, urdf_text
+from .urdf import drawing_colour
 
 __all__ = [
     "Bodies",
@@ -47,24 +44,14 @@ Array = NDArray[np.float64]
 ROOT = "table"
 LOOP_FOR_EVER = 1_000_000_000  # repetitions
 FIELD_OF_VIEW = 36.0  # [deg]
-CAMERA = (-0.5, 1.1, 2.05)  # camera's place in its own axes, x right, y up, z to the viewer, over the machine's radius
-LIGHTS = (("FillLight", "position", [-3.0, -6.0, 10.0]), ("FillLight", "intensity", 0.55), ("AmbientLight", "intensity", 0.5))
+CAMERA = (-0.4, 1.1, 2.05)  # its place in its own axes, x right, y up, z to the viewer, over the machine's radius
+LIGHTS = (
+    ("FillLight", "position", [-3.0, -6.0, 10.0]),
+    ("FillLight", "intensity", 0.55),
+    ("AmbientLight", "intensity", 0.5),
+)
 BACKGROUND = {"top_color": [0.93, 0.95, 0.97], "bottom_color": [0.80, 0.84, 0.88]}
 FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
-
-
-class Window(Protocol):
-    """What meshcat's `Visualizer` needs of a window: somewhere to send its commands."""
-
-    def send(self, command: Any) -> None:
-        """Take one meshcat command."""
-
-
-class Bodies(NamedTuple):
-    """A machine's URDF in Pinocchio: joints, and primitive shapes to draw."""
-
-    model: Any  # pin.Model
-    shapes: Any  # pin.GeometryModel
 
 
 class Frames(NamedTuple):
@@ -74,76 +61,6 @@ class Frames(NamedTuple):
     displacement: Array  # (n, 6) of C in {s} and Euler angles [m, rad]
     reference: Array | None  # (n, 6) the same, as asked for
     amplify: float  # factor on both
-
-
-# -------------------------------------------------------------------------------------------- kinematics
-def load_bodies(machine: Machine) -> Bodies:
-    """Read the machine's URDF with Pinocchio."""
-    text = urdf_text(machine)
-    model = pin.buildModelFromXML(text)
-    return Bodies(model, pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL))
-
-
-def joint_positions(machine: Machine, model: Any, displacement: Array) -> Array:
-    """Positions q (n, nq) of the URDF's joints at which every leg ends at the platen (Eqs. 3-20, 3-24, 4-13, 4-14).
-
-    displacement (n, 6): of C in {s} and Euler angles [m, rad]. A guided platen uses its own axis only.
-    """
-    pose = np.array(np.atleast_2d(displacement), float)
-    if machine.motion != "free":
-        pose[:, np.arange(6) != "xyz".index(machine.motion)] = 0.0
-    turn = _rotation(pose[:, 3:])
-    q = np.zeros((len(pose), model.nq))
-
-    def put(joint: str, values: Array) -> None:
-        index = model.getJointId(joint)
-        start = model.idx_qs[index]
-        q[:, start : start + model.nqs[index]] = values.reshape(len(pose), -1)
-
-    if machine.motion == "free":
-        centre = np.array(machine.platen.centre_of_gravity)
-        put("platen_motion", np.hstack([pose[:, :3] + turn @ centre - centre, _quaternions(turn)]))
-    else:
-        put("platen_motion", pose[:, "xyz".index(machine.motion)])
-    normal = turn[:, :, 2]
-    foot = pose[:, :3] + turn @ np.array(machine.platen.bearing_plane)
-    for leg in (*machine.actuators, *machine.struts):
-        base, point = np.array(leg.base_point), np.array(leg.platen_point)
-        zero_length = np.linalg.norm(point - base)
-        if getattr(leg, "mount", "swivel") == "bearing":
-            length = np.einsum("ni,ni->n", foot - base, normal) / normal[:, 2]
-            put(f"{leg.name}_plate_y", np.arctan2(normal[:, 0], normal[:, 2]))
-            put(f"{leg.name}_plate_x", -np.arcsin(normal[:, 1]))
-        else:
-            reach = pose[:, :3] + turn @ point - base
-            length = np.linalg.norm(reach, axis=1)
-            at_zero = model.jointPlacements[model.getJointId(f"{leg.name}_swivel_x")].rotation
-            x, y, z = (reach @ at_zero / length[:, None]).T
-            put(f"{leg.name}_swivel_x", np.arctan2(-y, z))
-            put(f"{leg.name}_swivel_y", np.arcsin(x))
-        put(f"{leg.name}_extension", length - zero_length)
-    return q
-
-
-def body_poses(model: Any, q: Array) -> Array:
-    """Poses (n, n_joints, 7) of the bodies in {s}: position [m] and quaternion x y z w, joint 0 being the world."""
-    data = model.createData()
-    poses = np.zeros((len(q), model.njoints, 7))
-    for k, position in enumerate(q):
-        pin.forwardKinematics(model, data, position)
-        for joint in range(model.njoints):
-            poses[k, joint] = pin.SE3ToXYZQUAT(data.oMi[joint])
-    return poses
-
-
-def _rotation(euler: Array) -> Array:
-    from .pose import rotation  # imports numba
-
-    return rotation(euler)
-
-
-def _quaternions(turn: Array) -> Array:
-    return np.array([pin.Quaternion(r).coeffs() for r in turn])
 
 
 # ------------------------------------------------------------------------------------------------ frames
@@ -196,26 +113,6 @@ def record_frames(machine: Machine, record: xr.Dataset, *, rate: float = 30.0, a
 
 
 # --------------------------------------------------------------------------------------------- drawing
-class Recorder:
-    """A window that keeps the commands it is sent, packed as meshcat's page reads them."""
-
-    def __init__(self) -> None:
-        """Begin with no commands."""
-        self.commands: list[bytes] = []
-
-    def send(self, command: Any) -> None:
-        """Keep one command."""
-        self.commands.append(pack_command(command))
-
-
-def pack_command(command: Any) -> bytes:
-    """Pack one meshcat command as its page reads it."""
-    import umsgpack
-
-    packed: bytes = umsgpack.packb(command.lower())
-    return packed
-
-
 def draw_scene(window: Window, machine: Machine, bodies: Bodies, reference: bool = False) -> None:
     """Send the machine in its control zero-position, the camera and the light; with the reference's outline."""
     import meshcat
@@ -225,7 +122,7 @@ def draw_scene(window: Window, machine: Machine, bodies: Bodies, reference: bool
     poses = body_poses(bodies.model, joint_positions(machine, bodies.model, np.zeros((1, 6))))[0]
     table = vis[ROOT]
     for shape in bodies.shapes.geometryObjects:
-        body = table[_body_name(bodies.model, shape.parentJoint)]
+        body = table[body_name(bodies.model, shape.parentJoint)]
         body.set_transform(pin.XYZQUATToSE3(poses[shape.parentJoint]).homogeneous)
         primitive, upright = _primitive(shape.geometry)
         red, green, blue, opacity = (float(c) for c in shape.meshColor)
@@ -266,11 +163,11 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
 
     _warn_of_strokes(machine, bodies.model, frames)
     poses = body_poses(bodies.model, joint_positions(machine, bodies.model, frames.displacement))
-    moving = {_body_name(bodies.model, joint): poses[:, joint] for joint in range(1, bodies.model.njoints)}
+    moving = {body_name(bodies.model, joint): poses[:, joint] for joint in range(1, bodies.model.njoints)}
     if frames.reference is not None:
         middle = np.array([0.0, 0.0, 0.5 * machine.platen.bearing_plane[2]])
-        turn = _rotation(frames.reference[:, 3:])
-        moving["reference"] = np.hstack([frames.reference[:, :3] + turn @ middle, _quaternions(turn)])
+        turn = rotation(frames.reference[:, 3:])
+        moving["reference"] = np.hstack([frames.reference[:, :3] + turn @ middle, quaternions(turn)])
     clips = []
     for name, pose in moving.items():
         tracks = [
@@ -315,12 +212,6 @@ def _packed(values: Array) -> Any:
     return umsgpack.Ext(FLOAT_ARRAY, np.ascontiguousarray(values, "<f4").tobytes())
 
 
-def _body_name(model: Any, joint: int) -> str:
-    """Link that moves with a joint; its name in the scene."""
-    kinds = pin.FrameType.BODY
-    return next(f.name for f in model.frames if f.parentJoint == joint and f.type == kinds)
-
-
 def _primitive(shape: Any) -> tuple[Any, Array]:
     """Meshcat's geometry for a URDF primitive, and the turn (4, 4) that brings its axis to z."""
     from meshcat import geometry
@@ -339,63 +230,6 @@ def _box_edges(size: Array) -> Array:
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(signs[a] - signs[b]).sum() == 2]
     return np.array([0.5 * size * signs[k] for pair in pairs for k in pair])
-
-
-# ------------------------------------------------------------------------------------------------- page
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; \
-style-src 'unsafe-inline'; img-src data: blob:; {connect}">
-<title>{title}</title>
-<style>
-body {{ margin:0; }}
-#meshcat-pane {{ width:100vw; height:100vh; overflow:hidden; }}
-#caption {{ position:absolute; left:0; top:0; margin:1rem; padding:.5rem .8rem; max-width:calc(100vw - 300px); border-radius:.3rem;
-  background:rgba(255,255,255,.85); color:#1b1f24; font:14px/1.45 system-ui,"Liberation Sans",sans-serif; }}
-#caption b {{ font-size:1.1em; }}
-.kind {{ white-space:nowrap; margin-right:.8em; }}
-.mark {{ display:inline-block; width:.75em; height:.75em; margin-right:.3em; border-radius:2px; }}
-</style>
-</head>
-<body>
-<div id="meshcat-pane"></div>
-<div id="caption"><b>{title}</b><br>{note}<br>{legend}<br>
-<small>Drag to turn, wheel to zoom; "Open Controls" has play, pause, time and speed.</small></div>
-<script>{library}</script>
-<script>
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-for (const packed of {commands})
-  viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
-{connection}
-</script>
-</body>
-</html>
-"""
-
-
-def render_page(title: str, note: str, commands: list[bytes], *, reference: bool = False, live: bool = False) -> str:
-    """Return a page that draws `commands` and loads nothing; a live one then asks its own server for more."""
-    import meshcat
-
-    library = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
-    kinds = ["platen", "swivel", "bearing", "strut", *(["reference"] if reference else [])]
-    words = {"swivel": "horizontal actuators", "bearing": "vertical actuators", "strut": "hold-down struts"}
-    marks = (
-        f'<span class="kind"><span class="mark" style="background:{drawing_colour(kind)}"></span>'
-        f"{words.get(kind, kind)}</span> "
-        for kind in kinds
-    )
-    return PAGE.format(
-        connect="connect-src 'self'" if live else "",
-        title=html.escape(title),
-        note=html.escape(note),
-        legend="".join(marks),
-        library=library.read_text(encoding="utf-8").replace("</script", "<\\/script"),
-        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in commands]),
-        connection="viewer.connect();" if live else "",
-    )
 
 
 def save_animation(

@@ -241,6 +241,12 @@ def test_a_gap_in_time_is_found_with_its_length(tests_by_name: dict[str, xr.Data
     assert "12 missing samples" in found[0].message
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 9, 70, 300])
+def test_a_record_of_any_length_can_be_checked(tests_by_name: dict[str, xr.Dataset], count: int) -> None:
+    found = faults(check_dataset(tests_by_name["TX"].isel(time=slice(0, count)), AREAS))
+    assert [severity for severity, channel, _ in found if channel == "time"] == ["error"] * (count == 1)
+
+
 def test_what_cannot_be_opened_is_one_error_that_names_the_file(tmp_path: Path) -> None:
     (tmp_path / "notes.nc").write_text("not a record")
     for name in ("notes.nc", "absent.nc"):

@@ -178,7 +178,7 @@ def test_platen_jacobians_are_pinocchios_frame_jacobians(name):
         pin.updateFramePlacements(model, data)
 
         def theirs(frame, reference=pin.LOCAL_WORLD_ALIGNED):
-            raw = pin.getFrameJacobian(model, data, model.getFrameId(frame), reference)  # noqa: B023
+            raw = pin.getFrameJacobian(model, data, model.getFrameId(frame), reference)
             return kin.to_report_order(kin.to_report_order(raw).T).T  # rows and columns
 
         assert np.allclose(kin.c_J_b(machine, pose), theirs("platen_top"), atol=ROUNDING)

@@ -10,6 +10,7 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from lhpost6_pin.check import check_record
 from lhpost6_pin.errors import RecordError, UnknownNameError
 from lhpost6_pin.records import (
     AXES,
@@ -273,6 +274,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def loads_or_record_error(path: Path) -> None:
+    assert check_record(path)  # always says something
     try:
         load_record(path)
     except RecordError as error:

@@ -1,0 +1,409 @@
+"""The platen's dynamics on Pinocchio against the report's equations, and specimens against closed forms."""
+
+import logging
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from machine_cases import DATA, FREE_MACHINES, MACHINES, machine_named, plant_named, platen_se3, random_poses
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
+
+from lhpost6_pin import kinematics as kin
+from lhpost6_pin.effects import LAWS
+from lhpost6_pin.engine_fused import inertia_table, integrate_platen, platen_acceleration
+from lhpost6_pin.errors import ParameterError, SimulationError
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.rigid_body import lumped_inertia, make_model, platen_inertia
+from lhpost6_pin.schemes import FORCE, SD, TAU, V_SEEN, S, dexp_inverse, forces_stage, pose_stage, set_twist
+from lhpost6_pin.workspace import make_workspace
+
+PENDULUM = DATA / "pendulum.urdf"
+BOB, ARM, BOB_INERTIA, POST = 500.0, 2.0, 25.0, 200.0  # of pendulum.urdf: kg, m, kg m2 about Y, kg
+G = 9.80665
+ABOVE = (0.5, -0.3, 0.0)  # where the tests bolt it
+
+
+def random_states(plant, count, seed=0):
+    """q, v, z and spools of violent states: all over the travel range, chambers between return and supply."""
+    rng = np.random.default_rng(seed)
+    low, high = plant.supply[1], plant.supply[0]
+    for pose in random_poses(plant.machine, count, seed):
+        if plant.machine.motion == "free":
+            q = pin.SE3ToXYZQUAT(platen_se3(plant.machine, pose))
+        else:
+            q = pose[plant.axes]
+        v = (rng.uniform(-1.0, 1.0, 6) * [3.0, 2.0, 0.5, 0.3, 0.3, 0.5])[plant.axes]
+        z = np.array([rng.uniform(low, high) if "pressure" in n else rng.uniform(-0.7, 0.7) for n in plant.states])
+        yield pose, q, v, z
+
+
+def forces_at(plant, q, v, z):
+    """Workspace with ports, ledger and torques at a state, as every scheme computes them."""
+    ws = make_workspace(plant, plant.zero_state())
+    ws.q[:], ws.z[:], ws.motion[V_SEEN] = q, z, v
+    pose_stage(ws.q, plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB)
+    forces_stage(
+        plant.axes, plant.legs, plant.body, plant.rows, plant.model.damping,
+        ws.frame, ws.port, ws.JB, ws.z, ws.force, ws.motion,
+    )  # fmt: skip
+    return ws
+
+
+def report_wrench(plant, pose, ws):
+    """Eq. 4-24 from the ledger: axial force and pad friction of every component, hand-derived directions."""
+    machine = plant.machine
+    axial = {c.name: 0.0 for c in machine.components}
+    pad = {c.name: np.zeros(2) for c in machine.components}
+    for row, force in zip(plant.rows, ws.force, strict=True):
+        name = plant.ports[row["port"]].split(".")[0]
+        if row["law"] == LAWS["bouc_wen_2d"].code:
+            pad[name] += force
+        else:
+            axial[name] += force[0]
+    forces = {c.name: kin.component_force(machine, pose, c, axial[c.name], pad[c.name]) for c in machine.components}
+    return kin.external_wrench(machine, pose, forces)
+
+
+# The platen against Eqs. 4-24 to 4-30 --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("thrust", ["report", "normal"])
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_aba_with_directional_mass_bias_and_weight_is_the_reports_equation_of_motion(name, thrust):
+    plant = plant_named(name, thrust)
+    data = plant.model.createData()
+    for pose, q, v, z in random_states(plant, 24):
+        ws = forces_at(plant, q, v, z)
+        a = pin.aba(plant.model, data, q, v, ws.motion[TAU])
+        inert = kin.inertial_wrench(plant.machine, kin.to_report_order(v), kin.to_report_order(a))
+        external = report_wrench(plant, pose, ws)
+        # Eq. 4-30; sums of terms up to 1e7 N and N m, each rounded at 1e-16 of it a few dozen times
+        scale = np.abs(ws.port[FORCE]).max() + np.abs(inert).max()
+        assert np.abs(inert - external).max() < 1e-13 * scale
+
+
+def test_directional_mass_needs_its_bias_and_its_weight():
+    # left out, each would be seen: the check above is not blind to them
+    plant = plant_named("lhpost6")
+    extra = np.array(plant.machine.platen.mass) - min(plant.machine.platen.mass)
+    pose, q, v, z = list(random_states(plant, 8))[-1]
+    ws = forces_at(plant, q, v, z)
+    a = pin.aba(plant.model, plant.model.createData(), q, v, ws.motion[TAU])
+    bias = extra * np.cross(v[3:], v[:3])
+    weight = extra[2] * G
+    assert np.abs(bias).max() > 100.0 and weight > 6e4
+    m = np.array(plant.machine.platen.mass)
+    gravity = ws.frame[:3].T @ [0.0, 0.0, -G]
+    ports = ws.JB[1][:, :3].T @ ws.port[FORCE]
+    assert np.allclose(m * (a[:3] + np.cross(v[3:], v[:3])), ports + m[2] * gravity, rtol=0.0, atol=1e-6)
+
+
+def test_weight_is_straight_down_with_the_vertical_mass_at_any_tilt():
+    # Eq. 4-24: R^T (0, 0, -m_z g), not a force in platen axes of each direction's mass
+    plant = make_plant(machine_named("lhpost6").with_params(platen__inertia=[9e5, 9e5, 9e5]))
+    for pose, q, _, z in random_states(plant, 4):
+        ws = forces_at(plant, q, np.zeros(6), z)
+        ws.port[FORCE] = 0.0
+        total = pin.rnea(plant.model, plant.model.createData(), q, np.zeros(6), np.zeros(6))[:3] * -1.0
+        total += ws.motion[TAU][:3] - ws.JB[1][:, :3].T @ forces_at(plant, q, np.zeros(6), z).port[FORCE]
+        down = kin.rotation(pose[3:]) @ total
+        assert np.allclose(down, [0.0, 0.0, -plant.machine.platen.mass[2] * G], rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_fused_forward_dynamics_are_pinocchios(name):
+    plant = plant_named(name)
+    table, data = inertia_table(plant), plant.model.createData()
+    a = np.zeros(plant.axes.size)
+    for _, q, v, z in random_states(plant, 24):
+        ws = forces_at(plant, q, v, z)
+        platen_acceleration(table, plant.axes, ws.frame, ws.motion[TAU], np.zeros((2, 6)), a)
+        wanted = pin.aba(plant.model, data, q, v, ws.motion[TAU])
+        assert np.allclose(a, wanted, rtol=1e-12, atol=1e-11)  # up to 100 m/s2; inverse of a well-conditioned 6x6
+
+
+def test_fused_forward_dynamics_take_a_rigid_specimen_anywhere_on_the_platen():
+    machine = machine_named("lhpost6").with_specimen(PENDULUM, (2.0, -1.0, 0.1), (0.1, -0.2, 0.7), locked=True)
+    plant = make_plant(machine)
+    table, data = inertia_table(plant), plant.model.createData()
+    a = np.zeros(6)
+    for _, q, v, z in random_states(plant, 12):
+        ws = forces_at(plant, q, v, z)
+        platen_acceleration(table, plant.axes, ws.frame, ws.motion[TAU], np.zeros((2, 6)), a)
+        assert np.allclose(a, pin.aba(plant.model, data, q, v, ws.motion[TAU]), rtol=1e-12, atol=1e-11)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 1e-4, 9.9e-3, 1.01e-2, 0.3, 2.0])  # series below 0.01 rad, sines above
+def test_fused_pose_step_is_pinocchios(turn):
+    plant = plant_named("lhpost6")
+    rng = np.random.default_rng(7)
+    for _, q, _, _ in random_states(plant, 8):
+        axis = rng.standard_normal(3)
+        dq = np.concatenate([rng.uniform(-0.1, 0.1, 3), turn * axis / np.linalg.norm(axis)])
+        out = np.zeros(7)
+        integrate_platen(q, dq, plant.axes, out)
+        wanted = pin.integrate(plant.model, q, dq)
+        assert np.allclose(out[:3], wanted[:3], rtol=0.0, atol=2e-15)
+        same_sign = np.sign(out[3:] @ wanted[3:])  # q and -q are one rotation
+        assert np.allclose(out[3:], same_sign * wanted[3:], rtol=0.0, atol=2e-15)
+        assert np.linalg.norm(out[3:]) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_fused_pose_step_may_write_over_its_input():
+    plant = plant_named("lhpost6")
+    _, q, v, _ = list(random_states(plant, 4))[-1]
+    out = np.zeros(7)
+    integrate_platen(q, 1e-3 * v, plant.axes, out)
+    integrate_platen(q, 1e-3 * v, plant.axes, q)
+    assert np.array_equal(out, q)
+
+
+def test_fused_quaternion_stays_unit_over_a_million_steps_worth_of_turning():
+    plant = plant_named("lhpost6")
+    q = plant.zero_state().q.copy()
+    dq = np.array([0.0, 0.0, 0.0, 1e-4, -2e-4, 3e-4])
+    for _ in range(20000):
+        integrate_platen(q, dq, plant.axes, q)
+    # each step's rounding is corrected by the next: no growth with their number
+    assert np.linalg.norm(q[3:]) == pytest.approx(1.0, abs=5e-16)
+
+
+def test_guided_platen_moves_along_its_guide_only():
+    plant = plant_named("guided")
+    out = np.zeros(1)
+    integrate_platen(np.array([0.2]), np.array([0.05]), plant.axes, out)
+    assert out[0] == 0.25
+    assert plant.model.nq == plant.model.nv == 1
+    # its mass is the one along the guide
+    assert pin.crba(plant.model, plant.model.createData(), np.zeros(1))[0, 0] == plant.machine.platen.mass[0]
+
+
+def test_inverse_exponential_differential_is_pinocchios_to_its_stated_order():
+    plant = plant_named("lhpost6")
+    rng = np.random.default_rng(8)
+    q0 = plant.zero_state().q
+    out = np.zeros(6)
+    miss = {}
+    for size in (1e-3, 1e-1, 2e-1):
+        miss[size] = 0.0
+        for _ in range(20):
+            step, v = size * rng.uniform(-1.0, 1.0, 6), rng.uniform(-1.0, 1.0, 6)
+            q1 = pin.integrate(plant.model, q0, step)
+            wanted = pin.dDifference(plant.model, q0, q1, pin.ArgumentPosition.ARG1) @ v
+            dexp_inverse(step, v, out)
+            miss[size] = max(miss[size], np.abs(out - wanted).max())
+    # largest turn in one step of 1/2048 s at 0.33 rad/s is 2e-4: the next term, x^4/720, is below 1e-18
+    assert miss[1e-3] < 1e-14
+    assert 1e-8 < miss[1e-1] < 1e-5
+    assert 8.0 < miss[2e-1] / miss[1e-1] < 32.0  # fourth order: 16, over other random directions
+
+
+# Table 4.1 -----------------------------------------------------------------------------------------------------------
+
+
+def lumped():
+    machine = machine_named("lhpost6")
+    alone = [machine.parameters[f"estimates.platen_alone.{key}"].value for key in ("mass", "inertia")]
+    return machine, lumped_inertia(*alone, machine)
+
+
+def table_4_1(machine, row):
+    mass, inertia = (machine.parameters[f"estimates.{row}.{key}"].value for key in ("mass", "inertia"))
+    return np.array([*mass, *inertia])
+
+
+@pytest.mark.parametrize(
+    "kind, tolerance",
+    [
+        # masses: the lumped masses were derived from these sums; printed to 10 kg
+        # inertias: coordinates to 0.01 m of 3 to 6 m give 0.4 %; printed to 10 kg m2
+        ("horizontal", [1e-4, 1e-4, 1e-4, 0.03, 0.005, 0.015]),  # I_x: lever 0.44 m drawn, not derived; I_z: 6.19 m
+        ("vertical", [None, None, 1e-4, 1e-3, 1e-3, None]),
+        ("hold_down", [1e-4, 1e-4, 1e-4, 0.005, None, 0.01]),  # I_y does not fit: see below
+    ],
+)
+def test_moving_parts_at_their_connection_points_are_the_contributions_of_table_4_1(kind, tolerance):
+    machine, parts = lumped()
+    found, printed = np.diag(parts[kind]), table_4_1(machine, kind)
+    for mine, theirs, rel in zip(found, printed, tolerance, strict=True):
+        if rel is not None:
+            assert mine == pytest.approx(theirs, rel=rel)
+    nothing = printed == 0.0
+    assert np.allclose(found[nothing], 0.0, atol=1e-9)
+
+
+def test_struts_pitch_inertia_is_the_one_contribution_that_does_not_fit():
+    machine, parts = lumped()
+    found, printed = parts["hold_down"][4, 4], table_4_1(machine, "hold_down")[4]
+    # 156.2 against 177.88 t m2: the strut pins would have to be 2.6 m below B, I_x says 1.62 m
+    assert found / printed == pytest.approx(0.878, abs=0.005)
+    mass = table_4_1(machine, "hold_down")
+    lever_from_pitch = np.sqrt((printed - 2.0 / 3.0 * mass[2] * 4.89**2) / mass[0])
+    lever_from_roll = np.sqrt(mass[3] / mass[1])
+    assert lever_from_pitch == pytest.approx(2.6, abs=0.05)
+    assert lever_from_roll == pytest.approx(1.62, abs=0.01)
+
+
+def test_first_estimate_is_the_sum_of_platen_and_moving_parts():
+    machine, parts = lumped()
+    total, printed = np.diag(sum(parts.values())), table_4_1(machine, "first")
+    assert np.allclose(total[:3], printed[:3], rtol=1e-5)  # M_eff,1
+    assert np.allclose(total[[3, 5]], printed[[3, 5]], rtol=0.0025)  # 0.01 % in roll, -0.2 % in yaw
+    assert total[4] / printed[4] == pytest.approx(0.993, abs=0.001)  # the struts' misfit, in pitch
+    # and the report's own rows add up to its sum, to the last digit printed
+    rows = sum(table_4_1(machine, row) for row in ("platen_alone", "horizontal", "vertical", "hold_down"))
+    assert np.allclose(rows, printed, rtol=0.0, atol=15.0)
+
+
+def test_moving_parts_couple_no_directions_but_surge_with_pitch_and_sway_with_roll():
+    machine, parts = lumped()
+    total = sum(parts.values())
+    coupling = total - np.diag(np.diag(total))
+    pairs = {(0, 4): -1.0, (1, 3): 1.0}
+    for (i, j), sign in pairs.items():
+        # 13.5 t m: the swivels and pins hang below B, which Table 4.1's diagonal inertia does not show; for B to be the
+        # centre of gravity of all, that of the platen alone would lie 0.09 m above it
+        assert coupling[i, j] == pytest.approx(sign * 13.5e3, rel=0.01)
+        assert abs(coupling[i, j]) / machine.parameters["estimates.platen_alone.mass"].value[0] < 0.1
+        coupling[i, j] = coupling[j, i] = 0.0
+    assert np.allclose(coupling, 0.0, atol=1e-6)
+
+
+def test_second_estimate_differs_from_the_first_by_what_the_report_says():
+    machine = machine_named("lhpost6")
+    off = 100.0 * (table_4_1(machine, "second") / table_4_1(machine, "first") - 1.0)
+    assert np.allclose(off, [1.42, 1.50, 1.18, -3.39, -6.20, 6.88], atol=0.006)  # printed to 0.01 %
+
+
+# Specimens -----------------------------------------------------------------------------------------------------------
+
+
+def test_locked_specimen_adds_its_mass_and_inertia_to_the_platen():
+    machine = machine_named("lhpost6")
+    position, rpy = (0.5, -0.3, 0.2), (0.1, -0.2, 0.3)
+    plant = make_plant(machine.with_specimen(PENDULUM, position, rpy, locked=True))
+    assert plant.model.nv == 6
+    assert plant.model.inertias[1].mass == pytest.approx(min(machine.platen.mass) + POST + BOB, rel=1e-15)
+    # by hand, at B: each link's inertia about its own centre, turned and moved (parallel axes)
+    turn = pin.rpy.rpyToMatrix(*rpy)
+    centre = np.array(machine.platen.centre_of_gravity)
+    wanted = np.diag([*[min(machine.platen.mass)] * 3, *machine.platen.inertia])
+    links = [(POST, [0.0, 0.0, 1.5], [150.0, 150.0, 4.0]), (BOB, [0.0, 0.0, 1.0], [20.0, 25.0, 10.0])]
+    for mass, at, inertia in links:
+        lever = np.array(position) - centre + turn @ at
+        reach = kin.skew(lever)
+        wanted += np.block(
+            [[mass * np.eye(3), -mass * reach], [mass * reach, turn @ np.diag(inertia) @ turn.T - mass * reach @ reach]]
+        )
+    plain, full = platen_inertia(plant.model, plant.machine)
+    assert np.allclose(plain, wanted, rtol=1e-13, atol=1e-9)
+    extra = np.array(machine.platen.mass) - min(machine.platen.mass)
+    assert np.allclose(full - plain, np.diag([*extra, 0.0, 0.0, 0.0]), rtol=0.0, atol=1e-9)
+
+
+def test_free_specimen_joins_the_same_model_with_its_joints():
+    plant = make_plant(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE))
+    assert list(plant.model.names) == ["universe", "platen", "pivot"]
+    assert plant.model.nv == 7
+    assert plant.axes.size == 6
+    assert pin.computeTotalMass(plant.model) == pytest.approx(168060.0 + POST + BOB)
+    with pytest.raises(SimulationError, match="free joints"):
+        inertia_table(plant)
+
+
+def pendulum_rate():
+    """Small-swing angular frequency of the pendulum on a platen that does not move [rad/s]."""
+    return np.sqrt(BOB * G * ARM / (BOB_INERTIA + BOB * ARM**2))
+
+
+def test_pendulum_on_a_held_platen_swings_at_its_closed_form_frequency():
+    model = make_model(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE))
+    held = pin.buildReducedModel(model, [model.getJointId("platen")], pin.neutral(model))
+    data = held.createData()
+    zero = np.zeros(1)
+    angle = 1e-4  # sin(x) = x to 2e-9 of it
+    a = pin.aba(held, data, pin.integrate(held, pin.neutral(held), np.array([angle])), zero, zero)
+    assert a[0] == pytest.approx(-(pendulum_rate() ** 2) * angle, rel=1e-8)
+
+
+def test_pendulum_swings_wide_with_the_period_of_the_elliptic_integral():
+    model = make_model(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE))
+    held = pin.buildReducedModel(model, [model.getJointId("platen")], pin.neutral(model))
+    data, zero = held.createData(), np.zeros(1)
+    start = 1.2  # rad
+
+    def rates(_, y):
+        q = np.array([np.cos(y[0]), np.sin(y[0])])  # a continuous joint
+        return [y[1], pin.aba(held, data, q, y[1:], zero)[0]]
+
+    def bottom(_, y):
+        return y[0]
+
+    period = 4.0 * ellipk(np.sin(0.5 * start) ** 2) / pendulum_rate()
+    swing = solve_ivp(rates, (0.0, 0.3 * period), [start, 0.0], events=bottom, rtol=1e-10, atol=1e-12)
+    assert swing.t_events[0][0] == pytest.approx(0.25 * period, rel=1e-8)  # the solver's tolerance
+
+
+def test_pendulum_on_a_platen_free_to_roll_swings_faster_by_the_mass_ratio():
+    # two masses in one model: omega^2 = m g L / (J - (m L)^2 / (M + m)), J about the pivot
+    machine = machine_named("guided").with_specimen(PENDULUM, ABOVE)
+    model = make_model(machine)
+    data = model.createData()
+    angle = 1e-4
+    q = pin.integrate(model, pin.neutral(model), np.array([0.0, angle]))
+    a = pin.aba(model, data, q, np.zeros(2), np.zeros(2))
+    all_mass = machine.platen.mass[0] + POST + BOB
+    rate = BOB * G * ARM / (BOB_INERTIA + BOB * ARM**2 - (BOB * ARM) ** 2 / all_mass)
+    assert a[1] == pytest.approx(-rate * angle, rel=1e-8)
+    # and the centre of mass of all stays: the turn about +Y takes the bob (below the pivot) to -X
+    assert all_mass * a[0] - BOB * ARM * a[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_platen_and_pendulum_falling_free_keep_their_momentum_balance():
+    machine = machine_named("lhpost6").with_params(platen__mass=[168e3] * 3).with_specimen(PENDULUM, ABOVE)
+    model = make_model(machine)
+    data = model.createData()
+    rng = np.random.default_rng(11)
+    weight = pin.computeTotalMass(model) * G
+    for _ in range(12):
+        q = pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, 7))
+        v = rng.uniform(-2.0, 2.0, 7)
+        a = pin.aba(model, data, q, v, np.zeros(7))
+        rate = pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
+        # Newton: total force is the weight, no moment about the common centre of gravity; rounding of 1e6 N
+        assert np.allclose(rate.linear, [0.0, 0.0, -weight], rtol=0.0, atol=1e-6)
+        assert np.allclose(rate.angular, 0.0, rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "robot, joints, mass",
+    [("double_pendulum", 2, None), ("ur5", 6, None), ("solo12", 12, None)],
+)
+def test_models_of_example_robot_data_mount_as_specimens(robot, joints, mass):
+    example_robot_data = pytest.importorskip("example_robot_data")
+    found = example_robot_data.load(robot)
+    free = make_plant(machine_named("lhpost6").with_specimen(found.urdf, (1.0, 0.5, 0.0), (0.0, 0.0, 0.4)))
+    locked = make_plant(machine_named("lhpost6").with_specimen(found.urdf, (1.0, 0.5, 0.0), locked=True))
+    assert free.model.nv == 6 + joints
+    assert locked.model.nv == 6
+    alone = pin.buildModelFromUrdf(found.urdf)
+    total = 168060.0 + sum(i.mass for i in alone.inertias)  # the root link's mass sits on Pinocchio's universe joint
+    assert sum(i.mass for i in free.model.inertias) == pytest.approx(total, rel=1e-12)
+    assert locked.model.inertias[1].mass == pytest.approx(total, rel=1e-12)
+    a = pin.aba(free.model, free.model.createData(), pin.neutral(free.model), np.zeros(6 + joints), np.zeros(6 + joints))
+    assert np.all(np.isfinite(a))
+
+
+def test_urdf_that_cannot_be_a_specimen_is_refused_with_its_name(tmp_path):
+    machine = machine_named("lhpost6")
+    with pytest.raises(ParameterError, match="nowhere.urdf: no such URDF"):
+        make_plant(machine.with_specimen(tmp_path / "nowhere.urdf"))
+    broken = tmp_path / "broken.urdf"
+    broken.write_text("<robot name='x'><link", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"broken.urdf: not a URDF"):
+        make_plant(machine.with_specimen(broken))
+    light = tmp_path / "light.urdf"
+    light.write_text("<robot name='light'><link name='air'/></robot>", encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"light.urdf: the specimen has no mass"):
+        make_plant(machine.with_specimen(light))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .machine import Machine
 from .pose import rotation
-from .urdf import urdf_text
+from .urdf import legs, urdf_text
 
 __all__ = ["Bodies", "body_name", "body_poses", "joint_positions", "load_bodies", "quaternions"]
 
@@ -56,20 +56,20 @@ def joint_positions(machine: Machine, model: Any, displacement: Array) -> Array:
         put("platen_motion", pose[:, "xyz".index(machine.motion)])
     normal = turn[:, :, 2]
     foot = pose[:, :3] + turn @ np.array(machine.platen.bearing_plane)
-    for leg in (*machine.actuators, *machine.struts):
+    for leg in legs(machine):
         base, point = np.array(leg.base_point), np.array(leg.platen_point)
         zero_length = np.linalg.norm(point - base)
         if getattr(leg, "mount", "swivel") == "bearing":
             length = np.einsum("ni,ni->n", foot - base, normal) / normal[:, 2]
             put(f"{leg.name}_plate_y", np.arctan2(normal[:, 0], normal[:, 2]))
-            put(f"{leg.name}_plate_x", -np.arcsin(normal[:, 1]))
+            put(f"{leg.name}_plate_x", np.arctan2(-normal[:, 1], np.hypot(normal[:, 0], normal[:, 2])))
         else:
             reach = pose[:, :3] + turn @ point - base
             length = np.linalg.norm(reach, axis=1)
             at_zero = model.jointPlacements[model.getJointId(f"{leg.name}_swivel_x")].rotation
             x, y, z = (reach @ at_zero / length[:, None]).T
             put(f"{leg.name}_swivel_x", np.arctan2(-y, z))
-            put(f"{leg.name}_swivel_y", np.arcsin(x))
+            put(f"{leg.name}_swivel_y", np.arctan2(x, np.hypot(y, z)))
         put(f"{leg.name}_extension", length - zero_length)
     return q
 

@@ -21,7 +21,7 @@ from .files import models_folder
 from .machine import Actuator, Machine, Strut
 from .parameters import Parameters, load_parameters
 
-__all__ = ["drawing_colour", "drawing_sizes", "urdf_text"]
+__all__ = ["drawing_colour", "drawing_sizes", "legs", "urdf_text"]
 
 Vec = Sequence[float]
 ORIGIN = (0.0, 0.0, 0.0)
@@ -36,6 +36,11 @@ def drawing_sizes() -> Parameters:
 def drawing_colour(kind: str) -> str:
     """Colour of a kind of body, as ``#0072B2``."""
     return str(drawing_sizes().words[f"colour.{kind}"])
+
+
+def legs(machine: Machine) -> tuple[Actuator | Strut, ...]:
+    """All that stands between the base and the platen: actuators, then struts."""
+    return (*machine.actuators, *machine.struts)
 
 
 def _size(path: str) -> float:
@@ -99,12 +104,12 @@ def _leg(machine: Machine, component: Actuator | Strut) -> _Leg:
 def urdf_text(machine: Machine) -> str:
     """URDF of a machine, as text that ends with a newline; the same machine gives the same text."""
     robot = ET.Element("robot", name=machine.name)
-    legs = [_leg(machine, component) for component in (*machine.actuators, *machine.struts)]
+    measures = [_leg(machine, component) for component in legs(machine)]
     for kind in ("platen", "swivel", "bearing", "strut", "rod", "plate", "reaction_mass"):
         _material(robot, kind)
-    _reaction_mass(_link(robot, "world"), machine, legs)
-    _platen(robot, machine, legs)
-    for leg in legs:
+    _reaction_mass(_link(robot, "world"), machine, measures)
+    _platen(robot, machine, measures)
+    for leg in measures:
         _add_leg(robot, leg)
     ET.indent(robot)
     note = (
@@ -116,7 +121,7 @@ def urdf_text(machine: Machine) -> str:
     return f'<?xml version="1.0"?>\n<!-- {note} -->\n{ET.tostring(robot, encoding="unicode")}\n'
 
 
-def _platen(robot: ET.Element, machine: Machine, legs: Sequence[_Leg]) -> None:
+def _platen(robot: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> None:
     """Platen as a box from its top face to the bearing plane, with lugs to swivels outside it."""
     centre = machine.platen.centre_of_gravity
     depth = -machine.platen.bearing_plane[2]
@@ -125,7 +130,7 @@ def _platen(robot: ET.Element, machine: Machine, legs: Sequence[_Leg]) -> None:
     _inertial(link, *_platen_inertia(machine))
     middle = _minus((0.0, 0.0, -0.5 * depth), centre)
     _visual(link, "platen", middle, box=size)
-    for leg in legs:
+    for leg in measures:
         if leg.kind == "bearing":
             continue
         point = _minus(leg.platen_point, centre)
@@ -197,18 +202,22 @@ def _universal(robot: ET.Element, name: str, what: str, axes: str, ends: tuple[s
     _joint(robot, f"{name}_{what}_{axes[1]}", "revolute", (between, ends[1]), ORIGIN, ORIGIN, second, free)
 
 
-def _reaction_mass(world: ET.Element, machine: Machine, legs: Sequence[_Leg]) -> None:
+def _reaction_mass(world: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> None:
     """Translucent block that the legs stand on and in, with a pedestal under each swivel above it."""
     margin = _size("reaction_mass.margin") * max(machine.platen.size)
-    stand = [leg.base[2] - (0.0 if leg.kind == "bearing" else _size("barrel.radius") * leg.bore) for leg in legs]
-    actuators = [z for z, leg in zip(stand, legs, strict=True) if leg.kind != "strut"]
-    top, bottom = min(actuators), min(stand) - margin
-    corners = [*(leg.base for leg in legs), *(leg.platen_point for leg in legs)]
-    halves = [max(abs(c[k]) for c in corners) for k in (0, 1)]
-    halves = [max(h, 0.5 * s) + margin for h, s in zip(halves, machine.platen.size, strict=True)]
-    middle = (0.0, 0.0, 0.5 * (top + bottom))
-    _visual(world, "reaction_mass", middle, box=(2.0 * halves[0], 2.0 * halves[1], top - bottom))
-    for leg, z in zip(legs, stand, strict=True):
+    stand = [leg.base[2] - (0.0 if leg.kind == "bearing" else _size("barrel.radius") * leg.bore) for leg in measures]
+    under_platen = machine.platen.bearing_plane[2] - 0.5 * margin
+    actuators = [z for z, leg in zip(stand, measures, strict=True) if leg.kind != "strut"]
+    top, bottom = min(*actuators, under_platen), min(*stand, under_platen) - margin
+    low, high = [], []
+    for k, size in enumerate(machine.platen.size):
+        ends = [leg.base[k] for leg in measures] + [leg.platen_point[k] for leg in measures]
+        low.append(min(*ends, -0.5 * size) - margin)
+        high.append(max(*ends, 0.5 * size) + margin)
+    low, high = [*low, bottom], [*high, top]
+    middle = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
+    _visual(world, "reaction_mass", middle, box=_minus(high, low))
+    for leg, z in zip(measures, stand, strict=True):
         if z > top:
             edge = 3.0 * _size("barrel.radius") * leg.bore
             _visual(world, "reaction_mass", (*leg.base[:2], 0.5 * (z + top)), box=(edge, edge, z - top))

@@ -1,8 +1,7 @@
-"""A record to look at: the machine's bodies follow it in a browser, from a file that plays off line or from loopback.
+"""A record to look at: the machine's bodies follow it in a browser.
 
-The URDF gives bodies and joints (`urdf`), kinematics the joint positions of every frame, meshcat draws. Scene and
-animation are meshcat commands sent to a "window": `Recorder` keeps them for a page, `loopback.LoopbackWindow` hands
-them to the browsers that look. Neither starts meshcat's own server, which listens on all network interfaces.
+The URDF gives bodies and joints (`urdf`), `bodies` where they are in every frame, meshcat draws. A scene and its
+animation are meshcat commands, sent to a window of `viewer_page`: a file that plays off line or a page on loopback.
 """
 
 import logging
@@ -15,25 +14,22 @@ import pinocchio as pin
 import xarray as xr
 from numpy.typing import NDArray
 
+from .bodies import Bodies, body_name, body_poses, joint_positions, load_bodies, quaternions
 from .errors import ParameterError, RecordError
 from .files import write_whole
 from .machine import Machine
+from .pose import rotation
 from .records import require
-from .urdf import drawing_colour
+from .urdf import drawing_colour, legs
+from .viewer_page import LoopbackWindow, Recorder, packed_array, render_page
 
 __all__ = [
-    "Bodies",
     "Frames",
-    "Recorder",
-    "Window",
-    "body_poses",
     "draw_animation",
     "draw_scene",
-    "joint_positions",
-    "load_bodies",
+    "live_animation",
     "make_frames",
     "record_frames",
-    "render_page",
     "save_animation",
 ]
 
@@ -50,8 +46,8 @@ LIGHTS = (
     ("FillLight", "intensity", 0.55),
     ("AmbientLight", "intensity", 0.5),
 )
+HIDDEN = ("/Grid", "/Axes", "/Lights/PointLightNegativeX", "/Lights/PointLightPositiveX")
 BACKGROUND = {"top_color": [0.93, 0.95, 0.97], "bottom_color": [0.80, 0.84, 0.88]}
-FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
 
 
 class Frames(NamedTuple):
@@ -113,7 +109,7 @@ def record_frames(machine: Machine, record: xr.Dataset, *, rate: float = 30.0, a
 
 
 # --------------------------------------------------------------------------------------------- drawing
-def draw_scene(window: Window, machine: Machine, bodies: Bodies, reference: bool = False) -> None:
+def draw_scene(window: Recorder | LoopbackWindow, machine: Machine, bodies: Bodies, reference: bool = False) -> None:
     """Send the machine in its control zero-position, the camera and the light; with the reference's outline."""
     import meshcat
     from meshcat import geometry
@@ -142,7 +138,7 @@ def _set_stage(vis: Any, machine: Machine) -> None:
     """Camera that sees the whole table from -Y, +X to the right; light from above; no grid through the platen."""
     from meshcat import geometry
 
-    points = np.array([p for leg in (*machine.actuators, *machine.struts) for p in (leg.base_point, leg.platen_point)])
+    points = np.array([p for leg in legs(machine) for p in (leg.base_point, leg.platen_point)])
     points = np.vstack([points, 0.5 * np.array([[*machine.platen.size, 0.0]]) * [[1, 1, 1], [-1, -1, 1]]])
     middle, radius = 0.5 * (points.max(0) + points.min(0)), 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
     vis[ROOT].set_transform(pin.SE3(np.eye(3), -middle).homogeneous)  # meshcat's camera turns about the origin
@@ -153,16 +149,17 @@ def _set_stage(vis: Any, machine: Machine) -> None:
         vis[f"/Lights/{light}/<object>"].set_property(property, value)
     for end, colour in BACKGROUND.items():
         vis["/Background"].set_property(end, colour)
-    for thing in ("/Grid", "/Axes"):
+    for thing in HIDDEN:
         vis[thing].set_property("visible", False)
 
 
-def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Frames) -> None:
+def draw_animation(window: Recorder | LoopbackWindow, machine: Machine, bodies: Bodies, frames: Frames) -> None:
     """Send the frames as one animation that loops; bodies that stand still are left out."""
     from meshcat.path import Path as MeshcatPath
 
-    _warn_of_strokes(machine, bodies.model, frames)
-    poses = body_poses(bodies.model, joint_positions(machine, bodies.model, frames.displacement))
+    q = joint_positions(machine, bodies.model, frames.displacement)
+    _warn_of_strokes(machine, bodies.model, q)
+    poses = body_poses(bodies.model, q)
     moving = {body_name(bodies.model, joint): poses[:, joint] for joint in range(1, bodies.model.njoints)}
     if frames.reference is not None:
         middle = np.array([0.0, 0.0, 0.5 * machine.platen.bearing_plane[2]])
@@ -171,7 +168,7 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
     clips = []
     for name, pose in moving.items():
         tracks = [
-            {"name": f".{key}", "type": kind, "times": _packed(np.arange(len(pose))), "values": _packed(part)}
+            {"name": f".{key}", "type": kind, "times": packed_array(np.arange(len(pose))), "values": packed_array(part)}
             for key, kind, part in (("position", "vector3", pose[:, :3]), ("quaternion", "quaternion", pose[:, 3:]))
             if np.ptp(part, axis=0).max() > 1e-9  # [m, 1]: nobody sees less
         ]
@@ -191,25 +188,11 @@ class _Animation:
         return {"type": "set_animation", "animations": self.clips, "options": options, "path": ""}
 
 
-def _warn_of_strokes(machine: Machine, model: Any, frames: Frames) -> None:
-    q = joint_positions(machine, model, frames.displacement)
-    for actuator in machine.actuators:
-        extension = q[:, model.idx_qs[model.getJointId(f"{actuator.name}_extension")]]
-        most = float(np.abs(extension).max())
-        if most > actuator.stroke:
-            log.warning(
-                "drawn %g times, %s moves %.3f m, beyond its stroke of %.3f m: its rod leaves the barrel",
-                frames.amplify,
-                actuator.name,
-                most,
-                actuator.stroke,
-            )
-
-
-def _packed(values: Array) -> Any:
-    import umsgpack
-
-    return umsgpack.Ext(FLOAT_ARRAY, np.ascontiguousarray(values, "<f4").tobytes())
+def _warn_of_strokes(machine: Machine, model: Any, q: Array) -> None:
+    extension = [np.abs(q[:, model.idx_qs[model.getJointId(f"{a.name}_extension")]]).max() for a in machine.actuators]
+    beyond = [a.name for a, most in zip(machine.actuators, extension, strict=True) if most > a.stroke]
+    if beyond:
+        log.warning("drawn beyond the stroke: %s; amplify less to see it as it can be", ", ".join(beyond))
 
 
 def _primitive(shape: Any) -> tuple[Any, Array]:
@@ -232,6 +215,7 @@ def _box_edges(size: Array) -> Array:
     return np.array([0.5 * size * signs[k] for pair in pairs for k in pair])
 
 
+# ------------------------------------------------------------------------------------------------ pages
 def save_animation(
     machine: Machine, record: xr.Dataset, path: Path | str, *, rate: float = 30.0, amplify: float = 1.0
 ) -> None:
@@ -240,19 +224,38 @@ def save_animation(
     Raises RecordError or ParameterError as `record_frames`.
     """
     frames = record_frames(machine, record, rate=rate, amplify=amplify)
-    bodies, recorder = load_bodies(machine), Recorder()
-    reference = frames.reference is not None
-    draw_scene(recorder, machine, bodies, reference)
-    draw_animation(recorder, machine, bodies, frames)
-    page = render_page(*page_words(machine, record, frames), recorder.commands, reference=reference)
+    recorder = Recorder()
+    _draw(recorder, machine, frames)
+    page = render_page(*_words(machine, record, frames), recorder.commands)
     with write_whole(path) as beside:
         beside.write_text(page, encoding="utf-8")
 
 
-def page_words(machine: Machine, record: xr.Dataset, frames: Frames) -> tuple[str, str]:
-    """Title and note of a record's page."""
+def live_animation(machine: Machine, record: xr.Dataset, *, rate: float = 30.0, amplify: float = 1.0) -> LoopbackWindow:
+    """Return a window that shows a record at its `url` while used in a ``with`` block; only this computer can look.
+
+    Raises RecordError or ParameterError as `record_frames`.
+    """
+    frames = record_frames(machine, record, rate=rate, amplify=amplify)
+    window = LoopbackWindow(render_page(*_words(machine, record, frames), live=True))
+    _draw(window, machine, frames)
+    return window
+
+
+def _draw(window: Recorder | LoopbackWindow, machine: Machine, frames: Frames) -> None:
+    bodies = load_bodies(machine)
+    draw_scene(window, machine, bodies, frames.reference is not None)
+    draw_animation(window, machine, bodies, frames)
+
+
+def _words(machine: Machine, record: xr.Dataset, frames: Frames) -> tuple[str, str, dict[str, str]]:
+    """Title, note and legend of a record's page."""
     size = "drawn to scale" if frames.amplify == 1.0 else f"motion drawn {frames.amplify:g} times as large"
     seconds = (len(frames.displacement) - 1) / frames.rate
     kind = str(record.attrs.get("kind", "record"))
     note = f"{machine.name}, {kind}, {seconds:.1f} s at {frames.rate:g} frames/s, {size}; +X to the right"
-    return str(record.attrs.get("title", record.attrs.get("test", "record"))), note
+    kinds = {"platen": "platen"} | {a.mount: f"{a.kind} actuators" for a in machine.actuators}
+    kinds |= {"strut": f"{machine.struts[0].kind} struts"} if machine.struts else {}
+    kinds |= {"reference": "reference (outline)"} if frames.reference is not None else {}
+    legend = {word.replace("_", "-"): drawing_colour(kind) for kind, word in kinds.items()}
+    return str(record.attrs.get("title", record.attrs.get("test", "record"))), note, legend

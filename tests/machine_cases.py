@@ -12,7 +12,7 @@ from lhpost6_pin.pose import PlatenMotion
 
 DATA = Path(__file__).parent / "data"
 FREE_MACHINES = ("lhpost6", "stewart")
-MACHINES = (*FREE_MACHINES, "guided")
+MACHINES = (*FREE_MACHINES, "uniaxial")
 
 
 @cache

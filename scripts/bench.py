@@ -1,0 +1,219 @@
+"""Benchmarks: cost per step of both engines and each scheme, and ratios against plain alternatives in the same run.
+
+    python scripts/bench.py [--out DIR] [--quick]
+
+Prints a table and writes bench.json. Times are the best of several repeats on one core, warm unless said otherwise.
+Nothing here is a test: what a machine is busy with shows in the figures; ratios within one run are what to compare.
+"""
+
+import json
+import os
+import platform
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from lhpost6_pin.batch import simulate_many
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.files import write_whole
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.schemes import SCHEMES
+from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, simulate
+
+FIRST_RESULT = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {args!r}; main()"
+
+
+def best(work: Callable[[], Any], repeats: int) -> float:
+    """Seconds of the fastest of some repeats."""
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+class Bench:
+    """Collects rows (what, value, unit)."""
+
+    def __init__(self, repeats: int) -> None:
+        """Prepare the plant, a reference motion and its spools."""
+        self.repeats = repeats
+        self.rows: list[tuple[str, float, str]] = []
+        self.plant = make_plant(load_machine())
+        self.rest = find_equilibrium(self.plant)
+        self.loop = make_controller(self.plant, self.rest, load_controller("lhpost6"))
+        target = make_target(find_motion("ridgecrest"), rate=float(SAMPLE_RATE))
+        self.reference = np.hstack([target.displacement, target.velocity])
+        run = simulate(self.plant, self.closed(len(self.reference)), samples=len(self.reference), engine="fused")
+        self.spool = run.spool
+
+    def closed(self, samples: int) -> ClosedLoop:
+        """Closed loop on the first samples of the motion's strong part."""
+        return ClosedLoop(self.loop, np.ascontiguousarray(self.reference[:samples]), self.rest)
+
+    def open(self, samples: int) -> OpenLoop:
+        """Open loop on the spools of that motion."""
+        return OpenLoop(self.spool[:samples], self.rest.state)
+
+    def add(self, what: str, value: float, unit: str) -> None:
+        """Keep a row."""
+        self.rows.append((what, value, unit))
+
+    def engines(self, seconds: float) -> None:
+        """Microseconds a step and times real time, each engine and scheme, open and closed loop at 8192 Hz."""
+        samples = int(seconds * SAMPLE_RATE)
+        for engine in ENGINES:
+            for scheme in SCHEMES:
+                for name, drive in (("open loop", self.open(samples)), ("closed loop", self.closed(samples))):
+
+                    def work(engine: str = engine, scheme: str = scheme, drive: Any = drive) -> None:
+                        simulate(self.plant, drive, samples=samples, scheme=scheme, engine=engine, record_every=4)
+
+                    work()
+                    took = best(work, self.repeats)
+                    self.add(f"{engine} {scheme} {name}", 1e6 * took / (4 * samples), "us/step")
+                    self.add(f"{engine} {scheme} {name}", seconds / took, "x real time")
+
+    def lengths(self) -> None:
+        """Cost against record length (fused, closed loop)."""
+        for seconds in (5, 10, 20, 40):
+            samples = seconds * SAMPLE_RATE
+            drive = self.closed(samples)
+            took = best(lambda d=drive, n=samples: simulate(self.plant, d, samples=n, engine="fused"), self.repeats)
+            self.add(f"fused, record of {seconds} s", took, "s")
+
+    def machines(self) -> None:
+        """Cost against the number of machines (fused, 5 s, threads on all cores)."""
+        samples = 5 * SAMPLE_RATE
+        for count in (1, 2, 4, 8, 16):
+            jobs = [(self.plant, self.closed(samples))] * count
+            took = best(lambda j=jobs: simulate_many(j, samples=samples), self.repeats)
+            self.add(f"fused, {count} machines, {os.cpu_count()} cores", took / count, "s a machine")
+
+    def against(self) -> None:
+        """Ratios to a plain NumPy-and-Pinocchio loop and to SciPy's solve_ivp on the same work."""
+        from plain_loop import PlainPlant
+
+        samples, steps = 256, 16
+        dt = 1.0 / (steps * SAMPLE_RATE)
+        drive = self.open(samples)
+        plain = PlainPlant(self.plant.machine)
+
+        def loop() -> np.ndarray:
+            z = self.rest.state.z
+            state = (
+                self.rest.state.q.copy(), np.zeros(6), np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy(), np.zeros(10), np.zeros((6, 2))
+            )  # fmt: skip
+            for k in range(samples):
+                for _ in range(steps):
+                    state = plain.step(*state, drive.spool[k], dt)
+            return state[0]
+
+        def ours(engine: str) -> np.ndarray:
+            return simulate(
+                self.plant, drive, samples=samples, scheme="euler", steps_per_second=steps * SAMPLE_RATE, engine=engine
+            ).q[-1]
+
+        difference = float(np.abs(loop()[:3] - ours("fused")[:3]).max())
+        self.add("plain NumPy and Pinocchio loop against ours, last position", difference, "m (one sample apart)")
+        slow = best(loop, 1)
+        self.add("plain NumPy and Pinocchio loop, euler", 1e6 * slow / (samples * steps), "us/step")
+        for engine in ENGINES:
+            self.add(f"plain loop over {engine} engine, euler", slow / best(lambda e=engine: ours(e), self.repeats), "x")
+        self._solve_ivp(drive, samples)
+
+    def _solve_ivp(self, drive: OpenLoop, samples: int) -> None:
+        """SciPy's LSODA on the compiled right-hand side, sample by sample as the spool is held."""
+        import pinocchio as pin
+        from scipy.integrate import solve_ivp
+
+        from lhpost6_pin.engine_pinocchio import settle
+        from lhpost6_pin.schemes import A, V
+        from lhpost6_pin.workspace import make_workspace
+
+        plant, rest = self.plant, self.rest
+        ws = make_workspace(plant, rest.state)
+        nv, nz = plant.model.nv, len(plant.states)
+
+        def right(spool: np.ndarray, q0: np.ndarray) -> Callable[[float, np.ndarray], np.ndarray]:
+            def f(_: float, x: np.ndarray) -> np.ndarray:
+                ws.q[:] = pin.integrate(plant.model, q0, x[:nv])
+                ws.motion[V] = x[nv : 2 * nv]
+                ws.z[:] = x[2 * nv :]
+                settle(plant, ws, spool)
+                local = pin.dDifference(plant.model, q0, ws.q, pin.ArgumentPosition.ARG1) @ ws.motion[V]
+                return np.concatenate([local, ws.motion[A], ws.zd])
+
+            return f
+
+        def work() -> np.ndarray:
+            q, x = rest.state.q.copy(), np.concatenate([np.zeros(2 * nv), rest.state.z])
+            scale = np.concatenate([np.full(2 * nv, 1e-7), np.full(nz, 1e-6)])
+            scale[2 * nv : 2 * nv + 14] = 10.0
+            for k in range(samples):
+                x = solve_ivp(
+                    right(drive.spool[k], q), (0.0, 1.0 / SAMPLE_RATE), x, method="RK45", rtol=1e-6, atol=scale
+                ).y[:, -1]
+                q = pin.integrate(plant.model, q, x[:nv])
+                x[:nv] = 0.0
+            return q
+
+        took = best(work, 1)
+        for engine in ENGINES:
+            ours = best(lambda e=engine: simulate(plant, drive, samples=samples, engine=e), self.repeats)
+            self.add(f"solve_ivp RK45 (rtol 1e-6) over {engine} engine, default scheme", took / ours, "x")
+
+    def first_result(self) -> None:
+        """Wall time of `lhpost6 run` in a new process, compiled code cold and warm, and its peak memory."""
+        with tempfile.TemporaryDirectory() as folder:
+            out = str(Path(folder) / "out")
+            code = FIRST_RESULT.format(args=["run", "ridgecrest", "--out", out])
+            environment = {**os.environ, "LHPOST6_CACHE_DIR": folder}
+            for word in ("cold", "warm"):
+                before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+                begin = time.perf_counter()
+                subprocess.run([sys.executable, "-c", code], env=environment, check=True, capture_output=True)
+                self.add(f"lhpost6 run ridgecrest (50 s of motion), {word}", time.perf_counter() - begin, "s")
+                after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+                self.add(f"peak memory of it, {word}", max(before, after) / 1024.0, "MiB")
+
+
+def main(
+    out: Annotated[Path | None, typer.Option(help="Folder for bench.json.")] = None,
+    quick: Annotated[bool, typer.Option(help="Shorter runs, once each: shows that the script works.")] = False,
+) -> None:
+    """Run all benchmarks, print them and keep them."""
+    bench = Bench(repeats=1 if quick else 5)
+    bench.engines(0.5 if quick else 10.0)
+    bench.against()
+    if not quick:
+        bench.lengths()
+        bench.machines()
+        bench.first_result()
+    facts = f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    table = Table("what", "value", "unit", title=facts)
+    for what, value, unit in bench.rows:
+        table.add_row(what, f"{value:.4g}", unit)
+    Console(width=110).print(table)
+    if out is not None:
+        rows = [{"what": what, "value": value, "unit": unit} for what, value, unit in bench.rows]
+        with write_whole(out / "bench.json") as path:
+            path.write_text(json.dumps({"machine": facts, "rows": rows}, indent=1))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -25,5 +25,7 @@ def simulate_many(
     run = delayed(simulate)
     options = {"engine": "fused", **options}
     return list(
-        Parallel(n_jobs=threads, prefer="threads")(run(plant, drive, samples=samples, **options) for plant, drive in jobs)
+        Parallel(n_jobs=threads, prefer="threads")(
+            run(plant, drive, samples=samples, **options) for plant, drive in jobs
+        )
     )

@@ -92,7 +92,9 @@ def compiled(function: _F) -> _F:
     before = config.CACHE_DIR
     config.CACHE_DIR = "" if folder is None else str(folder)
     try:
-        return cast(_F, numba.njit(cache=folder is not None, error_model="numpy", nogil=True)(function))
+        return cast(
+            _F, numba.njit(cache=folder is not None, error_model="numpy", nogil=True, fastmath={"contract"})(function)
+        )
     finally:
         config.CACHE_DIR = before
 

@@ -9,7 +9,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from .compiled import compiled
+from .effects import ROW
 from .plant import Plant
+from .ports import BODY, LEG
 from .schemes import DQ, TAU, V_SEEN, A, V, kick, open_step, rates_stage, staggered_stage
 from .workspace import Workspace
 
@@ -43,7 +46,7 @@ def _rates(plant: Plant, ws: Workspace, q: Array, z: Array, spool: Array) -> int
         plant.rows,
         plant.model.damping,
         spool,
-        plant.supply,
+        ws.supply,
         ws.frame,
         ws.port,
         ws.JB,
@@ -59,26 +62,31 @@ def make_stepper(plant: Plant, scheme: str, dt: float) -> Stepper:
     return {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}[scheme](plant, dt)
 
 
+@compiled
+def _staggered(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, force, motion):  # type: ignore[no-untyped-def]
+    """`staggered_stage` with its tables as plain numbers, which are cheaper to hand over than records."""
+    tables = legs.view(LEG), body.view(BODY), rows.view(ROW)
+    return staggered_stage(q, dt, axes, *tables, damping, spool, supply, frame, port, JB, z, force, motion)
+
+
 def _semi_implicit(plant: Plant, dt: float) -> Stepper:
     model, data = plant.model, plant.model.createData()
-    axes, legs, body, rows, supply = plant.axes, plant.legs, plant.body, plant.rows, plant.supply
-    damping = np.array(model.damping)
+    axes, damping = plant.axes, np.array(model.damping)
+    legs, body, rows = (table.view(float) for table in (plant.legs, plant.body, plant.rows))
     aba, integrate = pin.aba, pin.integrate
     opened: Workspace | None = None
 
     def advance(ws: Workspace, spool: Array) -> int:
         nonlocal opened
-        motion, frame, port, JB, z, force = ws.motion, ws.frame, ws.port, ws.JB, ws.z, ws.force
+        motion, frame, port, JB, z, force, supply = ws.motion, ws.frame, ws.port, ws.JB, ws.z, ws.force, ws.supply
         dq, v_seen, tau = motion[DQ], motion[V_SEEN], motion[TAU]
         if opened is not ws:
             open_step(motion, dt)
             opened = ws
-        q = ws.q
+        q, status = ws.q, 0
         for held in spool:
             q = integrate(model, q, dq)
-            status = staggered_stage(
-                q, dt, axes, legs, body, rows, damping, held, supply, frame, port, JB, z, force, motion
-            )
+            status = _staggered(q, dt, axes, legs, body, rows, damping, held, supply, frame, port, JB, z, force, motion)
             if status:
                 break
             kick(motion, aba(model, data, q, v_seen, tau), dt)

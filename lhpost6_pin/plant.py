@@ -8,7 +8,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from .effects import effect_table, state_names
-from .ports import body_table, leg_table, port_names
+from .ports import PLATEN_PORTS, body_table, leg_table, port_names
 from .rigid_body import free_axes, make_model
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Plant:
     legs: NDArray[np.void]  # ports.LEG, actuators then struts
     body: NDArray[np.void]  # ports.BODY, one row
     rows: NDArray[np.void]  # effects.ROW
-    ports: tuple[str, ...]
+    ports: tuple[str, ...]  # those that its arrays hold; the platen's only where an effect acts on them
     states: tuple[str, ...]
     supply: Array  # (2,) supply and return pressure [Pa]
     delays: Array  # (n_actuators,) valve delay [s]
@@ -63,13 +63,16 @@ def make_plant(machine: "Machine") -> Plant:
     """Build tables and model of a machine; raises ParameterError or UnknownNameError."""
     ports = port_names(machine)
     effects = machine.effects
+    rows = effect_table(effects, ports)
+    if len(rows) and rows["port"].max() < len(ports) - len(PLATEN_PORTS):
+        ports = ports[: -len(PLATEN_PORTS)]  # no effect acts on the platen as such: nothing to evaluate there
     return Plant(
         machine=machine,
         model=make_model(machine),
         axes=free_axes(machine),
         legs=leg_table(machine),
         body=body_table(machine),
-        rows=effect_table(effects, ports),
+        rows=rows,
         ports=ports,
         states=state_names(effects),
         supply=np.array([machine.hydraulics.supply_pressure, machine.hydraulics.return_pressure]),

@@ -149,7 +149,8 @@ def evaluate_ports(frame, legs, body, s, J, B):
     leg vertical and the platen sliding over it; B is the thrust direction, vertical (Eq. 4-23) or normal. Pads: slip
     of the platen over the plate in the axes of {n_i} (Eqs. 4-13 to 4-15); J is slip relative to the rising plate, B
     the force on the platen alone (Eq. 4-24); s is the displacement of the platen point of the zero-position.
-    Platen ports: J = B^T, displacement of C, Euler angles (whose rates are not omega), wrench at C in {c}.
+    Platen ports, where the arrays have room for them: J = B^T, displacement of C, Euler angles (whose rates are not
+    omega), wrench at C in {c}.
     """
     r00, r01, r02 = frame[0, 0], frame[0, 1], frame[0, 2]
     r10, r11, r12 = frame[1, 0], frame[1, 1], frame[1, 2]
@@ -158,14 +159,17 @@ def evaluate_ports(frame, legs, body, s, J, B):
     plane = body[0].plane
     # {n}: same for all pads, z along the platen normal (r02, r12, r22), no rotation about it (Eq. 4-13)
     cos_a = math.sqrt(1.0 - r12 * r12)
-    sin_b = r02 / cos_a
-    cos_b = r22 / cos_a
+    scale = 1.0 / cos_a
+    sin_b = r02 * scale
+    cos_b = r22 * scale
+    rise = 1.0 / r22  # of the leg per displacement along the normal
     # its x and y axes in {s}, then in body axes (their body z components vanish)
     yx, yy, yz = -sin_b * r12, cos_a, -cos_b * r12
     xbx = r00 * cos_b - r20 * sin_b
     xby = r01 * cos_b - r21 * sin_b
     ybx = r00 * yx + r10 * yy + r20 * yz
     yby = r01 * yx + r11 * yy + r21 * yz
+    pads = 0
     for i in range(legs.size):
         leg = legs[i]
         px, py, pz = leg.rho[0], leg.rho[1], leg.rho[2]
@@ -176,9 +180,10 @@ def evaluate_ports(frame, legs, body, s, J, B):
             dz = bz + r20 * px + r21 * py + r22 * pz - az
             length = math.sqrt(dx * dx + dy * dy + dz * dz)
             s[i] = length - leg.zero_length
-            dx /= length
-            dy /= length
-            dz /= length
+            scale = 1.0 / length
+            dx *= scale
+            dy *= scale
+            dz *= scale
             _row(
                 J,
                 i,
@@ -192,18 +197,19 @@ def evaluate_ports(frame, legs, body, s, J, B):
             for k in range(6):
                 B[i, k] = J[i, k]
             continue
+        pads += 1
         # bearing: the vertical through A meets the plane through N with normal n
         ex, ey, ez = bx - ax, by - ay, bz - az
-        length = (ex * r02 + ey * r12 + ez * r22 + plane) / r22
+        length = (ex * r02 + ey * r12 + ez * r22 + plane) * rise
         s[i] = length - leg.zero_length
         # P from B, in body axes; its body z is the plane's height
         hx, hy, hz = -ex, -ey, length - ez
         cx = r00 * hx + r10 * hy + r20 * hz
         cy = r01 * hx + r11 * hy + r21 * hz
-        _row(J, i, 0.0, 0.0, 1.0 / r22, cx, cy, plane)
+        _row(J, i, 0.0, 0.0, rise, cx, cy, plane)
         share = leg.normal_thrust
         lateral = 1.0 - share
-        _row(B, i, lateral * r20, lateral * r21, lateral * r22 + share / r22, cx, cy, plane)
+        _row(B, i, lateral * r20, lateral * r21, lateral * r22 + share * rise, cx, cy, plane)
         k = leg.pad
         _row(B, k, xbx, xby, 0.0, cx, cy, plane)
         _row(B, k + 1, ybx, yby, 0.0, cx, cy, plane)
@@ -213,7 +219,9 @@ def evaluate_ports(frame, legs, body, s, J, B):
         gx, gy = px - cx, py - cy
         s[k] = xbx * gx + xby * gy
         s[k + 1] = ybx * gx + yby * gy
-    first = s.size - 6
+    first = legs.size + 2 * pads
+    if s.size == first:
+        return
     rho = body[0].rho_c
     ox, oy, oz = rho[0], rho[1], rho[2]
     for k in range(3):

@@ -34,12 +34,15 @@ S, SD, DS, FORCE = range(4)
 @compiled
 def set_twist(v, axes, frame):
     """Scatter the platen's free velocities into the twist, rows 4 and 5 of frame."""
+    if axes.size == 6:
+        for k in range(3):
+            frame[4, k] = v[k]
+            frame[5, k] = v[3 + k]
+        return
     for k in range(3):
         frame[4, k] = 0.0
         frame[5, k] = 0.0
-    for k in range(axes.size):
-        i = axes[k]
-        frame[4 + i // 3, i % 3] = v[k]
+    frame[4, axes[0]] = v[0]
 
 
 @compiled
@@ -69,9 +72,12 @@ def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, mot
     port_rates(JB[0], frame, port[SD])
     apply_forces(rows, port[S], port[SD], z, force, port[FORCE])
     wrench_on_platen(frame, body, JB[1], port[FORCE])
-    for k in range(axes.size):
-        i = axes[k]
-        motion[TAU, k] = frame[6 + i // 3, i % 3]
+    if axes.size == 6:
+        for k in range(3):
+            motion[TAU, k] = frame[6, k]
+            motion[TAU, 3 + k] = frame[7, k]
+    else:
+        motion[TAU, 0] = frame[6, axes[0]]
     for k in range(axes.size, motion.shape[1]):  # specimen joints
         motion[TAU, k] = -damping[k] * motion[V_SEEN, k]
 

@@ -292,7 +292,7 @@ def _run_fused(
             plant.body,
             plant.rows,
             damping,
-            plant.supply,
+            ws.supply,
             plant.delays,
             inertia,
             ws.q,

@@ -25,6 +25,7 @@ class Workspace:
     JB: Array  # (2, n_ports, 6)
     frame: Array  # (8, 3)
     force: Array  # (n_rows, 2)
+    supply: Array  # (2,) supply and return pressure [Pa]
 
 
 def make_workspace(plant: Plant, start: State) -> Workspace:
@@ -41,4 +42,5 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
         JB=np.zeros((2, n, 6)),
         frame=np.zeros((8, 3)),
         force=np.zeros((plant.rows.size, 2)),
+        supply=plant.supply.copy(),
     )

@@ -18,10 +18,11 @@ from scipy.linalg import expm
 from scipy.special import ellipk
 
 from lhpost6_pin import kinematics as kin
-from lhpost6_pin.effects import LAWS
+from lhpost6_pin.effects import LAWS, Effect
 from lhpost6_pin.engine_fused import inertia_table, integrate_platen, platen_acceleration
 from lhpost6_pin.errors import ParameterError, SimulationError
 from lhpost6_pin.plant import make_plant
+from lhpost6_pin.ports import PLATEN_PORTS
 from lhpost6_pin.rigid_body import lumped_inertia, make_model, platen_inertia
 from lhpost6_pin.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
 from lhpost6_pin.stage import wrench_on_platen
@@ -63,15 +64,18 @@ def report_wrench(plant, pose, ws):
     """Eq. 4-24 from the ledger: axial force and pad friction of every component, hand-derived directions."""
     machine = plant.machine
     axial = {c.name: 0.0 for c in machine.components}
+    at_c = np.zeros(6)
     pad = {c.name: np.zeros(2) for c in machine.components}
     for row, force in zip(plant.rows, ws.force, strict=True):
         name = plant.ports[row["port"]].split(".")[0]
         if row["law"] == LAWS["bouc_wen_2d"].code:
             pad[name] += force
+        elif name == "platen":
+            at_c[(np.array(PLATEN_PORTS) == plant.ports[row["port"]])[[3, 4, 5, 0, 1, 2]]] += force[0]
         else:
             axial[name] += force[0]
     forces = {c.name: kin.component_force(machine, pose, c, axial[c.name], pad[c.name]) for c in machine.components}
-    return kin.external_wrench(machine, pose, forces)
+    return kin.external_wrench(machine, pose, forces) + kin.c_J_b(machine, pose).T @ at_c
 
 
 # The platen against Eqs. 4-24 to 4-30 --------------------------------------------------------------------------------
@@ -80,7 +84,9 @@ def report_wrench(plant, pose, ws):
 @pytest.mark.parametrize("thrust", ["report", "normal"])
 @pytest.mark.parametrize("name", FREE_MACHINES)
 def test_aba_with_directional_mass_bias_and_weight_is_the_reports_equation_of_motion(name, thrust):
-    plant = plant_named(name, thrust)
+    drag = tuple((c,) for c in (1e4, 2e4, 3e4, 1e5, 2e5, 3e5))
+    effect = Effect("drag", "viscous", PLATEN_PORTS, drag, "a test of the platen's own ports")
+    plant = make_plant(machine_named(name, thrust).with_effect(effect))
     data = plant.model.createData()
     for pose, q, v, z in random_states(plant, 24):
         ws = forces_at(plant, q, v, z)
@@ -180,7 +186,7 @@ def test_fused_quaternion_stays_unit_however_many_steps_are_taken():
 
 
 def test_guided_platen_moves_along_its_guide_only():
-    plant = plant_named("uniaxial")
+    plant = make_plant(machine_named("uniaxial").with_params(platen__mass=[4.5e3, 4e3, 5e3]))
     out = np.zeros(1)
     integrate_platen(np.array([0.2]), np.array([0.05]), plant.axes, out)
     assert out[0] == 0.25
@@ -444,3 +450,11 @@ def test_urdf_that_cannot_be_a_specimen_is_refused_with_its_name(tmp_path):
     light.write_text("<robot name='light'><link name='air'/></robot>", encoding="utf-8")
     with pytest.raises(ParameterError, match=r"light.urdf: the specimen has no mass"):
         make_plant(machine.with_specimen(light))
+
+
+@pytest.mark.xfail(strict=True, raises=ValueError, reason="pin.appendModel's complaint is not caught")
+def test_specimen_with_a_joint_named_as_the_platen_is_refused_with_its_name(tmp_path):
+    path = tmp_path / "clash.urdf"
+    path.write_text(PENDULUM.read_text(encoding="utf-8").replace('"pivot"', '"platen"'), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"clash.urdf"):
+        make_plant(machine_named("lhpost6").with_specimen(path))

@@ -124,12 +124,12 @@ def advance_double(
     q_a, q_b, slope_a, slope_b = flows_double(
         opened, pressure_a, pressure_b, k_pa, k_bt, k_at, k_pb, leakage, supply, back, linear_below
     )
-    stiff_a = bulk / (length_a + 0.5 * stroke)
-    stiff_b = bulk / (length_b - 0.5 * stroke)
-    half_a = 0.5 * dt * stiff_a / area_a
-    half_b = 0.5 * dt * stiff_b / area_b
-    rise_a = 2.0 * half_a * q_a - stiff_a * stroke
-    rise_b = 2.0 * half_b * q_b + stiff_b * stroke
+    rise_per_oil_a = bulk / (area_a * (length_a + 0.5 * stroke))  # [Pa/m3]
+    rise_per_oil_b = bulk / (area_b * (length_b - 0.5 * stroke))
+    rise_a = rise_per_oil_a * (dt * q_a - area_a * stroke)
+    rise_b = rise_per_oil_b * (dt * q_b + area_b * stroke)
+    half_a = 0.5 * dt * rise_per_oil_a
+    half_b = 0.5 * dt * rise_per_oil_b
     # (I - dt/2 J) rise = dt rate, J = d(rates)/d(pressures)
     m_aa = 1.0 - half_a * (slope_a - leakage)
     m_ab = -half_a * leakage
@@ -160,6 +160,6 @@ def advance_single(
 ) -> float:
     """Pressure of the only chamber one step on [Pa]; the step rule of `advance_double` with P_B = 0."""
     q_a, slope = flows_single(opened, pressure_a, k_pa, k_at, leakage, supply, back, linear_below)
-    stiff = bulk / (length_a + 0.5 * stroke)
-    half = 0.5 * dt * stiff / area_a
-    return pressure_a + (2.0 * half * q_a - stiff * stroke) / (1.0 - half * (slope - leakage))
+    rise_per_oil = bulk / (area_a * (length_a + 0.5 * stroke))
+    rise = rise_per_oil * (dt * q_a - area_a * stroke)
+    return pressure_a + rise / (1.0 - 0.5 * dt * rise_per_oil * (slope - leakage))

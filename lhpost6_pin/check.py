@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.records import LAYOUT, Finding, channel_name, layout_faults, open_record
-from lhpost6_pin.signals import differentiate, lowpass_zero_phase
+from .errors import RecordError
+from .records import LAYOUT, Finding, channel_name, layout_faults, open_record
+from .signals import differentiate, lowpass_zero_phase
 
 __all__ = ["check_dataset", "check_record"]
 

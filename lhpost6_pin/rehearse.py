@@ -42,9 +42,9 @@ def target_within_limits(plant: Plant, target: Target) -> LimitsSummary:
     limits, axes = plant.machine.limits, plant.axes
     blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
     if blocked:
-        free = ",".join(AXES[k] for k in axes)
+        name, free = plant.machine.name, ",".join(AXES[k] for k in axes)
         raise OutOfRangeError(
-            f"{target.reference.motion}: {plant.machine.name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
+            f"{target.reference.motion}: {name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
         )
 
     def six(values: tuple[float, ...]) -> Array:

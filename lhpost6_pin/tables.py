@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from .plant import Plant
     from .records import Finding
-    from .report import RunSummary
+    from .report.run_report import RunSummary
     from .simulate import Run
 
 __all__ = [

@@ -62,7 +62,7 @@ for (const packed of {commands})
 
 def pack_command(command: Any) -> bytes:
     """Pack one meshcat command as its page reads it."""
-    import umsgpack  # type: ignore[import-untyped]
+    import umsgpack
 
     packed: bytes = umsgpack.packb(command.lower())
     return packed

@@ -115,9 +115,8 @@ class Bench:
 
         def loop() -> np.ndarray:
             z = self.rest.state.z
-            state = (
-                self.rest.state.q.copy(), np.zeros(6), np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy(), np.zeros(10), np.zeros((6, 2))
-            )  # fmt: skip
+            pressure_a, pressure_b = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
+            state = (self.rest.state.q.copy(), np.zeros(6), pressure_a, pressure_b, np.zeros(10), np.zeros((6, 2)))
             for k in range(samples):
                 for _ in range(steps):
                     state = plain.step(*state, drive.spool[k], dt)
@@ -133,7 +132,8 @@ class Bench:
         slow = best(loop, 1)
         self.add("plain NumPy and Pinocchio loop, euler", 1e6 * slow / (samples * steps), "us/step")
         for engine in ENGINES:
-            self.add(f"plain loop over {engine} engine, euler", slow / best(lambda e=engine: ours(e), self.repeats), "x")
+            fast = best(lambda e=engine: ours(e), self.repeats)
+            self.add(f"plain loop over {engine} engine, euler", slow / fast, "x")
         self._solve_ivp(drive, samples)
 
     def _solve_ivp(self, drive: OpenLoop, samples: int) -> None:

@@ -35,9 +35,7 @@ REFERENCE_STEPS = 64
 def errors(plant: Plant, drive: OpenLoop, scheme: str, steps: int, exact: np.ndarray) -> dict[str, float] | None:
     """Displacement RRMSE (worst axis) and largest chamber pressure error, or None if the run stopped."""
     samples = len(drive.spool)
-    run = simulate(
-        plant, drive, samples=samples, scheme=scheme, steps_per_second=steps * SAMPLE_RATE, engine="fused"
-    )
+    run = simulate(plant, drive, samples=samples, scheme=scheme, steps_per_second=steps * SAMPLE_RATE, engine="fused")
     if run.trouble:
         return None
     motion = platen_motion(plant, run.q, run.v, run.a)

@@ -1,21 +1,21 @@
 """Ground motions: reading, making, finding by name, turning into targets for the table, response spectra."""
 
-from lhpost6_pin.motions.ac156 import required_spectrum
-from lhpost6_pin.motions.at2 import load_at2
-from lhpost6_pin.motions.csv import load_csv
-from lhpost6_pin.motions.library import MotionEntry, find_motion, list_motions
-from lhpost6_pin.motions.limits import (
+from .ac156 import required_spectrum
+from .at2 import load_at2
+from .csv import load_csv
+from .library import MotionEntry, find_motion, list_motions
+from .limits import (
     LegUtilisation,
     LimitsSummary,
     MotionLimits,
     check_limits,
     largest_scale,
 )
-from lhpost6_pin.motions.motion import AXES, GroundMotion, make_motion
-from lhpost6_pin.motions.process import Reference, Target, make_target, with_scale
-from lhpost6_pin.motions.readers import load_motion
-from lhpost6_pin.motions.spectra import ResponseSpectrum, response_spectrum
-from lhpost6_pin.motions.v1 import load_v1
+from .motion import AXES, GroundMotion, make_motion
+from .process import Reference, Target, make_target, with_scale
+from .readers import load_motion
+from .spectra import ResponseSpectrum, response_spectrum
+from .v1 import load_v1
 
 __all__ = [
     "AXES",

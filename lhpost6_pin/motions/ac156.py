@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.motion import GroundMotion, make_motion
-from lhpost6_pin.motions.process import smooth_step
-from lhpost6_pin.motions.spectra import response_spectrum
+from ..errors import MotionError
+from .motion import GroundMotion, make_motion
+from .process import smooth_step
+from .spectra import response_spectrum
 
 __all__ = ["ac156", "required_spectrum"]
 

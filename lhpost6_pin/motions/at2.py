@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.motion import GroundMotion, make_motion
-from lhpost6_pin.motions.text import parse_numbers, read_text
-from lhpost6_pin.motions.units import to_si
+from ..errors import MotionError
+from .motion import GroundMotion, make_motion
+from .text import parse_numbers, read_text
+from .units import to_si
 
 __all__ = ["is_at2", "load_at2"]
 

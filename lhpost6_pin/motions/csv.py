@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.motion import AXES, GroundMotion, make_motion
-from lhpost6_pin.motions.text import read_text
-from lhpost6_pin.motions.units import to_si
+from ..errors import MotionError
+from .motion import AXES, GroundMotion, make_motion
+from .text import read_text
+from .units import to_si
 
 __all__ = ["load_csv"]
 

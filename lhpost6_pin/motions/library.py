@@ -4,14 +4,14 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from lhpost6_pin.errors import MotionError, UnknownNameError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.motions.ac156 import ac156
-from lhpost6_pin.motions.csv import load_csv
-from lhpost6_pin.motions.motion import GroundMotion
-from lhpost6_pin.motions.pulse_records import load_pulse_record, missing_package
-from lhpost6_pin.motions.synthetic import sine, six_axial, triangle, white_noise
-from lhpost6_pin.motions.toml import load_toml, values_of
+from ..errors import MotionError, UnknownNameError
+from ..files import models_folder
+from .ac156 import ac156
+from .csv import load_csv
+from .motion import GroundMotion
+from .pulse_records import load_pulse_record, missing_package
+from .synthetic import sine, six_axial, triangle, white_noise
+from .toml import load_toml, values_of
 
 __all__ = ["MotionEntry", "find_motion", "list_motions"]
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhpost6_pin.errors import OutOfRangeError
-from lhpost6_pin.motions.motion import AXES
-from lhpost6_pin.motions.process import Target
+from ..errors import OutOfRangeError
+from .motion import AXES
+from .process import Target
 
 __all__ = ["LegCheck", "LegUtilisation", "LimitsSummary", "MotionLimits", "check_limits", "largest_scale"]
 

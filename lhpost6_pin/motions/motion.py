@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
+from ..errors import MotionError
 
 __all__ = ["AXES", "QUANTITIES", "GroundMotion", "make_motion"]
 

@@ -14,10 +14,10 @@ from functools import cache
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.motions.motion import AXES, GroundMotion
-from lhpost6_pin.motions.toml import load_toml, values_of
+from ..errors import MotionError
+from ..files import models_folder
+from .motion import AXES, GroundMotion
+from .toml import load_toml, values_of
 
 __all__ = ["Reference", "Target", "axes_map", "make_target", "smooth_step", "with_scale"]
 

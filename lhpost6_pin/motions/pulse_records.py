@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.motion import GroundMotion, make_motion
-from lhpost6_pin.motions.units import to_si
+from ..errors import MotionError
+from .motion import GroundMotion, make_motion
+from .units import to_si
 
 __all__ = ["load_pulse_record", "missing_package"]
 

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.at2 import is_at2, load_at2
-from lhpost6_pin.motions.csv import load_csv
-from lhpost6_pin.motions.motion import GroundMotion
-from lhpost6_pin.motions.text import read_text
-from lhpost6_pin.motions.v1 import is_v1, load_v1
+from ..errors import MotionError
+from .at2 import is_at2, load_at2
+from .csv import load_csv
+from .motion import GroundMotion
+from .text import read_text
+from .v1 import is_v1, load_v1
 
 __all__ = ["load_motion"]
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.motion import AXES, GroundMotion, make_motion
-from lhpost6_pin.motions.process import smooth_step
+from ..errors import MotionError
+from .motion import AXES, GroundMotion, make_motion
+from .process import smooth_step
 
 __all__ = ["sine", "six_axial", "triangle", "white_noise"]
 

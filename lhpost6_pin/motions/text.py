@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
+from ..errors import MotionError
 
 __all__ = ["parse_fixed_width", "parse_numbers", "read_text"]
 

@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from lhpost6_pin.errors import MotionError
+from ..errors import MotionError
 
 __all__ = ["load_toml", "values_of"]
 

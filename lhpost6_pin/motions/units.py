@@ -4,8 +4,8 @@ import re
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.motions.motion import AXES
+from ..errors import MotionError
+from .motion import AXES
 
 __all__ = ["to_si"]
 

@@ -4,6 +4,6 @@
 say what one test is judged by. A report of another kind is another set of sections on the same `Page`.
 """
 
-from lhpost6_pin.report.run_report import write_run_report
+from .run_report import write_run_report
 
 __all__ = ["write_run_report"]

@@ -17,8 +17,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Literal
 
-from lhpost6_pin import __version__
-from lhpost6_pin.files import write_whole
+from .. import __version__
+from ..files import write_whole
 
 __all__ = [
     "Figure",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import g
 
-from lhpost6_pin.report.page import Figure
+from .page import Figure
 
 __all__ = [
     "ACHIEVED",

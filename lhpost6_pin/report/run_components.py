@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from lhpost6_pin.report.page import Markup, bar, figure, missing, number, table
-from lhpost6_pin.report.plots import SCALES, SUPPLY, Row, Scale, Trace, palette, time_figure
-from lhpost6_pin.report.run_metrics import SpoolUse, channel, peaks, sampling
+from .page import Markup, bar, figure, missing, number, table
+from .plots import SCALES, SUPPLY, Row, Scale, Trace, palette, time_figure
+from .run_metrics import SpoolUse, channel, peaks, sampling
 
 __all__ = [
     "Limits",

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.signals import align, delay, lowpass_zero_phase, rrmse
+from ..errors import RecordError
+from ..signals import align, delay, lowpass_zero_phase, rrmse
 
 __all__ = [
     "QUANTITIES",

@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from lhpost6_pin.motions.spectra import response_spectrum
-from lhpost6_pin.report.page import Figure, Markup, details, figure, grid, missing, number, paragraph, table
-from lhpost6_pin.report.plots import (
+from ..motions.spectra import response_spectrum
+from .page import Figure, Markup, details, figure, grid, missing, number, paragraph, table
+from .plots import (
     ACHIEVED,
     SCALES,
     SHIFTED,
@@ -20,8 +20,8 @@ from lhpost6_pin.report.plots import (
     spectrum_figure,
     time_figure,
 )
-from lhpost6_pin.report.run_components import draw_over_time
-from lhpost6_pin.report.run_metrics import QUANTITIES, Tracking, asked_axes, channel, drift, sampling
+from .run_components import draw_over_time
+from .run_metrics import QUANTITIES, Tracking, asked_axes, channel, drift, sampling
 
 __all__ = ["axis_scale", "drift_blocks", "percent", "shown_as", "spectrum_blocks", "tracking_blocks"]
 

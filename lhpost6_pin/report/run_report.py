@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from lhpost6_pin.errors import UnknownNameError
-from lhpost6_pin.report.page import Headline, Level, Page, number, save_page, versions
-from lhpost6_pin.report.run_components import Limits
-from lhpost6_pin.report.run_metrics import (
+from ..errors import UnknownNameError
+from .page import Headline, Level, Page, number, save_page, versions
+from .run_components import Limits
+from .run_metrics import (
     QUANTITIES,
     SpoolUse,
     Tracking,
@@ -21,9 +21,9 @@ from lhpost6_pin.report.run_metrics import (
     spool_use,
     track,
 )
-from lhpost6_pin.report.run_motion import axis_scale, shown_as
-from lhpost6_pin.report.run_sections import run_sections
-from lhpost6_pin.report.run_verdict import headlines, judge
+from .run_motion import axis_scale, shown_as
+from .run_sections import run_sections
+from .run_verdict import headlines, judge
 
 __all__ = ["LIMIT_NAMES", "RunSummary", "write_run_report"]
 

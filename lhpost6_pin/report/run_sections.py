@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from lhpost6_pin.report.page import Markup, Section, bar, details, missing, number, paragraph, table
-from lhpost6_pin.report.plots import SCALES
-from lhpost6_pin.report.run_components import (
+from .page import Markup, Section, bar, details, missing, number, paragraph, table
+from .plots import SCALES
+from .run_components import (
     Limits,
     force_blocks,
     pressure_blocks,
@@ -16,8 +16,8 @@ from lhpost6_pin.report.run_components import (
     spool_blocks,
     strut_blocks,
 )
-from lhpost6_pin.report.run_metrics import QUANTITIES, SpoolUse, Tracking
-from lhpost6_pin.report.run_motion import (
+from .run_metrics import QUANTITIES, SpoolUse, Tracking
+from .run_motion import (
     axis_scale,
     drift_blocks,
     percent,

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from lhpost6_pin.report.page import Headline, Level
-from lhpost6_pin.report.plots import SCALES
-from lhpost6_pin.report.run_components import Limits, share_of_limit
-from lhpost6_pin.report.run_metrics import SpoolUse, Tracking, channel, peaks
-from lhpost6_pin.report.run_motion import axis_scale, percent, shown_as
+from .page import Headline, Level
+from .plots import SCALES
+from .run_components import Limits, share_of_limit
+from .run_metrics import SpoolUse, Tracking, channel, peaks
+from .run_motion import axis_scale, percent, shown_as
 
 __all__ = ["FOLLOWED", "NEAR", "headlines", "judge"]
 

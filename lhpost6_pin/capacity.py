@@ -67,7 +67,7 @@ def capacity_table(machine: Machine) -> tuple[Capacity, ...]:
     Peak velocities are with all servovalves open (two on each double-acting actuator), as the table's are.
     Raises OutOfRangeError for a guided machine, for which there is no such table.
     """
-    if machine.motion != "free" or "limits.force_actuators" not in machine.parameters:
+    if machine.motion != "free" or "table_2_2.force_actuators" not in machine.parameters:
         raise OutOfRangeError(
             f"{machine.name} has no Table 2.2 to compare with; it is a {machine.motion}-guided machine"
         )
@@ -89,26 +89,26 @@ def _forces(plant: Plant) -> list[Capacity]:
     push = high * rows["p"][:, 0] - low * rows["p"][:, 1]
     pull = low * rows["p"][:, 0] - high * rows["p"][:, 1]
     hold_down = sum(s.pressure * s.area for s in machine.struts)
-    printed = par.vector("limits.force_actuators")
+    printed = par.vector("table_2_2.force_actuators")
     lines = []
     for k, name in enumerate("XY"):
         force = float(np.sum(np.maximum(jacobian[:, k] * push, jacobian[:, k] * pull)))
         lines.append(Capacity(f"peak force {name}", force, printed[k], "N", "supply against return in all actuators"))
     up = float(jacobian[:, 2] @ np.where(jacobian[:, 2] > 0.0, push, pull)) - hold_down
     lines.append(Capacity("peak force Z up", up, printed[2], "N", "supply in all chambers, less hold-down"))
-    left = par.number("limits.chamber_pressure_down")
+    left = par.number("table_2_2.chamber_pressure_down")
     down = hold_down - float(jacobian[:, 2] @ (left * rows["p"][:, 0]))
     lines.append(
         Capacity(
             "peak force Z down",
             down,
-            par.number("limits.force_down"),
+            par.number("table_2_2.force_down"),
             "N",
             "hold-down less 125 psi in the chambers",
         )
     )
     _, mass = platen_inertia(plant.model, machine)
-    accelerations = par.vector("limits.acceleration_actuators")
+    accelerations = par.vector("table_2_2.acceleration_actuators")
     for k, name in enumerate(("X", "Y", "Z up")):
         weight = mass[2, 2] * machine.platen.gravity if k == 2 else 0.0
         value = (lines[k].model - weight) / mass[k, k]

@@ -4,6 +4,7 @@ It assumes nothing of the number of velocities: specimen joints ride in the same
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -13,7 +14,7 @@ from .compiled import compiled
 from .effects import ROW
 from .plant import Plant
 from .ports import BODY, LEG
-from .schemes import DQ, TAU, V_SEEN, A, V, kick, open_step, rates_stage, staggered_stage
+from .schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
 from .workspace import Workspace
 
 __all__ = ["Stepper", "evaluate", "make_stepper", "settle"]
@@ -115,8 +116,21 @@ def _euler(plant: Plant, dt: float) -> Stepper:
     return advance
 
 
+def _local_rate(model: Any, n_platen: int, q0: Array, q: Array, moved: Array, v: Array) -> Array:
+    """Rate of the local coordinates `moved` from q0 to q whose pose moves with v.
+
+    The platen's six by `dexp_inverse`: pin.dDifference loses eight digits at steps of 1e-4 to 5e-3 rad (4.1.0).
+    """
+    out = v.copy()
+    if n_platen == 6:
+        dexp_inverse(moved[:6], v[:6], out[:6])
+    if v.size > n_platen:
+        out[n_platen:] = (pin.dDifference(model, q0, q, pin.ArgumentPosition.ARG1) @ v)[n_platen:]
+    return out
+
+
 def _rk4(plant: Plant, dt: float) -> Stepper:
-    model, data = plant.model, plant.model.createData()
+    model, data, n_platen = plant.model, plant.model.createData(), plant.axes.size
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, q0 = ws.motion, ws.q
@@ -131,8 +145,7 @@ def _rk4(plant: Plant, dt: float) -> Stepper:
                 status = _rates(plant, ws, q, z, held)
                 if status:
                     return status
-                # local coordinates of the pose move with the inverse differential of `difference`
-                step = pin.dDifference(model, q0, q, pin.ArgumentPosition.ARG1) @ v
+                step = _local_rate(model, n_platen, q0, q, reach * dt * step, v)
                 dv, dz = pin.aba(model, data, q, v, motion[TAU]), ws.zd
                 if reach == 0.0:
                     motion[A] = dv

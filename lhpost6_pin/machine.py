@@ -34,6 +34,17 @@ class Platen:
     size: tuple[float, float] = quantity_field("m", length=2, bound="positive")
     gravity: float = quantity_field("m/s2", bound="nonnegative")
 
+    @property
+    def isotropic_mass(self) -> float:
+        """Part of the directional masses that an Inertia can hold [kg]."""
+        return min(self.mass)
+
+    @property
+    def directional_mass(self) -> Vec3:
+        """What the masses along X, Y, Z have beyond it [kg]."""
+        x, y, z = self.mass
+        return x - self.isotropic_mass, y - self.isotropic_mass, z - self.isotropic_mass
+
 
 @dataclass(frozen=True)
 class Hydraulics:
@@ -213,7 +224,7 @@ def build_machine(
         "motion": _word(parameters, "machine.motion", ("free", "x", "y", "z")),
         "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
     }
-    components = [path.split(".")[0] for path in words if path.endswith(".kind")]
+    components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}
     actuators, struts = [], []
     for name in components:
@@ -271,18 +282,28 @@ def _count(parameters: Parameters, component: str, kind: str) -> int:
     return count
 
 
+_COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
+"""Sections of numbers to compare with; their keys are free."""
+
+
 def _check_names(parameters: Parameters, components: list[str], kinds: set[str]) -> None:
     """Refuse keys that nothing reads: a misspelt key must not be silently ignored."""
+    both = {f.name for f in (*fields(Actuator), *fields(Strut)) if f.metadata}
     known = {
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
-        "machine": set(),
+        "limits": {f.name for f in fields(Limits)},
+        "machine": {"name", "title", "motion", "thrust"},
+        **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
+        **{name: both | {"kind", "valves"} for name in components},
     }
-    both = {f.name for f in fields(Actuator)} | {f.name for f in fields(Strut)}
-    known |= {name: both for name in (*components, *kinds)}
-    for path in parameters:
+    for path in (*parameters, *parameters.words):
         section, _, key = path.partition(".")
-        if section in known and key not in known[section]:
+        if section in _COMPARISONS and path in parameters.quantities:
+            continue
+        if section not in known:
+            raise ParameterError(f"{parameters.origin}: {path} is in no known section: {', '.join(sorted(known))}")
+        if key not in known[section]:
             raise ParameterError(f"{parameters.origin}: unknown key {path}; valid: {', '.join(sorted(known[section]))}")
 
 

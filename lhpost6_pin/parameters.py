@@ -107,28 +107,28 @@ def load_parameters(name_or_path: str | Path) -> Parameters:
 def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str | Path) -> Parameters:
     """Return a copy with some values replaced.
 
-    `changes` maps a path to a number in the file's unit, or to a table ``{value, unit, source, ...}``; or it is
-    the path of a small TOML file of such tables. A component's path (``H3.seal_friction``) may be new if its kind
-    has that key; anything else must exist. Raises ParameterError naming the key, or UnknownNameError.
+    `changes` maps a path to a number or array in the file's unit, or to a table ``{value, unit, source, ...}`` of
+    which only value is needed; or it is the path of a small TOML file of such tables. A component's path
+    (``H3.seal_friction``) may be new if its kind has that key; anything else must exist. Raises ParameterError naming
+    the key, or UnknownNameError.
     """
     if isinstance(changes, str | Path):
         path = Path(changes)
-        flat = _flatten(_read_toml(path), path.name)
-        entries: dict[str, Any] = {**flat.quantities, **flat.words}
-        origin = path.name
+        entries, origin = _entries(_read_toml(path), path.name), path.name
     else:
         entries, origin = dict(changes), "given by hand"
     quantities, words = dict(parameters.quantities), dict(parameters.words)
     for key, entry in entries.items():
-        if isinstance(entry, str) or key in words:
-            if key not in words:
-                raise UnknownNameError("option", key, list(words))
+        inherited = _of_kind(parameters, key)
+        if key in words or inherited in words:
+            if isinstance(entry, bool) or not isinstance(entry, str | int):
+                raise ParameterError(f"{key}: {entry!r} should be a word or a whole number")
             words[key] = entry
             continue
-        base = quantities.get(key) or _kind_quantity(parameters, key)
+        base = quantities.get(key) or quantities.get(inherited)
         if base is None:
-            parameters[key]  # raises with the valid names
-            raise AssertionError
+            near = [p for p in (*quantities, *words) if p.split(".")[0] == key.split(".")[0]]
+            raise UnknownNameError("parameter", key, near or list(quantities))
         quantities[key] = _changed(base, entry, key, origin)
     return Parameters(quantities, words, f"{parameters.origin} + {origin}")
 
@@ -167,7 +167,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
             return tomllib.load(handle)
     except FileNotFoundError:
         raise ParameterError(f"{path}: no such machine file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ParameterError(f"{path}: not a TOML file: {error}") from None
     except OSError as error:
         raise ParameterError(f"{path}: cannot be read: {error.strerror}") from None
@@ -176,21 +176,31 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:
     quantities: dict[str, Quantity] = {}
     words: dict[str, str | int] = {}
+    for path, entry in _entries(tree, file).items():
+        if isinstance(entry, dict):
+            quantities[path] = _quantity(entry, f"{file}: {path}")
+        elif isinstance(entry, str | int) and not isinstance(entry, bool):
+            words[path] = entry
+        else:
+            raise ParameterError(
+                f"{file}: {path} = {entry!r} has no unit; write {path.split('.')[-1]} = "
+                '{ value = ..., unit = "...", evidence = "...", source = "..." }'
+            )
+    return Parameters(quantities, words, file)
+
+
+def _entries(tree: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """Entries of a file by path, as they stand."""
+    found: dict[str, Any] = {}
     for section, table in _sections(tree, file):
         for key, entry in table.items():
             path = f"{section}.{key}"
-            if path in quantities or path in words:
+            if path in found:
                 raise ParameterError(f"{file}: {path} is given twice; kinds, components and sections share names")
-            if isinstance(entry, dict):
-                quantities[path] = _quantity(entry, f"{file}: {path}")
-            elif isinstance(entry, str | int) and not isinstance(entry, bool):
-                words[path] = entry
-            else:
-                raise ParameterError(
-                    f"{file}: {path} = {entry!r} has no unit; write {path.split('.')[-1]} = "
-                    '{ value = ..., unit = "...", evidence = "...", source = "..." }'
-                )
-    return Parameters(quantities, words, file)
+            if "." in key:
+                raise ParameterError(f"{file}: {path}: a key may not hold a dot")
+            found[path] = entry
+    return found
 
 
 def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -203,21 +213,30 @@ def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping
         for sub, inner in table.items():
             if not isinstance(inner, dict):
                 raise ParameterError(f"{file}: {name}.{sub} must be a section [{name}.{sub}]")
+            if not sub.isidentifier():
+                raise ParameterError(f"{file}: {name}.{sub}: use letters, digits and underscores for a name")
             yield (f"{name}.{sub}" if name == "estimates" else sub), inner
 
 
 def _number(value: object, key: str) -> Value:
+    value = value.tolist() if hasattr(value, "tolist") else value  # an array, or a number of one
     if isinstance(value, list | tuple):
-        return tuple(float(_scalar(v, key)) for v in value)
+        if not value:
+            raise ParameterError(f"{key}: an empty list is no value")
+        return tuple(_scalar(v, key) for v in value)
     return _scalar(value, key)
 
 
 def _scalar(value: object, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ParameterError(f"{key}: value {value!r} is not a number")
-    if not math.isfinite(value):
-        raise ParameterError(f"{key}: value {value!r} is not finite")
-    return float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ParameterError(f"{key}: value {str(value)[:40]} is not finite")
+    return number
 
 
 def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
@@ -233,9 +252,10 @@ def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
         if not isinstance(entry.get(text, ""), str):
             raise ParameterError(f"{key}: {text} must be text")
     value = _number(entry["value"], key)
-    return Quantity(
-        value, entry["unit"], entry["evidence"], entry["source"], _sd(entry, value, key), entry.get("printed")
-    )
+    sd = _sd(entry, value, key)
+    if sd is not None and _length(sd) not in (0, _length(value)):
+        raise ParameterError(f"{key}: sd {sd!r} has not the shape of {value!r}")
+    return Quantity(value, entry["unit"], entry["evidence"], entry["source"], sd, entry.get("printed"))
 
 
 def _sd(entry: Mapping[str, Any], value: Value, key: str) -> Value | None:
@@ -251,11 +271,11 @@ def _sd(entry: Mapping[str, Any], value: Value, key: str) -> Value | None:
     return sd
 
 
-def _kind_quantity(parameters: Parameters, key: str) -> Quantity | None:
-    """Quantity that component key ``H3.seal_friction`` inherits from its kind, if any."""
+def _of_kind(parameters: Parameters, key: str) -> str:
+    """Path that component key ``H3.seal_friction`` inherits from: its kind's; empty for anything else."""
     component, _, name = key.partition(".")
     kind = parameters.words.get(f"{component}.kind")
-    return parameters.quantities.get(f"{kind}.{name}") if kind is not None else None
+    return f"{kind}.{name}" if kind is not None else ""
 
 
 def _changed(base: Quantity, entry: Any, key: str, origin: str) -> Quantity:
@@ -265,10 +285,13 @@ def _changed(base: Quantity, entry: Any, key: str, origin: str) -> Quantity:
         new = _quantity({"unit": base.unit, "evidence": "override", "source": origin, **entry}, key)
     else:
         new = Quantity(_number(entry, key), base.unit, "override", f"{origin}; was {base.value!r} ({base.source})")
-    value = to_unit(new.value, new.unit, base.unit, key)
-    if isinstance(value, tuple) != isinstance(base.value, tuple) or (
-        isinstance(value, tuple) and isinstance(base.value, tuple) and len(value) != len(base.value)
-    ):
-        raise ParameterError(f"{key}: {new.value!r} has not the shape of {base.value!r}")
+    value = _number(to_unit(new.value, new.unit, base.unit, key), key)
     sd = base.sd if new.sd is None else to_unit(new.sd, new.unit, base.unit, key)
+    if _length(value) != _length(base.value) or (sd is not None and _length(sd) not in (0, _length(value))):
+        raise ParameterError(f"{key}: {new.value!r} has not the shape of {base.value!r}")
     return replace(new, value=value, unit=base.unit, sd=sd)
+
+
+def _length(value: Value) -> int:
+    """Length of a vector, 0 for a scalar."""
+    return len(value) if isinstance(value, tuple) else 0

@@ -41,7 +41,7 @@ LEG = np.dtype(
         ),  # 1: the leg stays vertical and the platen slides on it; 0: swivels at both ends
         ("pad", np.int64),  # number of the first of its two pad ports, -1 without
         ("rho", np.float64, 3),  # platen point from B, body axes, control zero-position [m]
-        ("base", np.float64, 3),  # base point in {s} [m]
+        ("base_point", np.float64, 3),  # base point in {s} [m]
         ("zero_length", np.float64),  # length in the control zero-position [m]
         ("stroke", np.float64),  # largest |s| [m]
         (
@@ -79,7 +79,7 @@ def leg_table(machine: "Machine") -> NDArray[np.void]:
     pad = len(legs)
     for row, component in zip(legs, machine.components, strict=True):
         row["rho"] = np.array(component.platen_point) - centre
-        row["base"] = component.base_point
+        row["base_point"] = component.base_point
         row["zero_length"] = math.dist(component.platen_point, component.base_point)
         row["stroke"] = getattr(component, "stroke", math.inf)
         row["pad"] = -1
@@ -94,11 +94,10 @@ def body_table(machine: "Machine") -> NDArray[np.void]:
     """Table (one row) of the platen: C, bearing plane, and what an Inertia cannot hold (see `rigid_body`)."""
     platen = machine.platen
     body = np.zeros(1, BODY)
-    base_mass = min(platen.mass)
     body["rho_c"] = -np.array(platen.centre_of_gravity)
     body["plane"] = platen.bearing_plane[2] - platen.centre_of_gravity[2]
-    body["mass_extra"] = np.array(platen.mass) - base_mass
-    body["weight_extra"] = (platen.mass[2] - base_mass) * platen.gravity
+    body["mass_extra"] = platen.directional_mass
+    body["weight_extra"] = platen.directional_mass[2] * platen.gravity
     return body
 
 
@@ -173,7 +172,7 @@ def evaluate_ports(frame, legs, body, s, J, B):
     for i in range(legs.size):
         leg = legs[i]
         px, py, pz = leg.rho[0], leg.rho[1], leg.rho[2]
-        ax, ay, az = leg.base[0], leg.base[1], leg.base[2]
+        ax, ay, az = leg.base_point[0], leg.base_point[1], leg.base_point[2]
         if leg.bearing == 0:
             dx = bx + r00 * px + r01 * py + r02 * pz - ax
             dy = by + r10 * px + r11 * py + r12 * pz - ay

@@ -195,6 +195,26 @@ def leg_jacobian(pose, legs, body, s, J, B, frame, out):
 
 
 @compiled
+def _solve(matrix, right):
+    """Solution of a small positive definite system by Cholesky; not finite where it is singular."""
+    n = right.size
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = np.sqrt(total) if i == j else total / matrix[j, j]
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]
+    return right
+
+
+@compiled
 def gauss_newton_step(displacement, s, K, axes, pose):
     """Improve pose (6,) in place by one step towards legs of `displacement` (n,), from their s and K there (Eq. 3-34).
 
@@ -209,7 +229,7 @@ def gauss_newton_step(displacement, s, K, axes, pose):
             right[a] += K[i, axes[a]] * miss
             for b in range(free):
                 normal[a, b] += K[i, axes[a]] * K[i, axes[b]]
-    step = np.linalg.solve(normal, right)
+    step = _solve(normal, right)
     largest = 0.0
     for a in range(free):
         pose[axes[a]] -= step[a]
@@ -244,6 +264,8 @@ def _track(displacement, axes, legs, body, n_ports, steps, tolerance, pose, resi
     at = np.zeros(6)
     for k in range(displacement.shape[0]):
         residual[k] = gauss_newton(displacement[k], at, axes, legs, body, n_ports, steps, tolerance)
+        if not np.isfinite(residual[k]):
+            break
         pose[k] = at
 
 
@@ -253,16 +275,22 @@ def forward_kinematics(
     """Platen displacement (n, 6) of C and Euler angles from actuator displacements (n, n_actuators) [m].
 
     Gauss-Newton on all actuators (Eqs. 3-29 to 3-34), each sample started from the one before, the first from the zero
-    position. Returns also the residual norm (n,) [m]. Raises RecordError at the first sample without a solution.
+    position. Returns also the residual norm (n,) [m]: what no pose explains, to be judged beside the sensors' noise.
+    Raises RecordError naming the first sample that is not finite, or from which the iteration does not come back.
     """
     measured = np.ascontiguousarray(np.atleast_2d(displacement), float)
     if measured.shape[1] != plant.spools:
         raise RecordError(f"actuator_displacement has {measured.shape[1]} columns; this machine has {plant.spools}")
-    pose, residual = np.zeros((len(measured), 6)), np.zeros(len(measured))
-    _track(measured, plant.axes, plant.legs, plant.body, len(plant.ports), steps, tolerance, pose, residual)
-    bad = np.flatnonzero(~np.isfinite(residual))
+    bad = np.argwhere(~np.isfinite(measured))
     if bad.size:
-        raise RecordError(f"actuator_displacement at sample {bad[0]} fits no pose of the platen; check its channels")
+        sample, column = bad[0]
+        name = plant.machine.actuator_names[column]
+        raise RecordError(f"actuator_displacement[{name}] at sample {sample} is not finite; mend or cut the record")
+    pose, residual = np.zeros((len(measured), 6)), np.full(len(measured), np.nan)
+    _track(measured, plant.axes, plant.legs, plant.body, len(plant.ports), steps, tolerance, pose, residual)
+    lost = np.flatnonzero(~np.isfinite(residual))
+    if lost.size:
+        raise RecordError(f"actuator_displacement at sample {lost[0]} fits no pose of the platen; check its channels")
     return pose, residual
 
 

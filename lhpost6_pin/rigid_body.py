@@ -45,12 +45,13 @@ def make_model(machine: "Machine") -> Any:
         joint = {"x": pin.JointModelPX, "y": pin.JointModelPY, "z": pin.JointModelPZ}[machine.motion]()
         placement = pin.SE3(np.eye(3), np.array(platen.centre_of_gravity))
     index = model.addJoint(0, joint, placement, "platen")
-    inertia = pin.Inertia(min(platen.mass), np.zeros(3), np.diag(platen.inertia))
+    model.addJointFrame(index)
+    inertia = pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia))
     model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
     top = pin.SE3(np.eye(3), -np.array(platen.centre_of_gravity))
     model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
     armature = np.zeros(6)
-    armature[:3] = np.array(platen.mass) - min(platen.mass)
+    armature[:3] = platen.directional_mass
     if machine.specimen is not None:
         model = _mount(model, machine.specimen)
     extra = np.zeros(model.nv)
@@ -70,10 +71,15 @@ def _mount(model: Any, specimen: Specimen) -> Any:
         raise ParameterError(f"{specimen.urdf}: not a URDF that Pinocchio can read: {error}") from error
     if specimen.locked and body.njoints > 1:
         body = pin.buildReducedModel(body, list(range(1, body.njoints)), pin.neutral(body))
+    if not np.all(np.isfinite((*specimen.position, *specimen.rpy))):
+        raise ParameterError(f"{specimen.urdf}: position {specimen.position} and rpy {specimen.rpy} must be finite")
     at = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position))
     if sum(i.mass for i in body.inertias) <= 0.0:
         raise ParameterError(f"{specimen.urdf}: the specimen has no mass; give its links <inertial> elements")
-    joined = pin.appendModel(model, body, model.getFrameId("platen_top"), at)
+    try:
+        joined = pin.appendModel(model, body, model.getFrameId("platen_top"), at)
+    except ValueError as error:  # a joint or frame named as one of the platen's
+        raise ParameterError(f"{specimen.urdf}: {error}; rename it in the URDF") from error
     joined.gravity = model.gravity
     return joined
 
@@ -85,7 +91,7 @@ def platen_inertia(model: Any, machine: "Machine") -> tuple[Array, Array]:
     """
     plain = np.array(model.inertias[1].matrix())
     extra = np.zeros(6)
-    extra[:3] = np.array(machine.platen.mass) - min(machine.platen.mass)
+    extra[:3] = machine.platen.directional_mass
     return plain, plain + np.diag(extra)
 
 

@@ -155,7 +155,7 @@ def _platen_inertia(machine: Machine) -> tuple[float, Vec, Vec]:
     """Mass, centre of gravity and moments of inertia of the platen alone, else of the smallest effective mass."""
     known = machine.parameters
     if "estimates.platen_alone.mass" not in known:
-        return min(machine.platen.mass), ORIGIN, machine.platen.inertia
+        return machine.platen.isotropic_mass, ORIGIN, machine.platen.inertia
     mass, moments = known["estimates.platen_alone.mass"].value, known["estimates.platen_alone.inertia"].value
     assert isinstance(mass, tuple) and isinstance(moments, tuple)
     return mass[0], ORIGIN, moments

@@ -39,7 +39,7 @@ def v_angle():
 
 
 def test_v_angle_of_the_coordinates_is_that_of_the_peak_forces_in_table_2_2():
-    force = printed("limits.force_actuators")
+    force = printed("table_2_2.force_actuators")
     # 10.6 MN is printed to 0.5 %, 8.38 to 0.1 %: 0.13 deg
     assert np.degrees(np.arctan2(force[1], force[0])) == pytest.approx(38.33, abs=0.01)
     assert np.degrees(v_angle()) == pytest.approx(38.33, abs=0.13)
@@ -62,7 +62,7 @@ def test_peak_horizontal_forces_of_table_2_2_are_both_areas_at_supply_less_retur
     both = 2.0 * (h1.area_a + h1.area_b) * pressure
     # two actuators push, two pull; tables to 3 digits
     found = both * np.array([np.cos(v_angle()), np.sin(v_angle())])
-    assert np.allclose(found, printed("limits.force_actuators")[:2], rtol=0.003)
+    assert np.allclose(found, printed("table_2_2.force_actuators")[:2], rtol=0.003)
 
 
 def test_vertical_actuators_stand_where_table_4_1_puts_them():

@@ -452,7 +452,6 @@ def test_urdf_that_cannot_be_a_specimen_is_refused_with_its_name(tmp_path):
         make_plant(machine.with_specimen(light))
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="pin.appendModel's complaint is not caught")
 def test_specimen_with_a_joint_named_as_the_platen_is_refused_with_its_name(tmp_path):
     path = tmp_path / "clash.urdf"
     path.write_text(PENDULUM.read_text(encoding="utf-8").replace('"pivot"', '"platen"'), encoding="utf-8")

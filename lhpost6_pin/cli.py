@@ -8,15 +8,18 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .errors import LhpostError, MotionError, SimulationError
+from .errors import LhpostError, MotionError, ParameterError, SimulationError
+from .files import refuse_folder
 
 if TYPE_CHECKING:
     import xarray as xr
+    from rich.console import Console
 
     from .machine import Machine
     from .motions import GroundMotion
@@ -41,21 +44,39 @@ Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
 
 def main() -> None:
     """Entry point: errors that a user can act on are printed without a traceback."""
-    from rich.console import Console
     from rich.logging import RichHandler
 
-    handler = RichHandler(console=Console(stderr=True), show_path=False, show_time=False)
+    handler = RichHandler(console=_stderr(), show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     try:
         app()
     except LhpostError as error:
-        console = Console(stderr=True, soft_wrap=True)
-        console.print("[bold red]error:[/] ", end="")
-        console.print(str(error), markup=False, highlight=False)
-        sys.exit(2)
-    except KeyboardInterrupt:
-        Console(stderr=True).print("interrupted; nothing half-written is left behind")
-        sys.exit(130)
+        _fail(str(error))
+    except OSError as error:  # disk full, no permission, a file where a folder should be
+        where = f"cannot read or write {error.filename}: " if error.filename else ""
+        _fail(f"{where}{error.strerror or error}")
+    except SystemExit as end:
+        if end.code == _INTERRUPTED:
+            _stderr().print("interrupted; nothing half-written is left behind")
+        raise
+
+
+_INTERRUPTED = 130
+"""Exit code that typer gives to Ctrl-C."""
+
+
+def _fail(message: str) -> None:
+    _stderr().print("[bold red]error:[/] ", end="")
+    _stderr().print(message, markup=False, highlight=False)
+    sys.exit(2)
+
+
+@cache
+def _stderr() -> "Console":
+    """One console for errors, warnings and progress, so that they do not overwrite each other."""
+    from rich.console import Console
+
+    return Console(stderr=True, soft_wrap=True)
 
 
 @app.command()
@@ -80,7 +101,7 @@ def capacity(machine: MachineName = "lhpost6", override: Override = None) -> Non
     from .tables import print_capacity, print_modes
 
     table = _machine(machine, override)
-    if table.motion == "free":
+    if "table_2_2.force_actuators" in table.parameters:
         print_capacity(table)
     print_modes(table)
 
@@ -118,7 +139,7 @@ def run(
     override: Override = None,
     controller: Annotated[str | None, typer.Option(help="Controller settings: name or TOML file.")] = None,
     valves: Annotated[
-        int, typer.Option(help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+        int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
     ] = 0,
     specimen: Annotated[Path | None, typer.Option(help="URDF of a specimen bolted to the platen.")] = None,
     locked: Annotated[bool, typer.Option(help="Lock the specimen's joints: one rigid body.")] = False,
@@ -136,6 +157,10 @@ def run(
     from .rehearse import rehearse, with_valves
     from .simulate import SAMPLE_RATE
 
+    if record_rate < 1 or SAMPLE_RATE % record_rate:
+        raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
+    if locked and specimen is None:
+        raise ParameterError("--locked is about a specimen's joints; give the specimen with --specimen FILE")
     table = with_valves(_machine(machine, override), valves)
     if specimen is not None:
         table = table.with_specimen(specimen, locked=locked)
@@ -148,11 +173,10 @@ def run(
         low_pass=low_pass,
         rate=float(SAMPLE_RATE),
     )
-    if record_rate < 1 or SAMPLE_RATE % record_rate:
-        raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
     settings = load_controller(controller or (machine if Path(machine).suffix != ".toml" else "lhpost6"))
     name = ground.name.replace("/", "_")
     folder = out or Path("out") / name
+    refuse_folder(folder)
     with _progress(f"{name} on {table.name}") as progress:
         run_, record = rehearse(
             table,
@@ -187,6 +211,8 @@ def open_loop(
     table = _machine(machine, override)
     measured = load_record(record, {"actuator": table.actuator_names})
     name = f"{record.stem}_open_loop"
+    folder = out or Path("out") / name
+    refuse_folder(folder)
     with _progress(f"{name} on {table.name}") as progress:
         run_, simulated = replay(
             table,
@@ -198,7 +224,7 @@ def open_loop(
             progress=progress,
         )
     print_comparison(measured, simulated)
-    _save(table, run_, simulated, out or Path("out") / name, report=False)
+    _save(table, run_, simulated, folder, report=False)
 
 
 def _machine(name: str, override: Path | None) -> "Machine":
@@ -217,8 +243,11 @@ def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
         if not equals:
             raise MotionError(f"--set {item}: write key=value")
         options[key.strip()] = _number_or_text(value.strip())
-    if any(Path(n).suffix or Path(n).exists() for n in names):
-        return load_motion(names[0] if len(names) == 1 else names, **options)
+    if any(Path(n).suffix or Path(n).is_file() for n in names):
+        try:
+            return load_motion(names[0] if len(names) == 1 else names, **options)
+        except (AttributeError, TypeError, ValueError) as error:  # an option of the wrong kind
+            raise MotionError(f"{' '.join(names)}: --set {' --set '.join(settings)}: {error}") from error
     if len(names) > 1:
         raise MotionError(f"one motion at a time; got {', '.join(names)}")
     return find_motion(names[0], **options)
@@ -263,7 +292,6 @@ def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, 
 @contextmanager
 def _progress(title: str) -> Iterator[Callable[[float], None]]:
     """A progress bar with remaining time on stderr; yields what to call with the share done."""
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         Progress,
@@ -273,7 +301,9 @@ def _progress(title: str) -> Iterator[Callable[[float], None]]:
         TimeRemainingColumn,
     )
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+    name = TextColumn("{task.description}", markup=False)
+    with Progress(
+        name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=_stderr()
+    ) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share: bar.update(task, completed=share)

@@ -35,9 +35,9 @@ def print_doctor() -> None:
         table.add_row(module, "there" if util.find_spec(module) else escape(f"not installed; {remedy}"))
     browser = next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None)
     table.add_row("browser", browser or "none found; reports and views are HTML files")
-    table.add_row("machine files", str(models_folder()))
+    table.add_row("machine files", escape(str(models_folder())))
     folder = cache_folder()
-    table.add_row("compiled code", str(folder) if folder else "[yellow]not kept: every run compiles anew[/]")
+    table.add_row("compiled code", escape(str(folder)) if folder else "[yellow]not kept: every run compiles anew[/]")
     console.print(table)
     seconds, fresh = _time_first_step()
     word = "compiled now; the next run loads it" if fresh else "loaded from the cache"

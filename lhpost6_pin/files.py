@@ -1,12 +1,13 @@
 """Where shipped data lives, and writing files whole or not at all."""
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-__all__ = ["models_folder", "write_whole"]
+__all__ = ["models_folder", "refuse_folder", "write_whole"]
 
 
 def models_folder() -> Path:
@@ -14,6 +15,18 @@ def models_folder() -> Path:
     package = Path(__file__).parent
     installed = package / "models"
     return installed if installed.is_dir() else package.parent / "models"
+
+
+def refuse_folder(folder: "Path | str") -> None:
+    """Raise OSError naming the path that stands in the way if no file could be written below `folder`.
+
+    Nothing is made on disk: a long computation can ask first and make the folder when it has something to put there.
+    """
+    path = Path(folder).absolute()
+    nearest = next(p for p in (path, *path.parents) if os.path.lexists(p))
+    reason = errno.ENOTDIR if not nearest.is_dir() else 0 if os.access(nearest, os.W_OK | os.X_OK) else errno.EACCES
+    if reason:
+        raise OSError(reason, os.strerror(reason), str(nearest))
 
 
 @contextmanager

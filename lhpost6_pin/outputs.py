@@ -68,17 +68,18 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         platen_q = 7 if plant.axes.size == 6 else 1
         channels["specimen_joint_position"] = (("time", "specimen_joint"), run.q[:, platen_q:], about)
     valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
-    facts = {
+    facts: dict[str, Any] = {
         "kind": "simulated",
         "machine": machine.name,
         "specimen": machine.specimen.name if machine.specimen else "none",
-        "valves_per_horizontal_actuator": int(valves[0]) if valves else 0,
         "scheme": run.scheme,
         "steps_per_second": run.steps_per_second,
         "engine": run.engine,
         "spool_values_clipped": run.clipped,
         "trouble": run.trouble or "none",
     }
+    if valves:
+        facts["valves_per_horizontal_actuator"] = int(valves[0])
     return make_record(run.time, channels, labels, {**facts, **attrs})
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,6 +86,7 @@ def rehearse(
         progress=progress,
         **options,
     )
+    run = _usable(run)
     asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in target_motion(target)))
     facts = {"scale": target.reference.scale, "motion": target.reference.motion, "source": target.reference.source}
     return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, asked))
@@ -126,7 +128,24 @@ def replay(
         middle = (np.arange(samples * (steps // SAMPLE_RATE)) + 0.5) / steps
         spool = resample_band_limited(recorded, t_old, np.minimum(middle, t_old[-1]))
     run = simulate(plant, OpenLoop(spool, _start(plant, record)), samples=samples, progress=progress, **options)
+    run = _usable(run)
     return SimulatedTest(run, record_of_run(run, {"spool_interpolation": "held" if held else "band-limited", **attrs}))
+
+
+def _usable(run: Run) -> Run:
+    """The run up to its last sample that is finite throughout: one that diverged may end in numbers that are not.
+
+    Raises SimulationError with the run's trouble if not even two samples are left to make a record of.
+    """
+    finite = np.isfinite(np.hstack([run.q, run.v, run.a, run.z, run.spool])).all(axis=1)
+    n = len(finite) if finite.all() else int(np.argmin(finite))
+    if n < 2:
+        raise SimulationError(run.trouble or f"a record needs two samples; this run has {n}")
+    if n == len(finite):
+        return run
+    command = None if run.command is None else run.command[:n]
+    rows = {name: getattr(run, name)[:n] for name in ("time", "q", "v", "a", "z", "spool")}
+    return replace(run, **rows, command=command)
 
 
 def with_valves(machine: Machine, valves: int) -> Machine:

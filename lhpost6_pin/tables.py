@@ -69,21 +69,21 @@ def report_limits(plant: "Plant") -> dict[str, Any]:
 def print_machine(machine: Machine) -> None:
     """Print every quantity with unit, evidence and source; assumed ones are marked."""
     console = _console()
-    console.print(f"[bold]{machine.name}[/]: {machine.title}")
+    console.print(f"[bold]{escape(machine.name)}[/]: {escape(machine.title)}")
     console.print(
         f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
         f"platen motion {machine.motion}, bearing thrust {machine.thrust}"
     )
     table = Table("quantity", "value", "unit", "sd", "evidence", "source")
     for path, q in machine.parameters.quantities.items():
-        evidence = f"[bold yellow]{q.evidence} *[/]" if q.assumed else q.evidence
+        evidence = f"[bold yellow]{escape(q.evidence)} *[/]" if q.assumed else escape(q.evidence)
         sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)
-        table.add_row(path, _text(q.value), q.unit, sd, evidence, escape(q.source))
+        table.add_row(escape(path), _text(q.value), escape(q.unit), sd, evidence, escape(q.source))
     console.print(table)
     console.print("* assumed: nobody has published this number; change it with --override")
     effects = Table("effect", "law", "acts on", "source", title="Force effects, in ledger order")
     for effect in machine.effects:
-        effects.add_row(effect.name, effect.law, " ".join(effect.ports), effect.source)
+        effects.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
     console.print(effects)
     if "estimates.platen_alone.mass" in machine.parameters:
         console.print(_inertia_table(machine))
@@ -97,7 +97,7 @@ def _inertia_table(machine: Machine) -> Table:
     parts = lumped_inertia(
         par.vector("estimates.platen_alone.mass"), par.vector("estimates.platen_alone.inertia"), machine
     )
-    table = Table("part", *(f"{q} {a} [{u}]" for q, u in (("mass", "t"), ("inertia", "t m2")) for a in "XYZ"))
+    table = Table("part", *(escape(f"{q} {a} [{u}]") for q, u in (("mass", "t"), ("inertia", "t m2")) for a in "XYZ"))
     table.title = "Effective inertia about B, composed from the parts (printed in Table 4.1)"
     printed = {"platen": "platen_alone", **{k: k for k in parts if k != "platen"}}
     for kind, matrix in (*parts.items(), ("sum, M_eff,1", sum(parts.values()))):
@@ -147,19 +147,19 @@ def print_motions(name: str | None = None) -> None:
         console.print(table)
         console.print("lhpost6 motions NAME says what can be chosen about one of them")
         return
-    found = next((m for m in known if name in (m.name, *m.aliases)), None)
+    found = next((m for m in known if name.lower() in (m.name, *m.aliases)), None)
     if found is None:
         raise UnknownNameError("ground motion", name, [m.name for m in known])
     console.print(f"[bold]{found.name}[/]: {found.title}")
     chosen = ", ".join(found.options) or "none"
     console.print(f"options, each as --set key=value: {chosen}")
     if found.remedy:
-        console.print(f"not installed: {escape(found.remedy)}", markup=False)
+        console.print(f"not installed: {found.remedy}", markup=False)
 
 
 def print_findings(file: str, findings: "Sequence[Finding]") -> None:
     """Print what is in a record and what is wrong with it."""
-    table = Table("", "channel", "sample", "finding", "what to do", title=file)
+    table = Table("", "channel", "sample", "finding", "what to do", title=escape(file))
     colour = {"error": "[bold red]error[/]", "warning": "[yellow]warning[/]", "info": "info"}
     for f in findings:
         sample = "" if f.sample is None else str(f.sample)
@@ -203,15 +203,15 @@ def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
     """Print where results are and what they say first."""
     console = _console()
     if summary is not None:
-        console.print(f"[bold]{summary.verdict}[/]")
-        table = Table("axis", "what", "peak asked", "peak achieved", "RRMSE", "delay [ms]", "RRMSE, delay removed")
+        console.print(f"[bold]{escape(summary.verdict)}[/]")
+        delay = escape("delay [ms]")
+        table = Table("axis", "what", "peak asked", "peak achieved", "RRMSE", delay, "RRMSE, delay removed")
         for row in summary.tracking:
             if row.peak_target:
                 table.add_row(*tracking_cells(row))
         console.print(table)
-    for name in ("record.nc", "report.html"):
-        if (folder / name).exists():
-            console.print(f"wrote {folder / name}")
+    for name in ("record.nc", "report.html") if summary else ("record.nc",):
+        console.print(f"wrote {folder / name}", markup=False, highlight=False, soft_wrap=True)
     console.print(
         f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second"
     )

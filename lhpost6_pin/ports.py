@@ -205,16 +205,24 @@ def evaluate_ports(frame, legs, body, s, J, B):
         hx, hy, hz = -ex, -ey, length - ez
         cx = r00 * hx + r10 * hy + r20 * hz
         cy = r01 * hx + r11 * hy + r21 * hz
-        _row(J, i, 0.0, 0.0, rise, cx, cy, plane)
+        J[i, 0], J[i, 1], J[i, 2] = 0.0, 0.0, rise
+        J[i, 3], J[i, 4], J[i, 5] = cy * rise, -cx * rise, 0.0
         share = leg.normal_thrust
-        lateral = 1.0 - share
-        _row(B, i, lateral * r20, lateral * r21, lateral * r22 + share * rise, cx, cy, plane)
+        tx, ty, tz = (1.0 - share) * r20, (1.0 - share) * r21, (1.0 - share) * r22 + share * rise
+        _row(B, i, tx, ty, tz, cx, cy, plane)
         k = leg.pad
-        _row(B, k, xbx, xby, 0.0, cx, cy, plane)
-        _row(B, k + 1, ybx, yby, 0.0, cx, cy, plane)
-        for j in range(6):
-            J[k, j] = B[k, j] + sin_b * J[i, j]
-            J[k + 1, j] = B[k + 1, j] - yz * J[i, j]
+        turn_x = cx * xby - cy * xbx
+        turn_y = cx * yby - cy * ybx
+        B[k, 0], B[k, 1], B[k, 2] = xbx, xby, 0.0
+        B[k, 3], B[k, 4], B[k, 5] = -plane * xby, plane * xbx, turn_x
+        B[k + 1, 0], B[k + 1, 1], B[k + 1, 2] = ybx, yby, 0.0
+        B[k + 1, 3], B[k + 1, 4], B[k + 1, 5] = -plane * yby, plane * ybx, turn_y
+        # slip relative to the plate, which rises with the leg: less its share of the rise along {n}'s x and y
+        lift_x, lift_y = sin_b * rise, -yz * rise
+        J[k, 0], J[k, 1], J[k, 2] = xbx, xby, lift_x
+        J[k, 3], J[k, 4], J[k, 5] = lift_x * cy - plane * xby, plane * xbx - lift_x * cx, turn_x
+        J[k + 1, 0], J[k + 1, 1], J[k + 1, 2] = ybx, yby, lift_y
+        J[k + 1, 3], J[k + 1, 4], J[k + 1, 5] = lift_y * cy - plane * yby, plane * ybx - lift_y * cx, turn_y
         gx, gy = px - cx, py - cy
         s[k] = xbx * gx + xby * gy
         s[k + 1] = ybx * gx + yby * gy

@@ -137,7 +137,8 @@ def _usable(run: Run) -> Run:
 
     Raises SimulationError with the run's trouble if not even two samples are left to make a record of.
     """
-    finite = np.isfinite(np.hstack([run.q, run.v, run.a, run.z, run.spool])).all(axis=1)
+    arrays = (run.q, run.v, run.a, run.z, run.spool)
+    finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in arrays])
     n = len(finite) if finite.all() else int(np.argmin(finite))
     if n < 2:
         raise SimulationError(run.trouble or f"a record needs two samples; this run has {n}")

@@ -203,8 +203,9 @@ def test_an_over_range_target_names_axis_value_limit_time_and_the_scale_that_fit
 
 def test_a_target_at_exactly_its_limit_passes():
     target = make_target(find_motion("sxh1"))
-    summary = check_limits(target, limited(displacement=("x", 0.89)))
-    assert summary.largest_scale == 1.0
+    limits = limited(displacement=("x", 0.89))
+    summary = check_limits(target, limits)
+    assert largest_scale(target, limits) == 1.0
     assert summary.highest[:2] == ("displacement", "x")
     assert summary.utilisation["velocity"]["y"] == 0
 

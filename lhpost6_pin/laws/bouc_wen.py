@@ -87,6 +87,10 @@ def advance(dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, sha
     scale = 1.0 / yield_slip
     a_x = dx * scale
     a_y = dy * scale
+    if a_x * z_x >= 0.0 and a_y * z_y >= 0.0:  # nothing opposes the slip: one piece
+        w, total = _growth(a_x * a_x + a_y * a_y, a_x * z_x + a_y * z_y, 1.0)
+        scale = 1.0 / w
+        return (z_x + a_x * total) * scale, (z_y + a_y * total) * scale
     left = 1.0
     for _ in range(_SEGMENTS):
         b_x = a_x if a_x * z_x >= 0.0 else (2.0 * shape - 1.0) * a_x

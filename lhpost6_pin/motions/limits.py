@@ -51,7 +51,6 @@ class LimitsSummary:
     """Largest part used of each limit, by quantity (or "leg velocity", "leg stroke"), then axis or leg."""
 
     utilisation: dict[str, dict[str, float]]
-    largest_scale: float  # of the motion, rounded down to three digits
 
     @property
     def highest(self) -> tuple[str, str, float]:
@@ -77,13 +76,13 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
     limit exceeded with axis or leg, time, sample and values, and the largest scale that would fit.
     """
     peaks = _axis_peaks(target, limits) + (_leg_peaks(target, leg_check, 1.0) if leg_check else [])
-    fits = largest_scale(target, limits, leg_check)
     over = sorted((peak for peak in peaks if peak.utilisation > _FULL), key=lambda peak: -peak.utilisation)
     if over:
         lines = "; ".join(
             f"{peak.name} {peak.quantity} {peak.text} at t = {target.time[peak.sample]:.3f} s (sample {peak.sample})"
             for peak in over
         )
+        fits = largest_scale(target, limits, leg_check)
         raise OutOfRangeError(
             f"{target.reference.motion} at scale {target.reference.scale:g} is more than the table can give: "
             f"{lines}. The largest scale that fits is {fits:g}"
@@ -91,7 +90,7 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
     utilisation: dict[str, dict[str, float]] = {}
     for peak in peaks:
         utilisation.setdefault(peak.quantity, {})[peak.name] = peak.utilisation
-    return LimitsSummary(utilisation, fits)
+    return LimitsSummary(utilisation)
 
 
 def largest_scale(target: Target, limits: MotionLimits, leg_check: LegCheck | None = None) -> float:

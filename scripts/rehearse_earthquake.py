@@ -1,0 +1,54 @@
+"""The Python interface end to end: an earthquake on the virtual table, its record and its report.
+
+    python scripts/rehearse_earthquake.py [MOTION] [--scale 0.5] [--out DIR]
+
+What `lhpost6 run` does, in six steps to copy from.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.machine import AXES, load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.records import save_record
+from lhpost6_pin.rehearse import rehearse
+from lhpost6_pin.report import write_run_report
+from lhpost6_pin.signals import rrmse
+from lhpost6_pin.tables import report_limits
+
+
+def main(
+    motion: Annotated[str, typer.Argument(help="Name, as `lhpost6 motions` lists them.")] = "ridgecrest",
+    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
+    out: Annotated[Path, typer.Option(help="Folder for record.nc and report.html.")] = Path("out/example"),
+) -> None:
+    """Rehearse MOTION and say how closely the platen followed it."""
+    # 1. The machine, a ground motion, and what the table is asked to do, sampled at the controller's rate
+    machine = load_machine("lhpost6")
+    target = make_target(find_motion(motion), scale=scale)
+
+    # 2. Closed loop from rest; a motion beyond the table's limits is refused with the scale that fits
+    test = rehearse(machine, target, load_controller("lhpost6"), attrs={"test": motion}, engine="fused")
+
+    # 3. The record has the layout of a measured one: an xarray.Dataset, written as netCDF
+    save_record(test.record, out / "record.nc")
+
+    # 4. The report: one HTML file
+    summary = write_run_report(test.record, out / "report.html", limits=report_limits(test.run.plant))
+
+    # 5. Or straight from the arrays: how far the platen's displacement is from what was asked
+    errors = rrmse(test.record["reference_displacement"], test.record["platen_displacement"])
+    for axis, error, asked in zip(AXES, errors, target.displacement.any(axis=0), strict=True):
+        if asked:
+            print(f"{axis}: displacement RRMSE {100 * error:.2f} %")
+
+    # 6. Where to look
+    print(summary.verdict)
+    print(summary.path)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from .equilibrium import find_equilibrium, hydraulic_rows, unloaded_speeds
 from .errors import OutOfRangeError
 from .laws.orifice import opening
-from .machine import AXES, Machine
+from .machine import Machine
+from .names import AXES
 from .plant import Plant, make_plant
 from .pose import leg_displacements
 from .rigid_body import platen_inertia

@@ -7,16 +7,14 @@ units, its hidden states and what it can say of energy. `effect_table` turns a l
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .components import Actuator, Hydraulics, Strut
 from .errors import ParameterError, UnknownNameError
 from .laws.orifice import width_ratios
-
-if TYPE_CHECKING:
-    from .machine import Actuator, Hydraulics, Strut
 
 __all__ = [
     "BOUC_WEN_1D",
@@ -123,9 +121,7 @@ class Effect:
             )
 
 
-def standard_effects(
-    actuators: "Sequence[Actuator]", struts: "Sequence[Strut]", oil: "Hydraulics"
-) -> tuple[Effect, ...]:
+def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil: Hydraulics) -> tuple[Effect, ...]:
     """The report's effects (Chapter 4) for these components, in ledger order; friction of zero has no row."""
     found = []
     for law, valve in (("hydraulic_double", "4-way"), ("hydraulic_single", "3-way")):
@@ -158,7 +154,7 @@ def standard_effects(
     return tuple(found)
 
 
-def _hydraulic_numbers(actuator: "Actuator", oil: "Hydraulics") -> tuple[float, ...]:
+def _hydraulic_numbers(actuator: Actuator, oil: Hydraulics) -> tuple[float, ...]:
     flow = actuator.flow * actuator.valves / oil.rated_pressure**0.5
     if actuator.valve == "4-way":
         w1, w2, w3, w4 = width_ratios(actuator.area_a, actuator.area_b)

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import SimulationError
 
 if TYPE_CHECKING:
-    from .machine import Actuator, Machine, Strut
+    from .components import Actuator, Strut
+    from .machine import Machine
 
 __all__ = ["Frame", "b_J_E", "bearing_jacobian", "bearing_vector", "c_J_b", "component_force", "component_vector"]
 __all__ += ["external_wrench", "f_J_g", "forward_kinematics", "frame_b", "frame_c", "frame_n", "frame_p", "frame_s"]

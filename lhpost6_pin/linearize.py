@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from .engine_pinocchio import settle
 from .equilibrium import find_equilibrium
-from .machine import AXES, Machine
+from .machine import Machine
+from .names import AXES
 from .plant import Plant, State, make_plant
 from .schemes import A, V
 from .workspace import make_workspace

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from .errors import RecordError, UnknownNameError
 from .files import write_whole
+from .names import AXES
 
 __all__ = [
     "AXES",
@@ -37,7 +38,6 @@ __all__ = [
 ]
 
 LAYOUT_VERSION = 1
-AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 STEP_TOLERANCE = 0.01  # of one sample: how far a time stamp may be from its place
 RATE_TOLERANCE = 1e-4  # relative: 2 ms over 20 s, the least that would spoil a comparison of two records
 DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 1032:1, times int16 to float64)

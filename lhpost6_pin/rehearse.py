@@ -13,8 +13,9 @@ from .capacity import make_leg_check
 from .control import LoopSettings, make_controller
 from .equilibrium import find_equilibrium, hydraulic_rows
 from .errors import OutOfRangeError, SimulationError
-from .machine import AXES, Machine
+from .machine import Machine
 from .motions import LimitsSummary, MotionLimits, Target, check_limits
+from .names import AXES
 from .outputs import record_of_run
 from .plant import Plant, State, make_plant
 from .pose import PlatenMotion

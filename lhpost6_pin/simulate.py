@@ -112,12 +112,10 @@ def simulate(
     log_ = _Log(plant, -(-samples // record_every))
     command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
     status = settle(plant, ws, np.ascontiguousarray(first))
-    runner = _run_fused if engine == "fused" else _run_pinocchio
     done = 0
     if status == 0:
-        status, done, more = runner(
-            plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress
-        )
+        job = _Job(plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress)
+        status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
     kept = -(-done // record_every)
     trouble = None if status == 0 else _diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
@@ -191,30 +189,35 @@ def _clip(spool: Array) -> tuple[Array, int]:
     return np.ascontiguousarray(np.clip(spool, -1.0, 1.0), float), beyond
 
 
-def _run_pinocchio(
-    plant: Plant,
-    drive: OpenLoop | ClosedLoop,
-    ws: Workspace,
-    log_: _Log,
-    scheme: str,
-    samples: int,
-    steps: int,
-    dt: float,
-    spool: Array,
-    command: Array,
-    every: int,
-    progress: Progress | None,
-) -> tuple[int, int, int]:
+class _Job(NamedTuple):
+    """A run made ready: what both engines need."""
+
+    plant: Plant
+    drive: OpenLoop | ClosedLoop
+    ws: Workspace
+    log: _Log
+    scheme: str
+    samples: int
+    steps: int  # model steps a sample
+    dt: float  # of one [s]
+    spool: Array  # (samples * k, n_actuators), open loop
+    command: Array  # (samples, n_actuators), closed loop
+    every: int
+    progress: Progress | None
+
+
+def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     """Run all samples step by step; returns (status, samples done, commands clipped)."""
-    advance = make_stepper(plant, scheme, dt)
+    plant, drive, ws, steps, command = job.plant, job.drive, job.ws, job.steps, job.command
+    advance = make_stepper(plant, job.scheme, job.dt)
     window = np.zeros((steps, plant.spools))
     fed = hydraulic_rows(plant)
     memory = drive.controller.fresh_memory() if isinstance(drive, ClosedLoop) else np.zeros((1, 1))
-    per_sample = len(spool) // samples
+    held = len(job.spool) == job.samples
     clipped = 0
-    for sample in range(samples):
+    for sample in range(job.samples):
         if isinstance(drive, ClosedLoop):
-            if scheme != "semi_implicit":
+            if job.scheme != "semi_implicit":  # the other schemes leave the ports of their last stage behind
                 evaluate(plant, ws, window[0])
             loop = drive.controller
             clipped += control_step(
@@ -232,37 +235,25 @@ def _run_pinocchio(
                 command[sample],
             )
             spool_windows(command, 0, sample, plant.delays, float(SAMPLE_RATE), window)
-        elif per_sample == 1:
-            window[:] = spool[sample]
+        elif held:
+            window[:] = job.spool[sample]
         else:
-            window = spool[sample * steps : (sample + 1) * steps]
-        if sample % every == 0:
-            log_.take(sample // every, ws, window[0])
+            window = job.spool[sample * steps : (sample + 1) * steps]
+        if sample % job.every == 0:
+            job.log.take(sample // job.every, ws, window[0])
         status = advance(ws, window)
         if status:
             return status, sample + 1, clipped
-        if progress is not None and sample % _CHUNK == 0:
-            progress(sample / samples)
-    if progress is not None:
-        progress(1.0)
-    return 0, samples, clipped
+        if job.progress is not None and sample % _CHUNK == 0:
+            job.progress(sample / job.samples)
+    if job.progress is not None:
+        job.progress(1.0)
+    return 0, job.samples, clipped
 
 
-def _run_fused(
-    plant: Plant,
-    drive: OpenLoop | ClosedLoop,
-    ws: Workspace,
-    log_: _Log,
-    scheme: str,
-    samples: int,
-    steps: int,
-    dt: float,
-    spool: Array,
-    command: Array,
-    every: int,
-    progress: Progress | None,
-) -> tuple[int, int, int]:
+def _run_fused(job: _Job) -> tuple[int, int, int]:
     """Run all samples in compiled chunks; returns (status, samples done, commands clipped)."""
+    plant, drive, ws, log_ = job.plant, job.drive, job.ws, job.log
     inertia = inertia_table(plant)
     damping = np.array(plant.model.damping)
     fed = hydraulic_rows(plant)
@@ -270,23 +261,16 @@ def _run_fused(
         loop = drive.controller
         tables = (True, loop.axis, loop.actuator, loop.balance, loop.fresh_memory(), drive.reference)
     else:
-        tables = (
-            False,
-            np.zeros(1, AXIS),
-            np.zeros(1, ACTUATOR),
-            np.zeros((1, 1)),
-            np.zeros((1, 1)),
-            np.zeros((1, 12)),
-        )
+        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), *np.zeros((2, 1, 1)), np.zeros((1, 12)))
     clipped = 0
-    for first in range(0, samples, _CHUNK):
-        last = min(first + _CHUNK, samples)
+    for first in range(0, job.samples, _CHUNK):
+        last = min(first + _CHUNK, job.samples)
         status, done, more = run_fused(
-            SCHEMES.index(scheme),
+            SCHEMES.index(job.scheme),
             first,
             last,
-            steps,
-            dt,
+            job.steps,
+            job.dt,
             plant.axes,
             plant.legs,
             plant.body,
@@ -305,9 +289,9 @@ def _run_fused(
             ws.force,
             fed,
             *tables,
-            command,
-            spool,
-            every,
+            job.command,
+            job.spool,
+            job.every,
             log_.q,
             log_.v,
             log_.a,
@@ -317,9 +301,9 @@ def _run_fused(
         clipped += more
         if status:
             return status, done, clipped
-        if progress is not None:
-            progress(last / samples)
-    return 0, samples, clipped
+        if job.progress is not None:
+            job.progress(last / job.samples)
+    return 0, job.samples, clipped
 
 
 def _diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:

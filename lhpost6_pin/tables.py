@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
-from .machine import AXES, Machine
+from .machine import Machine
+from .names import AXES
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,8 +17,9 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
+from .components import Actuator, Strut
 from .files import models_folder
-from .machine import Actuator, Machine, Strut
+from .machine import Machine
 from .parameters import Parameters, load_parameters
 
 __all__ = ["drawing_colour", "drawing_sizes", "legs", "urdf_text"]

@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.machine import AXES, load_machine
+from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.names import AXES
 from lhpost6_pin.records import save_record
 from lhpost6_pin.rehearse import rehearse
 from lhpost6_pin.report import write_run_report

@@ -11,10 +11,12 @@ import lhpost6_pin
 PACKAGE = Path(lhpost6_pin.__file__).parent
 
 LAYERS = [
-    {"", "errors", "files", "compiled"},  # "" is the package itself: its version
+    {"", "errors", "files", "compiled", "names"},  # "" is the package itself: its version
     {"laws"},
     {"parameters", "specimen", "signals"},
-    {"effects", "ports", "schema", "records", "motions"},
+    {"schema", "records", "motions"},
+    {"components"},
+    {"effects", "ports"},
     {"machine"},
     {"rigid_body", "kinematics", "stage", "urdf"},
     {"plant", "schemes"},
@@ -23,7 +25,7 @@ LAYERS = [
     {"control", "capacity", "linearize"},
     {"engine_fused"},
     {"simulate"},
-    {"batch", "outputs", "check"},
+    {"batch", "outputs", "check", "ledger"},
     {"rehearse", "tables", "doctor"},
     {"report", "viewer_page"},
     {"viewer"},

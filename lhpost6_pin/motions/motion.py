@@ -5,11 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MotionError
+from ..names import AXES
 
 __all__ = ["AXES", "QUANTITIES", "GroundMotion", "make_motion"]
-
-AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-"""Axis order everywhere: X longitudinal, Y transverse, Z up, then the Euler angles about them."""
 
 QUANTITIES = ("acceleration", "displacement")
 

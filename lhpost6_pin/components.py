@@ -1,0 +1,108 @@
+"""The parts of a machine, typed: platen, oil, actuators, struts, limits. Points in {s}, control zero-position."""
+
+from dataclasses import dataclass
+
+from .schema import quantity_field
+
+__all__ = ["Actuator", "Hydraulics", "Limits", "Platen", "Strut", "Vec3"]
+
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Platen:
+    """Effective rigid body: platen and the moving parts lumped to it (Table 4.1), frame {b} at B."""
+
+    mass: Vec3 = quantity_field("kg", length=3, bound="positive")
+    inertia: Vec3 = quantity_field("kg m2", length=3, bound="positive")
+    centre_of_gravity: Vec3 = quantity_field("m", length=3)
+    bearing_plane: Vec3 = quantity_field("m", length=3)
+    size: tuple[float, float] = quantity_field("m", length=2, bound="positive")
+    gravity: float = quantity_field("m/s2", bound="nonnegative")
+
+    @property
+    def isotropic_mass(self) -> float:
+        """Part of the directional masses that an Inertia can hold [kg]."""
+        return min(self.mass)
+
+    @property
+    def directional_mass(self) -> Vec3:
+        """What the masses along X, Y, Z have beyond it [kg]."""
+        x, y, z = self.mass
+        return x - self.isotropic_mass, y - self.isotropic_mass, z - self.isotropic_mass
+
+
+@dataclass(frozen=True)
+class Hydraulics:
+    """Oil and supply shared by all actuators."""
+
+    supply_pressure: float = quantity_field("Pa", bound="positive")
+    return_pressure: float = quantity_field("Pa", bound="nonnegative")
+    rated_pressure: float = quantity_field("Pa", bound="positive")
+    bulk_modulus: float = quantity_field("Pa", bound="positive")
+    root_regularisation: float = quantity_field("Pa", bound="positive")
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """One servo-hydraulic actuator; points in {s}, control zero-position.
+
+    mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
+    valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are 0 without chamber B,
+    pad quantities 0 without a bearing.
+    """
+
+    name: str
+    kind: str
+    mount: str
+    valve: str
+    valves: int
+    platen_point: Vec3 = quantity_field("m", length=3)
+    base_point: Vec3 = quantity_field("m", length=3)
+    area_a: float = quantity_field("m2", bound="positive")
+    flow: float = quantity_field("m3/s", bound="positive")
+    flow_curve: float = quantity_field("1", bound="positive")
+    leakage: float = quantity_field("m3/s/Pa", bound="nonnegative")
+    chamber_a: float = quantity_field("m", bound="positive")
+    stroke: float = quantity_field("m", bound="positive")
+    valve_delay: float = quantity_field("s", bound="nonnegative")
+    seal_friction: float = quantity_field("N", bound="nonnegative")
+    seal_yield: float = quantity_field("m", bound="positive")
+    seal_shape: float = quantity_field("1", bound="fraction")
+    viscous: float = quantity_field("N s/m", bound="nonnegative")
+    mass_along: float = quantity_field("kg", bound="nonnegative")
+    mass_across: float = quantity_field("kg", bound="nonnegative")
+    area_b: float = quantity_field("m2", bound="positive", optional=True)
+    chamber_b: float = quantity_field("m", bound="positive", optional=True)
+    pad_friction: float = quantity_field("N", bound="nonnegative", optional=True)
+    pad_yield: float = quantity_field("m", bound="positive", optional=True)
+    pad_shape: float = quantity_field("1", bound="fraction", optional=True)
+
+
+@dataclass(frozen=True)
+class Strut:
+    """One nitrogen hold-down strut (Eq. 4-8); points in {s}, control zero-position."""
+
+    name: str
+    kind: str
+    platen_point: Vec3 = quantity_field("m", length=3)
+    base_point: Vec3 = quantity_field("m", length=3)
+    area: float = quantity_field("m2", bound="positive")
+    pressure: float = quantity_field("Pa", bound="nonnegative")
+    gas_length: float = quantity_field("m", bound="positive")
+    polytropic_index: float = quantity_field("1", bound="positive")
+    seal_friction: float = quantity_field("N", bound="nonnegative")
+    seal_yield: float = quantity_field("m", bound="positive")
+    seal_shape: float = quantity_field("1", bound="fraction")
+    mass_along: float = quantity_field("kg", bound="nonnegative")
+    mass_across: float = quantity_field("kg", bound="nonnegative")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the machine is said to give (Table 2.2), axis order x y z roll pitch yaw."""
+
+    displacement: tuple[float, ...] = quantity_field("m | rad", length=6, bound="nonnegative")
+    velocity: tuple[float, ...] = quantity_field("m/s | rad/s", length=6, bound="nonnegative")
+    acceleration: tuple[float, ...] = quantity_field("m/s2 | rad/s2", length=6, bound="nonnegative")
+    bandwidth: float = quantity_field("Hz", bound="positive")

@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the in
 """
 
 import logging
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator
@@ -53,8 +54,8 @@ def main() -> None:
     except LhpostError as error:
         _fail(str(error))
     except OSError as error:  # disk full, no permission, a file where a folder should be
-        where = f"cannot read or write {error.filename}: " if error.filename else ""
-        _fail(f"{where}{error.strerror or error}")
+        where = f"cannot read or write {error.filename}" if error.filename else "cannot read or write a file"
+        _fail(f"{where}: {os.strerror(error.errno) if error.errno else error}")
     except SystemExit as end:
         if end.code == _INTERRUPTED:
             _stderr().print("interrupted; nothing half-written is left behind")

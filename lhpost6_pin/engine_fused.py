@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .control.loop import control_step
 from .errors import SimulationError
 from .plant import Plant
@@ -60,7 +60,7 @@ def inertia_table(plant: Plant) -> NDArray[np.void]:
     return table
 
 
-@compiled
+@compiled_inline
 def platen_acceleration(inertia, axes, frame, tau, work, a):
     """Forward dynamics of the platen body: fill a (n_axes,) from tau at the pose and twist in frame (ABA's oracle).
 
@@ -101,7 +101,7 @@ def platen_acceleration(inertia, axes, frame, tau, work, a):
         a[k] = value
 
 
-@compiled
+@compiled_inline
 def integrate_platen(q, dq, axes, out):
     """Pose after the body displacement dq: q exp(dq) on SE(3), quaternion kept unit (pin.integrate's oracle)."""
     if axes.size != 6:
@@ -346,27 +346,14 @@ def run_fused(
             out_v[at] = motion[V]
             out_a[at] = motion[A]
             out_z[at] = z
-            out_spool[at] = window[0]
+            for i in range(nu):
+                out_spool[at, i] = window[:, i].sum() / steps
         status = 0
         for j in range(steps):
             if scheme == 0:
                 integrate_platen(q, motion[DQ], axes, q)
                 status = staggered_stage(
-                    q,
-                    dt,
-                    axes,
-                    legs,
-                    body,
-                    rows,
-                    damping,
-                    window[j],
-                    supply,
-                    frame,
-                    port,
-                    JB,
-                    z,
-                    force,
-                    motion,
+                    q, dt, axes, legs, body, rows, damping, window[j], supply, frame, port, JB, z, force, motion
                 )
                 if status != 0:
                     break

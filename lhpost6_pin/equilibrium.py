@@ -108,7 +108,8 @@ def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[flo
             drop = a - low if sign < 0.0 else high - a
             opened = leakage * abs(a - b) / (out * math.sqrt(max(drop, np.finfo(float).tiny)))
             return (float(a), float(b)), float(spool_for_opening(sign * opened, curve))
-    raise SimulationError(f"no chamber pressures give {force:.4g} N at rest")
+    pressure = float(force / (area_a - area_b))  # in between nothing leaks and the valve is shut
+    return (pressure, pressure), 0.0
 
 
 def unloaded_speeds(row: np.void, force: float, supply: Array) -> tuple[float, float]:

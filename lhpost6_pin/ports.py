@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from .compiled import compiled_inline
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -101,7 +101,7 @@ def body_table(machine: "Machine") -> NDArray[np.void]:
     return body
 
 
-@compiled
+@compiled_inline
 def platen_pose(q, axes, body, frame):
     """Fill rows 0 to 3 of frame from q: the rotation s_R_b and the position of B in {s} [m].
 
@@ -129,7 +129,7 @@ def platen_pose(q, axes, body, frame):
         frame[3, axes[0]] += q[0]
 
 
-@compiled
+@compiled_inline
 def _row(out, i, fx, fy, fz, rx, ry, rz):
     """Row of a unit force (fx, fy, fz) at r from B, body axes: (f, r x f)."""
     out[i, 0] = fx
@@ -140,7 +140,7 @@ def _row(out, i, fx, fy, fz, rx, ry, rz):
     out[i, 5] = rx * fy - ry * fx
 
 
-@compiled
+@compiled_inline
 def evaluate_ports(frame, legs, body, s, J, B):
     """Fill s (n,), J (n, 6) and B (n, 6) of all ports at the pose in rows 0 to 3 of frame.
 

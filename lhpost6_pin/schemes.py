@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .ports import evaluate_ports, platen_pose
 from .stage import advance_states, apply_forces, state_rates, wrench_on_platen
 
@@ -31,7 +31,7 @@ S, SD, DS, FORCE = range(4)
 """Rows of `port`: coordinate, rate, increment over the step, force."""
 
 
-@compiled
+@compiled_inline
 def set_twist(v, axes, frame):
     """Scatter the platen's free velocities into the twist, rows 4 and 5 of frame."""
     if axes.size == 6:
@@ -45,7 +45,7 @@ def set_twist(v, axes, frame):
     frame[4, axes[0]] = v[0]
 
 
-@compiled
+@compiled_inline
 def port_rates(J, frame, out):
     """Port rates J v of the twist in frame."""
     v0, v1, v2 = frame[4, 0], frame[4, 1], frame[4, 2]
@@ -54,7 +54,7 @@ def port_rates(J, frame, out):
         out[i] = J[i, 0] * v0 + J[i, 1] * v1 + J[i, 2] * v2 + J[i, 3] * w0 + J[i, 4] * w1 + J[i, 5] * w2
 
 
-@compiled
+@compiled_inline
 def leg_out_of_stroke(legs, s):
     """Number (from 1) of the first leg out of its stroke, -1 if not finite, else 0."""
     for i in range(legs.size):
@@ -65,7 +65,7 @@ def leg_out_of_stroke(legs, s):
     return 0
 
 
-@compiled
+@compiled_inline
 def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, motion):
     """Forces at the pose and ports in place, for the velocity V_SEEN; fills port[SD], port[FORCE], force, TAU."""
     set_twist(motion[V_SEEN], axes, frame)
@@ -82,7 +82,7 @@ def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, mot
         motion[TAU, k] = -damping[k] * motion[V_SEEN, k]
 
 
-@compiled
+@compiled_inline
 def pose_stage(q, axes, legs, body, frame, port, JB):
     """Ports at the pose q; returns the stage's status."""
     platen_pose(q, axes, body, frame)
@@ -98,7 +98,7 @@ def open_step(motion, dt):
         motion[DQ, k] = dt * motion[V_MID, k]
 
 
-@compiled
+@compiled_inline
 def kick(motion, acceleration, dt):
     """Semi-implicit: close the step with the acceleration at its end (V, A), open the next (V_MID, DQ)."""
     for k in range(motion.shape[1]):
@@ -110,7 +110,7 @@ def kick(motion, acceleration, dt):
         motion[DQ, k] = dt * motion[V_MID, k]
 
 
-@compiled
+@compiled_inline
 def staggered_stage(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, force, motion):
     """Semi-implicit, after the drift to q: hidden states over the step, then forces at its end.
 

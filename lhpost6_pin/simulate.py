@@ -71,7 +71,7 @@ class Run:
     v: Array  # (n, nv)
     a: Array  # (n, nv)
     z: Array  # (n, n_states)
-    spool: Array  # (n, n_actuators) position that the ports see
+    spool: Array  # (n, n_actuators) position that the ports see, mean over the sample
     command: Array | None  # (n, n_actuators), closed loop only
     rate: float
     scheme: str
@@ -240,7 +240,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
         else:
             window = job.spool[sample * steps : (sample + 1) * steps]
         if sample % job.every == 0:
-            job.log.take(sample // job.every, ws, window[0])
+            job.log.take(sample // job.every, ws, window.sum(axis=0) / steps)
         status = advance(ws, window)
         if status:
             return status, sample + 1, clipped

@@ -8,7 +8,7 @@ supply (2,) supply and return pressure [Pa], force (n_rows, 2) the ledger: force
 port [N or N m], port_force (n_ports,) their sum per port.
 """
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .effects import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, VISCOUS
 from .laws.bouc_wen import advance as bouc_wen_advance
 from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
@@ -57,7 +57,7 @@ def state_rates(rows, s, sd, spool, supply, z, zd):
             zd[k] = chamber_rate(q_a, p[0], sd[a], p[8] + s[a], p[10])
 
 
-@compiled
+@compiled_inline
 def advance_states(rows, s, ds, dt, spool, supply, z):
     """Advance z in place over one step in which the ports move by ds from s (scheme `semi_implicit`).
 
@@ -116,7 +116,7 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
             )
 
 
-@compiled
+@compiled_inline
 def apply_forces(rows, s, sd, z, force, port_force):
     """Fill the ledger force (n_rows, 2) and its sum per port."""
     port_force[:] = 0.0
@@ -148,7 +148,7 @@ def apply_forces(rows, s, sd, z, force, port_force):
         port_force[a] += first
 
 
-@compiled
+@compiled_inline
 def wrench_on_platen(frame, body, B, port_force):
     """Fill rows 6 and 7 of frame: total wrench at B in platen axes [N, N m] (Eq. 4-24 less the Inertia's weight).
 

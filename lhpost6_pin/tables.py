@@ -75,7 +75,7 @@ def print_machine(machine: Machine) -> None:
         f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
         f"platen motion {machine.motion}, bearing thrust {machine.thrust}"
     )
-    table = Table("quantity", "value", "unit", "sd", "evidence", "source")
+    table = Table(Column("quantity", no_wrap=True), "value", "unit", "sd", Column("evidence", no_wrap=True), "source")
     for path, q in machine.parameters.quantities.items():
         evidence = f"[bold yellow]{escape(q.evidence)} *[/]" if q.assumed else escape(q.evidence)
         sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)

@@ -26,7 +26,7 @@ from rich.table import Table
 from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import write_whole
+from lhpost6_pin.files import refuse_folder, write_whole
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import make_plant
@@ -197,6 +197,8 @@ def main(
     quick: Annotated[bool, typer.Option(help="Shorter runs, once each: shows that the script works.")] = False,
 ) -> None:
     """Run all benchmarks, print them and keep them."""
+    if out is not None:
+        refuse_folder(out)
     bench = Bench(repeats=1 if quick else 5)
     bench.engines(0.5 if quick else 10.0)
     bench.against()

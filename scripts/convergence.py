@@ -19,7 +19,7 @@ from rich.table import Table
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import write_whole
+from lhpost6_pin.files import refuse_folder, write_whole
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import Plant, make_plant
@@ -94,6 +94,8 @@ def main(
     seconds: Annotated[float, typer.Option(help="Length of the test.")] = 4.0,
 ) -> None:
     """Run the study, print it and keep it."""
+    if out is not None:
+        refuse_folder(out)
     logging.getLogger("lhpost6_pin").setLevel(logging.ERROR)  # runs that stop are rows of the table
     found = study(seconds)
     show(found)

@@ -34,7 +34,7 @@ LAYERS = [
 """Modules and subpackages, lowest first; one imports only from layers below, or within its own subpackage."""
 
 PINOCCHIO = {
-    *("rigid_body", "kinematics", "plant", "equilibrium", "engine_pinocchio", "linearize"),  # dynamics
+    *("rigid_body", "kinematics", "plant", "equilibrium", "engine_pinocchio", "linearize", "ledger"),  # dynamics
     *("bodies", "viewer"),  # pictures
 }
 """Modules that may import pinocchio."""

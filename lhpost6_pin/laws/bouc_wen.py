@@ -17,6 +17,13 @@ __all__ = ["advance", "advance_1d", "friction_force", "rate"]
 _SEGMENTS = 12
 """Pieces of one step between changes of sign; two opposing components need three for shapes up to 1/2."""
 
+_SATURATED = 100.0
+"""Slip over yield displacement beyond which Z changes no more; keeps exponentials finite."""
+_TINY = 1e-200
+"""Z that counts as zero, so that no product or ratio underflows."""
+_ZERO = 1e-15
+"""Share of an opposing component that rounding leaves of it where it reaches zero."""
+
 
 @compiled
 def friction_force(friction: float, z: float) -> float:
@@ -87,6 +94,12 @@ def advance(dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, sha
     scale = 1.0 / yield_slip
     a_x = dx * scale
     a_y = dy * scale
+    reach = max(abs(a_x), abs(a_y))
+    if reach > _SATURATED:
+        a_x *= _SATURATED / reach
+        a_y *= _SATURATED / reach
+    z_x = z_x if abs(z_x) > _TINY else 0.0
+    z_y = z_y if abs(z_y) > _TINY else 0.0
     if a_x * z_x >= 0.0 and a_y * z_y >= 0.0:  # nothing opposes the slip: one piece
         w, total = _growth(a_x * a_x + a_y * a_y, a_x * z_x + a_y * z_y, 1.0)
         scale = 1.0 / w
@@ -104,10 +117,10 @@ def advance(dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, sha
             t = min(t, -z_y / a_y)
         w, total = _growth(curvature, slope, t)
         cross = 0
-        if a_x * z_x < 0.0 and a_x * (z_x + a_x * total) >= 0.0:
+        if a_x * z_x < 0.0 and a_x * total / z_x <= _ZERO - 1.0:
             t = _crossing(z_x, a_x, curvature, slope, t)
             cross = 1
-        if a_y * z_y < 0.0 and a_y * (z_y + a_y * total) >= 0.0:
+        if a_y * z_y < 0.0 and a_y * total / z_y <= _ZERO - 1.0:
             t_y = _crossing(z_y, a_y, curvature, slope, t)
             if cross == 0 or t_y < t:
                 t = t_y

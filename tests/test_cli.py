@@ -1,0 +1,553 @@
+"""The command line: what each command says and leaves, and how it ends: 0 done, 1 trouble on the way, 2 bad input.
+
+Commands run in this process through the installed entry point's function; a few in a process of their own.
+"""
+
+import importlib.metadata
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import lhpost6_pin.motions.library as library
+from lhpost6_pin import cli, rehearse
+from lhpost6_pin.check import check_record
+from lhpost6_pin.compiled import cache_folder
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, list_motions
+from lhpost6_pin.records import load_record, save_record
+from machine_cases import DATA
+
+REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
+PRACTICE = DATA / "records" / "practice_a_TX.nc"
+PENDULUM = DATA / "pendulum.urdf"
+STEWART = DATA / "stewart.toml"
+ENTRY = Path(sys.executable).parent / "lhpost6"
+
+SHORT = ("sine", "--set", "amplitude=0.02", "--set", "cycles=0.5", "--set", "ramp_cycles=0.5", "--engine", "fused")
+COARSE = (*SHORT, "--rate", "2048")
+
+
+class Ended(NamedTuple):
+    """What a command left behind on the terminal."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def words(self) -> str:
+        """All text with line breaks and table rules taken out, for phrases that may be wrapped."""
+        return " ".join(re.sub(r"[\u2500-\u257f]", " ", self.out + self.err).split())
+
+
+@pytest.fixture
+def lhpost6(capsys, monkeypatch, tmp_path):
+    """Run a command as the entry point does, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        code = end.value.code
+        return Ended(code if isinstance(code, int) else 0 if code is None else 1, *capsys.readouterr())
+
+    return run
+
+
+def process(*arguments: object, **options) -> subprocess.CompletedProcess:
+    """Run the installed entry point."""
+    command = [str(ENTRY), *map(str, arguments)]
+    return subprocess.run(command, check=False, timeout=300, **{"capture_output": True, "text": True, **options})
+
+
+def refused(ended: Ended, *phrases: str) -> bool:
+    """Whether a command ended with one clear message on stderr that holds all phrases."""
+    assert ended.code == 2, ended
+    assert "Traceback" not in ended.err
+    for phrase in phrases:
+        assert phrase in ended.words, (phrase, ended.words)
+    return True
+
+
+def sound(folder: Path) -> xr.Dataset:
+    """The record in a folder, which has no errors, and a report beside it that needs nothing else."""
+    assert [f for f in check_record(folder / "record.nc") if f.severity == "error"] == []
+    page = (folder / "report.html").read_text()
+    assert page.startswith("<!DOCTYPE html>") or page.startswith("<!doctype html>")
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']?https?:", page)
+    return load_record(folder / "record.nc")
+
+
+def everything(folder: Path) -> list[str]:
+    """Every file below a folder, hidden ones too."""
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
+
+
+# Looking --------------------------------------------------------------------------------------------------------------
+
+
+def test_help_names_every_command(lhpost6):
+    ended = lhpost6("--help")
+    assert ended.code == 0
+    for command in ("doctor", "info", "capacity", "motions", "check", "run", "open-loop"):
+        assert command in ended.out
+    assert "--beyond-limits" in lhpost6("run", "--help").out
+
+
+def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6):
+    ended = lhpost6("doctor")
+    assert ended.code == 0
+    for part in ("pin", "numba", "xarray", "typer"):
+        assert f"{part} {importlib.metadata.version(part)}" in ended.words
+    assert cache_folder().name in ended.words.replace(" ", "")
+    assert "first model step after" in ended.words
+
+
+def test_doctor_says_when_compiled_code_cannot_be_kept(lhpost6, monkeypatch):
+    import lhpost6_pin.doctor
+
+    monkeypatch.setattr(lhpost6_pin.doctor, "cache_folder", lambda: None)
+    assert "every run compiles anew" in lhpost6("doctor").words
+
+
+@pytest.mark.parametrize("machine", ["lhpost6", "uniaxial", STEWART])
+def test_info_lists_every_quantity_and_marks_the_assumed_ones(lhpost6, machine):
+    ended = lhpost6("info", "--machine", machine)
+    assert ended.code == 0
+    quantities = load_machine(machine).parameters.quantities
+    rows = {row[0]: row for row in (re.split(r"\s*│\s*", line)[1:-1] for line in ended.out.splitlines()) if row}
+    for path, quantity in quantities.items():
+        assert path in rows
+        assert ("*" in rows[path][4]) == quantity.assumed, path
+        assert quantity.unit == rows[path][2]
+    assert any(q.assumed for q in quantities.values())
+
+
+def test_info_composes_table_4_1_with_its_units(lhpost6):
+    words = lhpost6("info").words
+    assert "Table 4.1" in words
+    assert "mass X [t]" in words and "inertia Z [t m2]" in words  # not taken for markup
+    assert "148.80 (148.80)" in words  # the platen alone, as printed
+    assert "composed from the parts" not in lhpost6("info", "--machine", "uniaxial").words
+
+
+def test_info_shows_what_an_override_changes(lhpost6, tmp_path):
+    (tmp_path / "mine.toml").write_text('[platen]\nmass = { value = [123400.0, 1e5, 1e5], unit = "kg" }\n')
+    assert "123400" not in lhpost6("info").words
+    assert "123400" in lhpost6("info", "--override", "mine.toml").words
+
+
+def test_capacity_compares_with_table_2_2_and_gives_the_oil_column_modes(lhpost6):
+    ended = lhpost6("capacity")
+    assert ended.code == 0 and "Table 2.2" in ended.words and "Oil-column modes" in ended.words
+    assert re.search(r"[+-]\d+\.\d %", ended.words)
+
+
+@pytest.mark.parametrize("machine", ["uniaxial", STEWART])
+def test_capacity_of_a_machine_without_that_table_gives_its_modes(lhpost6, machine):
+    ended = lhpost6("capacity", "--machine", machine)
+    assert ended.code == 0 and "Oil-column modes" in ended.words and "Table 2.2" not in ended.words
+
+
+def test_motions_lists_every_motion_and_one_with_its_options(lhpost6):
+    ended = lhpost6("motions")
+    assert ended.code == 0
+    for entry in list_motions():
+        for name in (entry.name, *entry.aliases):
+            assert name in ended.words
+    small, large = lhpost6("motions", "tx5"), lhpost6("motions", "TX5")
+    assert small == large and "corner_acceleration" in small.words
+    assert refused(lhpost6("motions", "nonsense"), "no ground motion named 'nonsense'", "ridgecrest-ccc")
+
+
+def test_motions_says_how_to_get_those_of_a_missing_package(lhpost6, monkeypatch):
+    monkeypatch.setattr(library, "missing_package", lambda module: True)
+    for arguments in (("motions",), ("motions", "rinaldi")):
+        assert "pip install 'lhpost6-pin[records]'" in lhpost6(*arguments).words
+    assert "none" in lhpost6("motions", "rinaldi").words
+
+
+# Checking -------------------------------------------------------------------------------------------------------------
+
+
+def test_check_accepts_a_sound_record_and_says_what_is_in_it(lhpost6):
+    ended = lhpost6("check", PRACTICE)
+    assert ended.code == 0
+    assert "0 errors" in ended.words and "platen_displacement" in ended.words and "5632 samples" in ended.words
+
+
+def test_check_names_channel_and_sample_of_a_broken_record_and_exits_1(lhpost6, tmp_path):
+    with xr.open_dataset(PRACTICE, engine="h5netcdf") as lazy:
+        record = lazy.load().drop_encoding()
+    values = record["actuator_force"].values.astype(float)
+    values[1234, 2] = np.nan
+    record["actuator_force"] = (("time", "actuator"), values, record["actuator_force"].attrs)
+    record.to_netcdf(tmp_path / "broken.nc", engine="h5netcdf")
+    ended = lhpost6("check", "broken.nc")
+    assert ended.code == 1
+    assert "actuator_force[H3]" in ended.words and "1234" in ended.words and "1 errors" in ended.words
+
+
+@pytest.mark.parametrize("name", ["absent.nc", "[red]absent.nc", "[/red].nc", "a folder"])
+def test_check_of_what_is_no_record_exits_1_and_names_it(lhpost6, tmp_path, name):
+    (tmp_path / "a folder").mkdir()
+    ended = lhpost6("check", name)
+    assert ended.code == 1 and f"{name}: no such file" in ended.words
+
+
+# Running --------------------------------------------------------------------------------------------------------------
+
+
+def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lhpost6, tmp_path):
+    ended = lhpost6("run", *SHORT, "--out", "here")
+    assert ended.code == 0
+    record = sound(tmp_path / "here")
+    assert everything(tmp_path) == ["here/record.nc", "here/report.html"]
+    assert record.attrs["steps_per_second"] == 8192 and record.attrs["scheme"] == "semi_implicit"
+    for phrase in ("wrote here/record.nc", "wrote here/report.html", "RRMSE", "delay [ms]", "x displacement 0.02"):
+        assert phrase in ended.words
+    page = (tmp_path / "here" / "report.html").read_text()
+    assert "lhpost6 run sine --set amplitude=0.02" in page  # how to repeat it
+
+
+def test_run_without_a_folder_names_one_after_the_motion(lhpost6, tmp_path):
+    assert lhpost6("run", *COARSE).code == 0
+    assert everything(tmp_path) == ["out/sine/record.nc", "out/sine/report.html"]
+
+
+def test_run_overwrites_its_own_results(lhpost6, tmp_path):
+    for scale in ("1", "0.5"):
+        assert lhpost6("run", *COARSE, "--scale", scale, "--out", "here").code == 0
+        peak = np.abs(sound(tmp_path / "here")["reference_displacement"].values).max()
+        assert peak == pytest.approx(0.02 * float(scale), rel=1e-3)
+    assert everything(tmp_path) == ["here/record.nc", "here/report.html"]
+
+
+@pytest.mark.parametrize(
+    "options, attributes",
+    [
+        (("--scheme", "rk4"), {"scheme": "rk4"}),
+        (("--scheme", "euler", "--rate", "32768"), {"scheme": "euler", "steps_per_second": 32768}),
+        (("--valves", "2"), {"valves_per_horizontal_actuator": 2}),
+        (("--record-rate", "256"), {"sample_rate_hz": 256.0}),
+        (("--machine", "uniaxial"), {"machine": "uniaxial"}),
+        (("--machine", STEWART), {"machine": "Stewart"}),
+        (("--specimen", PENDULUM, "--locked"), {"specimen": "pendulum"}),
+        (("--controller", "lhpost6"), {"trouble": "none"}),
+        (("--low-pass", "10", "--high-pass", "0.05"), {"trouble": "none"}),
+    ],
+)
+def test_run_does_what_its_options_say(lhpost6, tmp_path, options, attributes):
+    arguments = COARSE if "--rate" not in options else SHORT
+    assert lhpost6("run", *arguments, *options, "--out", "here").code == 0
+    record = sound(tmp_path / "here")
+    assert {name: record.attrs[name] for name in attributes} == attributes
+
+
+def test_run_with_free_joints_records_them(lhpost6, tmp_path):
+    assert lhpost6("run", *COARSE[:-4], "--rate", "2048", "--specimen", PENDULUM, "--out", "here").code == 0
+    record = sound(tmp_path / "here")
+    assert record.attrs["engine"] == "pinocchio"
+    assert np.abs(record["specimen_joint_position"].values[:, 1]).max() > 1e-3  # sine of the pendulum's angle
+
+
+def test_run_moves_the_axes_asked_for(lhpost6, tmp_path):
+    assert lhpost6("run", *COARSE, "--axes", "y=x", "--out", "here").code == 0
+    asked = np.abs(sound(tmp_path / "here")["reference_displacement"].values).max(axis=0)
+    assert asked[1] == pytest.approx(0.02, rel=1e-3) and np.all(np.delete(asked, 1) == 0)
+
+
+def test_run_with_an_override_runs_the_changed_machine(lhpost6, tmp_path):
+    (tmp_path / "mine.toml").write_text('[hydraulics]\nsupply_pressure = { value = 19.5e6, unit = "Pa" }\n')
+    assert lhpost6("run", *COARSE, "--override", "mine.toml", "--out", "here").code == 0
+    assert np.all(sound(tmp_path / "here")["supply_pressure"].values == 19.5e6)
+
+
+def test_run_reproduces_a_motion_from_a_csv_file(lhpost6, tmp_path):
+    t = np.arange(101) * 0.02
+    bell = 0.01 * np.sin(np.pi * t / 2.0) ** 4
+    rows = [f"{a:.2f},{b:.9f}" for a, b in zip(t, bell, strict=True)]
+    (tmp_path / "bell.csv").write_text("time_s,z_m\n" + "\n".join(rows) + "\n")
+    assert lhpost6("run", "bell.csv", "--engine", "fused", "--rate", "2048").code == 0
+    record = sound(tmp_path / "out" / "bell")
+    asked = record["reference_displacement"].sel(axis="z")
+    begin = float(record["time"][-1]) / 2 - 1.0  # the record lies in the middle of its own padding
+    # a smooth bell of 2 s has nothing above the low-pass of 33 Hz
+    assert np.abs(asked.interp(time=begin + t).values - bell).max() < 1e-6
+    assert np.abs(np.delete(record["reference_displacement"].values, 2, axis=1)).max() == 0
+
+
+def test_a_folder_with_the_name_of_a_motion_does_not_hide_it(lhpost6, tmp_path):
+    (tmp_path / "sine").mkdir()
+    assert lhpost6("run", *COARSE, "--out", "sine").code == 0
+    assert lhpost6("run", *COARSE, "--out", "sine").code == 0
+
+
+def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_insisted(lhpost6, tmp_path):
+    large = ("sine", "--set", "amplitude=0.8", "--set", "cycles=0.5", "--set", "ramp_cycles=0.5", "--engine", "fused")
+    ended = lhpost6("run", *large, "--out", "a")
+    assert refused(ended, "more than the table can give", "x velocity", "The largest scale that fits is")
+    assert everything(tmp_path) == []
+    fits = re.search(r"scale that fits is ([\d.]+)", ended.words)[1]
+    assert lhpost6("run", *large, "--rate", "2048", "--scale", fits, "--out", "b").code == 0
+    sound(tmp_path / "b")
+    assert lhpost6("run", *large, "--rate", "2048", "--beyond-limits", "--out", "c").code in (0, 1)
+    assert sound(tmp_path / "c").attrs["spool_values_clipped"] > 0
+    assert "clipped" in (tmp_path / "c" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "arguments, phrases",
+    [
+        (("nonsense",), ("no ground motion named 'nonsense'", "ridgecrest")),
+        (("absent.csv",), ("absent.csv", "No such file")),
+        (("[red]absent.csv",), ("[red]absent.csv", "No such file")),
+        (("[/red]absent.csv",), ("[/red]absent.csv",)),
+        (("sine", "triangle"), ("one motion at a time",)),
+        (("sine", "--set", "amplitude"), ("--set amplitude", "key=value")),
+        (("sine", "--set", "colour=red"), ("no option 'colour'", "amplitude")),
+        (("sine", "--set", "amplitude=large"), ("sine", "large")),
+        (("sine", "--set", "amplitude=nan"), ("sine", "nan")),
+        (("sine", "--axes", "q"), ("no axis 'q'",)),
+        (("sine", "--scale", "inf"), ("scale is inf",)),
+        (("sine", "--scheme", "magic"), ("no scheme named 'magic'", "rk4")),
+        (("sine", "--engine", "steam"), ("no engine named 'steam'", "fused")),
+        (("sine", "--rate", "3000"), ("3000 model steps", "multiple")),
+        (("sine", "--rate", "0"), ("0 model steps",)),
+        (("sine", "--rate", "fast"), ("--rate", "integer")),
+        (("sine", "--record-rate", "300"), ("--record-rate 300 does not divide 2048",)),
+        (("sine", "--record-rate", "0"), ("--record-rate 0",)),
+        (("sine", "--valves", "3"), ("--valves", "2")),
+        (("sine", "--locked"), ("--locked", "--specimen")),
+        (("sine", "--specimen", "absent.urdf"), ("absent.urdf", "no such URDF")),
+        (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("fused", "pinocchio")),
+        (("sine", "--machine", "absent"), ("no machine named 'absent'", "uniaxial")),
+        (("sine", "--machine", "absent.toml"), ("absent.toml",)),
+        (("sine", "--override", "absent.toml"), ("absent.toml",)),
+        (("sine", "--controller", "absent"), ("absent", "lhpost6")),
+        (("ridgecrest", "--machine", "uniaxial"), ("largest scale that fits",)),
+        (("ridgecrest", "--high-pass", "40"), ("high_pass < low_pass",)),
+        ((), ("motion",)),
+    ],
+)
+def test_what_cannot_be_run_is_refused_with_a_clear_message_and_leaves_nothing(lhpost6, tmp_path, arguments, phrases):
+    assert refused(lhpost6("run", *arguments), *phrases)
+    assert everything(tmp_path) == []
+
+
+@pytest.mark.parametrize("option", ["columns=x", "units=5", "time_step=slow", "colour=red"])
+def test_a_wrong_option_for_a_file_is_named(lhpost6, tmp_path, option):
+    (tmp_path / "a.csv").write_text("time_s,x_m\n0,0\n0.1,0.001\n0.2,0\n")
+    assert refused(lhpost6("run", "a.csv", "--set", option), "a.csv", option.split("=")[0])
+
+
+@pytest.mark.parametrize("name", ["[red]x", "[/red]y", "[bold]z[/bold]"])
+def test_brackets_in_names_are_shown_as_they_are(lhpost6, tmp_path, name):
+    """Terminal markup, which rich would swallow or refuse."""
+    folder = tmp_path / name.replace("/", "_")
+    folder.mkdir()
+    stem = name.replace("/", "_")
+    (tmp_path / f"{stem}.csv").write_text("time_s,x_m\n0,0\n0.1,0.001\n0.2,0\n")
+    ended = lhpost6("run", f"{stem}.csv", "--engine", "fused", "--rate", "2048", "--out", folder / "o")
+    assert ended.code == 0 and f"wrote {folder / 'o' / 'record.nc'}" in ended.out
+    assert stem in ended.err  # beside the progress bar
+    assert f"{stem}" in lhpost6("check", folder / "o" / "record.nc").words
+    machine = (DATA / "stewart.toml").read_text().replace('"A Stewart platform for tests"', f'"{name}"')
+    (tmp_path / "machine.toml").write_text(machine)
+    assert name in lhpost6("info", "--machine", "machine.toml").words
+    assert refused(lhpost6("run", "sine", "--set", name), f"--set {name}")
+
+
+# Open loop ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("engine", ["pinocchio", "fused"])
+@pytest.mark.parametrize("record, how, rrmse", [(REFERENCE, "held", 1e-5), (PRACTICE, "band-limited", 1e-2)])
+def test_open_loop_drives_the_plant_with_a_records_spools(lhpost6, tmp_path, engine, record, how, rrmse):
+    ended = lhpost6("open-loop", record, "--engine", engine)
+    assert ended.code == 0 and "model against record" in ended.words
+    folder = tmp_path / "out" / f"{record.stem}_open_loop"
+    assert [p.name for p in folder.iterdir()] == ["record.nc"]
+    assert "report.html" not in ended.words
+    assert [f for f in check_record(folder / "record.nc") if f.severity == "error"] == []
+    simulated = load_record(folder / "record.nc")
+    assert simulated.attrs["spool_interpolation"] == how and record.name in simulated.attrs["source"]
+    row = next(line for line in ended.out.splitlines() if re.match(r"│ x +│", line))
+    assert float(row.split("│")[4]) < rrmse  # as printed: noise and another step in the practice record
+
+
+def test_open_loop_does_not_claim_a_report_that_an_earlier_run_left(lhpost6, tmp_path):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "report.html").write_text("older")
+    ended = lhpost6("open-loop", REFERENCE, "--engine", "fused", "--rate", "2048", "--out", "here")
+    assert ended.code == 0 and "report.html" not in ended.words
+
+
+def test_open_loop_replays_a_record_of_another_machine_on_that_machine_only(lhpost6, tmp_path):
+    assert lhpost6("run", *COARSE, "--machine", "uniaxial", "--out", "a").code == 0
+    again = ("open-loop", tmp_path / "a" / "record.nc", "--rate", "2048")
+    assert lhpost6(*again, "--machine", "uniaxial", "--out", "b").code == 0
+    a, b = (load_record(tmp_path / name / "record.nc") for name in "ab")
+    assert np.array_equal(a["platen_displacement"].values, b["platen_displacement"].values)
+    assert refused(lhpost6(*again), "actuator", "has labels A1", "H1 H2")
+
+
+@pytest.mark.parametrize(
+    "arguments, phrases",
+    [
+        (("absent.nc",), ("absent.nc: no such file",)),
+        (("[red].nc",), ("[red].nc: no such file",)),
+        ((PENDULUM,), ("pendulum.urdf", "not a netCDF-4")),
+        ((PRACTICE, "--rate", "1000"), ("1000 model steps",)),
+        ((PRACTICE, "--scheme", "magic"), ("no scheme named 'magic'",)),
+        ((PRACTICE, "--machine", "uniaxial"), ("they must be A1",)),
+    ],
+)
+def test_what_cannot_be_replayed_is_refused_with_a_clear_message(lhpost6, tmp_path, arguments, phrases):
+    assert refused(lhpost6("open-loop", *arguments), *phrases)
+    assert everything(tmp_path) == []
+
+
+def test_a_record_without_chamber_b_is_refused_by_name(lhpost6, tmp_path):
+    save_record(load_record(PRACTICE).drop_vars("chamber_pressure_b"), tmp_path / "a.nc")
+    assert refused(lhpost6("open-loop", "a.nc"), "has no chamber_pressure_b")
+
+
+# Trouble on the way ---------------------------------------------------------------------------------------------------
+
+
+def too_far(path: Path) -> None:
+    """A record whose spools drive the platen up and out of its stroke."""
+    record = load_record(REFERENCE).isel(time=slice(0, 4096))
+    spool = record["spool_position"].values.copy()
+    spool[500:, 4:] = 0.6
+    save_record(record.assign(spool_position=(("time", "actuator"), spool, record["spool_position"].attrs)), path)
+
+
+def test_a_run_that_leaves_its_stroke_exits_1_keeps_what_was_done_and_says_when_and_what(tmp_path):
+    too_far(tmp_path / "up.nc")
+    ended = process("open-loop", tmp_path / "up.nc", "--out", tmp_path / "here", "--engine", "fused")
+    assert ended.returncode == 1
+    words = " ".join(ended.stderr.split())
+    found = re.search(r"stopped at (\d\.\d+) s: V\d left its stroke of \+-0\.127 m", words)
+    assert found and "Traceback" not in words
+    record = load_record(tmp_path / "here" / "record.nc")
+    assert found[0] in record.attrs["trouble"]
+    # the last sample is at most two before the stop: one of the record's end, one of rounding in the message
+    assert float(record["time"][-1]) == pytest.approx(float(found[1]), abs=2 / 2048)
+    assert [f for f in check_record(tmp_path / "here" / "record.nc") if f.severity == "error"] == []
+
+
+def test_a_run_that_diverges_exits_1_with_a_record_and_a_report_that_says_so(lhpost6, tmp_path):
+    """The report's Euler on an oil column of 0.30 m at 2048 Hz."""
+    assert lhpost6("run", *COARSE, "--scheme", "euler", "--out", "here").code == 1
+    record = load_record(tmp_path / "here" / "record.nc")
+    assert 1.0 < float(record["time"][-1]) < 8.0
+    assert "stopped at" in record.attrs["trouble"]
+    assert "stopped at" in (tmp_path / "here" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("command", [("run", *SHORT), ("open-loop", REFERENCE)])
+def test_a_folder_that_cannot_be_written_is_refused_before_the_simulation(lhpost6, tmp_path, monkeypatch, command):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(rehearse, "simulate", lambda *a, **k: pytest.fail("it was simulated"))
+    assert refused(lhpost6(*command, "--out", "file/below"), "file", "Not a directory")
+    assert everything(tmp_path) == ["file"]
+
+
+def test_a_disk_that_fills_up_is_a_clear_message_and_leaves_no_half_file(tmp_path):
+    """A limit on the size of files in a process of its own does as a full disk does."""
+    code = (
+        "import resource, signal, sys; from lhpost6_pin.cli import main;"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000));"
+        f"sys.argv = {['lhpost6', 'run', *COARSE, '--out', str(tmp_path / 'here')]!r}; main()"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=300)
+    # once its flush has failed, HDF5 may crash while the interpreter shuts down, after all has been said and removed
+    assert ended.returncode in (2, -signal.SIGSEGV), ended.stderr
+    assert "error: cannot read or write a file: File too large" in " ".join(ended.stderr.split())
+    assert "Traceback" not in ended.stderr
+    assert everything(tmp_path) == []
+
+
+def test_an_unwritable_file_is_a_clear_message(lhpost6, tmp_path):
+    (tmp_path / "here" / "record.nc").mkdir(parents=True)  # a folder where the file should be
+    assert refused(lhpost6("run", *COARSE, "--out", "here"), "record.nc", "directory")
+    assert everything(tmp_path) == []
+
+
+def test_ctrl_c_while_simulating_leaves_nothing_and_says_so(lhpost6, tmp_path, monkeypatch):
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rich.progress.Progress.update", interrupt)
+    for engine in ("pinocchio", "fused"):
+        ended = lhpost6("run", "sine", "--engine", engine, "--out", "here")
+        assert ended.code == 130
+        assert "interrupted" in ended.words and "Traceback" not in ended.words
+    assert everything(tmp_path) == []
+
+
+def test_ctrl_c_while_writing_leaves_the_earlier_results(lhpost6, tmp_path, monkeypatch):
+    assert lhpost6("run", *COARSE, "--out", "here").code == 0
+    before = {name: (tmp_path / name).read_bytes() for name in everything(tmp_path)}
+
+    def half(self: xr.Dataset, path: Path, **_: object) -> None:
+        Path(path).write_bytes(b"half of it")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(xr.Dataset, "to_netcdf", half)
+    assert lhpost6("run", *COARSE, "--scale", "0.5", "--out", "here").code == 130
+    assert {name: (tmp_path / name).read_bytes() for name in everything(tmp_path)} == before
+
+
+# A process of its own -------------------------------------------------------------------------------------------------
+
+
+def test_the_entry_point_runs_and_its_errors_go_to_stderr(tmp_path):
+    good = process("motions", cwd=tmp_path)
+    assert good.returncode == 0 and "ridgecrest" in good.stdout and good.stderr == ""
+    bad = process("run", "nonsense", cwd=tmp_path)
+    assert bad.returncode == 2 and bad.stdout == ""
+    assert bad.stderr.startswith("error: no ground motion named 'nonsense'") and "Traceback" not in bad.stderr
+    assert process("check", "absent.nc", cwd=tmp_path).returncode == 1
+
+
+def test_output_into_a_closed_pipe_ends_quietly():
+    """As in `lhpost6 info | head -1`."""
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        ended = process("info", capture_output=False, stdout=write, stderr=subprocess.PIPE)
+    finally:
+        os.close(write)
+    assert "Traceback" not in ended.stderr and "error" not in ended.stderr
+
+
+@pytest.mark.skipif(hasattr(os, "getuid") and os.getuid() == 0, reason="root may write everywhere")
+def test_a_read_only_folder_is_refused(lhpost6, tmp_path):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    assert refused(lhpost6("run", *COARSE, "--out", "locked/here"), "locked", "Permission denied")
+
+
+def test_run_works_from_names_that_a_shell_would_quote(lhpost6, tmp_path):
+    shutil.copy(PRACTICE, tmp_path / "two words; and more.nc")
+    assert lhpost6("open-loop", "two words; and more.nc", "--engine", "fused", "--rate", "2048").code == 0
+    assert (tmp_path / "out" / "two words; and more_open_loop" / "record.nc").is_file()
+
+
+def test_shipped_motions_have_names_that_find_them():
+    for entry in list_motions():
+        if entry.available and entry.kind == "record":
+            assert find_motion(entry.name.upper()).name == entry.name

@@ -1,0 +1,77 @@
+"""Files are written whole or not at all, and a folder that cannot take them is refused before the work."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from lhpost6_pin import files
+from lhpost6_pin.files import models_folder, refuse_folder, write_whole
+
+
+def left_in(folder: Path) -> list[str]:
+    """Names of everything in a folder, hidden files too."""
+    return sorted(p.name for p in folder.iterdir())
+
+
+def test_a_file_appears_with_all_its_content_and_nothing_beside_it(tmp_path):
+    with write_whole(tmp_path / "new" / "folder" / "a.txt") as beside:
+        assert beside.suffix == ".txt"  # writers that look at the suffix see the right one
+        beside.write_text("all of it")
+        assert not (tmp_path / "new" / "folder" / "a.txt").exists()
+    assert (tmp_path / "new" / "folder" / "a.txt").read_text() == "all of it"
+    assert left_in(tmp_path / "new" / "folder") == ["a.txt"]
+
+
+@pytest.mark.parametrize("trouble", [ValueError, OSError, KeyboardInterrupt, SystemExit])
+def test_a_write_that_fails_leaves_what_stood_there_before(tmp_path, trouble):
+    (tmp_path / "a.txt").write_text("before")
+    for name in ("a.txt", "b.txt"):
+        with pytest.raises(trouble), write_whole(tmp_path / name) as beside:
+            beside.write_text("half of")
+            raise trouble
+    assert left_in(tmp_path) == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "before"
+
+
+def test_files_get_the_permissions_that_the_users_umask_asks_for(tmp_path):
+    before = os.umask(0o027)
+    try:
+        with write_whole(tmp_path / "a.txt") as beside:
+            beside.write_text("for my group to read")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "a.txt").stat().st_mode) == 0o640
+
+
+def test_a_folder_that_can_be_made_is_not_refused_and_not_made(tmp_path):
+    refuse_folder(tmp_path)
+    refuse_folder(tmp_path / "not" / "yet" / "there")
+    assert left_in(tmp_path) == []
+
+
+def test_a_path_below_a_regular_file_is_refused_naming_that_file(tmp_path):
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path / "file", tmp_path / "file" / "below", tmp_path / "file" / "far" / "below"):
+        with pytest.raises(NotADirectoryError) as caught:
+            refuse_folder(path)
+        assert caught.value.filename == str(tmp_path / "file")
+
+
+def test_a_link_to_nowhere_is_refused(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(NotADirectoryError, match="link"):
+        refuse_folder(tmp_path / "link" / "out")
+
+
+def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(files.os, "access", lambda path, mode: False)  # root may write everywhere
+    with pytest.raises(PermissionError) as caught:
+        refuse_folder(tmp_path / "out")
+    assert caught.value.filename == str(tmp_path)
+
+
+def test_shipped_data_is_where_the_package_looks_for_it():
+    assert (models_folder() / "lhpost6.toml").is_file()
+    assert (models_folder() / "ground_motions" / "index.toml").is_file()

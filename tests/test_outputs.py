@@ -1,0 +1,239 @@
+"""The record of a run says what the plant says: forces, lengths, pressures, hidden states, and what was run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machine_cases import DATA, machine_named
+
+from lhpost6_pin.check import check_dataset
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.kinematics import inverse_kinematics
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.outputs import record_of_run
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.records import layout_faults, load_record, save_record
+from lhpost6_pin.rehearse import rehearse
+from lhpost6_pin.simulate import SAMPLE_RATE, OpenLoop, simulate
+
+
+@pytest.fixture(scope="module")
+def test_run():
+    """A rehearsal that moves all six axes at once."""
+    target = make_target(find_motion("sfu-like", duration=4.0), scale=0.5)
+    return rehearse(
+        load_machine(), target, load_controller("lhpost6"), attrs={"test": "sfu"}, engine="fused", beyond_limits=True
+    )
+
+
+def short_run(machine, samples=64, spool=0.02, **options):
+    """Open-loop run from rest, the spools a little off their bias."""
+    plant = make_plant(machine)
+    rest = find_equilibrium(plant)
+    drive = OpenLoop(np.tile(rest.spool + spool, (samples, 1)), rest.state)
+    return simulate(plant, drive, samples=samples, **options)
+
+
+def broken(record):
+    """Errors of the layout and of the values."""
+    return [f for f in check_dataset(record) if f.severity == "error"] + layout_faults(record)
+
+
+# What the plant says --------------------------------------------------------------------------------------------------
+
+
+def test_actuator_forces_are_pressures_times_areas(test_run):
+    machine, record = test_run.run.plant.machine, test_run.record
+    for actuator in machine.actuators:
+        force = actuator.area_a * record["chamber_pressure_a"].sel(actuator=actuator.name)
+        if actuator.area_b is not None:
+            force = force - actuator.area_b * record["chamber_pressure_b"].sel(horizontal=actuator.name)
+        found = record["actuator_force"].sel(actuator=actuator.name)
+        assert np.ptp(found.values) > 1e4
+        # rounding of two terms of 4 MN
+        assert np.abs(found.values - force.values).max() < 1e-8
+
+
+def test_chamber_pressures_are_the_plants_states_by_name(test_run):
+    run, record = test_run
+    for i, state in enumerate(run.plant.states):
+        effect, name, what = state.split(".")
+        if what == "pressure_a":
+            assert np.array_equal(record["chamber_pressure_a"].sel(actuator=name).values, run.z[:, i]), effect
+        if what == "pressure_b":
+            assert np.array_equal(record["chamber_pressure_b"].sel(horizontal=name).values, run.z[:, i]), effect
+
+
+def test_actuator_displacements_are_the_reports_inverse_kinematics_of_the_platen(test_run):
+    """The hand-written equations of Chapter 3, which the simulation does not use, at some samples."""
+    machine, record = test_run.run.plant.machine, test_run.record
+    zero = inverse_kinematics(machine, np.zeros(6))
+    poses, legs = record["platen_displacement"].values, record["actuator_displacement"].values
+    assert np.all(np.abs(poses).max(axis=0) > 1e-3)
+    for k in range(0, len(poses), 997):
+        # rounding of lengths of 5 m
+        assert np.abs(inverse_kinematics(machine, poses[k]) - zero - legs[k]).max() < 1e-13
+
+
+def test_strut_pressure_follows_the_polytropic_law_of_the_strut_length(test_run):
+    """P = P_0 (1 + dL / L_c0)^-n (Eq. 4-8), with dL from the pose alone."""
+    machine, record = test_run.run.plant.machine, test_run.record
+    pose = record["platen_displacement"].values
+    a, b, c = pose[:, 3:].T
+    rows = [  # Rz(c) Ry(b) Rx(a), element by element
+        [np.cos(c) * np.cos(b), np.cos(c) * np.sin(b) * np.sin(a) - np.sin(c) * np.cos(a)],
+        [np.sin(c) * np.cos(b), np.sin(c) * np.sin(b) * np.sin(a) + np.cos(c) * np.cos(a)],
+        [-np.sin(b), np.cos(b) * np.sin(a)],
+    ]
+    third = [np.cos(c) * np.sin(b) * np.cos(a) + np.sin(c) * np.sin(a)]
+    third += [np.sin(c) * np.sin(b) * np.cos(a) - np.cos(c) * np.sin(a), np.cos(b) * np.cos(a)]
+    for strut in machine.struts:
+        p, base = np.array(strut.platen_point), np.array(strut.base_point)
+        end = [pose[:, i] + rows[i][0] * p[0] + rows[i][1] * p[1] + third[i] * p[2] for i in range(3)]
+        length = np.linalg.norm(np.array(end).T - base, axis=1)
+        stretch = length - np.linalg.norm(p - base)
+        expected = strut.pressure * (1.0 + stretch / strut.gas_length) ** -strut.polytropic_index
+        found = record["strut_pressure"].sel(strut=strut.name).values
+        assert np.ptp(found) > 1e4
+        assert np.allclose(found, expected, rtol=1e-13, atol=0.0)  # rounding of lengths of 4 m
+
+
+def test_velocity_and_acceleration_are_derivatives_of_the_displacement(test_run):
+    record, dt = test_run.record, 1.0 / SAMPLE_RATE
+    for low, high in (("displacement", "velocity"), ("velocity", "acceleration")):
+        x, rate = record[f"platen_{low}"].values, record[f"platen_{high}"].values
+        central = (x[2:] - x[:-2]) / (2 * dt)
+        # central differences err by (w dt)^2/6: 3e-3 of what is in the oil column's 46 Hz, 1e-4 of the whole; where
+        # friction sticks, the acceleration jumps within a sample. A shift by one sample shows far more.
+        error = np.sqrt(np.sum((central - rate[1:-1]) ** 2, axis=0) / np.sum(rate**2, axis=0))
+        shifted = np.sqrt(np.sum((central - rate[:-2]) ** 2, axis=0) / np.sum(rate**2, axis=0))
+        assert np.all(error < (1e-3 if low == "displacement" else 0.1))
+        assert np.all(shifted > 3 * error)
+
+
+def test_reference_and_supply_are_in_the_record(test_run):
+    target = make_target(find_motion("sfu-like", duration=4.0), scale=0.5)
+    for quantity in ("displacement", "velocity", "acceleration"):
+        found = test_run.record[f"reference_{quantity}"]
+        assert np.array_equal(found.values, getattr(target, quantity))
+        assert found.attrs["units"] and found.attrs["long_name"]
+    supply = test_run.run.plant.machine.hydraulics.supply_pressure
+    assert np.all(test_run.record["supply_pressure"].values == supply)
+
+
+def test_hidden_friction_states_are_kept_with_their_names(test_run):
+    run, record = test_run
+    friction = [i for i, name in enumerate(run.plant.states) if "pressure" not in name]
+    found = {}
+    for name in (n for n in record.data_vars if str(n).startswith("hidden_")):
+        labels = record[name].attrs["states"].split()
+        assert len(labels) == record[name].shape[1]
+        found |= {f"{str(name)[7:]}.{label}": record[name].values[:, k] for k, label in enumerate(labels)}
+    assert set(found) == {run.plant.states[i] for i in friction}
+    for i in friction:
+        assert np.array_equal(found[run.plant.states[i]], run.z[:, i])
+        assert np.abs(run.z[:, i]).max() < 1.01  # a Bouc-Wen state stays within the unit circle
+    assert max(np.abs(x).max() for x in found.values()) > 0.9  # and the friction did slide
+
+
+def test_command_is_in_closed_loop_records_only(test_run):
+    assert "spool_command" in test_run.record
+    record = record_of_run(short_run(load_machine()), {})
+    assert "spool_command" not in record and "reference_displacement" not in record
+    assert np.all(record["spool_position"].values[1] > 0.01)
+
+
+def test_every_variable_has_a_unit_and_a_meaning(test_run):
+    for name, variable in test_run.record.data_vars.items():
+        assert variable.attrs.get("units"), name
+        assert variable.attrs.get("long_name"), name
+
+
+# What was run ---------------------------------------------------------------------------------------------------------
+
+
+def test_attributes_say_what_was_run(test_run):
+    attrs = test_run.record.attrs
+    assert {k: attrs[k] for k in ("kind", "test", "machine", "specimen", "scheme", "engine", "trouble")} == {
+        "kind": "simulated",
+        "test": "sfu",
+        "machine": "LHPOST6",
+        "specimen": "none",
+        "scheme": "semi_implicit",
+        "engine": "fused",
+        "trouble": "none",
+    }
+    assert attrs["steps_per_second"] == 8192 and attrs["sample_rate_hz"] == 2048
+    assert attrs["scale"] == 0.5 and attrs["motion"] == "sfu-like" and attrs["source"]
+    assert attrs["valves_per_horizontal_actuator"] == 1
+
+
+def test_attributes_given_by_hand_win():
+    record = record_of_run(short_run(load_machine()), {"kind": "measured", "operator": "me"})
+    assert record.attrs["kind"] == "measured" and record.attrs["operator"] == "me"
+
+
+def test_trouble_and_clipping_are_in_the_attributes():
+    run = short_run(load_machine(), samples=4)
+    record = record_of_run(replace(run, trouble="stopped at 1 s: V1 left its stroke", clipped=7), {})
+    assert "V1" in record.attrs["trouble"] and record.attrs["spool_values_clipped"] == 7
+
+
+def test_two_valves_are_in_the_attributes():
+    record = record_of_run(short_run(load_machine().with_params({"horizontal.valves": 2})), {})
+    assert record.attrs["valves_per_horizontal_actuator"] == 2
+
+
+# Other machines and specimens -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["uniaxial", "stewart"])
+def test_records_of_other_machines_are_valid_on_disk(tmp_path, name):
+    machine = machine_named(name)
+    record = record_of_run(short_run(machine), {})
+    assert broken(record) == []
+    assert list(record["actuator"].values) == list(machine.actuator_names)
+    assert list(record["horizontal"].values) == list(machine.double_acting)
+    assert "strut_pressure" not in record and "strut" not in record.dims
+    save_record(record, tmp_path / "a.nc")
+    again = load_record(tmp_path / "a.nc", {"actuator": machine.actuator_names})
+    assert again.equals(record)
+
+
+def test_a_guided_platen_moves_along_its_axis_only():
+    record = record_of_run(short_run(machine_named("uniaxial")), {})
+    moved = np.abs(record["platen_displacement"].values).max(axis=0)
+    assert moved[0] > 0 and np.all(moved[1:] == 0)
+    sum_ = record["actuator_displacement"].values[:, 0] + record["platen_displacement"].values[:, 0]
+    assert np.abs(sum_).max() < 1e-15  # its wall is at +x; rounding of a length of 1 m
+
+
+def test_a_machine_without_second_chambers_has_a_valid_record(tmp_path):
+    """Every actuator single-acting, as in no shipped machine: no chamber B, no number of valves on horizontals."""
+    lines = (DATA / "stewart.toml").read_text().replace('"4-way"', '"3-way"').splitlines()
+    path = tmp_path / "single.toml"
+    path.write_text("\n".join(line for line in lines if not line.startswith(("area_b", "chamber_b"))))
+    record = record_of_run(short_run(load_machine(path)), {})
+    assert "chamber_pressure_b" not in record and "valves_per_horizontal_actuator" not in record.attrs
+    assert broken(record) == []
+
+
+def test_joints_of_an_articulated_specimen_are_recorded():
+    machine = load_machine().with_specimen(DATA / "pendulum.urdf")
+    along_x = np.r_[-0.1, -0.1, 0.1, 0.1, np.zeros(6)]
+    run = short_run(machine, samples=512, spool=along_x)
+    record = record_of_run(run, {})
+    joint = record["specimen_joint_position"].values  # a joint without limits: cosine and sine of its angle
+    assert record.attrs["specimen"] == "pendulum"
+    assert np.array_equal(joint, run.q[:, 7:])
+    assert np.allclose(np.sum(joint**2, axis=1), 1.0, atol=1e-12)
+    assert joint[0, 0] == 1.0 and np.abs(joint[:, 1]).max() > 1e-4  # it swings
+    assert broken(record) == []
+
+
+def test_a_locked_specimen_has_no_joints_to_record():
+    record = record_of_run(short_run(load_machine().with_specimen(DATA / "pendulum.urdf", locked=True)), {})
+    assert record.attrs["specimen"] == "pendulum"
+    assert "specimen_joint_position" not in record

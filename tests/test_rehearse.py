@@ -1,0 +1,304 @@
+"""Rehearsing a motion in closed loop and replaying a record's spools in open loop."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machine_cases import DATA, machine_named
+
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.errors import OutOfRangeError, ParameterError, RecordError, SimulationError
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.records import load_record, make_record
+from lhpost6_pin.rehearse import rehearse, replay, target_within_limits, with_valves
+from lhpost6_pin.schemes import spool_windows
+from lhpost6_pin.signals import rrmse
+from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
+
+RECORDS = DATA / "records"
+
+
+def sine_target(**options):
+    """Two cycles along X, some 10 s with the rest at both ends."""
+    scale = options.pop("scale", 1.0)
+    axes = options.pop("axes", None)
+    numbers = {"amplitude": 0.05, "cycles": 1, "ramp_cycles": 0.5, **options}
+    return make_target(find_motion("sine", **numbers), scale=scale, axes=axes)
+
+
+@pytest.fixture(scope="module")
+def rehearsed():
+    return rehearse(load_machine(), sine_target(), load_controller("lhpost6"), attrs={}, engine="fused")
+
+
+@pytest.fixture(scope="module")
+def practice():
+    return load_record(RECORDS / "practice_a_TX.nc")
+
+
+# Rest -----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["lhpost6", "stewart", "uniaxial"])
+def test_a_zero_target_keeps_the_platen_at_rest_for_ten_seconds(name):
+    controller = load_controller("uniaxial" if name == "uniaxial" else "lhpost6")
+    test = rehearse(machine_named(name), sine_target(scale=0.0), controller, attrs={}, engine="fused")
+    assert test.run.time[-1] >= 10.0
+    # required: 1e-6 m. What rounding of the pressures leaves is far less
+    assert np.abs(test.record["platen_displacement"].values).max() < 1e-9
+
+
+def test_an_eccentric_specimen_is_held_at_rest():
+    machine = load_machine().with_specimen(DATA / "pendulum.urdf", position=(2.0, 1.0, 0.0), locked=True)
+    test = rehearse(machine, sine_target(scale=0.0), load_controller("lhpost6"), attrs={}, engine="fused")
+    assert np.abs(test.record["platen_displacement"].values).max() < 1e-9
+
+
+# Limits ---------------------------------------------------------------------------------------------------------------
+
+
+def test_a_guided_machine_refuses_what_it_cannot_move_and_says_what_to_choose():
+    plant = make_plant(machine_named("uniaxial"))
+    with pytest.raises(OutOfRangeError, match=r"uniaxial cannot move in y, z; choose with --axes x"):
+        target_within_limits(plant, make_target(find_motion("ridgecrest"), scale=0.1))
+    summary = target_within_limits(plant, make_target(find_motion("ridgecrest"), scale=0.1, axes="x"))
+    assert summary.utilisation["displacement"]["x"] == pytest.approx(0.1 / 0.596, rel=2e-3)  # three digits of a scale
+
+
+@pytest.mark.parametrize("name", ["lhpost6", "stewart", "uniaxial"])
+def test_the_scale_that_a_refusal_names_fits_and_the_next_does_not(name):
+    plant = make_plant(machine_named(name))
+    with pytest.raises(OutOfRangeError) as caught:
+        target_within_limits(plant, sine_target(amplitude=5.0))
+    fits = float(str(caught.value).rsplit(" ", 1)[1])
+    assert target_within_limits(plant, sine_target(amplitude=5.0, scale=fits)).highest[2] <= 1.0 + 1e-6
+    with pytest.raises(OutOfRangeError):
+        target_within_limits(plant, sine_target(amplitude=5.0, scale=1.01 * fits))
+
+
+def test_two_valves_carry_what_one_cannot():
+    target = sine_target(amplitude=0.7, period=2.0)  # 2.2 m/s
+    with pytest.raises(OutOfRangeError, match="H1 leg velocity"):
+        target_within_limits(make_plant(load_machine()), target)
+    target_within_limits(make_plant(with_valves(load_machine(), 2)), target)
+
+
+def test_rehearsing_beyond_limits_is_refused_before_anything_runs_unless_asked_for():
+    called = []
+    with pytest.raises(OutOfRangeError):
+        rehearse(
+            load_machine(), sine_target(amplitude=5.0), load_controller("lhpost6"), attrs={}, progress=called.append
+        )
+    assert not called
+    test = rehearse(
+        load_machine(),
+        sine_target(amplitude=5.0),
+        load_controller("lhpost6"),
+        attrs={},
+        engine="fused",
+        beyond_limits=True,
+    )
+    assert test.run.trouble is not None or test.run.clipped > 0
+
+
+# What a rehearsal leaves ----------------------------------------------------------------------------------------------
+
+
+def test_the_platen_follows_its_target(rehearsed):
+    record = rehearsed.record
+    achieved, asked = record["platen_displacement"].values[:, 0], record["reference_displacement"].values[:, 0]
+    assert rrmse(asked, achieved) < 0.25  # a delay of 25 ms alone is 2 pi 0.025 = 16 % of a sine of 1 s
+    assert np.abs(record["platen_displacement"].values[:, 1]).max() < 1e-12  # by symmetry
+
+
+def test_the_record_is_thinned_without_touching_the_simulation(rehearsed):
+    thin = rehearse(
+        load_machine(), sine_target(), load_controller("lhpost6"), attrs={}, engine="fused", record_every=16
+    )
+    assert thin.record.attrs["sample_rate_hz"] == 128
+    for name in ("platen_displacement", "chamber_pressure_a", "spool_command", "reference_acceleration"):
+        assert np.array_equal(thin.record[name].values, rehearsed.record[name].values[::16])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_progress_rises_to_one(engine):
+    shares = []
+    rehearse(
+        load_machine(),
+        sine_target(),
+        load_controller("lhpost6"),
+        attrs={},
+        engine=engine,
+        steps_per_second=SAMPLE_RATE,
+        progress=shares.append,
+    )
+    assert len(shares) > 5 and shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_a_controller_of_another_rate_is_refused():
+    slow = replace(load_controller("lhpost6"), rate=1024.0)
+    with pytest.raises(SimulationError, match="1024 Hz is not the samples' 2048 Hz"):
+        rehearse(load_machine(), sine_target(), slow, attrs={})
+
+
+def test_a_run_that_diverges_keeps_what_was_finite_in_a_valid_record():
+    """The report's Euler at 2048 Hz: its last state may hold numbers that are none."""
+    test = rehearse(
+        load_machine(),
+        sine_target(),
+        load_controller("lhpost6"),
+        attrs={},
+        scheme="euler",
+        steps_per_second=SAMPLE_RATE,
+        engine="fused",
+    )
+    assert test.run.trouble and test.record.attrs["trouble"] == test.run.trouble
+    assert 1000 < test.record.sizes["time"] < len(sine_target().time)
+    for name, variable in test.record.data_vars.items():
+        assert np.isfinite(variable.values).all(), name
+    assert len(test.run.time) == len(test.run.command) == test.record.sizes["time"]
+
+
+# Replay ---------------------------------------------------------------------------------------------------------------
+
+
+def test_replay_of_a_rehearsal_at_the_controllers_rate_is_the_rehearsal():
+    """One step a sample: the recorded positions are all that the ports saw, and pressures start the same."""
+    test = rehearse(
+        load_machine(),
+        sine_target(),
+        load_controller("lhpost6"),
+        attrs={},
+        engine="fused",
+        steps_per_second=SAMPLE_RATE,
+    )
+    again = replay(load_machine(), test.record, attrs={}, engine="fused", steps_per_second=SAMPLE_RATE)
+    assert again.record.attrs["spool_interpolation"] == "held"
+    assert np.array_equal(again.run.q, test.run.q) and np.array_equal(again.run.z, test.run.z)
+
+
+def test_replay_of_a_rehearsal_at_a_finer_step_differs_by_what_moves_within_a_sample(rehearsed):
+    """The 5 ms delay is 10.24 samples, so the spools move 0.24 of a sample after each one.
+
+    A record has one position a sample, and holding it can misplace that move by up to 0.76 of a sample: 0.37 ms, or
+    0.1 mm at 0.31 m/s. With the positions at every step the replay is the rehearsal, bit for bit.
+    """
+    run, record = rehearsed
+    again = replay(load_machine(), record, attrs={}, engine="fused")
+    difference = np.abs(again.record["platen_displacement"].values - record["platen_displacement"].values)
+    fastest = np.abs(record["platen_velocity"].values[:, 0]).max()
+    assert difference[:, 0].max() < 1.05 * fastest * 0.76 / SAMPLE_RATE
+    assert difference[:, 1:3].max() < 1e-6
+    steps = run.steps_per_second // SAMPLE_RATE
+    exact = np.zeros((len(run.time) * steps, run.plant.spools))
+    for sample in range(len(run.time)):
+        window = exact[sample * steps : (sample + 1) * steps]
+        spool_windows(run.command, 0, sample, run.plant.delays, float(SAMPLE_RATE), window)
+    start = find_equilibrium(run.plant).state
+    same = simulate(run.plant, OpenLoop(exact, start), samples=len(run.time), engine="fused")
+    assert np.array_equal(same.q, run.q) and np.array_equal(same.z, run.z)
+
+
+def test_simulated_records_at_the_controllers_rate_are_held_and_all_others_interpolated(rehearsed, practice):
+    simulated = rehearsed.record.isel(time=slice(8192, 8192 + 600))
+    measured = simulated.assign_attrs(kind="measured")
+    slower = simulated.isel(time=slice(None, None, 4))
+    for record, how in (
+        (simulated, "held"),
+        (measured, "band-limited"),
+        (slower, "band-limited"),
+        (practice.isel(time=slice(0, 64)), "band-limited"),
+    ):
+        test = replay(load_machine(), record, attrs={}, engine="fused", steps_per_second=SAMPLE_RATE)
+        assert test.record.attrs["spool_interpolation"] == how
+        if how == "held":
+            assert np.array_equal(test.run.spool, record["spool_position"].values)
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_interpolated_spools_are_the_signal_in_the_middle_of_each_step(practice, steps):
+    """A sine of 31 Hz at 512 samples a second, between whose samples nothing was recorded."""
+    t = np.arange(512) / 512
+
+    def spool(time):
+        return 0.02 * np.outer(np.sin(2 * np.pi * 31 * time), np.linspace(0.1, 1.0, 10))
+
+    record = practice.isel(time=slice(0, 512)).assign(
+        spool_position=(("time", "actuator"), spool(t), practice["spool_position"].attrs)
+    )
+    test = replay(load_machine(), record, attrs={}, engine="fused", steps_per_second=steps * SAMPLE_RATE)
+    middle = test.run.time + 0.5 / (steps * SAMPLE_RATE)
+    inside = slice(100, -100)  # 24 samples of the old rate at each end are continued by reflection
+    # the interpolation is good to 1e-7 of the amplitude
+    assert np.abs(test.run.spool[inside] - spool(middle)[inside]).max() < 5e-9
+
+
+def test_replay_of_a_practice_record_follows_it_as_well_as_its_own_effects_allow(practice):
+    """Another simulator's test with sensor noise: another step and a filter, 0.7 mm of 200 mm after 11 s."""
+    runs = [replay(load_machine(), practice, attrs={}, engine=engine) for engine in ENGINES]
+    for run, record in runs:
+        assert run.trouble is None
+        t = practice["time"].values
+        model = record["platen_displacement"].interp(time=t[t <= record["time"].values[-1]]).values[:, 0]
+        assert rrmse(practice["platen_displacement"].values[: len(model), 0], model) < 0.01
+    assert np.abs(runs[0].run.q - runs[1].run.q).max() < 1e-10  # two engines, one result
+
+
+def test_channels_are_taken_by_name_whatever_their_order(rehearsed):
+    record = rehearsed.record.isel(time=slice(8192, 8192 + 256))
+    turned = record.isel(actuator=slice(None, None, -1), horizontal=slice(None, None, -1)).transpose()
+    a, b = (replay(load_machine(), r, attrs={}, engine="fused") for r in (record, turned))
+    assert np.array_equal(a.run.q, b.run.q) and np.array_equal(a.run.z, b.run.z)
+
+
+def test_replay_opens_as_many_valves_as_the_record_says(practice):
+    record = practice.isel(time=slice(0, 128)).assign_attrs(valves_per_horizontal_actuator=2)
+    test = replay(load_machine(), record, attrs={}, engine="fused")
+    assert {a.valves for a in test.run.plant.machine.actuators if a.area_b is not None} == {2}
+    assert test.record.attrs["valves_per_horizontal_actuator"] == 2
+
+
+@pytest.mark.parametrize("name", ["spool_position", "chamber_pressure_a", "chamber_pressure_b"])
+def test_a_record_without_what_a_replay_needs_says_so_by_name(practice, name):
+    with pytest.raises(RecordError, match=f"has no {name}"):
+        replay(load_machine(), practice.drop_vars(name), attrs={})
+
+
+def test_a_run_that_is_over_at_once_says_why_rather_than_that_its_record_is_short(practice):
+    record = practice.isel(time=slice(0, 64)).copy(deep=True)
+    record["chamber_pressure_a"][0] = 1e12
+    for engine in ENGINES:
+        with pytest.raises(SimulationError, match=r"stopped at 0\.\d+ s: V1 left its stroke"):
+            replay(load_machine(), record, attrs={}, engine=engine)
+
+
+def test_a_record_of_two_samples_can_be_replayed():
+    machine = load_machine()
+    rest = find_equilibrium(make_plant(machine))
+    pressure_a, pressure_b = np.r_[rest.state.z[0:8:2], rest.state.z[8:14]], rest.state.z[1:8:2]
+    channels = {
+        "spool_position": np.tile(rest.spool, (2, 1)),
+        "chamber_pressure_a": np.tile(pressure_a, (2, 1)),
+        "chamber_pressure_b": np.tile(pressure_b, (2, 1)),
+    }
+    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting}
+    record = make_record(np.arange(2) / SAMPLE_RATE, channels, labels, {"kind": "simulated"})
+    test = replay(machine, record, attrs={})
+    assert np.abs(test.record["platen_displacement"].values).max() < 1e-12
+
+
+# Valves ---------------------------------------------------------------------------------------------------------------
+
+
+def test_valves_are_opened_on_double_acting_actuators_only():
+    machine = load_machine()
+    assert with_valves(machine, 0) is machine
+    for count in (1, 2):
+        changed = with_valves(machine, count)
+        assert [a.valves for a in changed.actuators] == [count] * 4 + [a.valves for a in machine.actuators[4:]]
+    assert [a.valves for a in machine.actuators][:4] == [1] * 4  # a copy was changed
+    with pytest.raises(ParameterError, match="valves"):
+        with_valves(machine, -1)

@@ -1,0 +1,165 @@
+"""Every script runs from the command line, and the plain loop, an independent account of a step, agrees with ours."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lhpost6_pin.check import check_record
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.files import models_folder
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.records import load_record
+from lhpost6_pin.schemes import SCHEMES
+from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
+from machine_cases import DATA, machine_named
+
+SCRIPTS = Path(__file__).parent.parent / "scripts"
+PRACTICE = DATA / "records" / "practice_a_TX.nc"
+
+
+def script(name: str, *arguments: object) -> subprocess.CompletedProcess:
+    """Run a script in a process of its own."""
+    command = [sys.executable, str(SCRIPTS / name), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+
+
+@pytest.mark.parametrize("path", sorted(SCRIPTS.glob("*.py")), ids=lambda path: path.name)
+def test_every_script_says_what_it_is_for_and_has_a_main(path):
+    text = path.read_text()
+    assert text.startswith('"""')
+    if path.name != "plain_loop.py":  # imported by the benchmarks, and below
+        assert "def main(" in text and '__name__ == "__main__"' in text
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["bench.py", "convergence.py", "cut_ridgecrest.py", "make_urdf.py", "rehearse_earthquake.py", "view_platen.py"],
+)
+def test_every_script_explains_its_options(name):
+    ended = script(name, "--help")
+    assert ended.returncode == 0
+    assert ("--export" if name == "view_platen.py" else "--out") in ended.stdout
+
+
+def test_the_example_rehearses_a_motion_with_the_python_interface(tmp_path):
+    ended = script("rehearse_earthquake.py", "sine", "--scale", "0.2", "--out", tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert [f for f in check_record(tmp_path / "record.nc") if f.severity == "error"] == []
+    record = load_record(tmp_path / "record.nc")
+    asked, achieved = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
+    error = 100 * np.sqrt(np.sum((achieved - asked) ** 2) / np.sum(asked**2))
+    assert f"x: displacement RRMSE {error:.2f} %" in ended.stdout
+    assert "y: displacement" not in ended.stdout
+    assert str(tmp_path / "report.html") in ended.stdout and (tmp_path / "report.html").is_file()
+
+
+def test_the_benchmarks_run_and_keep_their_figures(tmp_path):
+    ended = script("bench.py", "--quick", "--out", tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    rows = json.loads((tmp_path / "bench.json").read_text())["rows"]
+    named = {row["what"] for row in rows}
+    for engine in ENGINES:
+        assert {f"{engine} {scheme} {loop} loop" for scheme in SCHEMES for loop in ("open", "closed")} <= named
+    assert all(row["value"] > 0 for row in rows)
+    assert any("solve_ivp" in what for what in named) and any("plain" in what for what in named)
+
+
+def test_the_convergence_study_runs_and_keeps_its_errors(tmp_path):
+    ended = script("convergence.py", "--seconds", "0.5", "--out", tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads((tmp_path / "convergence.json").read_text())
+    assert set(found) == set(SCHEMES)
+    for rows in found.values():
+        assert [row["steps_per_second"] for row in rows] == [k * SAMPLE_RATE for k in (1, 2, 4, 8, 16, 32)]
+    finest = {scheme: rows[-1]["displacement_rrmse"] for scheme, rows in found.items()}
+    assert finest["rk4"] < finest["semi_implicit"] < finest["euler"]
+
+
+@pytest.mark.parametrize("name, option", [("bench.py", "--quick"), ("convergence.py", "--seconds=0.5")])
+def test_a_study_is_refused_a_folder_it_could_not_write_before_it_begins(tmp_path, name, option):
+    (tmp_path / "file").write_text("")
+    ended = script(name, option, "--out", tmp_path / "file" / "below")
+    assert ended.returncode == 1 and "NotADirectoryError" in ended.stderr and ended.stdout == ""
+
+
+def test_the_viewer_exports_one_file(tmp_path):
+    ended = script("view_platen.py", PRACTICE, "--export", tmp_path / "a.html")
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "a.html").read_text().lstrip().lower().startswith("<!doctype html>")
+    lost = script("view_platen.py", tmp_path / "absent.nc", "--export", tmp_path / "b.html")
+    assert lost.returncode == 1 and "absent.nc: no such file" in lost.stderr and "Traceback" not in lost.stderr
+
+
+def test_the_shipped_urdf_is_what_its_script_writes(tmp_path):
+    ended = script("make_urdf.py", "lhpost6", "--out", tmp_path / "a.urdf")
+    assert ended.returncode == 0, ended.stderr
+    assert (tmp_path / "a.urdf").read_bytes() == (models_folder() / "lhpost6.urdf").read_bytes()
+    lost = script("make_urdf.py", "absent", "--out", tmp_path / "b.urdf")
+    assert lost.returncode == 1 and "absent" in lost.stderr and "Traceback" not in lost.stderr
+
+
+def test_cutting_records_without_the_wheel_says_which_wheel_to_give(tmp_path):
+    (tmp_path / "no.whl").write_text("no wheel")
+    for name in ("absent.whl", "no.whl"):
+        ended = script("cut_ridgecrest.py", tmp_path / name, "--out", tmp_path / "out")
+        assert ended.returncode == 1 and "give the wheel of gmprocess 2.8.0" in ended.stderr
+        assert "Traceback" not in ended.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_plain_loop_is_the_fused_engines_euler_to_rounding(monkeypatch):
+    """NumPy over components, written from the equations: it shares no law, port or stage with the package.
+
+    Sixteen steps a sample, every actuator driven by a sine of its own; the pads and seals slide, no orifice's drop
+    comes below the 500 Pa at which ours rounds the root off (theirs does not).
+    """
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    from plain_loop import PlainPlant
+
+    plant = make_plant(machine_named("lhpost6"))
+    rest = find_equilibrium(plant)
+    samples, steps = 160, 16
+    dt = 1.0 / (steps * SAMPLE_RATE)
+    rng = np.random.default_rng(1)
+    t = np.arange(samples) / SAMPLE_RATE
+    size = np.r_[np.full(4, 0.1), np.full(6, 0.02)]
+    spool = rest.spool + size * np.sin(2 * np.pi * np.outer(t, rng.uniform(3, 12, 10)) + rng.uniform(0, 6, 10))
+
+    z = rest.state.z
+    # our hidden states: A and B of H1..H4 in turn, A of V1..V6, seals, pads
+    state = (
+        rest.state.q.copy(),
+        np.zeros(6),
+        np.r_[z[0:8:2], z[8:14]],
+        z[1:8:2].copy(),
+        np.zeros(10),
+        np.zeros((6, 2)),
+    )
+    plain, supply = PlainPlant(plant.machine), plant.supply
+    least, slid = np.inf, np.zeros(2)
+    for row in spool:
+        for _ in range(steps):
+            state = plain.step(*state, row, dt)
+        pressures = np.concatenate(state[2:4])
+        least = min(least, (supply[0] - pressures).min(), (pressures - supply[1]).min())
+        slid = np.maximum(slid, [np.abs(state[4]).max(), np.linalg.norm(state[5], axis=1).max()])
+    assert least > 500.0 and slid.min() > 0.9
+
+    drive = OpenLoop(np.vstack([spool, spool[-1:]]), rest.state)  # a run records the start of each sample
+    run = simulate(
+        plant, drive, samples=samples + 1, scheme="euler", steps_per_second=steps * SAMPLE_RATE, engine="fused"
+    )
+    q, v, pressure_a, pressure_b, seal, pad = state
+    ours = run.z[-1]
+    assert np.abs(q[:3] - rest.state.q[:3]).max() > 1e-3 and np.abs(q[3:6]).max() > 1e-4
+    # rounding of numbers near 1, 1 and 2e7, ten times over; seals (yield 0.2 mm) amplify that of the lengths
+    assert np.abs(run.q[-1] - q).max() < 2e-14
+    assert np.abs(run.v[-1] - v).max() < 2e-14
+    assert np.abs(np.r_[ours[0:8:2], ours[8:14]] - pressure_a).max() < 4e-7
+    assert np.abs(ours[1:8:2] - pressure_b).max() < 4e-7
+    assert np.abs(ours[14:24] - seal).max() < 1e-12
+    assert np.abs(ours[24:36] - pad.ravel()).max() < 1e-12

@@ -103,7 +103,7 @@ def _jit(function: _F, *, inline: bool) -> _F:
     config = cast(Any, numba.config)
     before = config.CACHE_DIR
     config.CACHE_DIR = "" if folder is None else str(folder)
-    options = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}, "forceinline": inline}
+    options: Any = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}, "forceinline": inline}
     try:
         return cast(_F, numba.njit(cache=folder is not None, **options)(function))
     finally:

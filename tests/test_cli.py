@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import xarray as xr
+from machine_cases import DATA
 
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli, rehearse
@@ -24,7 +25,6 @@ from lhpost6_pin.compiled import cache_folder
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, list_motions
 from lhpost6_pin.records import load_record, save_record
-from machine_cases import DATA
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
 PRACTICE = DATA / "records" / "practice_a_TX.nc"

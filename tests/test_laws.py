@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from lhpost6_pin.effects import LAWS
+from lhpost6_pin.energy import row_power
 from lhpost6_pin.laws import bouc_wen, chamber, orifice, strut, viscous
-from lhpost6_pin.ledger import row_power
 from lhpost6_pin.stage import advance_states, apply_forces, state_rates
 
 RNG_DRAWS = 200

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from machine_cases import DATA, machine_named
 
 from lhpost6_pin.check import check_record
 from lhpost6_pin.equilibrium import find_equilibrium
@@ -15,7 +16,6 @@ from lhpost6_pin.plant import make_plant
 from lhpost6_pin.records import load_record
 from lhpost6_pin.schemes import SCHEMES
 from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
-from machine_cases import DATA, machine_named
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 PRACTICE = DATA / "records" / "practice_a_TX.nc"

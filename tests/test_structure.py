@@ -26,6 +26,7 @@ LAYERS = [
     {"engine_fused"},
     {"simulate"},
     {"batch", "outputs", "check", "ledger"},
+    {"energy"},
     {"rehearse", "tables", "doctor"},
     {"report", "viewer_page"},
     {"viewer"},
@@ -34,7 +35,16 @@ LAYERS = [
 """Modules and subpackages, lowest first; one imports only from layers below, or within its own subpackage."""
 
 PINOCCHIO = {
-    *("rigid_body", "kinematics", "plant", "equilibrium", "engine_pinocchio", "linearize", "ledger"),  # dynamics
+    *(
+        "rigid_body",
+        "kinematics",
+        "plant",
+        "equilibrium",
+        "engine_pinocchio",
+        "linearize",
+        "ledger",
+        "energy",
+    ),  # dynamics
     *("bodies", "viewer"),  # pictures
 }
 """Modules that may import pinocchio."""

@@ -4,7 +4,8 @@ Y dZ/dt = v - H Z,  H = tau v.Z + (1 - tau) (|v_x Z_x| + |v_y Z_y|),  f = -F_mu 
 
 v [m/s] slip velocity, Y [m] yield displacement, tau [1] loop shape, Z [1] hysteretic state with |Z_i| <= 1,
 F_mu [N] sliding force. H takes the absolute value of each product. Rate-independent: only the slip's path counts.
-Stored energy: none is declared (the model has no potential; its small recoverable part is not separable).
+Stored energy: none is declared, all work counts as dissipated. (With tau <= 1/2, F_mu Y |Z|^2 / 2 could be set apart
+as recoverable: Z.v = d/dt (Y |Z|^2 / 2) + H |Z|^2.)
 """
 
 import math

@@ -118,8 +118,9 @@ def advance_double(
 ) -> tuple[float, float]:
     """Pressures of chambers A and B one step on [Pa], while the piston moves by `stroke` [m].
 
-    Linearly implicit midpoint (one-stage Rosenbrock, order 2, A-stable) on Eq. 4-5, with chamber lengths at
-    mid-step; length_a, length_b [m] are those at the start of the step.
+    Linearly implicit midpoint (one-stage Rosenbrock, order 2, A-stable for a linear orifice) on Eq. 4-5, with chamber
+    lengths at mid-step; length_a, length_b [m] are those at the start of the step. On the square root of a vanishing
+    drop it may flutter within some (dt beta k / (L A))^2 / 10, a few kPa at 1/2048 s.
     """
     q_a, q_b, slope_a, slope_b = flows_double(
         opened, pressure_a, pressure_b, k_pa, k_bt, k_at, k_pb, leakage, supply, back, linear_below

@@ -1,6 +1,7 @@
 """The command line `lhpost6`.
 
-Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the input cannot be used.
+Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the input cannot be used or a file cannot be
+read or written, 130 interrupted.
 """
 
 import logging

@@ -84,11 +84,10 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
 
 
 def _strut_pressure(run: Run, elongation: Array) -> Array:
-    pressures = np.empty_like(elongation)
-    for i, strut in enumerate(run.plant.machine.struts):
-        law = np.vectorize(lambda x, s=strut: gas_pressure(x, s.pressure, s.gas_length, s.polytropic_index))
-        pressures[:, i] = law(elongation[:, i])
-    return pressures
+    law = gas_pressure.py_func  # type: ignore[attr-defined]  # the scalar law as plain Python takes whole columns
+    struts = run.plant.machine.struts
+    columns = (law(x, s.pressure, s.gas_length, s.polytropic_index) for x, s in zip(elongation.T, struts, strict=True))
+    return np.column_stack(list(columns))
 
 
 def _hidden_states(run: Run) -> dict[str, Any]:

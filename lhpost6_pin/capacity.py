@@ -49,9 +49,11 @@ def leg_speeds(plant: Plant) -> Array:
 def make_leg_check(plant: Plant) -> LegCheck:
     """Return a check of strokes and valve flow: (displacement, velocity) (n, 6) to shares used, (n, n_actuators).
 
-    The returned function gives (speed over steady unloaded speed, actuator names, elongation over stroke).
+    The returned function gives (speed over what the valves can feed, actuator names, elongation over stroke). Valves
+    can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
     """
-    speeds, strokes = leg_speeds(plant), plant.legs["stroke"][: plant.spools]
+    reserve = plant.machine.limits.valve_reserve
+    speeds, strokes = (1.0 - reserve) * leg_speeds(plant), plant.legs["stroke"][: plant.spools]
 
     def check(displacement: Array, velocity: Array) -> tuple[Array, tuple[str, ...], Array]:
         moved, rate = leg_displacements(plant, displacement, velocity)
@@ -105,7 +107,7 @@ def _forces(plant: Plant) -> list[Capacity]:
             down,
             par.number("table_2_2.force_down"),
             "N",
-            "hold-down less 125 psi in the chambers",
+            f"hold-down less {left / 1e6:.3g} MPa in the chambers",
         )
     )
     _, mass = platen_inertia(plant.model, machine)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .errors import LhpostError, MotionError, ParameterError, SimulationError
+from .errors import LhpostError, MotionError, ParameterError, RecordError, SimulationError
 from .files import refuse_folder
 
 if TYPE_CHECKING:
@@ -41,6 +41,14 @@ Override = Annotated[Path | None, typer.Option("--override", help="TOML file wit
 Scheme = Annotated[str, typer.Option(help="Integration scheme: semi_implicit, euler or rk4.")]
 Rate = Annotated[int, typer.Option(help="Model steps per second, a multiple of 2048.")]
 EngineName = Annotated[str, typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).")]
+SpecimenName = Annotated[
+    str | None, typer.Option("--specimen", help="Specimen bolted to the platen: shipped name, or a URDF file.")
+]
+SpecimenAt = Annotated[
+    str | None,
+    typer.Option("--specimen-at", help="Its root on the platen's top: x,y,z [m], or with r,p,y [rad]."),
+]
+Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
 
 
@@ -117,12 +125,17 @@ def motions(name: Annotated[str | None, typer.Argument(help="One of them, to see
 
 
 @app.command()
-def check(file: Annotated[Path, typer.Argument(help="Record to look into.")]) -> None:
-    """Say what is in a record and what is wrong with it."""
+def check(
+    file: Annotated[Path, typer.Argument(help="Record to look into.")],
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+) -> None:
+    """Say what is in a record and what is wrong with it; forces are held against pressures times areas."""
     from .check import check_record
     from .tables import print_findings
 
-    findings = check_record(file)
+    areas = {a.name: (a.area_a, a.area_b or 0.0) for a in _machine(machine, override).actuators}
+    findings = check_record(file, areas)
     print_findings(str(file), findings)
     if any(f.severity == "error" for f in findings):
         raise typer.Exit(1)
@@ -143,8 +156,9 @@ def run(
     valves: Annotated[
         int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
     ] = 0,
-    specimen: Annotated[Path | None, typer.Option(help="URDF of a specimen bolted to the platen.")] = None,
-    locked: Annotated[bool, typer.Option(help="Lock the specimen's joints: one rigid body.")] = False,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
     high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None,
     low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None,
@@ -156,16 +170,13 @@ def run(
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
     from .control import load_controller
     from .motions import make_target
-    from .rehearse import rehearse, with_valves
+    from .plant import make_plant
+    from .rehearse import rehearse, target_within_limits, with_valves
     from .simulate import SAMPLE_RATE
 
     if record_rate < 1 or SAMPLE_RATE % record_rate:
         raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
-    if locked and specimen is None:
-        raise ParameterError("--locked is about a specimen's joints; give the specimen with --specimen FILE")
-    table = with_valves(_machine(machine, override), valves)
-    if specimen is not None:
-        table = table.with_specimen(specimen, locked=locked)
+    table = _mount(with_valves(_machine(machine, override), valves), specimen, specimen_at, locked)
     ground = _motion(motion, set_ or [])
     target = make_target(
         ground,
@@ -175,10 +186,14 @@ def run(
         low_pass=low_pass,
         rate=float(SAMPLE_RATE),
     )
-    settings = load_controller(controller or (machine if Path(machine).suffix != ".toml" else "lhpost6"))
+    if not (controller or table.controller):
+        raise ParameterError(f"{machine} names no controller; give one with --controller")
+    settings = load_controller(controller or table.controller)
     name = ground.name.replace("/", "_")
     folder = out or Path("out") / name
     refuse_folder(folder)
+    if not beyond:
+        target_within_limits(make_plant(table), target)
     with _progress(f"{name} on {table.name}") as progress:
         run_, record = rehearse(
             table,
@@ -189,7 +204,7 @@ def run(
             steps_per_second=rate,
             engine=engine,
             record_every=SAMPLE_RATE // record_rate,
-            beyond_limits=beyond,
+            beyond_limits=True,
             progress=progress,
         )
     _save(table, run_, record, folder, report=True)
@@ -204,22 +219,28 @@ def open_loop(
     out: Out = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
 ) -> None:
     """Drive the plant with a record's spools from its first sample's pressures; leaves record.nc."""
     from .records import load_record
     from .rehearse import replay
     from .tables import print_comparison
 
-    table = _machine(machine, override)
+    table = _mount(_machine(machine, override), specimen, specimen_at, locked)
     measured = load_record(record, {"actuator": table.actuator_names})
-    name = f"{record.stem}_open_loop"
+    test = str(measured.attrs.get("test", "")) or record.stem
+    name = f"{Path(test).stem}_open_loop"
     folder = out or Path("out") / name
+    if (folder / "record.nc").resolve() == record.resolve():
+        raise RecordError(f"{record} would be replaced by its own replay; choose another folder with --out")
     refuse_folder(folder)
     with _progress(f"{name} on {table.name}") as progress:
         run_, simulated = replay(
             table,
             measured,
-            attrs={"test": name, "title": f"{record.stem}, open loop", "source": f"spools of {record.name}"},
+            attrs={"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"},
             scheme=scheme,
             steps_per_second=rate,
             engine=engine,
@@ -233,6 +254,22 @@ def _machine(name: str, override: Path | None) -> "Machine":
     from .machine import load_machine
 
     return load_machine(name, override)
+
+
+def _mount(table: "Machine", specimen: str | None, at: str | None, locked: bool) -> "Machine":
+    """Machine with the specimen that the options name, if any."""
+    if specimen is None:
+        if locked or at:
+            raise ParameterError("--locked and --specimen-at are about a specimen; name it with --specimen")
+        return table
+    try:
+        place = [float(x) for x in at.split(",")] if at else [0.0] * 3
+    except ValueError:
+        place = []
+    if len(place) not in (3, 6):
+        raise ParameterError(f"--specimen-at {at}: write x,y,z in metres, or x,y,z,roll,pitch,yaw with radians")
+    x, y, z, roll, pitch, yaw = (*place, 0.0, 0.0, 0.0)[:6]
+    return table.with_specimen(specimen, (x, y, z), (roll, pitch, yaw), locked=locked)
 
 
 def _motion(names: list[str], settings: list[str]) -> "GroundMotion":

@@ -68,7 +68,8 @@ def cache_folder() -> Path | None:
     for base in _candidates():
         folder = base / source_key()
         try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            base.mkdir(parents=True, exist_ok=True, mode=0o700)  # in two steps: parents=True gives the mode to the last
+            folder.mkdir(exist_ok=True, mode=0o700)
             if not (_private(base) and _writable(folder)):
                 continue
         except OSError:
@@ -76,14 +77,16 @@ def cache_folder() -> Path | None:
         _drop_old(base, folder)
         return folder
     log.warning(
-        "no private folder for compiled code can be written: this run compiles anew (about a minute); "
+        "no private folder for compiled code can be written: this run compiles anew (about half a minute); "
         "set LHPOST6_CACHE_DIR to a folder of your own to keep it"
     )
     return None
 
 
 def compiled(function: _F) -> _F:
-    """Compile a function with numba (no Python objects, fused multiply-add, GIL released), cached on disk.
+    """Compile a function with numba (no Python objects, GIL released), cached on disk.
+
+    Multiply-adds may fuse and divisions become products with a reciprocal: rounding differs from ``.py_func``'s.
 
     The pure Python original stays at ``.py_func`` and is the reference in tests.
     """
@@ -93,7 +96,7 @@ def compiled(function: _F) -> _F:
 def compiled_inline(function: _F) -> _F:
     """As `compiled`, and put into every compiled caller: for pieces of a step that take many arrays.
 
-    An array is seven words to pass; handing a dozen to a function that is called once a step costs as much as its work.
+    An array is seven words to pass: handing a dozen to a function called once a step costs as much as its work.
     """
     return _jit(function, inline=True)
 
@@ -103,7 +106,12 @@ def _jit(function: _F, *, inline: bool) -> _F:
     config = cast(Any, numba.config)
     before = config.CACHE_DIR
     config.CACHE_DIR = "" if folder is None else str(folder)
-    options: Any = {"error_model": "numpy", "nogil": True, "fastmath": {"contract"}, "forceinline": inline}
+    options: Any = {
+        "error_model": "numpy",
+        "nogil": True,
+        "fastmath": {"contract", "nsz", "arcp"},
+        "forceinline": inline,
+    }
     try:
         return cast(_F, numba.njit(cache=folder is not None, **options)(function))
     finally:

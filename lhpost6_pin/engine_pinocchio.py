@@ -75,15 +75,11 @@ def _semi_implicit(plant: Plant, dt: float) -> Stepper:
     axes, damping = plant.axes, np.array(model.damping)
     legs, body, rows = (table.view(float) for table in (plant.legs, plant.body, plant.rows))
     aba, integrate = pin.aba, pin.integrate
-    opened: Workspace | None = None
 
     def advance(ws: Workspace, spool: Array) -> int:
-        nonlocal opened
         motion, frame, port, JB, z, force, supply = ws.motion, ws.frame, ws.port, ws.JB, ws.z, ws.force, ws.supply
         dq, v_seen, tau = motion[DQ], motion[V_SEEN], motion[TAU]
-        if opened is not ws:
-            open_step(motion, dt)
-            opened = ws
+        open_step(motion, dt)  # after a kick this changes nothing
         q, status = ws.q, 0
         for held in spool:
             q = integrate(model, q, dq)

@@ -14,7 +14,7 @@ from .effects import Effect, standard_effects
 from .errors import ParameterError
 from .parameters import Parameters, load_parameters, override_parameters
 from .schema import build_section
-from .specimen import Specimen
+from .specimen import Specimen, find_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -30,6 +30,7 @@ class Machine:
     title: str
     motion: str
     thrust: str
+    controller: str
     platen: Platen
     hydraulics: Hydraulics
     actuators: tuple[Actuator, ...]
@@ -91,12 +92,12 @@ class Machine:
         *,
         locked: bool = False,
     ) -> "Machine":
-        """Return a copy with the specimen of a URDF bolted to the platen.
+        """Return a copy with the specimen of a URDF (a path, or a shipped name: ``pendulum``) bolted to the platen.
 
         position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
         locked joints make it one rigid body; free ones join the same Pinocchio model.
         """
-        return replace(self, specimen=Specimen(Path(urdf), position, rpy, locked))
+        return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
 
 
 def load_machine(
@@ -147,6 +148,7 @@ def build_machine(
     machine = Machine(
         name=str(words.get("machine.name", "unnamed")),
         title=str(words.get("machine.title", "")),
+        controller=str(words.get("machine.controller", "")),
         **options,
         platen=build_section(Platen, parameters, ("platen",)),
         hydraulics=build_section(Hydraulics, parameters, ("hydraulics",)),
@@ -190,7 +192,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str])
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
         "limits": {f.name for f in fields(Limits)},
-        "machine": {"name", "title", "motion", "thrust"},
+        "machine": {"name", "title", "motion", "thrust", "controller"},
         **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
         **{name: both | {"kind", "valves"} for name in components},
     }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .capacity import make_leg_check
 from .control import LoopSettings, make_controller
 from .equilibrium import find_equilibrium, hydraulic_rows
-from .errors import OutOfRangeError, SimulationError
+from .errors import OutOfRangeError, RecordError, SimulationError
 from .machine import Machine
 from .motions import LimitsSummary, MotionLimits, Target, check_limits
 from .names import AXES
@@ -109,9 +109,13 @@ def replay(
     """Drive the plant with a record's spool positions, from rest with its first sample's pressures.
 
     A simulated record at the controller's rate is held over each sample (as it was made); any other is band-limited
-    and interpolated smoothly to the model's steps. Raises RecordError naming missing channels.
+    and interpolated smoothly to the model's steps. Raises RecordError naming missing channels, or a specimen
+    that the record was made with and the machine has not.
     """
     require(record, "spool_position", "chamber_pressure_a")
+    carried = str(record.attrs.get("specimen", "none"))
+    if carried != "none" and machine.specimen is None:
+        raise RecordError(f"the record was made with specimen {carried!r} on the table; mount it with --specimen")
     machine = with_valves(machine, int(record.attrs.get("valves_per_horizontal_actuator", 0)))
     if machine.double_acting:
         require(record, "chamber_pressure_b")
@@ -125,7 +129,7 @@ def replay(
         spool, samples = recorded, len(recorded)
     else:
         t_old = np.arange(len(recorded)) / rate
-        samples = math.floor(t_old[-1] * SAMPLE_RATE)
+        samples = math.floor(t_old[-1] * SAMPLE_RATE + 1e-6)  # a rounding error must not cost a sample
         middle = (np.arange(samples * (steps // SAMPLE_RATE)) + 0.5) / steps
         spool = resample_band_limited(recorded, t_old, np.minimum(middle, t_old[-1]))
     run = simulate(plant, OpenLoop(spool, _start(plant, record)), samples=samples, progress=progress, **options)

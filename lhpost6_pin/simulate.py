@@ -1,7 +1,9 @@
 """Simulation: a plant, driven by recorded spools or by a controller, by a scheme at a rate, in one of two engines.
 
     plant = make_plant(load_machine())
-    run = simulate(plant, ClosedLoop(controller, reference), duration=10.0)
+    rest = find_equilibrium(plant)
+    controller = make_controller(plant, rest, load_controller("lhpost6"))
+    run = simulate(plant, ClosedLoop(controller, reference, rest), samples=len(reference))
 
 The controller's samples are the clock: each is divided into equal model steps. A run that leaves a stroke or diverges
 stops; what was computed is kept, and `Run.trouble` says when, which component, and what to try.

@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Specimen"]
+from .errors import UnknownNameError
+from .files import models_folder
+
+__all__ = ["Specimen", "find_specimen"]
 
 
 @dataclass(frozen=True)
@@ -23,3 +26,14 @@ class Specimen:
     def name(self) -> str:
         """Short name, as written to records."""
         return self.urdf.stem
+
+
+def find_specimen(name_or_path: str | Path) -> Path:
+    """URDF of a shipped specimen by name, or the path itself; raises UnknownNameError that lists the shipped ones."""
+    path = Path(name_or_path)
+    if path.suffix:
+        return path
+    shipped = {p.stem: p for p in (models_folder() / "specimens").glob("*.urdf")}
+    if str(name_or_path) not in shipped:
+        raise UnknownNameError("specimen", str(name_or_path), list(shipped))
+    return shipped[str(name_or_path)]

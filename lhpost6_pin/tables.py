@@ -10,7 +10,6 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 from .machine import Machine
-from .names import AXES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +74,9 @@ def print_machine(machine: Machine) -> None:
         f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
         f"platen motion {machine.motion}, bearing thrust {machine.thrust}"
     )
-    table = Table(Column("quantity", no_wrap=True), "value", "unit", "sd", Column("evidence", no_wrap=True), "source")
+    table = Table(
+        Column("quantity", no_wrap=True), "value", "unit", "sd (ours)", Column("evidence", no_wrap=True), "source"
+    )
     for path, q in machine.parameters.quantities.items():
         evidence = f"[bold yellow]{escape(q.evidence)} *[/]" if q.assumed else escape(q.evidence)
         sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)
@@ -171,32 +172,37 @@ def print_findings(file: str, findings: "Sequence[Finding]") -> None:
     console.print(f"{counts['error']} errors, {counts['warning']} warnings")
 
 
+_COMPARED = (
+    ("platen_displacement", "axis", ("m", "m", "m", "rad", "rad", "rad")),
+    ("chamber_pressure_a", "actuator", "Pa"),
+    ("chamber_pressure_b", "horizontal", "Pa"),
+    ("actuator_force", "actuator", "N"),
+)
+_SILENT = 1e-6
+"""A channel whose peak is below this share of the largest of its kind did not move: its relative error says nothing."""
+
+
 def print_comparison(measured: "xr.Dataset", simulated: "xr.Dataset") -> None:
-    """Print how far a replayed motion is from the recorded one, per axis, on common samples."""
+    """Print how far a replayed test is from the recorded one, per channel, on common samples."""
     from .signals import drift_rate, rrmse
 
-    if "platen_displacement" not in measured:
-        return
     t = measured["time"].values - float(measured["time"][0])
     t = t[t <= simulated["time"].values[-1]]
     if len(t) < 2:
         return
-    recorded = measured["platen_displacement"].transpose("time", "axis").values[: len(t)]
-    model = simulated["platen_displacement"].interp(time=t).values
-    ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
-    peak = np.abs(model - recorded).max(axis=0)
-    table = Table(
-        "axis",
-        "peak recorded",
-        "largest difference",
-        "RRMSE",
-        "drift [1/s]",
-        title="Displacement, model against record",
-    )
-    for k, axis in enumerate(AXES):
-        unit = "m" if k < 3 else "rad"
-        asked = f"{np.abs(recorded[:, k]).max():.4g} {unit}"
-        table.add_row(axis, asked, f"{peak[k]:.3g} {unit}", f"{ratio[k]:.3g}", f"{drift[k]:.3g} {unit}")
+    table = Table("channel", "peak recorded", "largest difference", "RRMSE", "drift", title="Model against record")
+    for name, dim, unit in _COMPARED:
+        if name not in measured or name not in simulated:
+            continue
+        recorded = measured[name].transpose("time", dim).values[: len(t)]
+        model = simulated[name].interp(time=t).transpose("time", dim).values
+        ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
+        apart, peak = np.abs(model - recorded).max(axis=0), np.abs(recorded).max(axis=0)
+        for k, label in enumerate(measured[dim].values):
+            u = unit if isinstance(unit, str) else unit[k]
+            moved = peak[k] > _SILENT * peak.max()
+            cells = (f"{peak[k]:.4g} {u}", f"{apart[k]:.3g} {u}", f"{ratio[k]:.3g}" if moved else "")
+            table.add_row(f"{name} {label}", *cells, f"{drift[k]:.3g} {u}/s")
     _console().print(table)
 
 
@@ -209,7 +215,7 @@ def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
         table = Table("axis", "what", "peak asked", "peak achieved", "RRMSE", delay, "RRMSE, delay removed")
         for row in summary.tracking:
             if row.peak_target:
-                table.add_row(*tracking_cells(row))
+                table.add_row(*map(escape, tracking_cells(row)))
         console.print(table)
     for name in ("record.nc", "report.html") if summary else ("record.nc",):
         console.print(f"wrote {folder / name}", markup=False, highlight=False, soft_wrap=True)
@@ -222,10 +228,16 @@ def tracking_cells(row: Any) -> Sequence[str]:
     """Cells of one tracked axis and quantity."""
     return (
         row.axis,
-        row.quantity,
+        f"{row.quantity} [{_unit(row)}]",
         f"{row.peak_target:.4g}",
         f"{row.peak_achieved:.4g}",
         f"{row.rrmse:.3f}",
         f"{1e3 * row.delay:.1f}",
         f"{row.rrmse_aligned:.3f}",
     )
+
+
+def _unit(row: Any) -> str:
+    """SI unit of a tracked quantity of an axis."""
+    per = {"displacement": "", "velocity": "/s", "acceleration": "/s2"}[row.quantity]
+    return ("m" if row.axis in "xyz" else "rad") + per

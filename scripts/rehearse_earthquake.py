@@ -2,7 +2,7 @@
 
     python scripts/rehearse_earthquake.py [MOTION] [--scale 0.5] [--out DIR]
 
-What `lhpost6 run` does, in six steps to copy from.
+What `lhpost6 run` does, in seven steps to copy from.
 """
 
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from lhpost6_pin.control import load_controller
+from lhpost6_pin.energy import energy_audit
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.names import AXES
@@ -46,7 +47,13 @@ def main(
         if asked:
             print(f"{axis}: displacement RRMSE {100 * error:.2f} %")
 
-    # 6. Where to look
+    # 6. Where the energy went
+    audit = energy_audit(test.run)
+    for kind in ("inflow", "stored", "dissipated", "created"):
+        print(f"energy {kind}: {audit.total(kind)[-1] / 1e3:.1f} kJ")
+    print(f"not accounted for: {abs(audit.residual).max() / 1e3:.3f} kJ")
+
+    # 7. Where to look
     print(summary.verdict)
     print(summary.path)
 

@@ -422,7 +422,8 @@ def test_platen_and_pendulum_falling_free_keep_their_momentum_balance():
     [("double_pendulum", 2), ("ur5", 6), ("solo12", 12)],
 )
 def test_models_of_example_robot_data_mount_as_specimens(robot, joints):
-    example_robot_data = pytest.importorskip("example_robot_data")
+    import example_robot_data  # here: it takes a second to import
+
     found = example_robot_data.load(robot)
     free = make_plant(machine_named("lhpost6").with_specimen(found.urdf, (1.0, 0.5, 0.0), (0.0, 0.0, 0.4)))
     locked = make_plant(machine_named("lhpost6").with_specimen(found.urdf, (1.0, 0.5, 0.0), locked=True))

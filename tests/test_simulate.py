@@ -1,6 +1,7 @@
 """Simulation against the converged reference run, of the engines against each other, and of each scheme's order."""
 
 import logging
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -129,7 +130,6 @@ def test_both_engines_give_the_same_run(plant, rest, scheme):
         assert (np.abs(a - b).max(axis=0) / scale).max() < 1e-9, name
 
 
-@pytest.mark.slow
 def test_both_engines_give_the_same_run_over_twenty_seconds(plant, rest):
     reference = six_axis(20.0)
     a, b = (
@@ -278,7 +278,8 @@ def test_run_that_leaves_a_stroke_stops_with_time_and_component_and_keeps_what_w
     assert "V" in run.trouble and "0.127" in run.trouble and "scale the motion down" in run.trouble
     assert 100 < len(run.time) < len(spool)
     assert np.all(np.isfinite(run.q)) and np.all(np.isfinite(run.z))
-    assert f"{run.time[-1]:.2f}"[:3] in run.trouble
+    said = float(re.search(r"stopped at ([\d.]+) s", run.trouble).group(1))
+    assert said == pytest.approx(run.time[-1], abs=2 / SAMPLE_RATE)  # within the sample that failed
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -3,7 +3,7 @@
 from .ac156 import required_spectrum
 from .at2 import load_at2
 from .csv import load_csv
-from .library import MotionEntry, find_motion, list_motions
+from .library import MotionEntry, find_motion, list_motions, motion_options
 from .limits import (
     LegUtilisation,
     LimitsSummary,
@@ -12,6 +12,7 @@ from .limits import (
     largest_scale,
 )
 from .motion import AXES, GroundMotion, make_motion
+from .options import MotionOption
 from .process import Reference, Target, make_target, with_scale
 from .readers import load_motion
 from .spectra import ResponseSpectrum, response_spectrum
@@ -24,6 +25,7 @@ __all__ = [
     "LimitsSummary",
     "MotionEntry",
     "MotionLimits",
+    "MotionOption",
     "Reference",
     "ResponseSpectrum",
     "Target",
@@ -37,6 +39,7 @@ __all__ = [
     "load_v1",
     "make_motion",
     "make_target",
+    "motion_options",
     "required_spectrum",
     "response_spectrum",
     "with_scale",

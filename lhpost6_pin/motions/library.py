@@ -4,16 +4,19 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..errors import MotionError, UnknownNameError
 from ..files import models_folder
 from .ac156 import ac156
 from .csv import load_csv
 from .motion import GroundMotion
-from .pulse_records import load_pulse_record, missing_package
+from .options import MotionOption, checked_options, options_of
+from .pulse_records import INSTALL, load_pulse_record, missing_package
 from .synthetic import sine, six_axial, triangle, white_noise
 from .toml import load_toml, values_of
 
-__all__ = ["MotionEntry", "find_motion", "list_motions"]
+__all__ = ["MotionEntry", "find_motion", "list_motions", "motion_options"]
 
 _GENERATORS: dict[str, Callable[..., GroundMotion]] = {
     "ac156": ac156,
@@ -33,7 +36,7 @@ class MotionEntry(NamedTuple):
     aliases: tuple[str, ...]
     available: bool
     remedy: str  # what to install where not available
-    options: tuple[str, ...]  # what `find_motion` takes for it
+    options: tuple[str, ...]  # names of what `find_motion` takes for it; see `motion_options`
 
 
 @cache
@@ -54,25 +57,32 @@ def list_motions() -> tuple[MotionEntry, ...]:
             options = tuple(key for key in test if key not in ("kind", "title"))
             entries.append(MotionEntry(name, test["kind"], test["title"], (), True, "", options))
     package = index["package"]
-    remedy = "pip install 'lhpost6-pin[records]'" if missing_package(package["module"]) else ""
+    remedy = INSTALL if missing_package(package["module"]) else ""
     for name, record in package["records"].items():
         aliases = tuple(record.get("aliases", ()))
         entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, ()))
     return tuple(entries)
 
 
+def motion_options(name: str) -> tuple[MotionOption, ...]:
+    """Options of a motion by name or alias, each with its default in SI, unit and source; empty for a record.
+
+    Raises UnknownNameError for a name that does not exist.
+    """
+    entry = _entry(name)
+    return options_of(_tables()[1], entry.name) if entry.options else ()
+
+
 def find_motion(name: str, **options: Any) -> GroundMotion:
     """Ground motion by name or alias, as `list_motions` shows them.
 
-    `options` replace numbers of a test made by name, in SI, as in ``find_motion("ac156", sds=5.0, seed=2)``.
+    `options` replace numbers of a test made by name, in SI, as in ``find_motion("ac156", sds=5.0, seed=2)``;
+    `motion_options` lists them.
 
     Raises UnknownNameError for a name that does not exist, MotionError for an option the motion does not
-    take or a package that is not installed.
+    take, a value that it cannot have (named), numbers that do not go together, or a package that is not installed.
     """
-    entries = {key: entry for entry in list_motions() for key in (entry.name, *entry.aliases)}
-    entry = entries.get(name.lower())
-    if entry is None:
-        raise UnknownNameError("ground motion", name, list(entries))
+    entry = _entry(name)
     unknown = sorted(set(options) - set(entry.options))
     if unknown:
         takes = ", ".join(entry.options) or "none"
@@ -89,7 +99,17 @@ def find_motion(name: str, **options: Any) -> GroundMotion:
         return load_pulse_record(package["module"], package["file"], number, name=entry.name, title=entry.title)
     numbers = values_of(tests, entry.name)
     del numbers["kind"], numbers["title"]
+    chosen = checked_options(name, numbers, options)
     try:
-        return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **options})
-    except (TypeError, ValueError) as error:
+        with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite
+            return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **chosen})
+    except (ArithmeticError, MemoryError, TypeError, ValueError) as error:
         raise MotionError(f"{name}: options {options}: {error}") from error
+
+
+def _entry(name: str) -> MotionEntry:
+    entries = {key: entry for entry in list_motions() for key in (entry.name, *entry.aliases)}
+    entry = entries.get(name.lower())
+    if entry is None:
+        raise UnknownNameError("ground motion", name, list(entries))
+    return entry

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 
 import numpy as np
@@ -72,20 +73,17 @@ class _Peak(NamedTuple):
 def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | None = None) -> LimitsSummary:
     """Utilisation of the table by a target.
 
-    `leg_check` adds the actuators' strokes and the flow of their valves. Raises OutOfRangeError naming every
-    limit exceeded with axis or leg, time, sample and values, and the largest scale that would fit.
+    `leg_check` adds the actuators' strokes and the flow of their valves. Raises OutOfRangeError with the largest
+    scale that would fit, then a clause for each quantity exceeded, axes before legs: the worst axis or leg with
+    its value against the limit, time and sample, and the names of the others beyond theirs.
     """
     peaks = _axis_peaks(target, limits) + (_leg_peaks(target, leg_check, 1.0) if leg_check else [])
-    over = sorted((peak for peak in peaks if peak.utilisation > _FULL), key=lambda peak: -peak.utilisation)
+    over = [peak for peak in peaks if peak.utilisation > _FULL]
     if over:
-        lines = "; ".join(
-            f"{peak.name} {peak.quantity} {peak.text} at t = {target.time[peak.sample]:.3f} s (sample {peak.sample})"
-            for peak in over
-        )
         fits = largest_scale(target, limits, leg_check)
         raise OutOfRangeError(
-            f"{target.reference.motion} at scale {target.reference.scale:g} is more than the table can give: "
-            f"{lines}. The largest scale that fits is {fits:g}"
+            f"{target.reference.motion} at scale {target.reference.scale:g} is more than the table can give. "
+            f"The largest scale that fits is {fits:g}; beyond the limits: {'; '.join(_clauses(over, target.time))}"
         )
     utilisation: dict[str, dict[str, float]] = {}
     for peak in peaks:
@@ -96,11 +94,11 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
 def largest_scale(target: Target, limits: MotionLimits, leg_check: LegCheck | None = None) -> float:
     """Largest scale of the target's motion within all limits, rounded down to three digits.
 
-    Infinity for a target that does not move. Leg lengths are not linear in the pose, so with `leg_check`
+    Infinity for a target that does not move, or less than a floating-point number can resolve. Leg lengths are not linear in the pose, so with `leg_check`
     the scale is found by bisection below the one that the axes allow.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
-    if highest == 0:
+    if highest < np.finfo(float).tiny:
         return float("inf")
     factor = 1 / highest
     if leg_check is not None:
@@ -117,6 +115,20 @@ def largest_scale(target: Target, limits: MotionLimits, leg_check: LegCheck | No
     return _round_down(factor * abs(target.reference.scale))
 
 
+def _clauses(over: Sequence[_Peak], time: np.ndarray) -> list[str]:
+    """One clause for each quantity: its worst axis or leg in full, the others by name; axes before legs."""
+    ranked = sorted(over, key=lambda peak: (peak.quantity not in _QUANTITIES, -peak.utilisation))
+    groups: dict[str, list[_Peak]] = {}
+    for peak in ranked:
+        groups.setdefault(peak.quantity, []).append(peak)
+    clauses = []
+    for quantity, (worst, *others) in groups.items():
+        where = f"at t = {time[worst.sample]:.3f} s (sample {worst.sample})"
+        also = f", also {', '.join(peak.name for peak in others)}" if others else ""
+        clauses.append(f"{worst.name} {quantity} {worst.text} {where}{also}")
+    return clauses
+
+
 def _axis_peaks(target: Target, limits: MotionLimits) -> list[_Peak]:
     peaks = []
     for quantity in _QUANTITIES:
@@ -131,13 +143,19 @@ def _axis_peaks(target: Target, limits: MotionLimits) -> list[_Peak]:
 
 
 def _leg_peaks(target: Target, leg_check: LegCheck, factor: float) -> list[_Peak]:
-    velocity, names, stroke = leg_check(factor * target.displacement, factor * target.velocity)
+    with np.errstate(all="ignore"):  # a pose too far away to have a leg length is beyond every stroke: infinite
+        velocity, names, stroke = leg_check(factor * target.displacement, factor * target.velocity)
     peaks = []
-    for quantity, values in (("leg velocity", np.abs(velocity)), ("leg stroke", np.abs(stroke))):
+    for quantity, shares, of in (
+        ("leg velocity", velocity, "of what its valves can give"),
+        ("leg stroke", stroke, "of its stroke"),
+    ):
+        values = np.nan_to_num(np.abs(shares), nan=np.inf, posinf=np.inf)
         for i, name in enumerate(names):
             sample = int(np.argmax(values[:, i]))
             value = float(values[sample, i])
-            peaks.append(_Peak(quantity, name, value, sample, f"{100 * value:.1f} % of what it has"))
+            share = f"{100 * value:.4g} %" if np.isfinite(value) else "a countless multiple"
+            peaks.append(_Peak(quantity, name, value, sample, f"{share} {of}"))
     return peaks
 
 
@@ -148,8 +166,4 @@ def _unit(quantity: str, rotation: bool) -> str:
 
 def _round_down(value: float) -> float:
     """Three significant digits, never above `value` by more than rounding."""
-    if value == 0:
-        return value
-    digits = 2 - int(np.floor(np.log10(value)))
-    scaled = np.floor(value * 10.0**digits * _FULL)
-    return float(np.round(scaled / 10.0**digits, digits))
+    return float(Context(prec=3, rounding=ROUND_DOWN).create_decimal(value * _FULL))

@@ -80,6 +80,7 @@ def axes_map(text: str) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what becomes infinite is refused with its scale
 def make_target(
     motion: GroundMotion,
     *,
@@ -99,7 +100,7 @@ def make_target(
     extended by `pad` [s] at both ends, over which the target comes from and goes to rest. `rate` is the
     controller's [1/s].
 
-    Raises MotionError for a window, corner or scale that makes no sense.
+    Raises MotionError for a window, corner or scale that makes no sense, or numbers too large to compute with.
     """
     settings = _settings()
     acceleration_given = motion.quantity == "acceleration"
@@ -121,6 +122,7 @@ def make_target(
     channels = np.zeros((last - first, len(AXES)))
     for axis, channel in pairs:
         channels[:, AXES.index(axis)] = scale * motion.samples[first:last, AXES.index(channel)]
+    _refuse_infinite(motion.name, scale, channels)
     step = Fraction(motion.time_step * rate).limit_denominator(10_000)  # in samples of the target
     memory = max(settings["memory"] / high_pass if high_pass else 0.0, 2 * pad)
     # both the record's first sample and the period fall on samples of the target
@@ -149,13 +151,11 @@ def make_target(
         low_pass,
         first * motion.time_step - round(pad * rate) / rate,
     )
-    return Target(
-        np.arange(count) / rate,
-        np.where(moved, w * d, 0.0),
-        np.where(moved, w1 * d + w * v, 0.0),
-        np.where(moved, w2 * d + 2 * w1 * v + w * a, 0.0),
-        reference,
-    )
+    displacement = np.where(moved, w * d, 0.0)
+    velocity = np.where(moved, w1 * d + w * v, 0.0)
+    acceleration = np.where(moved, w2 * d + 2 * w1 * v + w * a, 0.0)
+    _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
+    return Target(np.arange(count) / rate, displacement, velocity, acceleration, reference)
 
 
 def with_scale(target: Target, scale: float) -> Target:
@@ -176,6 +176,11 @@ def smooth_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     x = np.clip(x, 0.0, 1.0)
     rest = 1.0 - x
     return x**3 * (10 - 15 * x + 6 * x**2), 30 * x**2 * rest**2, 60 * x * rest * (1 - 2 * x)
+
+
+def _refuse_infinite(name: str, scale: float, *arrays: np.ndarray) -> None:
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise MotionError(f"{name}: at scale {scale:g} its samples are too large to compute with; give a smaller scale")
 
 
 def _multiple(count: int, of: int) -> int:

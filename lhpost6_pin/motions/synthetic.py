@@ -27,12 +27,14 @@ def triangle(
     `corner_acceleration` [m/s^2]: a reversal lasts pi v / a, the start and the stop half as long. The peaks
     of the displacement are the amplitude. Rotations take rad, rad/s, rad/s^2.
 
-    Raises MotionError where the corners leave no straight part.
+    Raises MotionError for cycles that are not whole or corners that leave no straight part.
     """
+    if not (cycles >= 1 and cycles == int(cycles)):
+        raise MotionError(f"{name}: option cycles is {cycles}; give a whole number, one or more")
     reversal = np.pi * velocity / corner_acceleration
     straight = 2 * (amplitude - velocity * reversal / np.pi) / velocity  # from peak to opposite peak
     first = straight / 2 - reversal / 4  # the start takes v T/2 over its T = reversal/2
-    if not (cycles >= 1 and min(amplitude, velocity, corner_acceleration) > 0 and first > 0):
+    if not (min(amplitude, velocity, corner_acceleration) > 0 and first > 0):
         raise MotionError(
             f"{name}: {amplitude} at {velocity} per second leaves no straight part between corners of "
             f"{corner_acceleration} per second squared; give a larger amplitude or corner_acceleration"

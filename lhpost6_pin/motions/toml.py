@@ -6,7 +6,10 @@ from typing import Any
 
 from ..errors import MotionError
 
-__all__ = ["load_toml", "values_of"]
+__all__ = ["load_toml", "si_unit", "values_of"]
+
+
+_SI = ("", "1", "m", "m/s", "m/s^2", "rad", "s", "Hz")  # "" for texts and switches
 
 
 def load_toml(path: "Path | str") -> dict[str, Any]:
@@ -31,9 +34,19 @@ def values_of(table: dict[str, Any], section: str) -> dict[str, Any]:
     return found
 
 
+def si_unit(unit: str) -> str:
+    """SI unit that a value given in `unit` is converted to."""
+    if unit in _SI:
+        return unit
+    import pint
+
+    base = pint.get_application_registry().Quantity(1.0, unit).to_base_units().units
+    return f"{base:~C}".replace("**", "^")
+
+
 def _si(value: Any, unit: str) -> Any:
     """Value or list of values in SI base units."""
-    if unit in ("1", "m", "m/s", "m/s^2", "rad", "s", "Hz"):
+    if unit in _SI:
         return value
     import pint
 

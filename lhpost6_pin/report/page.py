@@ -141,16 +141,20 @@ def grid(*blocks: Markup) -> Markup:
     return Markup(f'<div class="grid">{"".join(blocks)}</div>')
 
 
-def bar(fraction: float) -> Markup:
-    """Return a bar filled to `fraction` of a limit, with the per cent in words; hatched beyond the limit."""
+def bar(fraction: float, tolerance: float = 0.0) -> Markup:
+    """Return a bar filled to `fraction` of a limit, with the per cent in words.
+
+    It is hatched from the limit on, or from `tolerance` (a share of the limit) beyond it. Infinity stands for
+    something of which there should be none.
+    """
     if fraction != fraction:
         return text("–")
-    level = "over" if fraction >= 1.0 else "near" if fraction >= 0.8 else "within"
+    level = "over" if fraction >= 1.0 + tolerance else "near" if fraction >= 0.8 else "within"
     width = min(100.0 * fraction, 100.0)
-    percent = number(100.0 * fraction, 3 if fraction >= 1.0 else 2)
+    percent = f"{number(100.0 * fraction, 3 if fraction >= 1.0 else 2)} %" if fraction < np.inf else "impossible"
     return Markup(
         f'<span class="bar {level}"><span class="fill" style="width:{width:.1f}%"></span></span>'
-        f'<span class="percent">{percent} %</span>'
+        f'<span class="percent">{percent}</span>'
     )
 
 

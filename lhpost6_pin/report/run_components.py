@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -14,9 +15,12 @@ from .plots import SCALES, SUPPLY, Row, Scale, Trace, palette, time_figure
 from .run_metrics import SpoolUse, channel, peaks, sampling
 
 __all__ = [
+    "TOLERANCE",
+    "ForceUse",
     "Limits",
     "draw_over_time",
     "force_blocks",
+    "force_use",
     "pressure_blocks",
     "share_of_limit",
     "spool_blocks",
@@ -25,7 +29,16 @@ __all__ = [
 
 Limits = Mapping[str, NDArray[np.float64]]
 
-OFF_SCALE = 0.4  # share of the supply below which pressures get a scale of their own, without the supply line
+OFF_SCALE = 0.4  # share of a limit below which pressures and forces get a scale of their own, without its line
+TOLERANCE = 1e-3  # share of a limit by which a sampled peak may pass it before it counts as beyond
+
+
+class ForceUse(NamedTuple):
+    """Peak forces of the actuators in one direction, and the share of what they can give."""
+
+    words: str  # "push", "pull", or "force" for both
+    peak: NDArray[np.float64]  # (n_act,) magnitude [N]
+    share: NDArray[np.float64]  # (n_act,) not-a-number without a limit, infinity for a pull where none can be
 
 
 def force_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
@@ -36,6 +49,9 @@ def force_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
     if "actuator_force" in record:
         words = "Chamber pressures times piston areas, P_A A₁ − P_B A₂; positive pushes the actuator longer."
         rows = _group_rows(record, "Force", "actuator_force", "actuator", SCALES["force"])
+        if "actuator_pull" in limits:
+            rows = [_with_force_limits(row, record, limits) for row in rows]
+            words += " Dashed lines, where the forces come near them, are the largest push and pull."
         blocks.append(draw_over_time(record, "force", "Actuator forces over time", words, rows))
     if len(absent) < len(names):
         blocks.append(_use_of_actuators(record, limits))
@@ -115,21 +131,56 @@ def share_of_limit(peak: float, limits: Limits, name: str, k: int) -> float:
     return float(peak / bounds[k]) if k < len(bounds) else float("nan")
 
 
+def force_use(record: xr.Dataset, limits: Limits) -> list[ForceUse]:
+    """Return the use of the actuators' forces: push and pull apart where `actuator_pull` is given, else magnitude."""
+    if "actuator_force" not in record:
+        return []
+    force = channel(record, "actuator_force", "actuator")
+
+    def used(peak: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+        return np.array([share_of_limit(value, limits, name, k) for k, value in enumerate(peak)])
+
+    if "actuator_pull" not in limits:
+        return [ForceUse("force", peaks(force), used(peaks(force), "actuator_force"))]
+    push, pull = peaks(np.maximum(force, 0.0)), peaks(np.maximum(-force, 0.0))
+    allowed = np.pad(limits["actuator_pull"], (0, len(pull)), constant_values=np.nan)[: len(pull)]
+    known = np.nan_to_num(np.pad(limits.get("actuator_force", np.array([])), (0, len(pull)))[: len(pull)])
+    # what cannot pull at all is allowed the tolerance of its push
+    none = np.where(pull > TOLERANCE * known, np.inf, np.where(np.isnan(pull), np.nan, 0.0))
+    share = np.where(allowed == 0.0, none, pull / np.where(allowed == 0.0, np.nan, allowed))
+    return [ForceUse("push", push, used(push, "actuator_force")), ForceUse("pull", pull, share)]
+
+
+def _with_force_limits(row: Row, record: xr.Dataset, limits: Limits) -> Row:
+    """Row with the largest push and pull, where its forces come near them and all its actuators have the same."""
+    labels = [str(label) for label in record["actuator"].values]
+    own = [labels.index(trace.name) for trace in row.traces]
+    lines = {}
+    for sign, use, name in zip((1.0, -1.0), force_use(record, limits), ("actuator_force", "actuator_pull"), strict=True):
+        bounds = limits.get(name, np.array([]))
+        level = set(bounds[own]) if max(own) < len(bounds) else set()
+        if len(level) == 1 and np.nanmax(use.share[own], initial=0.0) >= OFF_SCALE:
+            lines[f"largest {use.words}"] = sign * float(level.pop())
+    return replace(row, lines=lines)
+
+
 def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Markup:
     columns: list[list[object]] = [list(record["actuator"].values)]
     header = ["Actuator"]
-    for name, bound, scale, title in (
-        ("actuator_force", "actuator_force", SCALES["force"], "Peak force"),
-        ("actuator_displacement", "actuator_stroke", SCALES["displacement"], "Peak displacement"),
-    ):
-        if name not in record:
-            continue
-        largest = peaks(channel(record, name, "actuator"))
-        header.append(f"{title} [{scale.unit}]")
+    for words, peak, share in force_use(record, limits):
+        header.append(f"Peak {words} [{SCALES['force'].unit}]")
+        columns.append([number(value * SCALES["force"].factor) for value in peak])
+        if "actuator_force" in limits or "actuator_pull" in limits:
+            header.append("of its limit")
+            columns.append([bar(value, TOLERANCE) for value in share])
+    if "actuator_displacement" in record:
+        scale, largest = SCALES["displacement"], peaks(channel(record, "actuator_displacement", "actuator"))
+        header.append(f"Peak displacement [{scale.unit}]")
         columns.append([number(peak * scale.factor) for peak in largest])
-        if bound in limits:
-            header.append("of its stroke" if bound == "actuator_stroke" else "of its limit")
-            columns.append([bar(share_of_limit(peak, limits, bound, k)) for k, peak in enumerate(largest)])
+        if "actuator_stroke" in limits:
+            shares = [share_of_limit(peak, limits, "actuator_stroke", k) for k, peak in enumerate(largest)]
+            header.append("of its stroke")
+            columns.append([bar(share, TOLERANCE) for share in shares])
     return table("Forces and strokes used", header, zip(*columns, strict=True))
 
 

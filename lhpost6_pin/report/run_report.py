@@ -32,7 +32,8 @@ LIMIT_NAMES = (
     "velocity",  # (n_axes,) [m/s, rad/s]
     "acceleration",  # (n_axes,) [m/s2, rad/s2]
     "actuator_stroke",  # (n_act,) one-sided [m]
-    "actuator_force",  # (n_act,) [N]
+    "actuator_force",  # (n_act,) largest force [N]; of pushing alone where actuator_pull is given
+    "actuator_pull",  # (n_act,) magnitude of the largest pulling force [N]; 0: it cannot pull
     "supply_pressure",  # [Pa]
     "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
 )
@@ -75,7 +76,8 @@ def write_run_report(
 ) -> RunSummary:
     """Write the self-contained HTML report of a test to `path` and return its summary.
 
-    `limits` maps names of `LIMIT_NAMES` to what the machine can give (SI; not-a-number or 0 means no limit),
+    `limits` maps names of `LIMIT_NAMES` to what the machine can give (SI; not-a-number means no limit, as does 0
+    except for `actuator_pull`),
     `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name, value, unit,
     source, assumed). What the record lacks is named where it would have been shown.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
@@ -108,7 +110,8 @@ def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
         if name not in LIMIT_NAMES:
             raise UnknownNameError("limit", name, LIMIT_NAMES)
     values = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in limits.items()}
-    return {name: np.where(value > 0.0, value, np.nan) for name, value in values.items()}
+    none_at_all = {name: name == "actuator_pull" for name in values}  # there 0 is a limit
+    return {n: np.where((v > 0.0) | ((v == 0.0) & none_at_all[n]), v, np.nan) for n, v in values.items()}
 
 
 def _gaps(record: xr.Dataset) -> list[str]:

@@ -9,6 +9,7 @@ import xarray as xr
 from .page import Markup, Section, bar, details, missing, number, paragraph, table
 from .plots import SCALES
 from .run_components import (
+    TOLERANCE,
     Limits,
     force_blocks,
     pressure_blocks,
@@ -64,7 +65,7 @@ def _metrics(found: Sequence[Tracking], limits: Limits) -> Markup:
                 scale.unit,
                 number(row.peak_target * scale.factor),
                 number(row.peak_achieved * scale.factor),
-                bar(used),
+                bar(used, TOLERANCE),
                 percent(row.rrmse),
                 shown_as(row.delay, SCALES["time"]) if np.isfinite(row.delay) else "–",
                 percent(row.rrmse_aligned),

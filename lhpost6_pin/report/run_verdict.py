@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from .page import Headline, Level
+from .page import Headline, Level, number
 from .plots import SCALES
-from .run_components import Limits, share_of_limit
+from .run_components import TOLERANCE, Limits, force_use, share_of_limit
 from .run_metrics import SpoolUse, Tracking, channel, peaks
 from .run_motion import axis_scale, percent, shown_as
 
@@ -25,14 +25,19 @@ def judge(
     limits: Limits,
     notes: Sequence[str],
 ) -> tuple[str, Level]:
-    """Return the verdict in words and how grave it is: target followed, limits kept, notes to read."""
+    """Return the verdict in words and how grave it is: spools clipped, target followed, limits kept, notes to read."""
     sentences, level = _followed(record, found)
-    beyond = _beyond(record, found, spools, limits)
+    clipped, beyond = _clipped(record, spools), _beyond(record, found, limits)
+    if clipped:
+        sentences.insert(0, clipped)
     if beyond:
-        level = "bad"
         sentences.append(f"Beyond a limit: {', '.join(beyond)}.")
-    elif limits or spools:
-        sentences.append("Every limit that was given is kept." if limits else "No spool reached its limit.")
+    elif limits:
+        sentences.append("The rest is within all given limits." if clipped else "The test is within all given limits.")
+    elif spools and not clipped:
+        sentences.append("No spool reached its limit.")
+    if clipped or beyond:
+        level = "bad"
     if notes:
         level = "attention" if level in ("good", "plain") else level
         sentences.append("See the notes below.")
@@ -59,17 +64,38 @@ def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str],
     return [f"{start}: worst RRMSE, delay removed, {' and '.join(words)}."], "good" if good else "attention"
 
 
-def _beyond(record: xr.Dataset, found: Sequence[Tracking], spools: Sequence[SpoolUse], limits: Limits) -> list[str]:
+def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
+    """Return the sentence on spools at full stroke and commands clipped to it; empty where there were none."""
+    count = record.attrs.get("spool_values_clipped", 0)
+    count = int(count) if isinstance(count, int | np.integer) else 0
+    shares = {spool.actuator: spool.saturated for spool in spools}
+    if "spool_command" in record:
+        asked = np.mean(np.abs(channel(record, "spool_command", "actuator")) >= 1.0, axis=0)
+        for actuator, share in zip(map(str, record["actuator"].values), asked, strict=True):
+            shares[actuator] = max(shares.get(actuator, 0.0), float(share))
+    full = [f"spool {actuator} {percent(share)} of the time" for actuator, share in shares.items() if share]
+    if not (count or full):
+        return ""
+    start = f"{count} spool commands were clipped" if count else "Spools were at the limit of their stroke"
+    return f"{start}: {', '.join(full)}." if full else f"{start}."
+
+
+def _beyond(record: xr.Dataset, found: Sequence[Tracking], limits: Limits) -> list[str]:
+    """Name what passed its limit by more than the tolerance."""
     uses = [(f"{row.axis} {row.quantity}", _used(row, limits)) for row in found]
-    for name, bound in (("actuator_displacement", "actuator_stroke"), ("actuator_force", "actuator_force")):
-        if name in record and bound in limits:
-            largest = peaks(channel(record, name, "actuator"))
-            names = [f"{actuator} {name.removeprefix('actuator_')}" for actuator in record["actuator"].values]
-            shares = [share_of_limit(peak, limits, bound, k) for k, peak in enumerate(largest)]
-            uses += zip(names, shares, strict=True)
-    beyond = [f"{name} ({percent(use)} of its limit)" for name, use in uses if use > 1.0]
-    full = [f"spool {s.actuator} ({percent(s.saturated)} of the time at its limit)" for s in spools if s.saturated]
-    return beyond + full
+    actuators = [str(name) for name in record["actuator"].values] if "actuator" in record.coords else []
+    if "actuator_displacement" in record and "actuator_stroke" in limits:
+        largest = peaks(channel(record, "actuator_displacement", "actuator"))
+        shares = [share_of_limit(peak, limits, "actuator_stroke", k) for k, peak in enumerate(largest)]
+        uses += zip((f"{name} displacement" for name in actuators), shares, strict=True)
+    for words, _, share in force_use(record, limits):
+        uses += zip((f"{name} {words}" for name in actuators), map(float, share), strict=True)
+    return [f"{name} ({_of_limit(use)})" for name, use in uses if use > 1.0 + TOLERANCE]
+
+
+def _of_limit(use: float) -> str:
+    """Share of a limit with a digit more than elsewhere, to tell 100.2 % from 100 %."""
+    return f"{number(100 * use, 4)}\N{NO-BREAK SPACE}% of its limit" if np.isfinite(use) else "it can give none"
 
 
 def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
@@ -91,7 +117,7 @@ def _peak_displacement(found: Sequence[Tracking], limits: Limits) -> Headline:
     if limited:
         row = max(limited, key=lambda row: _used(row, limits))
         used = _used(row, limits)
-        level: Level = "bad" if used > 1.0 else "attention" if used >= NEAR else "good"
+        level: Level = "bad" if used > 1.0 + TOLERANCE else "attention" if used >= NEAR else "good"
         note = f"axis {row.axis}, {percent(used)} of its limit, nearest of all axes"
     elif rows:
         row = max(straight or rows, key=lambda row: row.peak_achieved)

@@ -226,7 +226,7 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
         return
     for channel, x, span in _columns(dataset, "platen_acceleration", "actuator_force"):
         f, power = welch(x - x.mean(), rate, nperseg=256)
-        top = float(power[f > 0.4 * rate].sum() / power.sum()) if np.ptp(x) > 0 else 0.0
+        top = float(power[f > 0.4 * rate].sum() / power.sum()) if power.sum() > 0 else 0.0
         if top > 0.05 and np.ptp(x) > max(0.05 * span, 100 * _resolution(x)):
             yield (
                 channel,

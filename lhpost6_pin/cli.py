@@ -311,10 +311,6 @@ def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, 
         from .report import write_run_report
 
         notes = [run_.trouble] if run_.trouble else []
-        if run_.clipped:
-            notes.append(
-                f"{run_.clipped} spool commands beyond full stroke were clipped: the motion asks for more flow."
-            )
         summary = write_run_report(
             record,
             folder / "report.html",

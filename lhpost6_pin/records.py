@@ -131,8 +131,11 @@ def save_record(dataset: xr.Dataset, path: Path | str) -> None:
     """
     _refuse(layout_faults(dataset), str(path))
     plain = dataset.drop_encoding()
+    encoding = {name: {"_FillValue": None} for name in plain.data_vars}
+    # through memory: HDF5 that meets a full disk crashes the process when it closes
+    content = plain.to_netcdf(engine="h5netcdf", encoding=encoding)
     with write_whole(path) as beside:
-        plain.to_netcdf(beside, engine="h5netcdf", encoding={name: {"_FillValue": None} for name in plain.data_vars})
+        beside.write_bytes(content)
 
 
 def make_record(

@@ -61,6 +61,7 @@ def report_limits(plant: "Plant") -> dict[str, Any]:
         "acceleration": machine.limits.acceleration,
         "actuator_stroke": [a.stroke for a in machine.actuators],
         "actuator_force": plant.supply[0] * rows["p"][:, 0] - plant.supply[1] * rows["p"][:, 1],
+        "actuator_pull": np.maximum(0.0, plant.supply[0] * rows["p"][:, 1] - plant.supply[1] * rows["p"][:, 0]),
         "supply_pressure": plant.supply[0],
         "strut_area": [s.area for s in machine.struts],
     }
@@ -139,7 +140,7 @@ def print_modes(machine: Machine) -> None:
 def print_motions(name: str | None = None) -> None:
     """Print the motions known by name and what each needs; with a name, what can be chosen about that one."""
     from .errors import UnknownNameError
-    from .motions import list_motions
+    from .motions import list_motions, motion_options
 
     console, known = _console(), list_motions()
     if name is None:
@@ -153,8 +154,11 @@ def print_motions(name: str | None = None) -> None:
     if found is None:
         raise UnknownNameError("ground motion", name, [m.name for m in known])
     console.print(f"[bold]{found.name}[/]: {found.title}")
-    chosen = ", ".join(found.options) or "none"
-    console.print(f"options, each as --set key=value: {chosen}")
+    chosen = motion_options(found.name)
+    table = Table("option", "default", "unit", "source", title="Options, each as --set key=value")
+    for option in chosen:
+        table.add_row(*map(escape, option))
+    console.print(table if chosen else "options: none")
     if found.remedy:
         console.print(f"not installed: {found.remedy}", markup=False)
 

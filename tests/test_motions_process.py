@@ -1,7 +1,11 @@
 """Targets: consistent derivatives, exact resampling, rest at both ends, and refusal of what does not fit."""
 
+import re
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lhpost6_pin.errors import MotionError, OutOfRangeError
 from lhpost6_pin.motions import (
@@ -16,6 +20,7 @@ from lhpost6_pin.motions import (
     make_target,
     with_scale,
 )
+from lhpost6_pin.motions.limits import _round_down
 
 RATE = 2048.0
 WIDE = MotionLimits(np.full(6, 1e6), np.full(6, 1e6), np.full(6, 1e6))
@@ -189,12 +194,15 @@ def test_an_over_range_target_names_axis_value_limit_time_and_the_scale_that_fit
     message = str(caught.value)
     # velocity is 1 m pi/s against 1, displacement 1 m against 0.3: scale 2 x 0.3 = 0.6
     for part in (
-        "x displacement 1 m against 0.3 m",
-        "x velocity 3.142 m/s against 1 m/s",
-        "(sample ",
-        "fits is 0.6",
+        "x displacement 1 m against 0.3 m at t = ",
+        "x velocity 3.142 m/s against 1 m/s at t = ",
+        "The largest scale that fits is 0.6; beyond",
     ):
         assert part in message
+    places = re.findall(r"t = ([\d.]+) s \(sample (\d+)\)", message)
+    assert len(places) == 2
+    for time, sample in places:
+        assert float(time) == pytest.approx(int(sample) / RATE, abs=5e-4)  # three decimals
     fitting = with_scale(target, largest_scale(target, limits))
     assert check_limits(fitting, limits).highest[2] == pytest.approx(1.0, abs=0.02)
     with pytest.raises(OutOfRangeError):
@@ -217,12 +225,84 @@ def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
         length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0  # a leg across the motion, 3 m long
         return LegUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 0.02)
 
-    with pytest.raises(OutOfRangeError, match="H1 leg stroke") as caught:
+    with pytest.raises(
+        OutOfRangeError, match=r"H1 leg stroke \d+(\.\d)? % of its stroke at t = .* s \(sample"
+    ) as caught:
         check_limits(target, WIDE, legs)
+    # closed form: sqrt(9.25) - 3 over 0.02 is 206.9 %
+    assert "H1 leg stroke 206.9 %" in str(caught.value)
     # closed form: (0.5 s)^2 = 3.02^2 - 9, so s = 0.6940, rounded down
     assert "fits is 0.694" in str(caught.value) or "fits is 0.693" in str(caught.value)
     fits = largest_scale(target, WIDE, legs)
     assert check_limits(with_scale(target, fits), WIDE, legs).utilisation["leg stroke"]["H1"] <= 1
+
+
+def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_legs_by_quantity():
+    motion = find_motion("sfu-like")
+    limits = MotionLimits(np.full(6, 1e-3), np.full(6, 1e-3), np.full(6, 1e-3))  # all 18 exceeded
+    names = tuple(f"H{i}" for i in range(1, 5))
+
+    def legs(displacement: np.ndarray, velocity: np.ndarray) -> LegUtilisation:
+        share = np.abs(velocity[:, :1]) * np.array([50.0, 90.0, 70.0, 1e-3])
+        return LegUtilisation(share, names, 100 * np.abs(displacement[:, :1]) * np.array([[1.0, 2.0, 0.0, 0.0]]))
+
+    target = make_target(motion)
+    with pytest.raises(OutOfRangeError) as caught:
+        check_limits(target, limits, legs)
+    first, _, rest = str(caught.value).partition("; beyond the limits: ")
+    assert re.fullmatch(r"sfu-like at scale 1 is more than .*\. The largest scale that fits is [\d.e-]+", first)
+    clauses = rest.split("; ")
+    assert len(clauses) == 5
+    assert {clause.split(" ")[1] for clause in clauses[:3]} == {"displacement", "velocity", "acceleration"}
+    assert all(clause.count("(sample ") == 1 and clause.count(" t = ") == 1 for clause in clauses)
+    for clause in clauses[:3]:  # the worst in full, the five other axes by name
+        worst, _, others = clause.partition(", also ")
+        assert {worst.split(" ")[0], *others.split(", ")} == set(AXES) and " against 0.001 " in worst
+    stroke, velocity = clauses[3:]
+    peak = np.abs(target.displacement[:, 0])
+    assert stroke.startswith(
+        f"H2 leg stroke {2e4 * peak.max():.4g} % of its stroke at t = {peak.argmax() / RATE:.3f} s"
+    )
+    assert stroke.endswith(", also H1")
+    speed = np.abs(target.velocity[:, 0])
+    assert velocity.startswith(f"H2 leg velocity {9000 * speed.max():.4g} % of what its valves can give at t = ")
+    assert velocity.endswith(f"(sample {speed.argmax()}), also H3, H1")  # H4 is within its own
+
+
+@pytest.mark.parametrize("scale", [1e-320, 1e-300, 1e-12, 1e12, 1e150, 1e290])
+def test_the_scale_that_fits_does_not_depend_on_the_scale_that_was_asked(scale):
+    motion = find_motion("sine", amplitude=0.5, period=2.0)
+    limits = limited(displacement=("x", 0.3))
+
+    def legs(displacement: np.ndarray, velocity: np.ndarray) -> LegUtilisation:
+        length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0
+        return LegUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 2.0)
+
+    target = make_target(motion, scale=scale)
+    if scale > 1:
+        with pytest.raises(OutOfRangeError) as caught:
+            check_limits(target, limits, legs)
+        assert len(str(caught.value)) < 600 and "scale that fits is 0.6;" in str(caught.value)
+        assert "H1 leg stroke" in str(caught.value)
+    else:
+        check_limits(target, limits, legs)
+    # below 1e-307 the samples themselves have lost their digits: no scale is too large that can be told
+    assert largest_scale(target, limits, legs) == (0.6 if scale > 1e-305 else np.inf)
+
+
+@pytest.mark.parametrize("scale", [1e306, -1e308])
+def test_a_scale_too_large_to_compute_with_is_refused_as_such(scale):
+    for name in ("sfu-like", "ridgecrest-ccc"):
+        with pytest.raises(MotionError, match=f"{name}: at scale .*; give a smaller scale"):
+            make_target(find_motion(name), scale=scale)
+
+
+@given(st.floats(min_value=1e-300, max_value=1e300))
+def test_a_scale_is_rounded_down_to_three_digits(value):
+    found = _round_down(value)
+    # a part in 1e6 up is the tolerance of the limits; three digits are at worst a hundredth
+    assert 0.99 * value <= found <= value * (1 + 2e-6)
+    assert float(f"{found:.2e}") == found
 
 
 def test_a_still_target_fits_at_any_scale():

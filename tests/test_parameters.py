@@ -143,7 +143,7 @@ BAD = {
     "text for a number": (r"value = 9.80665", "value = '9.8'", "platen.gravity: value '9.8' is not a number"),
     "a truth for a number": (r"value = 9.80665", "value = true", "platen.gravity: value True is not a number"),
     "a vector for a number": (r"value = 9.80665", "value = [9.8, 0.0]", "platen.gravity: .*should be one number"),
-    "a short vector": (r"\[6.19, 0.48, -1.25\]", "[6.19, 0.48]", "H1.platen_point: .*should be 3 numbers"),
+    "a short vector": (r"\[6.19, 0.48, -1.25\]", "[6.19, 0.48]", "H1.platen_point: sd .* has not the shape"),
     "a number without unit": (r"^gravity = .*", "gravity = 9.8", "platen.gravity = 9.8 has no unit"),
     "a negative deviation": (r"rel_sd = 0.1 ", "rel_sd = -0.1 ", "standard deviation .* is negative"),
     "a mount that is none": (r'^mount = "swivel"', 'mount = "glued"', "horizontal.mount = 'glued'; .*swivel, bearing"),
@@ -334,7 +334,7 @@ def test_overriding_parameters_leaves_those_given_alone():
 def test_standard_deviation_is_in_the_units_of_the_value():
     parameters = load_parameters("lhpost6")
     assert parameters["hydraulics.bulk_modulus"].sd == pytest.approx(89.6e6)  # rel_sd 0.1
-    assert parameters["platen.centre_of_gravity"].sd == 0.05
+    assert parameters["platen.centre_of_gravity"].sd == (0.01, 0.01, 0.05)
     assert parameters["platen.mass"].sd == pytest.approx((2521.5, 2520.9, 2616.3))
     assert parameters["platen.gravity"].sd is None
 

@@ -254,7 +254,93 @@ def test_what_was_exceeded_is_named_in_the_verdict(tmp_path):
     for name in ("x displacement", "H1 displacement", "spool V6"):
         assert name in summary.verdict
     assert "y displacement" not in summary.verdict
+    assert "within all given limits" not in summary.verdict
     assert 'class="bar over"' in page
+
+
+def test_the_verdict_leads_with_clipped_spools(tmp_path):
+    record = make_record()
+    record["spool_command"][100:104, 9] = -1.0
+    record.attrs["spool_values_clipped"] = 4
+    summary, _ = report(tmp_path, record, limits=LIMITS)
+    share = 100 * 4 / record.sizes["time"]
+    assert summary.verdict.startswith(
+        f"4 spool commands were clipped: spool V6 {share:.3g}\N{NO-BREAK SPACE}% of the time."
+    )
+    assert "within all given limits" in summary.verdict and summary.level == "bad"
+    record.attrs["spool_values_clipped"] = 0
+    assert report(tmp_path, record)[0].verdict.startswith("Spools were at the limit of their stroke: spool V6 ")
+    clean, _ = report(tmp_path, make_record(), limits=LIMITS)
+    assert "within all given limits" in clean.verdict and "clipped" not in clean.verdict
+    assert clean.level == "good"
+
+
+@pytest.mark.parametrize(("share", "beyond"), [(0.9995, False), (1.0005, False), (1.002, True)])
+def test_a_peak_counts_as_beyond_its_limit_from_a_thousandth_on(tmp_path, share, beyond):
+    record = make_record()
+    peak = float(np.abs(record["platen_displacement"].values[:, 0]).max())
+    summary, page = report(tmp_path, record, limits={"displacement": [peak / share] + [1.0] * 5})
+    found = re.search("Beyond a limit: x displacement \\((.*) of its limit\\)", summary.verdict)
+    assert bool(found) == beyond == ("within all given limits" not in summary.verdict)
+    assert beyond == (summary.level == "bad") == (summary.headlines[1].level == "bad") == ("bar over" in page)
+    if found:
+        assert found[1] == "100.2\N{NO-BREAK SPACE}%"  # not the 100 % that it would be in three digits
+
+
+PULL = {"actuator_force": [4.12e6] * 4 + [3.0e6] * 6, "actuator_pull": [2.57e6] * 4 + [0.0] * 6}
+
+
+def forced(pushed: float, pulled: float, actuator: int) -> xr.Dataset:
+    record = make_record()
+    force = np.full_like(record["actuator_force"].values, 1e5)
+    force[10, actuator], force[20, actuator] = pushed, -pulled
+    record["actuator_force"] = (("time", "actuator"), force)
+    return record
+
+
+@pytest.mark.parametrize(
+    ("actuator", "pushed", "pulled", "said"),
+    [
+        (0, 4.0e6, 2.5e6, ""),
+        (0, 4.2e6, 2.5e6, "H1 push (101.9\N{NO-BREAK SPACE}% of its limit)"),
+        (0, 4.0e6, 3.0e6, "H1 pull (116.7\N{NO-BREAK SPACE}% of its limit)"),
+        (9, 2.9e6, -1e4, ""),
+        (9, 2.9e6, 2e3, ""),  # a pull within a thousandth of its push is rounding
+        (9, 2.9e6, 1e5, "V6 pull (it can give none)"),
+        (9, 3.1e6, 0.0, "V6 push (103.3\N{NO-BREAK SPACE}% of its limit)"),
+    ],
+)
+def test_push_and_pull_have_limits_of_their_own(tmp_path, actuator, pushed, pulled, said):
+    summary, page = report(tmp_path, forced(pushed, pulled, actuator), limits=PULL)
+    assert summary.verdict.partition("Beyond a limit: ")[2].removesuffix(".") == said
+    row = re.search(
+        f'<th scope="row">{ACTUATORS[actuator]}</th>(<td>.*?)</tr>', page[page.index("Forces and strokes") :]
+    )
+    cells = re.findall("<td>(.*?)</td>", row[1])
+    assert cells[0] == number(max(pushed, 1e5) / 1e6) and cells[2] == number(max(pulled, 0.0) / 1e6)
+    assert ("impossible" in cells[3]) == ("none" in said)
+    assert ("over" in cells[1] or "over" in cells[3]) == bool(said)
+
+
+def test_force_limits_are_drawn_with_their_sign_where_the_forces_come_near_them(tmp_path):
+    def drawn(record: xr.Dataset, **limits: list[float]) -> list[float]:
+        layout = Reader(report(tmp_path, record, limits=limits)[1]).figures["plot-force"]["layout"]
+        return [shape["y0"] for shape in layout["shapes"]]
+
+    assert drawn(forced(4e6, 2.5e6, 0), **PULL) == pytest.approx([4.12, -2.57])
+    assert drawn(forced(4e6, 1e5, 0), **PULL) == pytest.approx([4.12])
+    assert drawn(forced(4e5, 1e5, 0), **PULL) == []
+    assert drawn(forced(4e6, 2.5e6, 0), actuator_force=PULL["actuator_force"]) == []
+
+
+def test_without_a_limit_of_pulling_the_magnitude_counts_and_without_a_number_nothing(tmp_path):
+    record = forced(1e6, 4.2e6, 0)
+    both, _ = report(tmp_path, record, limits={"actuator_force": [4.12e6] * 10})
+    assert "H1 force (101.9" in both.verdict
+    none, page = report(tmp_path, record, limits={**PULL, "actuator_pull": [np.nan] * 10})
+    assert "Beyond" not in none.verdict and "nan" not in " ".join(Reader(page).words).lower()
+    short, _ = report(tmp_path, record, limits={"actuator_pull": [2.57e6]})
+    assert "H1 pull (163.4" in short.verdict
 
 
 def test_poor_tracking_is_not_called_good(tmp_path):
@@ -263,6 +349,15 @@ def test_poor_tracking_is_not_called_good(tmp_path):
     summary, _ = report(tmp_path, record)
     assert summary.level == "attention"
     assert "did not follow" in summary.verdict
+
+
+def test_a_target_too_small_to_square_is_not_judged(tmp_path):
+    record = make_record()
+    for quantity in ("displacement", "velocity", "acceleration"):
+        record[f"reference_{quantity}"] = 1e-320 * record[f"reference_{quantity}"]
+    summary, _ = report(tmp_path, record)  # warnings are errors here
+    assert "cannot be judged" in summary.verdict
+    assert all(np.isnan(row.rrmse) for row in summary.tracking)
 
 
 def test_a_table_with_one_axis_and_one_actuator_is_reported_too(tmp_path):
@@ -425,6 +520,8 @@ def test_a_bar_never_runs_over_its_box_and_says_its_per_cent():
     assert "width:100.0%" in bar(1.7) and "170 %" in bar(1.7) and "over" in bar(1.7)
     assert "width:50.0%" in bar(0.5) and "within" in bar(0.5)
     assert bar(float("nan")) == "–"
+    assert "impossible" in bar(float("inf")) and "width:100.0%" in bar(float("inf"))
+    assert "bar over" in bar(1.0) and "bar near" in bar(1.0, 1e-3) and "bar over" in bar(1.002, 1e-3)
 
 
 PROBE = """<script>

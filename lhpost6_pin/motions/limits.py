@@ -94,8 +94,8 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
 def largest_scale(target: Target, limits: MotionLimits, leg_check: LegCheck | None = None) -> float:
     """Largest scale of the target's motion within all limits, rounded down to three digits.
 
-    Infinity for a target that does not move, or less than a floating-point number can resolve. Leg lengths are not linear in the pose, so with `leg_check`
-    the scale is found by bisection below the one that the axes allow.
+    Infinity for a target that does not move, or less than a floating-point number can resolve. Leg lengths are
+    not linear in the pose, so with `leg_check` the scale is found by bisection below the one the axes allow.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..errors import MotionError
 from .motion import AXES
 from .toml import si_unit, values_of
@@ -61,24 +63,25 @@ def _checked(where: str, key: str, default: Any, value: Any) -> Any:
         return numbers * len(default) if len(numbers) == 1 else numbers
     least = "zero or more" if key in _MAY_BE_ZERO else "above zero"
     kind = "whole" if key in _WHOLE else "finite"
-    number = math.nan if isinstance(value, str) else (_numbers(value) or [math.nan])[0]
+    number = math.nan if isinstance(value, str) else _number(value)
     possible = math.isfinite(number) and (number > 0 or (number == 0 and key in _MAY_BE_ZERO))
     if not possible or (key in _WHOLE and not number.is_integer()):
         raise MotionError(f"{problem} a {kind} number, {least}")
     return int(number) if key in _WHOLE else value
 
 
+def _number(value: Any) -> float:
+    """Value as a number; not-a-number where it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
 def _numbers(value: Any) -> list[float]:
-    """Numbers of a scalar, a sequence or a text with commas; empty where there are none."""
-    items = value.split(",") if isinstance(value, str) else value
-    try:
-        return [float(item) for item in items]
-    except (TypeError, ValueError, OverflowError):
-        pass
-    try:
-        return [float(items)]
-    except (TypeError, ValueError, OverflowError):
-        return []
+    """Numbers of a scalar, a sequence or a text with commas."""
+    items = value.split(",") if isinstance(value, str) else np.ravel(np.asarray(value, dtype=object))
+    return [_number(item) for item in items]
 
 
 def _text(value: Any) -> str:

@@ -151,7 +151,7 @@ def bar(fraction: float, tolerance: float = 0.0) -> Markup:
         return text("–")
     level = "over" if fraction >= 1.0 + tolerance else "near" if fraction >= 0.8 else "within"
     width = min(100.0 * fraction, 100.0)
-    percent = f"{number(100.0 * fraction, 3 if fraction >= 1.0 else 2)} %" if fraction < np.inf else "impossible"
+    percent = f"{number(100.0 * fraction, 3 if fraction >= 1.0 else 2)} %" if fraction < float("inf") else "impossible"
     return Markup(
         f'<span class="bar {level}"><span class="fill" style="width:{width:.1f}%"></span></span>'
         f'<span class="percent">{percent}</span>'

@@ -156,7 +156,9 @@ def _with_force_limits(row: Row, record: xr.Dataset, limits: Limits) -> Row:
     labels = [str(label) for label in record["actuator"].values]
     own = [labels.index(trace.name) for trace in row.traces]
     lines = {}
-    for sign, use, name in zip((1.0, -1.0), force_use(record, limits), ("actuator_force", "actuator_pull"), strict=True):
+    for sign, use, name in zip(
+        (1.0, -1.0), force_use(record, limits), ("actuator_force", "actuator_pull"), strict=True
+    ):
         bounds = limits.get(name, np.array([]))
         level = set(bounds[own]) if max(own) < len(bounds) else set()
         if len(level) == 1 and np.nanmax(use.share[own], initial=0.0) >= OFF_SCALE:

@@ -28,6 +28,7 @@ __all__ = [
 ]
 
 QUANTITIES = ("displacement", "velocity", "acceleration")
+SQUARED = float(np.sqrt(np.finfo(np.float64).tiny))  # what is smaller has no square to divide by
 ASKED = 1e-3  # an axis is asked to move if its target reaches this share of the largest one (1 rad as 1 m)
 DRIFT_BAND = 0.2  # [Hz] what the displacement error does below this is called drift
 FEWEST = 64  # samples, below which no delay is sought and no tracking judged
@@ -113,7 +114,7 @@ def track(record: xr.Dataset, quantity: str) -> list[Tracking]:
     found = []
     for k, axis in enumerate(map(str, record["axis"].values)):
         whole, late, without, shifted = np.nan, np.nan, np.nan, None
-        if axis in asked and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > 0.0:
+        if axis in asked and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
             whole = float(rrmse(target[:, k], achieved[:, k]))
             late = float(delay(target[:, k], achieved[:, k], step, longest))
             shifted = align(achieved[:, k], late, step) if np.isfinite(late) else achieved[:, k]

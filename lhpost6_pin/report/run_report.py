@@ -110,8 +110,9 @@ def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
         if name not in LIMIT_NAMES:
             raise UnknownNameError("limit", name, LIMIT_NAMES)
     values = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in limits.items()}
-    none_at_all = {name: name == "actuator_pull" for name in values}  # there 0 is a limit
-    return {n: np.where((v > 0.0) | ((v == 0.0) & none_at_all[n]), v, np.nan) for n, v in values.items()}
+    least = {"actuator_pull": 0.0}  # elsewhere 0 is no limit
+    tiny = np.finfo(float).tiny
+    return {name: np.where(value >= least.get(name, tiny), value, np.nan) for name, value in values.items()}
 
 
 def _gaps(record: xr.Dataset) -> list[str]:

@@ -230,8 +230,8 @@ def open_loop(
 
     table = _mount(_machine(machine, override), specimen, specimen_at, locked)
     measured = load_record(record, {"actuator": table.actuator_names})
-    test = str(measured.attrs.get("test", "")) or record.stem
-    name = f"{Path(test).stem}_open_loop"
+    test = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record"))
+    name = f"{test}_open_loop"
     folder = out or Path("out") / name
     if (folder / "record.nc").resolve() == record.resolve():
         raise RecordError(f"{record} would be replaced by its own replay; choose another folder with --out")

@@ -82,6 +82,8 @@ def make_frames(
         motion = np.asarray(motion, float)
         if motion.shape != (time.size, 6) or not np.isfinite(motion).all():
             raise RecordError(f"{name} must be {time.size} samples of six finite numbers; it is {motion.shape}")
+        if np.abs(motion).max(initial=0.0) > math.pi * 1e6 / amplify:
+            raise ParameterError(f"amplified {amplify:g} times {name} leaves every picture; amplify less")
         return amplify * np.stack([np.interp(moments, time, column) for column in motion.T], axis=1)
 
     asked = None if reference is None else sampled(reference, "reference_displacement")

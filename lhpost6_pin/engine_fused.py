@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compiled import compiled, compiled_inline
-from .control.loop import control_step
+from .control.loop import control_sample
 from .errors import SimulationError
 from .plant import Plant
 from .rigid_body import platen_inertia
@@ -19,13 +19,11 @@ from .schemes import (
     TAU,
     V_SEEN,
     A,
-    S,
     V,
     dexp_inverse,
     kick,
     open_step,
     rates_stage,
-    spool_windows,
     staggered_stage,
 )
 
@@ -290,7 +288,6 @@ def run_fused(
     """
     nu = command.shape[1]
     window = np.zeros((steps, nu))
-    measured = np.zeros(nu)
     work = np.zeros((2, 6))
     a = np.zeros(motion.shape[1])
     per_sample = spool.shape[0] // max(1, command.shape[0])
@@ -318,13 +315,12 @@ def run_fused(
                     force,
                     motion,
                 )
-            for i in range(nu):
-                measured[i] = force[fed[i], 0]
-            clipped += control_step(
+            clipped += control_sample(
                 sample,
                 reference,
-                port[S],
-                measured,
+                port,
+                force,
+                fed,
                 legs,
                 body,
                 axes,
@@ -332,9 +328,11 @@ def run_fused(
                 actuator,
                 balance,
                 memory,
-                command[sample],
+                command,
+                delays,
+                1.0 / (steps * dt),
+                window,
             )
-            spool_windows(command, 0, sample, delays, 1.0 / (steps * dt), window)
         else:
             for j in range(steps):
                 row = sample * per_sample + j * per_sample // steps

@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control import Controller
-from .control.loop import ACTUATOR, AXIS, control_step
+from .control.loop import ACTUATOR, AXIS, control_sample_flat
 from .engine_fused import inertia_table, run_fused
 from .engine_pinocchio import evaluate, make_stepper, settle
 from .equilibrium import Equilibrium, hydraulic_rows
 from .errors import SimulationError
 from .plant import Plant, State
-from .schemes import SCHEMES, A, S, V, spool_windows
+from .schemes import SCHEMES, A, V
 from .workspace import Workspace, make_workspace
 
 __all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "OpenLoop", "Run", "simulate"]
@@ -214,29 +214,17 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     advance = make_stepper(plant, job.scheme, job.dt)
     window = np.zeros((steps, plant.spools))
     fed = hydraulic_rows(plant)
-    memory = drive.controller.fresh_memory() if isinstance(drive, ClosedLoop) else np.zeros((1, 1))
+    if isinstance(drive, ClosedLoop):
+        loop, memory = drive.controller, drive.controller.fresh_memory()
+        legs, body, axis, actuator = (t.view(float) for t in (plant.legs, plant.body, loop.axis, loop.actuator))
+        tables = (drive.reference, ws.port, ws.force, fed, legs, body, plant.axes, axis, actuator, loop.balance)
     held = len(job.spool) == job.samples
     clipped = 0
     for sample in range(job.samples):
         if isinstance(drive, ClosedLoop):
             if job.scheme != "semi_implicit":  # the other schemes leave the ports of their last stage behind
                 evaluate(plant, ws, window[0])
-            loop = drive.controller
-            clipped += control_step(
-                sample,
-                drive.reference,
-                ws.port[S],
-                ws.force[fed, 0],
-                plant.legs,
-                plant.body,
-                plant.axes,
-                loop.axis,
-                loop.actuator,
-                loop.balance,
-                memory,
-                command[sample],
-            )
-            spool_windows(command, 0, sample, plant.delays, float(SAMPLE_RATE), window)
+            clipped += control_sample_flat(sample, *tables, memory, command, plant.delays, float(SAMPLE_RATE), window)
         elif held:
             window[:] = job.spool[sample]
         else:

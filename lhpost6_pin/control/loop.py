@@ -15,9 +15,11 @@ import numpy as np
 
 from ..compiled import compiled
 from ..laws.orifice import spool_for_opening
+from ..ports import BODY, LEG
 from ..pose import gauss_newton_step, leg_jacobian
+from ..schemes import S, spool_windows
 
-__all__ = ["ACTUATOR", "AXIS", "MEMORY_ROWS", "control_step"]
+__all__ = ["ACTUATOR", "AXIS", "MEMORY_ROWS", "control_sample", "control_sample_flat", "control_step"]
 
 AXIS = np.dtype(
     [
@@ -98,3 +100,61 @@ def control_step(sample, reference, displacement, force, legs, body, axes, axis,
             spool = 1.0 if spool > 0.0 else -1.0
         command[i] = spool
     return clipped
+
+
+@compiled
+def control_sample(
+    sample,
+    reference,
+    port,
+    force,
+    fed,
+    legs,
+    body,
+    axes,
+    axis,
+    actuator,
+    balance,
+    memory,
+    command,
+    delays,
+    rate,
+    window,
+):
+    """One controller sample of a run: measure, command, and the delayed spools of its model steps.
+
+    port and force are the plant's (see `schemes`, `stage`), fed (n_actuators,) the actuators' rows of force. Fills row
+    `sample` of command (n, n_actuators) and window (n_steps, n_actuators). Returns how many commands were clipped.
+    """
+    measured = np.empty(fed.size)
+    for i in range(fed.size):
+        measured[i] = force[fed[i], 0]
+    clipped = control_step(
+        sample, reference, port[S], measured, legs, body, axes, axis, actuator, balance, memory, command[sample]
+    )
+    spool_windows(command, 0, sample, delays, rate, window)
+    return clipped
+
+
+@compiled
+def control_sample_flat(
+    sample,
+    reference,
+    port,
+    force,
+    fed,
+    legs,
+    body,
+    axes,
+    axis,
+    actuator,
+    balance,
+    memory,
+    command,
+    delays,
+    rate,
+    window,
+):
+    """`control_sample` with its tables as plain numbers, which are cheaper to hand over from Python than records."""
+    tables = legs.view(LEG), body.view(BODY), axes, axis.view(AXIS), actuator.view(ACTUATOR)
+    return control_sample(sample, reference, port, force, fed, *tables, balance, memory, command, delays, rate, window)

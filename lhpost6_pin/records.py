@@ -133,8 +133,7 @@ def save_record(dataset: xr.Dataset, path: Path | str) -> None:
     plain = dataset.drop_encoding()
     encoding = {name: {"_FillValue": None} for name in plain.data_vars}
     # through memory: HDF5 that meets a full disk crashes the process when it closes
-    content = plain.to_netcdf(engine="h5netcdf", encoding=encoding)
-    with write_whole(path) as beside:
+    with write_whole(path) as beside, memoryview(plain.to_netcdf(engine="h5netcdf", encoding=encoding)) as content:
         beside.write_bytes(content)
 
 

@@ -88,14 +88,10 @@ def rehearse(
         **options,
     )
     run = _usable(run)
-    asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in target_motion(target)))
+    motion = (target.displacement, target.velocity, target.acceleration)
+    asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
     facts = {"scale": target.reference.scale, "motion": target.reference.motion, "source": target.reference.source}
     return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, asked))
-
-
-def target_motion(target: Target) -> PlatenMotion:
-    """The target's displacement, velocity and acceleration."""
-    return PlatenMotion(target.displacement, target.velocity, target.acceleration)
 
 
 def replay(

@@ -20,11 +20,6 @@ def table():
     return {line.name: line for line in capacity_table(load_machine())}
 
 
-@pytest.fixture(scope="module")
-def plant():
-    return make_plant(load_machine())
-
-
 @pytest.mark.parametrize("name, within", [("peak force X", 0.01), ("peak force Y", 0.01), ("peak force Z up", 0.01)])
 def test_peak_forces_are_those_of_table_2_2(table, name, within):
     """Supply against return in every actuator; the table took 20.34 MPa, Table 6.1 has 20.15 MPa between them."""

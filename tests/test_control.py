@@ -7,26 +7,15 @@ import pytest
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.control.loop import control_step
-from lhpost6_pin.equilibrium import find_equilibrium, hydraulic_rows, unloaded_speeds
+from lhpost6_pin.equilibrium import hydraulic_rows, unloaded_speeds
 from lhpost6_pin.errors import ParameterError
 from lhpost6_pin.laws.orifice import opening, spool_for_opening
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
 from lhpost6_pin.pose import leg_displacements, platen_motion
 from lhpost6_pin.rehearse import rehearse
 from lhpost6_pin.signals import align, delay, rrmse
 from lhpost6_pin.simulate import SAMPLE_RATE, OpenLoop, simulate
-
-
-@pytest.fixture(scope="module")
-def plant():
-    return make_plant(load_machine())
-
-
-@pytest.fixture(scope="module")
-def rest(plant):
-    return find_equilibrium(plant)
 
 
 @pytest.fixture(scope="module")

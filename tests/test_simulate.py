@@ -29,16 +29,6 @@ PENDULUM = DATA / "pendulum.urdf"
 
 
 @pytest.fixture(scope="module")
-def plant():
-    return make_plant(load_machine())
-
-
-@pytest.fixture(scope="module")
-def rest(plant):
-    return find_equilibrium(plant)
-
-
-@pytest.fixture(scope="module")
 def reference():
     return load_record(REFERENCE)
 

@@ -10,14 +10,12 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from .plant import Plant
-from .simulate import ClosedLoop, OpenLoop, Run, simulate
+from .simulate import Drive, Run, simulate
 
 __all__ = ["simulate_many"]
 
 
-def simulate_many(
-    jobs: Sequence[tuple[Plant, OpenLoop | ClosedLoop]], *, samples: int, threads: int = -1, **options: Any
-) -> list[Run]:
+def simulate_many(jobs: Sequence[tuple[Plant, Drive]], *, samples: int, threads: int = -1, **options: Any) -> list[Run]:
     """Run each (plant, drive) with the fused engine; options go to `simulate`. Results keep the order of jobs.
 
     threads = -1 uses all cores. Raises SimulationError as `simulate` does.

@@ -268,8 +268,9 @@ def run_fused(
     axis,
     actuator,
     balance,
+    canceller,
     memory,
-    reference,
+    drive,
     command,
     spool,
     every,
@@ -281,8 +282,8 @@ def run_fused(
 ):
     """Run controller samples first..last (exclusive) of `steps` model steps each.
 
-    scheme 0 semi_implicit, 1 euler, 2 rk4. closed: the controller (axis, actuator, balance, memory) fills command
-    (n, nu) from reference; otherwise spool (n * k, nu) drives, k rows a sample. fed (nu,) are the actuators' rows.
+    scheme 0 semi_implicit, 1 euler, 2 rk4. closed: the controller (axis, actuator, balance, canceller, memory) fills
+    command (n, nu) from drive; otherwise spool (n * k, nu) drives, k rows a sample. fed (nu,) are the actuators' rows.
     Every `every`-th sample is written to out_*. The other arrays are those of `Plant` and `Workspace`.
     Returns (status, samples done, commands clipped).
     """
@@ -315,18 +316,22 @@ def run_fused(
                     force,
                     motion,
                 )
+                platen_acceleration(inertia, axes, frame, motion[TAU], work, motion[A])
             clipped += control_sample(
                 sample,
-                reference,
+                drive,
                 port,
                 force,
                 fed,
+                frame,
+                motion,
                 legs,
                 body,
                 axes,
                 axis,
                 actuator,
                 balance,
+                canceller,
                 memory,
                 command,
                 delays,

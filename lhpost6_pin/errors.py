@@ -1,6 +1,7 @@
 """Errors that a user can act on: each message names the file, channel or key and says what to do."""
 
 __all__ = [
+    "ControllerError",
     "LhpostError",
     "MotionError",
     "OutOfRangeError",
@@ -17,6 +18,10 @@ class LhpostError(Exception):
 
 class ParameterError(LhpostError):
     """A machine or controller file has a missing, unknown or impossible value; the message names the key."""
+
+
+class ControllerError(LhpostError):
+    """A user's own controller cannot be loaded, or returned no command; the message names it and the sample."""
 
 
 class RecordError(LhpostError):

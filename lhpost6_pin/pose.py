@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .errors import RecordError
 from .plant import Plant
 from .ports import evaluate_ports
@@ -192,6 +192,42 @@ def leg_jacobian(pose, legs, body, s, J, B, frame, out):
     frame_of_pose(pose, body, frame)
     evaluate_ports(frame, legs, body, s, J, B)
     pose_jacobian(pose, body, frame, J, out)
+
+
+@compiled_inline
+def pose_acceleration(frame, body, axes, v, a, out):
+    """Acceleration of C in {s} and of the Euler angles, out (6,), of a platen with velocity v and acceleration a.
+
+    v, a (nv,) as a plant integrates them, frame its pose. What accelerometers on the platen tell its controller;
+    `platen_motion` does the same for whole records (Eqs. 3-11, 3-18).
+    """
+    if axes.size != 6:
+        out[:] = 0.0
+        out[axes[0]] = a[0]
+        return
+    rho = body[0].rho_c
+    wx, wy, wz = v[3], v[4], v[5]
+    cx = v[0] + wy * rho[2] - wz * rho[1]
+    cy = v[1] + wz * rho[0] - wx * rho[2]
+    cz = v[2] + wx * rho[1] - wy * rho[0]
+    ax = a[0] + a[4] * rho[2] - a[5] * rho[1] + wy * cz - wz * cy
+    ay = a[1] + a[5] * rho[0] - a[3] * rho[2] + wz * cx - wx * cz
+    az = a[2] + a[3] * rho[1] - a[4] * rho[0] + wx * cy - wy * cx
+    for k in range(3):
+        out[k] = frame[k, 0] * ax + frame[k, 1] * ay + frame[k, 2] * az
+    sb = -frame[2, 0]
+    cb = np.sqrt(1.0 - sb * sb)
+    sa, ca = frame[2, 1] / cb, frame[2, 2] / cb
+    dg = (sa * wy + ca * wz) / cb
+    db = ca * wy - sa * wz
+    da = wx + sb * dg
+    # alpha - (d b_J_E/dt) rates, then b_J_E solved for the second derivatives
+    tx = a[3] + cb * db * dg
+    ty = a[4] + sa * da * db - (cb * ca * da - sb * sa * db) * dg
+    tz = a[5] + ca * da * db + (cb * sa * da + sb * ca * db) * dg
+    out[5] = (sa * ty + ca * tz) / cb
+    out[4] = ca * ty - sa * tz
+    out[3] = tx + sb * out[5]
 
 
 @compiled

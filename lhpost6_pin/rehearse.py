@@ -10,7 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .capacity import make_leg_check
-from .control import LoopSettings, make_controller
+from .control import ControllerSettings, make_controller
+from .control.plug import UserController
 from .equilibrium import find_equilibrium, hydraulic_rows
 from .errors import OutOfRangeError, RecordError, SimulationError
 from .machine import Machine
@@ -21,7 +22,7 @@ from .plant import Plant, State, make_plant
 from .pose import PlatenMotion
 from .records import require
 from .signals import resample_band_limited
-from .simulate import SAMPLE_RATE, ClosedLoop, OpenLoop, Progress, Run, simulate
+from .simulate import SAMPLE_RATE, ClosedLoop, Drive, OpenLoop, PluggedLoop, Progress, Run, simulate
 
 __all__ = ["SimulatedTest", "rehearse", "replay", "target_within_limits", "with_valves"]
 
@@ -59,7 +60,7 @@ def target_within_limits(plant: Plant, target: Target) -> LimitsSummary:
 def rehearse(
     machine: Machine,
     target: Target,
-    settings: LoopSettings,
+    settings: ControllerSettings | UserController,
     *,
     attrs: Mapping[str, Any],
     beyond_limits: bool = False,
@@ -69,26 +70,24 @@ def rehearse(
 ) -> SimulatedTest:
     """Reproduce a target in closed loop from rest; options go to `simulate` (scheme, steps_per_second, engine).
 
+    settings are the 469D's, or a user's own controller.
+
     Raises OutOfRangeError if the target is more than the machine can give, unless `beyond_limits` asks to try all the
     same; SimulationError for options that cannot be.
     """
     plant = make_plant(machine)
     if not beyond_limits:
         target_within_limits(plant, target)
-    if settings.rate != SAMPLE_RATE:
-        raise SimulationError(f"controller rate {settings.rate:g} Hz is not the samples' {SAMPLE_RATE} Hz")
     rest = find_equilibrium(plant)
-    reference = np.hstack([target.displacement, target.velocity])
-    run = simulate(
-        plant,
-        ClosedLoop(make_controller(plant, rest, settings), reference, rest),
-        samples=len(reference),
-        record_every=record_every,
-        progress=progress,
-        **options,
-    )
-    run = _usable(run)
     motion = (target.displacement, target.velocity, target.acceleration)
+    drive: Drive
+    if isinstance(settings, ControllerSettings):
+        controller = make_controller(plant, rest, settings)
+        drive = ClosedLoop(controller, controller.drive_for(*motion), rest)
+    else:
+        drive = PluggedLoop(settings, *motion, rest)
+    run = simulate(plant, drive, samples=len(target.time), record_every=record_every, progress=progress, **options)
+    run = _usable(run)
     asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
     facts = {"scale": target.reference.scale, "motion": target.reference.motion, "source": target.reference.source}
     return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, asked))

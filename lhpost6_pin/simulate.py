@@ -3,7 +3,8 @@
     plant = make_plant(load_machine())
     rest = find_equilibrium(plant)
     controller = make_controller(plant, rest, load_controller("lhpost6"))
-    run = simulate(plant, ClosedLoop(controller, reference, rest), samples=len(reference))
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(drive))
 
 The controller's samples are the clock: each is divided into equal model steps. A run that leaves a stroke or diverges
 stops; what was computed is kept, and `Run.trouble` says when, which component, and what to try.
@@ -18,16 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control import Controller
-from .control.loop import ACTUATOR, AXIS, control_sample_flat
+from .control.loop import ACTUATOR, AXIS, CANCELLER, control_sample_flat, sense_flat
+from .control.plug import Sensors, UserController, Wanted, checked_command
 from .engine_fused import inertia_table, run_fused
-from .engine_pinocchio import evaluate, make_stepper, settle
+from .engine_pinocchio import make_stepper, settle
 from .equilibrium import Equilibrium, hydraulic_rows
 from .errors import SimulationError
 from .plant import Plant, State
-from .schemes import SCHEMES, A, V
+from .schemes import SAMPLE_RATE, SCHEMES, A, V, spool_windows
 from .workspace import Workspace, make_workspace
 
-__all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "OpenLoop", "Run", "simulate"]
+__all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis", "simulate"]
 
 log = logging.getLogger(__name__)
 
@@ -37,9 +39,6 @@ Progress = Callable[[float], None]
 
 ENGINES = ("pinocchio", "fused")
 """Engine names; the first is the default."""
-
-SAMPLE_RATE = 2048
-"""Rate of controller samples [Hz] (report, Chapter 5)."""
 
 _CHUNK = 1024
 """Controller samples between two progress reports."""
@@ -56,11 +55,27 @@ class OpenLoop(NamedTuple):
 
 
 class ClosedLoop(NamedTuple):
-    """Drive by a controller that follows `reference` (n, 12): displacement and velocity of C and Euler angles."""
+    """Drive by the 469D: drive (n, 6) goes into its reference generators (`Controller.drive_for`).
+
+    With sine cancellers drive is (n, 12): columns 6 to 11 hold the wanted acceleration of C and Euler angles.
+    """
 
     controller: Controller
-    reference: Array
+    drive: Array
     rest: Equilibrium
+
+
+class PluggedLoop(NamedTuple):
+    """Drive by a user's own controller (`control.plug`) that wants a motion of C and Euler angles, (n, 6) each."""
+
+    controller: UserController
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    rest: Equilibrium
+
+
+Drive = OpenLoop | ClosedLoop | PluggedLoop
 
 
 @dataclass(frozen=True)
@@ -90,7 +105,7 @@ class Run:
 
 def simulate(
     plant: Plant,
-    drive: OpenLoop | ClosedLoop,
+    drive: Drive,
     *,
     samples: int,
     scheme: str = SCHEMES[0],
@@ -106,11 +121,14 @@ def simulate(
     """
     steps = _check(plant, drive, samples, scheme, steps_per_second, engine)
     dt = 1.0 / steps_per_second
-    closed = isinstance(drive, ClosedLoop)
-    start = drive.rest.state if isinstance(drive, ClosedLoop) else drive.start
+    closed = not isinstance(drive, OpenLoop)
+    if isinstance(drive, OpenLoop):
+        start, (spool, clipped) = drive.start, _clip(drive.spool)
+        first = spool[0]
+    else:
+        start, spool, clipped = drive.rest.state, np.zeros((1, plant.spools)), 0
+        first = drive.rest.spool
     ws = make_workspace(plant, start)
-    spool, clipped = _clip(drive.spool) if isinstance(drive, OpenLoop) else (np.zeros((1, plant.spools)), 0)
-    first = drive.rest.spool if isinstance(drive, ClosedLoop) else spool[0]
     log_ = _Log(plant, -(-samples // record_every))
     command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
     status = settle(plant, ws, np.ascontiguousarray(first))
@@ -120,7 +138,7 @@ def simulate(
         status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
     kept = -(-done // record_every)
-    trouble = None if status == 0 else _diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
+    trouble = None if status == 0 else diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
     if trouble:
         log.warning(trouble)
     if clipped:
@@ -161,7 +179,7 @@ class _Log:
         self.spool[at] = spool
 
 
-def _check(plant: Plant, drive: OpenLoop | ClosedLoop, samples: int, scheme: str, rate: int, engine: str) -> int:
+def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, engine: str) -> int:
     if scheme not in SCHEMES:
         raise SimulationError(f"no scheme named {scheme!r}; valid names: {', '.join(SCHEMES)}")
     if engine not in ENGINES:
@@ -181,9 +199,23 @@ def _check(plant: Plant, drive: OpenLoop | ClosedLoop, samples: int, scheme: str
         if not np.all(np.isfinite(drive.spool)):
             at, which = np.argwhere(~np.isfinite(drive.spool))[0]
             raise SimulationError(f"spool of {plant.machine.actuator_names[which]} is not finite at row {at}")
-    elif drive.reference.shape != (samples, 12):
-        raise SimulationError(f"reference has shape {drive.reference.shape}; ({samples}, 12) is needed")
+    elif isinstance(drive, ClosedLoop):
+        columns = 12 if len(drive.controller.canceller) else 6
+        _check_shape("drive", drive.drive, (samples, columns))
+    else:
+        for name in ("displacement", "velocity", "acceleration"):
+            _check_shape(f"wanted {name}", getattr(drive, name), (samples, 6))
+        if engine == "fused":
+            raise SimulationError("the fused engine runs compiled controllers; use engine='pinocchio' for your own")
     return steps
+
+
+def _check_shape(name: str, values: Array, shape: tuple[int, int]) -> None:
+    if values.shape != shape:
+        raise SimulationError(f"{name} has shape {values.shape}; {shape} is needed")
+    if not np.isfinite(values).all():
+        at, axis = np.argwhere(~np.isfinite(values))[0]
+        raise SimulationError(f"{name} is not finite at sample {at}, column {axis}")
 
 
 def _clip(spool: Array) -> tuple[Array, int]:
@@ -195,7 +227,7 @@ class _Job(NamedTuple):
     """A run made ready: what both engines need."""
 
     plant: Plant
-    drive: OpenLoop | ClosedLoop
+    drive: Drive
     ws: Workspace
     log: _Log
     scheme: str
@@ -210,25 +242,15 @@ class _Job(NamedTuple):
 
 def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     """Run all samples step by step; returns (status, samples done, commands clipped)."""
-    plant, drive, ws, steps, command = job.plant, job.drive, job.ws, job.steps, job.command
+    plant, ws, steps = job.plant, job.ws, job.steps
     advance = make_stepper(plant, job.scheme, job.dt)
     window = np.zeros((steps, plant.spools))
-    fed = hydraulic_rows(plant)
-    if isinstance(drive, ClosedLoop):
-        loop, memory = drive.controller, drive.controller.fresh_memory()
-        legs, body, axis, actuator = (t.view(float) for t in (plant.legs, plant.body, loop.axis, loop.actuator))
-        tables = (drive.reference, ws.port, ws.force, fed, legs, body, plant.axes, axis, actuator, loop.balance)
-    held = len(job.spool) == job.samples
+    spools = _spools_from(job)
     clipped = 0
     for sample in range(job.samples):
-        if isinstance(drive, ClosedLoop):
-            if job.scheme != "semi_implicit":  # the other schemes leave the ports of their last stage behind
-                evaluate(plant, ws, window[0])
-            clipped += control_sample_flat(sample, *tables, memory, command, plant.delays, float(SAMPLE_RATE), window)
-        elif held:
-            window[:] = job.spool[sample]
-        else:
-            window = job.spool[sample * steps : (sample + 1) * steps]
+        if job.scheme != SCHEMES[0] and not isinstance(job.drive, OpenLoop):
+            settle(plant, ws, window[0])  # the other schemes leave the ports of their last stage behind
+        clipped += spools(sample, window)
         if sample % job.every == 0:
             job.log.take(sample // job.every, ws, window.sum(axis=0) / steps)
         status = advance(ws, window)
@@ -241,6 +263,45 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     return 0, job.samples, clipped
 
 
+def _spools_from(job: _Job) -> Callable[[int, Array], int]:
+    """Function that fills a sample's window (steps, n_actuators) of spools and returns how many were clipped."""
+    plant, drive, ws, command = job.plant, job.drive, job.ws, job.command
+    fed, rate = hydraulic_rows(plant), float(SAMPLE_RATE)
+    if isinstance(drive, OpenLoop):
+        rows = len(job.spool) // job.samples
+
+        def recorded(sample: int, window: Array) -> int:
+            window[:] = job.spool[sample * rows : (sample + 1) * rows]
+            return 0
+
+        return recorded
+    if isinstance(drive, ClosedLoop):
+        loop, memory = drive.controller, drive.controller.init()
+        state = ws.port, ws.force, fed, ws.frame, ws.motion
+        tables = loop.flat_tables()
+
+        def compiled_loop(sample: int, window: Array) -> int:
+            return control_sample_flat(
+                sample, drive.drive, *state, *tables, memory, command, plant.delays, rate, window
+            )
+
+        return compiled_loop
+    users = drive.controller
+    own = users.init(plant, drive.rest)
+    sensors = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
+    body = plant.body.view(float)
+
+    def plugged(sample: int, window: Array) -> int:
+        sense_flat(ws.port, ws.force, fed, body, plant.axes, ws.frame, ws.motion, *sensors)
+        wanted = Wanted(drive.displacement[sample], drive.velocity[sample], drive.acceleration[sample])
+        asked = checked_command(users, users.step(own, wanted, sensors), sample, plant.spools)
+        command[sample], clipped = _clip(asked)
+        spool_windows(command, 0, sample, plant.delays, rate, window)
+        return clipped
+
+    return plugged
+
+
 def _run_fused(job: _Job) -> tuple[int, int, int]:
     """Run all samples in compiled chunks; returns (status, samples done, commands clipped)."""
     plant, drive, ws, log_ = job.plant, job.drive, job.ws, job.log
@@ -249,9 +310,10 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     fed = hydraulic_rows(plant)
     if isinstance(drive, ClosedLoop):
         loop = drive.controller
-        tables = (True, loop.axis, loop.actuator, loop.balance, loop.fresh_memory(), drive.reference)
+        tables = (True, loop.axis, loop.actuator, loop.balance, loop.canceller, loop.init(), drive.drive)
     else:
-        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), *np.zeros((2, 1, 1)), np.zeros((1, 12)))
+        none = np.zeros((1, 1))
+        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER), none, none)
     clipped = 0
     for first in range(0, job.samples, _CHUNK):
         last = min(first + _CHUNK, job.samples)
@@ -296,7 +358,8 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     return 0, job.samples, clipped
 
 
-def _diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:
+def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:
+    """What a stage's status other than 0 means, and what to do."""
     if status > 0:
         leg = (*plant.machine.actuator_names, *plant.machine.strut_names)[status - 1]
         stroke = plant.legs["stroke"][status - 1]

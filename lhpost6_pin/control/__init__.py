@@ -1,5 +1,6 @@
-"""Controllers at the 469D's rate: settings from TOML, pure init and step functions, compiled."""
+"""The virtual 469D: settings from TOML, pure init and step functions at the controller's rate, compiled."""
 
-from .settings import Controller, LoopSettings, load_controller, make_controller
+from .controller import Controller, make_controller
+from .settings import ControllerSettings, Notch, load_controller, save_controller
 
-__all__ = ["Controller", "LoopSettings", "load_controller", "make_controller"]
+__all__ = ["Controller", "ControllerSettings", "Notch", "load_controller", "make_controller", "save_controller"]

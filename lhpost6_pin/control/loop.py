@@ -1,34 +1,56 @@
-"""The displacement loop, one compiled step at the controller's rate.
+"""Three-variable control, one compiled step at the controller's rate.
 
-Per degree of freedom a velocity is asked for,
+Per degree of freedom a velocity is asked for (report, Chapter 5),
 
-    u = Kvf vr + Kx (xr - xf) + sat(Ki int (xr - xf)) - KF HP(f)
+    u = Km N1..N5 [ Kxf xr + Kvf vr + Kaf ar + Kjf jr + Kx (xr - xf) + Kv (vr - vf) + Ka (ar - af)
+                    + sat(Ki int (xr - xf)) - KF HP(f) ]
 
-xr, vr reference displacement and velocity [m, rad and per s], xf the platen's displacement from the actuators' by
-forward kinematics (one Gauss-Newton step a sample), f the actuators' force on that degree of freedom, HP a first-order
-high-pass. The actuators' rates follow by the kinematic Jacobian at xf (Eq. 3-33). In the directions of force that do
-not move the platen a velocity lets internal forces decay. Each rate becomes a spool by the inverse of the valve's flow
-curve (Eq. 4-2) and its unloaded speed; a bias feeds the leak at rest.
+xr, vr, ar, jr come from the reference generator, xf, vf, af from the feedback generator (`filters`). The feedback
+generator takes the displacement xs, which follows from the actuators' by forward kinematics (one Gauss-Newton step a
+sample), and the acceleration as of the platen. f is the actuators' force on that degree of freedom, HP a first-order
+high-pass, N five notches. The actuators' rates follow by the kinematic Jacobian at xs (Eq. 3-33). In the directions of
+force that do not move the platen a velocity lets internal forces decay. Each rate becomes a spool by the inverse of
+the valve's flow curve (Eq. 4-2) and its unloaded speed; a bias feeds the leak at rest.
+
+For sine tests a canceller adds harmonics to the drive before the reference generator (`sine`).
 """
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, compiled_inline
 from ..laws.orifice import spool_for_opening
 from ..ports import BODY, LEG
-from ..pose import gauss_newton_step, leg_jacobian
-from ..schemes import S, spool_windows
+from ..pose import gauss_newton_step, leg_jacobian, pose_acceleration
+from ..schemes import A, S, V, spool_windows
+from .filters import NOTCHES
 
-__all__ = ["ACTUATOR", "AXIS", "MEMORY_ROWS", "control_sample", "control_sample_flat", "control_step"]
+__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "MEMORY_ROWS"]
+__all__ += ["control_sample", "control_sample_flat", "control_step", "control_step_flat", "sense", "sense_flat"]
 
 AXIS = np.dtype(
     [
-        ("displacement_gain", np.float64),  # Kx [1/s]
+        ("displacement_feedforward", np.float64),  # Kxf [1/s]
         ("velocity_feedforward", np.float64),  # Kvf [1]
+        ("acceleration_feedforward", np.float64),  # Kaf [s]
+        ("jerk_feedforward", np.float64),  # Kjf [s2]
+        ("displacement_gain", np.float64),  # Kx [1/s]
+        ("velocity_gain", np.float64),  # Kv [1]
+        ("acceleration_gain", np.float64),  # Ka [s]
         ("reset_gain", np.float64),  # Ki per sample [1/s]
         ("reset_limit", np.float64),  # [m/s, rad/s]
         ("force_gain", np.float64),  # KF [m/s/N, rad/s/(N m)]
         ("high_pass", np.float64),  # pole of the force high-pass per sample
+        ("master_gain", np.float64),  # Km [1]
+        ("generator_a", np.float64, (4, 4)),  # reference generator: x' = a x + b d, (xr vr ar jr) = c x + d d
+        ("generator_b", np.float64, 4),
+        ("generator_c", np.float64, (4, 4)),
+        ("generator_d", np.float64, 4),
+        ("feedback_a", np.float64, (3, 3)),  # feedback generator: inputs xs, as; outputs xf, vf, af
+        ("feedback_b", np.float64, (3, 2)),
+        ("feedback_c", np.float64, (3, 3)),
+        ("feedback_d", np.float64, (3, 2)),
+        ("notch", np.float64, (NOTCHES, 5)),  # b0 b1 b2 a1 a2 of each second-order section
+        ("notches", np.float64),  # how many of them act
     ]
 )
 """Table row of a free axis."""
@@ -40,52 +62,163 @@ ACTUATOR = np.dtype(
         ("flow_curve", np.float64),  # lambda [1]
         ("bias", np.float64),  # spool at rest [1]
         ("force", np.float64),  # force at rest [N]
+        ("limit", np.float64),  # largest spool command [1]
     ]
 )
 """Table row of an actuator."""
 
-MEMORY_ROWS = 4
-_POSE, _RESET, _FORCE, _HIGH_PASSED = range(MEMORY_ROWS)
-"""Rows of the memory: pose estimate, reset integral, force of the last sample, its high-passed value."""
+CANCELLER = np.dtype(
+    [
+        ("axis", np.float64),  # place among the free axes
+        ("turn", np.float64),  # phase per sample [rad]
+        ("advance", np.float64),  # phase of the path from drive to feedback at this frequency [rad]
+        ("rate", np.float64),  # adaptation per sample over that path's gain
+    ]
+)
+"""Table row of a sine canceller: one harmonic of one axis."""
+
+_POSE, _RESET, _FORCE, _HIGH_PASSED = range(4)
+_GENERATOR, _FEEDBACK, _NOTCH = 4, 8, 11
+MEMORY_ROWS = _NOTCH + 2 * NOTCHES
+"""Rows of the memory: pose estimate, reset integral, force of the last sample, its high-passed value, states of the
+reference generator (4), of the feedback generator (3) and of the notches (2 each); then two weights a canceller."""
+
+
+@compiled_inline
+def generate(row, drive, state, k, out):
+    """Reference generator of one axis: fill out (4,) xr vr ar jr and advance column k of state (4, ...)."""
+    for i in range(4):
+        total = row.generator_d[i] * drive
+        for j in range(4):
+            total += row.generator_c[i, j] * state[j, k]
+        out[i] = total
+    s0, s1, s2, s3 = state[0, k], state[1, k], state[2, k], state[3, k]
+    for i in range(4):
+        state[i, k] = (
+            row.generator_a[i, 0] * s0
+            + row.generator_a[i, 1] * s1
+            + row.generator_a[i, 2] * s2
+            + row.generator_a[i, 3] * s3
+            + row.generator_b[i] * drive
+        )
+
+
+@compiled_inline
+def compose(row, displacement, acceleration, state, k, out):
+    """Feedback generator of one axis: fill out (3,) xf vf af and advance column k of state (3, ...)."""
+    s0, s1, s2 = state[0, k], state[1, k], state[2, k]
+    for i in range(3):
+        out[i] = (
+            row.feedback_c[i, 0] * s0
+            + row.feedback_c[i, 1] * s1
+            + row.feedback_c[i, 2] * s2
+            + row.feedback_d[i, 0] * displacement
+            + row.feedback_d[i, 1] * acceleration
+        )
+    for i in range(3):
+        state[i, k] = (
+            row.feedback_a[i, 0] * s0
+            + row.feedback_a[i, 1] * s1
+            + row.feedback_a[i, 2] * s2
+            + row.feedback_b[i, 0] * displacement
+            + row.feedback_b[i, 1] * acceleration
+        )
+
+
+@compiled_inline
+def cancel(canceller, sample, a, error, weights):
+    """Correction of the drive of free axis a at a sample, whose weights (n, ...) learn from the error by LMS.
+
+    Each row adds w_c cos(theta) + w_s sin(theta); its weights move against the gradient of the squared error, seen
+    through the path from drive to feedback.
+    """
+    correction = 0.0
+    for h in range(canceller.size):
+        row = canceller[h]
+        if int(row.axis) != a:
+            continue
+        phase = row.turn * sample
+        weights[h, 0] += row.rate * error * np.cos(phase + row.advance)
+        weights[h, 1] += row.rate * error * np.sin(phase + row.advance)
+        correction += weights[h, 0] * np.cos(phase) + weights[h, 1] * np.sin(phase)
+    return correction
 
 
 @compiled
-def control_step(sample, reference, displacement, force, legs, body, axes, axis, actuator, balance, memory, command):
+def control_step(
+    sample,
+    drive,
+    displacement,
+    acceleration,
+    force,
+    legs,
+    body,
+    axes,
+    axis,
+    actuator,
+    balance,
+    canceller,
+    memory,
+    command,
+):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
-    reference (n, 12): displacement and velocity of C and Euler angles per sample; displacement (n_ports,) the ports,
-    actuators first [m]; force (n_actuators,) [N]. Commands beyond full stroke are clipped to -1..1. Returns how many.
+    drive (n, 6 or 12): what goes into the reference generators, in their mode's quantity; a canceller reads the wanted
+    acceleration from columns 6 to 11. displacement, force (n_actuators,) the actuators' [m, N]; acceleration (6,) the
+    platen's, of C and Euler angles. Commands beyond their limit are clipped to it. Returns how many.
     """
     n = command.size
-    ports = displacement.size
+    ports = legs.size
+    for i in range(legs.size):
+        if legs[i].pad >= 0:
+            ports = max(ports, legs[i].pad + 2)
     pose = memory[_POSE]
     s = np.empty(ports)
     J = np.empty((ports, 6))
     B = np.empty((ports, 6))
     K = np.empty((legs.size, 6))
     frame = np.empty((8, 3))
+    asked = np.empty(4)
+    met = np.empty(3)
     leg_jacobian(pose, legs, body, s, J, B, frame, K)
-    gauss_newton_step(displacement[:n], s, K, axes, pose)
+    gauss_newton_step(displacement, s, K, axes, pose)
     rate = np.zeros(n)
     for a in range(axes.size):
         k = axes[a]
         row = axis[a]
+        compose(row, pose[k], acceleration[k], memory[_FEEDBACK:], a, met)
+        wanted = drive[sample, k]
+        if canceller.size > 0:
+            wanted += cancel(canceller, sample, a, drive[sample, 6 + k] - met[2], memory[MEMORY_ROWS:])
+        generate(row, wanted, memory[_GENERATOR:], a, asked)
         total = 0.0
         for i in range(n):
             total += K[i, k] * (force[i] - actuator[i].force)
         passed = row.high_pass * (memory[_HIGH_PASSED, a] + total - memory[_FORCE, a])
         memory[_FORCE, a] = total
         memory[_HIGH_PASSED, a] = passed
-        error = reference[sample, k] - pose[k]
+        error = asked[0] - met[0]
         reset = memory[_RESET, a] + row.reset_gain * error
         reset = min(row.reset_limit, max(-row.reset_limit, reset))
         memory[_RESET, a] = reset
         speed = (
-            row.velocity_feedforward * reference[sample, 6 + k]
+            row.displacement_feedforward * asked[0]
+            + row.velocity_feedforward * asked[1]
+            + row.acceleration_feedforward * asked[2]
+            + row.jerk_feedforward * asked[3]
             + row.displacement_gain * error
+            + row.velocity_gain * (asked[1] - met[1])
+            + row.acceleration_gain * (asked[2] - met[2])
             + reset
             - row.force_gain * passed
         )
+        for j in range(int(row.notches)):
+            at = _NOTCH + 2 * j
+            out = row.notch[j, 0] * speed + memory[at, a]
+            memory[at, a] = row.notch[j, 1] * speed - row.notch[j, 3] * out + memory[at + 1, a]
+            memory[at + 1, a] = row.notch[j, 2] * speed - row.notch[j, 4] * out
+            speed = out
+        speed *= row.master_gain
         for i in range(n):
             rate[i] += K[i, k] * speed
     clipped = 0
@@ -95,26 +228,42 @@ def control_step(sample, reference, displacement, force, legs, body, axes, axis,
         row = actuator[i]
         full = row.extend if rate[i] >= 0.0 else row.retract
         spool = spool_for_opening(rate[i] / full, row.flow_curve) + row.bias
-        if abs(spool) > 1.0:
+        if abs(spool) > row.limit:
             clipped += 1
-            spool = 1.0 if spool > 0.0 else -1.0
+            spool = row.limit if spool > 0.0 else -row.limit
         command[i] = spool
     return clipped
 
 
 @compiled
+def sense(port, force, fed, body, axes, frame, motion, displacement, acceleration, measured):
+    """What the sensors say of a running plant: fill displacement, measured (n_actuators,) and acceleration (6,).
+
+    port, force, frame, motion are the plant's (see `schemes`, `stage`), fed (n_actuators,) the rows of force that are
+    actuators.
+    """
+    for i in range(fed.size):
+        displacement[i] = port[S, i]
+        measured[i] = force[fed[i], 0]
+    pose_acceleration(frame, body, axes, motion[V], motion[A], acceleration)
+
+
+@compiled
 def control_sample(
     sample,
-    reference,
+    drive,
     port,
     force,
     fed,
+    frame,
+    motion,
     legs,
     body,
     axes,
     axis,
     actuator,
     balance,
+    canceller,
     memory,
     command,
     delays,
@@ -123,38 +272,90 @@ def control_sample(
 ):
     """One controller sample of a run: measure, command, and the delayed spools of its model steps.
 
-    port and force are the plant's (see `schemes`, `stage`), fed (n_actuators,) the actuators' rows of force. Fills row
-    `sample` of command (n, n_actuators) and window (n_steps, n_actuators). Returns how many commands were clipped.
+    The plant's arrays are those of `sense`. Fills row `sample` of command (n, n_actuators) and window (n_steps,
+    n_actuators). Returns how many commands were clipped.
     """
+    displacement = np.empty(fed.size)
     measured = np.empty(fed.size)
-    for i in range(fed.size):
-        measured[i] = force[fed[i], 0]
+    acceleration = np.empty(6)
+    sense(port, force, fed, body, axes, frame, motion, displacement, acceleration, measured)
     clipped = control_step(
-        sample, reference, port[S], measured, legs, body, axes, axis, actuator, balance, memory, command[sample]
+        sample,
+        drive,
+        displacement,
+        acceleration,
+        measured,
+        legs,
+        body,
+        axes,
+        axis,
+        actuator,
+        balance,
+        canceller,
+        memory,
+        command[sample],
     )
     spool_windows(command, 0, sample, delays, rate, window)
     return clipped
 
 
+# Tables of records are costly to hand over from Python: these take them as plain numbers (`flat`).
+
+
 @compiled
 def control_sample_flat(
     sample,
-    reference,
+    drive,
     port,
     force,
     fed,
+    frame,
+    motion,
     legs,
     body,
     axes,
     axis,
     actuator,
     balance,
+    canceller,
     memory,
     command,
     delays,
     rate,
     window,
 ):
-    """`control_sample` with its tables as plain numbers, which are cheaper to hand over from Python than records."""
+    """`control_sample` with its tables as plain numbers."""
     tables = legs.view(LEG), body.view(BODY), axes, axis.view(AXIS), actuator.view(ACTUATOR)
-    return control_sample(sample, reference, port, force, fed, *tables, balance, memory, command, delays, rate, window)
+    plant = port, force, fed, frame, motion
+    return control_sample(
+        sample, drive, *plant, *tables, balance, canceller.view(CANCELLER), memory, command, delays, rate, window
+    )
+
+
+@compiled
+def control_step_flat(
+    sample,
+    drive,
+    displacement,
+    acceleration,
+    force,
+    legs,
+    body,
+    axes,
+    axis,
+    actuator,
+    balance,
+    canceller,
+    memory,
+    command,
+):
+    """`control_step` with its tables as plain numbers."""
+    sensors = displacement, acceleration, force
+    tables = legs.view(LEG), body.view(BODY), axes, axis.view(AXIS), actuator.view(ACTUATOR)
+    return control_step(sample, drive, *sensors, *tables, balance, canceller.view(CANCELLER), memory, command)
+
+
+@compiled
+def sense_flat(port, force, fed, body, axes, frame, motion, displacement, acceleration, measured):
+    """`sense` with its table as plain numbers."""
+    sense(port, force, fed, body.view(BODY), axes, frame, motion, displacement, acceleration, measured)

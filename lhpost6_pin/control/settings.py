@@ -1,58 +1,72 @@
-"""Controller settings: what a panel holds (TOML), and the tables that the compiled step reads."""
+"""Controller settings: what a panel holds, in TOML."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..effects import HYDRAULIC_DOUBLE
-from ..equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
 from ..errors import ParameterError
-from ..files import models_folder
-from ..parameters import Parameters, load_parameters
-from ..plant import Plant
-from ..pose import leg_jacobian
-from ..rigid_body import platen_inertia
+from ..files import models_folder, write_whole
+from ..parameters import Parameters, Quantity, load_parameters
 from ..schema import build_section, quantity_field
-from .loop import ACTUATOR, AXIS, MEMORY_ROWS
+from .filters import MODES, NOTCHES
 
-__all__ = ["Controller", "LoopSettings", "load_controller", "make_controller"]
+__all__ = ["ControllerSettings", "Notch", "load_controller", "save_controller"]
 
-Array = NDArray[np.float64]
 Six = tuple[float, ...]
+"""A number for each degree of freedom x y z roll pitch yaw."""
 
 
 @dataclass(frozen=True)
-class LoopSettings:
-    """Displacement loop with velocity feed-forward and force feedback, per degree of freedom x y z roll pitch yaw."""
+class Notch:
+    """N = 1 + d B s / (s^2 + B s + w0^2) per degree of freedom: w0/2pi, B/2pi, d; no notch where d is zero."""
+
+    frequency: Six = quantity_field("Hz", length=6, bound="positive")
+    bandwidth: Six = quantity_field("Hz", length=6, bound="positive")
+    depth: Six = quantity_field("1", length=6)
+
+
+@dataclass(frozen=True)
+class ControllerSettings:
+    """Three-variable control, force feedback and force balance (`loop`, `filters`)."""
 
     rate: float = quantity_field("Hz", bound="positive")
+    spool_limit: float = quantity_field("1", bound="fraction")
+    master_gain: Six = quantity_field("1", length=6, bound="nonnegative")
+    reference_high_pass: Six = quantity_field("Hz", length=6, bound="positive")
+    reference_damping: Six = quantity_field("1", length=6, bound="positive")
+    reference_low_pass: Six = quantity_field("Hz", length=6, bound="positive")
+    displacement_feedforward: Six = quantity_field("1/s", length=6)
+    velocity_feedforward: Six = quantity_field("1", length=6)
+    acceleration_feedforward: Six = quantity_field("s", length=6)
+    jerk_feedforward: Six = quantity_field("s2", length=6)
+    crossover: Six = quantity_field("Hz", length=6, bound="positive")
     displacement_gain: Six = quantity_field("1/s", length=6, bound="nonnegative")
-    velocity_feedforward: Six = quantity_field("1", length=6, bound="nonnegative")
+    velocity_gain: Six = quantity_field("1", length=6, bound="nonnegative")
+    acceleration_gain: Six = quantity_field("s", length=6, bound="nonnegative")
     reset_gain: Six = quantity_field("1/s2", length=6, bound="nonnegative")
     reset_limit: Six = quantity_field("m/s | rad/s", length=6, bound="nonnegative")
     force_damping: Six = quantity_field("1", length=6, bound="nonnegative")
     force_cut_in: float = quantity_field("Hz", bound="positive")
     balance_gain: float = quantity_field("1/s", bound="nonnegative")
+    mode: str
+    notches: tuple[Notch, ...]
+    name: str
+    stated: Parameters = field(compare=False, repr=False)  # numbers as read, with evidence and source
 
 
-class Controller(NamedTuple):
-    """Settings made ready for a plant, as `loop.control_step` reads them; treat the arrays as read only."""
-
-    settings: LoopSettings
-    axis: NDArray[np.void]  # loop.AXIS, one row a free axis
-    actuator: NDArray[np.void]  # loop.ACTUATOR
-    balance: Array  # (n_actuators, n_actuators) leg rate [m/s] per force [N] in the null space of the motion
-    memory: Array  # (loop.MEMORY_ROWS, max(6, n_actuators)), at rest
-
-    def fresh_memory(self) -> Array:
-        """A copy of the memory at rest, for one run."""
-        return self.memory.copy()
+_SECTIONS = {
+    "loop": ("rate", "spool_limit", "master_gain"),
+    "reference": ("reference_high_pass", "reference_damping", "reference_low_pass"),
+    "feedforward": tuple(f"{x}_feedforward" for x in ("displacement", "velocity", "acceleration", "jerk")),
+    "feedback": ("crossover", *(f"{x}_gain" for x in ("displacement", "velocity", "acceleration", "reset"))),
+    "force": ("force_damping", "force_cut_in", "balance_gain"),
+}
+_SECTIONS["feedback"] += ("reset_limit",)
+"""Sections of a panel's file and their quantities, in order."""
 
 
-def load_controller(name_or_path: str | Path) -> LoopSettings:
+def load_controller(name_or_path: str | Path) -> ControllerSettings:
     """Read controller settings by shipped name or path; raises ParameterError naming file and key."""
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -60,65 +74,63 @@ def load_controller(name_or_path: str | Path) -> LoopSettings:
         if not path.is_file():
             valid = ", ".join(sorted(p.stem for p in path.parent.glob("*.toml")))
             raise ParameterError(f"no controller settings named {name_or_path!r}; valid names: {valid}")
-    parameters: Parameters = load_parameters(path)
-    return build_section(LoopSettings, parameters, ("loop",))
-
-
-def make_controller(plant: Plant, rest: Equilibrium, settings: LoopSettings) -> Controller:
-    """Work out the loop's tables for a plant: force gains from oil stiffness and mass, valve gains, null space.
-
-    Force feedback of damping ratio zeta on an oil column of stiffness K and mass M is a velocity of
-    2 zeta / sqrt(K M) per unit force. Valve gains are steady unloaded piston speeds at full opening.
-    """
-    n, axes = plant.spools, plant.axes
-    ports = len(plant.ports)
-    jacobian = np.zeros((plant.legs.size, 6))
-    leg_jacobian(
-        np.zeros(6),
-        plant.legs,
-        plant.body,
-        np.zeros(ports),
-        np.zeros((ports, 6)),
-        np.zeros((ports, 6)),
-        np.zeros((8, 3)),
-        jacobian,
+    stated = load_parameters(path)
+    mode = str(stated.words.get("controller.mode", ""))
+    if mode not in MODES:
+        raise ParameterError(f"{stated.origin}: controller.mode {mode!r} is not one of {', '.join(MODES)}")
+    numbers = [k for k in range(1, NOTCHES + 1) if f"notch_{k}.depth" in stated]
+    notches = tuple(build_section(Notch, stated, (f"notch_{k}",)) for k in numbers)
+    settings = build_section(
+        ControllerSettings,
+        stated,
+        tuple(_SECTIONS),
+        mode=mode,
+        notches=notches,
+        name=str(stated.words.get("controller.name", path.stem)),
+        stated=stated,
     )
-    jacobian = jacobian[:n]
-    rows = plant.rows[hydraulic_rows(plant)]
-    actuator = np.zeros(n, ACTUATOR)
-    for row, out, force, spool in zip(rows, actuator, rest.force, rest.spool, strict=True):
-        out["extend"], out["retract"] = unloaded_speeds(row, float(force), plant.supply)
-        out["flow_curve"], out["bias"], out["force"] = row["p"][6], spool, force
-    oil = np.array([_oil_stiffness(row) for row in rows])
-    stiffness = (jacobian.T * oil) @ jacobian
-    mass = _mass_about_c(plant)
-    axis = np.zeros(axes.size, AXIS)
-    turn = 2.0 * np.pi * settings.force_cut_in / settings.rate
-    for out, k in zip(axis, axes, strict=True):
-        out["displacement_gain"] = settings.displacement_gain[k]
-        out["velocity_feedforward"] = settings.velocity_feedforward[k]
-        out["reset_gain"] = settings.reset_gain[k] / settings.rate
-        out["reset_limit"] = settings.reset_limit[k]
-        out["force_gain"] = 2.0 * settings.force_damping[k] / np.sqrt(stiffness[k, k] * mass[k, k])
-        out["high_pass"] = 1.0 / (1.0 + turn)
-    free = jacobian[:, axes]
-    null = np.eye(n) - free @ np.linalg.pinv(free)
-    balance = settings.balance_gain * null @ np.diag(1.0 / oil) @ null
-    return Controller(settings, axis, actuator, balance, np.zeros((MEMORY_ROWS, max(6, n))))
+    for key in ("reference_low_pass", "reference_high_pass", "crossover"):
+        if max(getattr(settings, key)) >= settings.rate / 2:
+            raise ParameterError(f"{stated.origin}: {key} must lie below half the controller's rate")
+    return settings
 
 
-def _oil_stiffness(row: np.void) -> float:
-    """Stiffness of an actuator's oil column with the valve closed, zero-position [N/m]."""
-    area_a, area_b, chamber_a, chamber_b, bulk = (float(row["p"][i]) for i in (0, 1, 8, 9, 10))
-    stiffness = bulk * area_a / chamber_a
-    return stiffness + (bulk * area_b / chamber_b if row["law"] == HYDRAULIC_DOUBLE else 0.0)
+def save_controller(settings: ControllerSettings, path: Path, changed: Mapping[str, str] | str) -> Path:
+    """Write settings as a panel's file, whole or not at all.
+
+    A number that is as it was read keeps its evidence and source; any other is `calibrated`, with `changed` as its
+    source, for all or by name.
+    """
+    lines = [
+        "# Settings of a three-variable controller; lists are per degree of freedom, x y z roll pitch yaw.",
+        "",
+        "[controller]",
+        f'name = "{settings.name}"',
+        f'mode = "{settings.mode}"',
+    ]
+    for section, names in _SECTIONS.items():
+        lines += ["", f"[{section}]"]
+        lines += [_line(settings, settings.stated, f"{section}.{name}", changed) for name in names]
+    for k, notch in enumerate(settings.notches, 1):
+        lines += ["", f"[notch_{k}]"]
+        lines += [_line(notch, settings.stated, f"notch_{k}.{f.name}", changed) for f in fields(Notch)]
+    with write_whole(path) as beside:
+        beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
 
 
-def _mass_about_c(plant: Plant) -> Array:
-    """Mass matrix of the platen for motion of C and turns at the zero-position (6, 6)."""
-    _, at_b = platen_inertia(plant.model, plant.machine)
-    rho = plant.body[0]["rho_c"]
-    lever = np.eye(6)
-    # v_B = v_C - omega x rho = v_C + [rho] omega
-    lever[:3, 3:] = np.array([[0.0, -rho[2], rho[1]], [rho[2], 0.0, -rho[0]], [-rho[1], rho[0], 0.0]])
-    return lever.T @ at_b @ lever
+def _line(holder: Any, stated: Parameters, key: str, changed: Mapping[str, str] | str) -> str:
+    name = key.split(".")[1]
+    value = getattr(holder, name)
+    unit = next(f.metadata["unit"] for f in fields(holder) if f.name == name)
+    as_read = stated[key] if key in stated else None
+    if as_read is None or as_read.value != value:
+        source = changed if isinstance(changed, str) else changed.get(name, "set by hand")
+        as_read = Quantity(value, unit, "calibrated", source)
+    numbers = list(value) if isinstance(value, tuple) else value
+    texts = ", ".join(f'{k} = "{_escaped(getattr(as_read, k))}"' for k in ("unit", "evidence", "source"))
+    return f"{name} = {{ value = {numbers!r}, {texts} }}"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", "\\\\").replace('"', '\\"')

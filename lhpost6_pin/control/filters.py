@@ -1,0 +1,111 @@
+"""The controller's linear filters, in continuous time and as the matrices of one sample.
+
+Reference generator, by mode: what the drive d is, and xr, vr, ar, jr from it, each the derivative of the one before
+(in acceleration mode jr is a filtered derivative).
+
+    acceleration   xr = d / (s^2 + 2 zeta w s + w^2): a second-order high-pass, integrated twice; jr = s ar / (1 + s/w2)
+    velocity       xr = L(s) d / (s + w): a high-pass of first order, integrated; L a low-pass of third order
+    displacement   xr = L(s) d, L a low-pass of fourth order
+
+Feedback generator: xf = L xs + H as / s^2, vf = s xf, af = s^2 xf with L + H = 1 and three poles at the crossover c,
+
+    L = (3 c^2 s + c^3) / (s + c)^3,   H = (s^3 + 3 c s^2) / (s + c)^3
+
+the lowest order whose three outputs are all proper. Notch: N = 1 + d B s / (s^2 + B s + w0^2).
+
+Low-passes are Bessel filters: what they pass they delay as a whole. Inputs are taken as straight between samples
+(first-order hold), notches by the bilinear transform that is exact at w0.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["MODES", "NOTCHES", "drive_for", "feedback_generator", "notch_section", "reference_generator"]
+
+Array = NDArray[np.float64]
+Matrices = tuple[Array, Array, Array, Array]
+
+MODES = ("acceleration", "velocity", "displacement")
+"""Modes of the reference generator; the first is the default."""
+
+NOTCHES = 5
+"""Notches of each degree of freedom."""
+
+
+def reference_generator(mode: str, high_pass: float, damping: float, low_pass: float, rate: float) -> Matrices:
+    """Sampled matrices a (4, 4), b (4,), c (4, 4), d (4,) of a mode; corners [Hz] as the mode uses them (see above)."""
+    w, w2 = 2.0 * np.pi * high_pass, 2.0 * np.pi * low_pass
+    a, b, c, d = np.zeros((4, 4)), np.zeros((4, 1)), np.zeros((4, 4)), np.zeros((4, 1))
+    if mode == "acceleration":  # states: xr, vr, low-passed ar; one is not needed
+        spring = np.array([-(w**2), -2.0 * damping * w, 0.0, 0.0])
+        a[0, 1], a[1], b[1] = 1.0, spring, 1.0
+        a[2], b[2] = w2 * spring, w2
+        a[2, 2] -= w2
+        a[3, 3] = -w2
+        c[0, 0] = c[1, 1] = 1.0
+        c[2], d[2] = spring, 1.0
+        c[3], d[3] = a[2], b[2]
+    elif mode == "velocity":  # states: xr, low-passed d and its derivatives
+        a[0, 0], a[0, 1] = -w, 1.0
+        _chain(a[1:, 1:], b[1:], w2)
+        c[0, 0] = 1.0
+        for k in range(1, 4):  # vr = s xr, and so on
+            c[k] = c[k - 1] @ a
+    else:  # states: xr and its derivatives
+        _chain(a, b, w2)
+        np.fill_diagonal(c, 1.0)
+    a, b, c, d = _sampled(a, b, c, d, rate)
+    return a, b[:, 0], c, d[:, 0]
+
+
+def drive_for(
+    mode: str, displacement: Array, velocity: Array, acceleration: Array, high_pass: Array, damping: Array
+) -> Array:
+    """Drive (n, 6) whose reference is the given motion, (n, 6) each: what the generator's high-pass takes is added.
+
+    Low-passes are not undone: in velocity and displacement mode the reference comes late by their delay.
+    """
+    w = 2.0 * np.pi * np.asarray(high_pass)
+    if mode == "acceleration":
+        return acceleration + 2.0 * np.asarray(damping) * w * velocity + w**2 * displacement
+    return velocity + w * displacement if mode == "velocity" else displacement.copy()
+
+
+def feedback_generator(crossover: float, rate: float) -> Matrices:
+    """Sampled matrices a (3, 3), b (3, 2), c (3, 3), d (3, 2); inputs xs, as; outputs xf, vf, af; crossover [Hz].
+
+    With e = xs - xf its states are xf, vf and p:  vf' = as + p + 3 c^2 e,  p' = -3 c p - 8 c^3 e.
+    """
+    w = 2.0 * np.pi * crossover
+    a = np.array([[0.0, 1.0, 0.0], [-3.0 * w**2, 0.0, 1.0], [8.0 * w**3, 0.0, -3.0 * w]])
+    b = np.array([[0.0, 0.0], [3.0 * w**2, 1.0], [-8.0 * w**3, 0.0]])
+    c = np.vstack([np.eye(3)[:2], a[1]])
+    d = np.vstack([np.zeros((2, 2)), b[1]])
+    return _sampled(a, b, c, d, rate)
+
+
+def notch_section(frequency: float, bandwidth: float, depth: float, rate: float) -> Array:
+    """Coefficients (5,) b0 b1 b2 a1 a2 of N = 1 + d B s / (s^2 + B s + w0^2); frequency, bandwidth B/2pi [Hz]."""
+    t = np.tan(np.pi * frequency / rate)
+    breadth = t * bandwidth / frequency  # B s over w0^2 at s = (1 - z^-1) / (t (1 + z^-1))
+    whole = 1.0 + breadth + t**2
+    b = np.array([whole + depth * breadth, 2.0 * (t**2 - 1.0), 1.0 - breadth - depth * breadth + t**2])
+    return np.concatenate([b, [2.0 * (t**2 - 1.0), 1.0 - breadth + t**2]]) / whole
+
+
+def _chain(a: Array, b: Array, corner: float) -> None:
+    """Fill a (n, n), b (n, 1) with a Bessel low-pass whose states are its output and its derivatives."""
+    from scipy import signal
+
+    order = len(a)
+    _, poles = signal.bessel(order, corner, analog=True, norm="mag")
+    np.fill_diagonal(a[:, 1:], 1.0)
+    a[-1] = -np.asarray(poles)[:0:-1]
+    b[-1] = poles[-1]
+
+
+def _sampled(a: Array, b: Array, c: Array, d: Array, rate: float) -> Matrices:
+    from scipy import signal
+
+    a, b, c, d, _ = signal.cont2discrete((a, b, c, d), 1.0 / rate, method="foh")
+    return a, b, c, d

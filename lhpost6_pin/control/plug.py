@@ -1,0 +1,102 @@
+"""The plug point: what a user's own controller looks like, and how one is found by file and name.
+
+    class Mine:
+        def init(self, plant, rest):
+            return {"last": rest.spool.copy()}          # its memory, for one run
+
+        def step(self, memory, wanted, sensors):
+            return spools                               # (n_actuators,), -1..1
+
+`lhpost6 run MOTION --controller mine.py:Mine` runs it in place of the 469D; so does `PluggedLoop` in Python.
+"""
+
+import importlib.util
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..equilibrium import Equilibrium
+from ..errors import ControllerError
+from ..plant import Plant
+
+__all__ = ["Sensors", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
+
+Array = NDArray[np.float64]
+
+
+class Sensors(NamedTuple):
+    """What the table tells its controller at one sample."""
+
+    displacement: Array  # (n_actuators,) from the zero-position [m]
+    acceleration: Array  # (6,) of C in {s} and Euler angles [m/s2, rad/s2]
+    force: Array  # (n_actuators,) [N]
+
+
+class Wanted(NamedTuple):
+    """What is wanted of the platen at one sample: motion of C in {s} and Euler angles, (6,) each."""
+
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+
+
+class UserController(Protocol):
+    """A controller at 2048 Hz. It may keep its state in `memory`, so that one object serves many runs."""
+
+    def init(self, plant: Plant, rest: Equilibrium) -> Any:
+        """Memory of one run of a plant that rests in the zero-position."""
+
+    def step(self, memory: Any, wanted: Wanted, sensors: Sensors) -> ArrayLike:
+        """Spool commands (n_actuators,), -1..1, of one sample; called once a sample, in order."""
+
+
+def is_plugged(name: str) -> bool:
+    """True if a name given for a controller means a Python file and a class or function in it, not settings."""
+    return ".py:" in name
+
+
+def load_plugged(name: str) -> UserController:
+    """Controller from ``file.py:Name``, a class without arguments or a function that returns one.
+
+    Raises ControllerError naming the file and what is wrong with it.
+    """
+    file, _, attribute = name.rpartition(":")
+    path = Path(file)
+    if not path.is_file():
+        raise ControllerError(f"{path}: no such file; write --controller FILE.py:NAME")
+    spec = importlib.util.spec_from_file_location(f"lhpost6_plugged_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ControllerError(f"{path} cannot be imported as Python")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's file raises
+        raise ControllerError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
+    if not hasattr(module, attribute):
+        names = [n for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == module.__name__]
+        raise ControllerError(f"{path} has no {attribute!r}; it has {', '.join(names) or 'nothing that can be called'}")
+    try:
+        controller = getattr(module, attribute)()
+    except Exception as error:  # likewise
+        raise ControllerError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
+    for method in ("init", "step"):
+        if not callable(getattr(controller, method, None)):
+            raise ControllerError(f"{name} has no {method}(); a controller has init(plant, rest) and step(...)")
+    return controller  # type: ignore[no-any-return]
+
+
+def checked_command(controller: UserController, command: ArrayLike, sample: int, spools: int) -> Array:
+    """Command (n_actuators,) as numbers; raises ControllerError naming the controller, the sample and the actuator."""
+    name = type(controller).__name__
+    try:
+        values = np.asarray(command, float)
+    except (TypeError, ValueError) as error:
+        raise ControllerError(f"{name} returned no numbers at sample {sample}: {error}") from error
+    if values.shape != (spools,):
+        raise ControllerError(f"{name} returned shape {values.shape} at sample {sample}; ({spools},) is needed")
+    if not np.isfinite(values).all():
+        at = int(np.argmin(np.isfinite(values)))
+        raise ControllerError(f"{name} returned {values[at]} for actuator {at + 1} of {spools} at sample {sample}")
+    return values

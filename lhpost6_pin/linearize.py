@@ -14,12 +14,12 @@ from .plant import Plant, State, make_plant
 from .schemes import A, V
 from .workspace import make_workspace
 
-__all__ = ["LinearPlant", "Mode", "linearize", "oil_column_modes"]
+__all__ = ["SPOOL_STEP", "LinearPlant", "Mode", "linearize", "oil_column_modes"]
 
 Array = NDArray[np.float64]
 
 # Finite-difference steps: small against every scale of the machine, large against rounding.
-_POSE_STEP, _VELOCITY_STEP, _PRESSURE_STEP, _SPOOL_STEP = 1e-6, 1e-6, 1e2, 1e-6
+_POSE_STEP, _VELOCITY_STEP, _PRESSURE_STEP, SPOOL_STEP = 1e-6, 1e-6, 1e2, 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
         a[:, k] = (rates(step, spool) - rates(-step, spool)) / (2.0 * size[k])
     for k in range(nu):
         step = np.zeros(nu)
-        step[k] = _SPOOL_STEP
-        b[:, k] = (rates(np.zeros(n), spool + step) - rates(np.zeros(n), spool - step)) / (2.0 * _SPOOL_STEP)
+        step[k] = SPOOL_STEP
+        b[:, k] = (rates(np.zeros(n), spool + step) - rates(np.zeros(n), spool - step)) / (2.0 * SPOOL_STEP)
     return LinearPlant(a, b, nv)
 
 

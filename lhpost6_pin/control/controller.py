@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..effects import HYDRAULIC_DOUBLE
 from ..equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
 from ..errors import ControllerError
+from ..laws.orifice import opening
 from ..plant import Plant
 from ..pose import leg_jacobian
 from ..rigid_body import platen_inertia
@@ -30,6 +31,8 @@ class Controller(NamedTuple):
     actuator: NDArray[np.void]  # loop.ACTUATOR
     balance: Array  # (n_actuators, n_actuators) leg rate [m/s] per force [N] in the null space of the motion
     canceller: NDArray[np.void]  # loop.CANCELLER, empty but in sine tests
+    jacobian: Array  # (n_actuators, 6) leg rates per motion of C and Euler angles, zero-position
+    lever: Array  # (6, 6) motion of C and Euler angles per twist at B, zero-position
 
     def init(self) -> Array:
         """The controller's memory at rest, for one run."""
@@ -80,7 +83,8 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
     actuator["limit"] = settings.spool_limit
     for row, out, force, spool in zip(rows, actuator, rest.force, rest.spool, strict=True):
         out["extend"], out["retract"] = unloaded_speeds(row, float(force), plant.supply)
-        out["flow_curve"], out["bias"], out["force"] = row["p"][6], spool, force
+        curve = float(row["p"][6])
+        out["flow_curve"], out["bias"], out["force"] = curve, opening(spool, curve), force
     oil = np.array([_oil_stiffness(row) for row in rows])
     stiffness = (jacobian.T * oil) @ jacobian
     mass = _mass_about_c(plant)
@@ -91,7 +95,8 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
     free = jacobian[:, axes]
     null = np.eye(n) - free @ np.linalg.pinv(free)
     balance = settings.balance_gain * null @ np.diag(1.0 / oil) @ null
-    return Controller(settings, plant, axis, actuator, balance, np.zeros(0, CANCELLER))
+    lever = _lever(plant)
+    return Controller(settings, plant, axis, actuator, balance, np.zeros(0, CANCELLER), jacobian, lever)
 
 
 def _fill_axis(out: np.void, settings: ControllerSettings, k: int) -> None:
@@ -124,8 +129,13 @@ def _oil_stiffness(row: np.void) -> float:
 def _mass_about_c(plant: Plant) -> Array:
     """Mass matrix of the platen for motion of C and turns at the zero-position (6, 6)."""
     _, at_b = platen_inertia(plant.model, plant.machine)
+    back = np.linalg.inv(_lever(plant))
+    return back.T @ at_b @ back
+
+
+def _lever(plant: Plant) -> Array:
+    """Motion of C and Euler angles per twist at B (6, 6), zero-position: v_C = v_B + omega x rho."""
     rho = plant.body[0]["rho_c"]
     lever = np.eye(6)
-    # v_B = v_C - omega x rho = v_C + [rho] omega
-    lever[:3, 3:] = np.array([[0.0, -rho[2], rho[1]], [rho[2], 0.0, -rho[0]], [-rho[1], rho[0], 0.0]])
-    return lever.T @ at_b @ lever
+    lever[:3, 3:] = np.array([[0.0, rho[2], -rho[1]], [-rho[2], 0.0, rho[0]], [rho[1], -rho[0], 0.0]])
+    return lever

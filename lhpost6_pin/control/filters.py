@@ -17,6 +17,8 @@ Low-passes are Bessel filters: what they pass they delay as a whole. Inputs are 
 (first-order hold), notches by the bilinear transform that is exact at w0.
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,6 +34,7 @@ NOTCHES = 5
 """Notches of each degree of freedom."""
 
 
+@cache  # tuning asks for the same ones again and again; the arrays are read only
 def reference_generator(mode: str, high_pass: float, damping: float, low_pass: float, rate: float) -> Matrices:
     """Sampled matrices a (4, 4), b (4,), c (4, 4), d (4,) of a mode; corners [Hz] as the mode uses them (see above)."""
     w, w2 = 2.0 * np.pi * high_pass, 2.0 * np.pi * low_pass
@@ -71,6 +74,7 @@ def drive_for(
     return velocity + w * displacement if mode == "velocity" else displacement.copy()
 
 
+@cache
 def feedback_generator(crossover: float, rate: float) -> Matrices:
     """Sampled matrices a (3, 3), b (3, 2), c (3, 3), d (3, 2); inputs xs, as; outputs xf, vf, af; crossover [Hz].
 

@@ -10,7 +10,7 @@ generator takes the displacement xs, which follows from the actuators' by forwar
 sample), and the acceleration as of the platen. f is the actuators' force on that degree of freedom, HP a first-order
 high-pass, N five notches. The actuators' rates follow by the kinematic Jacobian at xs (Eq. 3-33). In the directions of
 force that do not move the platen a velocity lets internal forces decay. Each rate becomes a spool by the inverse of
-the valve's flow curve (Eq. 4-2) and its unloaded speed; a bias feeds the leak at rest.
+the valve's flow curve (Eq. 4-2) and its unloaded speed; an opening at rest feeds the leak.
 
 For sine tests a canceller adds harmonics to the drive before the reference generator (`sine`).
 """
@@ -60,7 +60,7 @@ ACTUATOR = np.dtype(
         ("extend", np.float64),  # unloaded speed at full opening [m/s]
         ("retract", np.float64),
         ("flow_curve", np.float64),  # lambda [1]
-        ("bias", np.float64),  # spool at rest [1]
+        ("bias", np.float64),  # opening at rest [1]
         ("force", np.float64),  # force at rest [N]
         ("limit", np.float64),  # largest spool command [1]
     ]
@@ -226,8 +226,9 @@ def control_step(
         for j in range(n):
             rate[i] -= balance[i, j] * (force[j] - actuator[j].force)
         row = actuator[i]
-        full = row.extend if rate[i] >= 0.0 else row.retract
-        spool = spool_for_opening(rate[i] / full, row.flow_curve) + row.bias
+        # which orifices open follows from the opening, so that is what decides on the speed at full opening
+        full = row.extend if rate[i] + row.bias * row.extend >= 0.0 else row.retract
+        spool = spool_for_opening(rate[i] / full + row.bias, row.flow_curve)
         if abs(spool) > row.limit:
             clipped += 1
             spool = row.limit if spool > 0.0 else -row.limit

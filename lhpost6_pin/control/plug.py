@@ -11,6 +11,7 @@
 """
 
 import importlib.util
+import sys
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 class Sensors(NamedTuple):
-    """What the table tells its controller at one sample."""
+    """What the table tells its controller at one sample; a run fills the same arrays each time: copy what you keep."""
 
     displacement: Array  # (n_actuators,) from the zero-position [m]
     acceleration: Array  # (6,) of C in {s} and Euler angles [m/s2, rad/s2]
@@ -54,7 +55,7 @@ class UserController(Protocol):
 
 def is_plugged(name: str) -> bool:
     """True if a name given for a controller means a Python file and a class or function in it, not settings."""
-    return ".py:" in name
+    return ".py:" in name or name.endswith(".py")
 
 
 def load_plugged(name: str) -> UserController:
@@ -62,7 +63,9 @@ def load_plugged(name: str) -> UserController:
 
     Raises ControllerError naming the file and what is wrong with it.
     """
-    file, _, attribute = name.rpartition(":")
+    file, colon, attribute = name.rpartition(":")
+    if not colon:
+        raise ControllerError(f"{name}: which class or function in it? write --controller {name}:NAME")
     path = Path(file)
     if not path.is_file():
         raise ControllerError(f"{path}: no such file; write --controller FILE.py:NAME")
@@ -70,21 +73,23 @@ def load_plugged(name: str) -> UserController:
     if spec is None or spec.loader is None:
         raise ControllerError(f"{path} cannot be imported as Python")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses and pickle look their module up there
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever a user's file raises
+    except (Exception, SystemExit) as error:  # whatever a user's file raises
+        del sys.modules[spec.name]
         raise ControllerError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     if not hasattr(module, attribute):
         names = [n for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == module.__name__]
         raise ControllerError(f"{path} has no {attribute!r}; it has {', '.join(names) or 'nothing that can be called'}")
     try:
         controller = getattr(module, attribute)()
-    except Exception as error:  # likewise
+    except (Exception, SystemExit) as error:  # likewise
         raise ControllerError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
     for method in ("init", "step"):
         if not callable(getattr(controller, method, None)):
             raise ControllerError(f"{name} has no {method}(); a controller has init(plant, rest) and step(...)")
-    return controller  # type: ignore[no-any-return]
+    return controller
 
 
 def checked_command(controller: UserController, command: ArrayLike, sample: int, spools: int) -> Array:

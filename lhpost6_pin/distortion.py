@@ -1,0 +1,59 @@
+"""Harmonics of a sine test: amplitudes and phases, total harmonic distortion, lag behind the reference."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Harmonics", "harmonics", "phase_between", "total_harmonic_distortion"]
+
+Array = NDArray[np.float64]
+
+
+class Harmonics(NamedTuple):
+    """Fundamental and harmonics of a periodic signal, c + sum amplitude cos(2 pi frequency t + phase).
+
+    t = 0 is the first sample of the record, so phases of signals recorded together compare.
+    """
+
+    frequency: Array  # (count,) [Hz], multiples of the fundamental
+    amplitude: Array  # (count,) [unit of the signal]
+    phase: Array  # (count,) [rad], in (-pi, pi]
+
+
+def harmonics(signal: ArrayLike, rate: float, fundamental: float, count: int) -> Harmonics:
+    """First `count` harmonics, the fundamental included, over the longest whole number of last periods.
+
+    Least squares of sines, cosines and a constant: exact for a sum of these whether or not a period is a
+    whole number of samples.
+
+    Parameters: `signal` (n,), `rate` and `fundamental` [Hz]. Raises `ValueError` for a record shorter than one
+    period, a sample that is not finite, or a highest harmonic that is not below half the rate.
+    """
+    x = np.asarray(signal, dtype=float)
+    if x.ndim != 1 or not np.isfinite(x).all():
+        raise ValueError("the signal must be one column of finite samples")
+    if not (fundamental > 0 and count >= 1 and 2 * count * fundamental < rate):
+        raise ValueError(f"{count} harmonics of {fundamental:g} Hz do not lie between 0 and {rate / 2:g} Hz")
+    periods = int(len(x) * fundamental / rate + 1e-9)
+    if periods < 1:
+        raise ValueError(f"{len(x) / rate:g} s are less than one period of {fundamental:g} Hz")
+    used = min(len(x), int(np.ceil(periods * rate / fundamental - 1e-6)))  # more samples than unknowns
+    frequency = np.linspace(fundamental, count * fundamental, count)
+    angle = 2 * np.pi * np.multiply.outer(np.arange(len(x) - used, len(x)) / rate, frequency)
+    waves = np.hstack([np.cos(angle), np.sin(angle), np.ones((used, 1))])
+    weights = np.linalg.lstsq(waves, x[-used:], rcond=None)[0]
+    cosine, sine = weights[:count], weights[count : 2 * count]
+    return Harmonics(frequency, np.hypot(cosine, sine), np.arctan2(-sine, cosine))
+
+
+def total_harmonic_distortion(h: Harmonics) -> float:
+    """Amplitude of all harmonics together over that of the fundamental [1]; NaN if there is no fundamental."""
+    first, *rest = h.amplitude
+    return float(np.linalg.norm(rest) / first) if first > 0 else float("nan")
+
+
+def phase_between(reference: Harmonics, signal: Harmonics) -> float:
+    """Phase of the signal's fundamental less the reference's [rad], in (-pi, pi]; negative where it is late."""
+    difference = signal.phase[0] - reference.phase[0]
+    return float(np.pi - np.mod(np.pi - difference, 2 * np.pi))

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 
 DOUBTFUL, TRUSTED = 0.4, 0.8  # coherence up to which an axis counts as not measured, and from which as measured
 TAPER = 2 ** (1 / 3)  # a third of an octave: from full inverse to nothing above the band
+SHORT = 2 ** (1 / 8)  # an eighth of an octave: from full correction to nothing, within the band
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,13 @@ class InverseFilter:
 
 
 def make_inverse(
-    transfer: Transfer, rate: float, low: float, high: float, length: float = 4.0, floor: float = 0.2
+    transfer: Transfer,
+    rate: float,
+    low: float,
+    high: float,
+    length: float = 4.0,
+    floor: float = 0.2,
+    corrects: bool = False,
 ) -> InverseFilter:
     """Inverse of a square transfer function between `low` and `high` [Hz].
 
@@ -52,6 +59,10 @@ def make_inverse(
     nothing is known the drive is the reference advanced by tau_k, and the gain at 0 Hz is exactly one. Singular
     values of that matrix below `floor` are raised to it, which bounds the gain at 1 / `floor` and leaves the
     inverse exact elsewhere. From `high` to a third of an octave above the drive fades to nothing.
+
+    An inverse that `corrects` a drive by what an error asks for must do nothing where it does not know: where the
+    coherence of an axis falls from 0.8 to 0.4 its error fades out, and so does every error over the eighth of an octave
+    below `high`. Repeated corrections there would build up oscillations.
 
     Parameters: `rate` [Hz] of the filter, `length` [s] of the impulse response, features narrower than about
     2 / `length` [Hz] are smoothed. Raises `ValueError` for a transfer function that is not square or does not
@@ -74,7 +85,12 @@ def make_inverse(
     U, s, Vh = np.linalg.svd(level)
     inverse = (Vh.conj().swapaxes(1, 2) / np.maximum(s, floor)[:, None, :]) @ U.conj().swapaxes(1, 2)
     inverse *= np.exp(2j * np.pi * np.multiply.outer(grid, delays))[:, None, :]
-    inverse *= 1 - _rise(np.log2(np.maximum(grid, low) / high), 0, np.log2(TAPER))[:, None, None]
+    stop, fade = (high / SHORT, SHORT) if corrects else (high, TAPER)
+    inverse *= 1 - _rise(np.log2(np.maximum(grid, low) / stop), 0, np.log2(fade))[:, None, None]
+    if corrects:
+        known = np.array([np.interp(grid, transfer.frequency, c) for c in transfer.coherence.T]).T
+        known[grid < low] = 1.0  # there the axis alone, at unit gain
+        inverse *= _rise(known, DOUBTFUL, TRUSTED)[:, None, :]
     taps = np.roll(fft.irfft(inverse, 4 * half, axis=0), half, axis=0)[: 2 * half + 1]
     return InverseFilter(_windowed(taps), float(rate), (float(low), float(high)), transfer.axes)
 

@@ -1,0 +1,155 @@
+"""Sine tests: amplitude-phase control of the fundamental, adaptive harmonic cancellation of the rest.
+
+Both are the same least-mean-squares law, one canceller per multiple h of the fundamental. It adds to the drive
+
+    c(t) = w_c cos(h w t) + w_s sin(h w t),   (w_c, w_s)' = (2 / tau |T|) e (cos, sin)(h w t + arg T),
+
+e = wanted - achieved acceleration and T the response from drive to feedback at that frequency, from the linear model
+(`margins`). The fundamental's canceller (APC) brings amplitude and phase to what is wanted; the others (AHC) take out
+what friction, valve flow and geometry add.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .control import Controller, ControllerSettings, make_controller
+from .control.loop import CANCELLER
+from .distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
+from .equilibrium import find_equilibrium
+from .errors import SimulationError
+from .identify import tuning_numbers
+from .machine import Machine
+from .margins import expected_response, make_loop_model
+from .motions import Target, find_motion, make_target, motion_options
+from .names import AXES
+from .plant import make_plant
+from .pose import platen_motion
+from .schemes import SAMPLE_RATE
+from .simulate import ClosedLoop, Run, simulate
+
+__all__ = ["SineResult", "SineTest", "sine_target", "sine_test", "with_cancellers"]
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class SineResult:
+    """How well a sine was reproduced on its axis, over the last full cycles."""
+
+    run: Run
+    displacement: Harmonics  # achieved, all multiples within the table's band
+    acceleration: Harmonics
+    amplitude_error: float  # of the displacement's fundamental [1]
+    phase_error: float  # of the same [rad], negative where it is late
+    distortion: float  # total harmonic distortion of the acceleration [1]
+    distortion_displacement: float
+    peak_spool: float  # largest command [1]
+
+
+@dataclass(frozen=True)
+class SineTest:
+    """A sine as the three-variable controller alone reproduces it, and with APC and AHC."""
+
+    settings: ControllerSettings
+    target: Target
+    axis: str
+    amplitude: float  # [m, rad]
+    frequency: float  # [Hz]
+    measured: slice  # samples over which amplitude, phase and distortion are taken
+    before: SineResult
+    after: SineResult
+
+
+def with_cancellers(
+    controller: Controller, axis: str, frequency: float, count: int, time_constant: float
+) -> Controller:
+    """Controller with cancellers of the first `count` multiples of a frequency [Hz] on one axis.
+
+    Raises SimulationError for an axis that the machine has not, or multiples beyond the linear model's reach.
+    """
+    axes = controller.plant.axes
+    k = AXES.index(axis)
+    if k not in axes:
+        raise SimulationError(f"{controller.plant.machine.name} cannot move in {axis}")
+    a = int(np.flatnonzero(axes == k)[0])
+    multiples = frequency * np.arange(1, count + 1)
+    response = expected_response(make_loop_model(controller, multiples), controller)[:, a, a]
+    table = np.zeros(count, CANCELLER)
+    table["axis"] = a
+    table["turn"] = 2.0 * np.pi * multiples / SAMPLE_RATE
+    table["advance"] = np.angle(response)
+    table["rate"] = 2.0 / (time_constant * SAMPLE_RATE) / np.abs(response)
+    return controller._replace(canceller=table)
+
+
+def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, slice]:
+    """Target of a sine that lasts long enough for cancellers to learn, and the samples to judge it by."""
+    numbers = tuning_numbers()
+    cycles = int(numbers.number("sine.measured_cycles"))
+    settle = numbers.number("sine.settling") * numbers.number("sine.time_constant")
+    ramp = next(int(o.default) for o in motion_options("sine") if o.name == "ramp_cycles")
+    whole = int(np.ceil(settle * frequency)) + cycles
+    motion = find_motion("sine", axis=axis, amplitude=amplitude, period=1.0 / frequency, cycles=whole, ramp_cycles=ramp)
+    target = make_target(motion, axes=axis)
+    start = -target.reference.start + (ramp + whole - cycles) / frequency
+    first = round(start * SAMPLE_RATE)
+    return target, slice(first, first + int(np.ceil(cycles / frequency * SAMPLE_RATE)))
+
+
+def sine_test(
+    machine: Machine,
+    settings: ControllerSettings,
+    *,
+    axis: str,
+    amplitude: float,
+    frequency: float,
+    progress: Progress | None = None,
+    **options: Any,
+) -> SineTest:
+    """Run a sine [m or rad, Hz] from rest without and with APC and AHC; options go to `simulate`.
+
+    Raises SimulationError if a run does not last.
+    """
+    numbers = tuning_numbers()
+    report = progress or (lambda share: None)
+    plant = make_plant(machine)
+    rest = find_equilibrium(plant)
+    alone = make_controller(plant, rest, settings)
+    counted = int(numbers.number("feedforward_targets.high") / frequency)
+    count = min(int(numbers.number("sine.harmonics")), counted)
+    if count < 1:
+        raise SimulationError(f"a sine of {frequency:g} Hz lies above the table's band")
+    learning = with_cancellers(alone, axis, frequency, count, numbers.number("sine.time_constant"))
+    target, measured = sine_target(axis, amplitude, frequency)
+    wanted = alone.drive_for(target.displacement, target.velocity, target.acceleration)
+    options = {"engine": "fused" if plant.model.nv == plant.axes.size else "pinocchio", **options}
+    found = []
+    for n, (controller, drive) in enumerate(((alone, wanted), (learning, np.hstack([wanted, target.acceleration])))):
+        run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
+        if run.trouble:
+            raise SimulationError(f"{'with' if n else 'without'} cancellers {run.trouble}")
+        found.append(_judged(run, target, AXES.index(axis), frequency, measured, counted))
+        report((n + 1) / 2)
+    return SineTest(settings, target, axis, amplitude, frequency, measured, *found)
+
+
+def _judged(run: Run, target: Target, k: int, frequency: float, measured: slice, count: int) -> SineResult:
+    motion = platen_motion(run.plant, run.q, run.v, run.a)
+    asked = harmonics(target.displacement[measured, k], float(SAMPLE_RATE), frequency, 1)
+    moved = harmonics(motion.displacement[measured, k], float(SAMPLE_RATE), frequency, count)
+    felt = harmonics(motion.acceleration[measured, k], float(SAMPLE_RATE), frequency, count)
+    return SineResult(
+        run,
+        moved,
+        felt,
+        float(moved.amplitude[0] / asked.amplitude[0] - 1.0),
+        phase_between(asked, moved),
+        total_harmonic_distortion(felt),
+        total_harmonic_distortion(moved),
+        float(np.abs(run.command).max()) if run.command is not None else 0.0,
+    )

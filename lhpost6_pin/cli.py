@@ -143,7 +143,7 @@ def check(
 
 @app.command()
 def run(
-    motion: Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`) or file(s) of a motion.")],
+    motion: Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).")],
     scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
     axes: Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")] = None,
     scheme: Scheme = "semi_implicit",
@@ -152,7 +152,9 @@ def run(
     out: Out = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
-    controller: Annotated[str | None, typer.Option(help="Controller settings: name or TOML file.")] = None,
+    controller: Annotated[
+        str | None, typer.Option(help="Controller settings: name or TOML file; or your own, FILE.py:NAME.")
+    ] = None,
     valves: Annotated[
         int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
     ] = 0,
@@ -169,6 +171,7 @@ def run(
 ) -> None:
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
     from .control import load_controller
+    from .control.plug import is_plugged, load_plugged
     from .motions import make_target
     from .plant import make_plant
     from .rehearse import rehearse, target_within_limits, with_valves
@@ -186,9 +189,10 @@ def run(
         low_pass=low_pass,
         rate=float(SAMPLE_RATE),
     )
-    if not (controller or table.controller):
+    chosen = controller or table.controller
+    if not chosen:
         raise ParameterError(f"{machine} names no controller; give one with --controller")
-    settings = load_controller(controller or table.controller)
+    settings = load_plugged(chosen) if is_plugged(chosen) else load_controller(chosen)
     name = ground.name.replace("/", "_")
     folder = out or Path("out") / name
     refuse_folder(folder)
@@ -250,6 +254,132 @@ def open_loop(
     _save(table, run_, simulated, folder, report=False)
 
 
+@app.command("export-fmu")
+def export_fmu(
+    out: Annotated[Path, typer.Option(help="File to write, ending in .fmu.")] = Path("lhpost6.fmu"),
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    valves: Annotated[
+        int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+    ] = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Export the plant as an FMU (FMI 2.0, co-simulation) for Simulink, Modelica and other tools."""
+    from .fmi import export_fmu as write_fmu
+    from .rehearse import with_valves
+
+    write_fmu(_mount(with_valves(_machine(machine, override), valves), specimen, specimen_at, locked), out)
+    typer.echo(f"wrote {out}")
+
+
+@app.command()
+def serve(
+    mode: Annotated[str, typer.Option(help="lock-step, real-time, or free: as fast as the plant goes.")] = "lock-step",
+    host: Annotated[str, typer.Option(help="Address to listen at; others than this computer only if given.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
+    seconds: Annotated[float | None, typer.Option(help="End after so long; without it Ctrl-C ends.")] = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    valves: Annotated[
+        int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+    ] = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Let a controller in another process or on another computer drive the virtual table over UDP."""
+    from dataclasses import asdict
+
+    from .equilibrium import find_equilibrium
+    from .link import ServedPlant, find_mode, open_socket
+    from .link import serve as serve_link
+    from .link.summary import print_link
+    from .plant import make_plant
+    from .rehearse import with_valves
+
+    chosen = find_mode(mode)
+    table = _mount(with_valves(_machine(machine, override), valves), specimen, specimen_at, locked)
+    with open_socket(host, port) as sock:
+        plant = make_plant(table)
+        served = ServedPlant(plant, find_equilibrium(plant), chosen)
+        address, at = sock.getsockname()
+        typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends")
+        timing = serve_link(sock, served, seconds=seconds)
+    times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
+    print_link(f"{table.name}, {mode}", asdict(served.counts), {**times, "answer of the client": served.answer_time})
+
+
+@app.command()
+def link(
+    motion: Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).")],
+    host: Annotated[str, typer.Option(help="Where `lhpost6 serve` listens.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="And its UDP port.")] = 46946,
+    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
+    axes: Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")] = None,
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: Annotated[
+        str | None, typer.Option(help="Controller settings: name or TOML file; or your own, FILE.py:NAME.")
+    ] = None,
+    valves: Annotated[
+        int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+    ] = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None,
+) -> None:
+    """Run the virtual 469D, or your own controller, here and the table behind `lhpost6 serve`; leaves record.nc."""
+    from .control import load_controller, make_controller
+    from .control.plug import is_plugged, load_plugged
+    from .equilibrium import find_equilibrium
+    from .link import LinkClient, record_of_link_run, run_over_link
+    from .link.summary import print_link
+    from .motions import make_target
+    from .plant import make_plant
+    from .records import save_record
+    from .rehearse import target_within_limits, with_valves
+    from .simulate import SAMPLE_RATE, ClosedLoop, PluggedLoop
+
+    table = _mount(with_valves(_machine(machine, override), valves), specimen, specimen_at, locked)
+    ground = _motion(motion, set_ or [])
+    own_axes = None if table.motion == "free" else table.motion
+    target = make_target(ground, scale=scale, axes=axes or own_axes, rate=float(SAMPLE_RATE))
+    chosen = controller or table.controller
+    if not chosen:
+        raise ParameterError(f"{machine} names no controller; give one with --controller")
+    name = ground.name.replace("/", "_") + "_link"
+    folder = out or Path("out") / name
+    refuse_folder(folder)
+    plant = make_plant(table)
+    target_within_limits(plant, target)
+    rest = find_equilibrium(plant)
+    wanted = (target.displacement, target.velocity, target.acceleration)
+    loop: ClosedLoop | PluggedLoop
+    if is_plugged(chosen):
+        loop = PluggedLoop(load_plugged(chosen), *wanted, rest)
+    else:
+        virtual = make_controller(plant, rest, load_controller(chosen))
+        loop = ClosedLoop(virtual, virtual.drive_for(*wanted), rest)
+    with LinkClient(host, port) as client, _progress(f"{name} at {host}:{port}") as progress:
+        done = run_over_link(client, plant, loop, progress=progress)
+        counts = dict(client.close())
+    counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
+    counts["unanswered"] = int((~done.answered).sum())
+    attrs = {"test": name, "title": f"{ground.name} x {scale:g} over the link", "link_mode": client.mode.label}
+    save_record(record_of_link_run(done, plant, {**attrs, **counts}), folder / "record.nc")
+    print_link(f"{name}, {client.mode.label}", counts, {"command to sensors": client.round_trip})
+    typer.echo(f"wrote {folder / 'record.nc'}")
+    if done.tripped:
+        _stderr().print("the plant tripped: a leg left its stroke, or the run diverged; the server says which")
+        raise typer.Exit(1)
+
+
 def _machine(name: str, override: Path | None) -> "Machine":
     from .machine import load_machine
 
@@ -273,7 +403,7 @@ def _mount(table: "Machine", specimen: str | None, at: str | None, locked: bool)
 
 
 def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
-    """Motion by name, or from one file or three component files."""
+    """Motion by name, from one file or three component files, or by name from such files."""
     from .motions import find_motion, load_motion
 
     options: dict[str, Any] = {}
@@ -282,14 +412,17 @@ def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
         if not equals:
             raise MotionError(f"--set {item}: write key=value")
         options[key.strip()] = _number_or_text(value.strip())
-    if any(Path(n).suffix or Path(n).is_file() for n in names):
-        try:
-            return load_motion(names[0] if len(names) == 1 else names, **options)
-        except (AttributeError, TypeError, ValueError) as error:  # an option of the wrong kind
-            raise MotionError(f"{' '.join(names)}: --set {' --set '.join(settings)}: {error}") from error
-    if len(names) > 1:
-        raise MotionError(f"one motion at a time; got {', '.join(names)}")
-    return find_motion(names[0], **options)
+    first, *files = names
+    if not _is_file(first) and files and not any(map(_is_file, files)):
+        raise MotionError(f"one motion at a time; got {', '.join(names)}, none of which is a file")
+    try:
+        return load_motion(names, **options) if _is_file(first) else find_motion(first, files, **options)
+    except (AttributeError, TypeError, ValueError) as error:  # an option of the wrong kind
+        raise MotionError(f"{' '.join(names)}: --set {' --set '.join(settings)}: {error}") from error
+
+
+def _is_file(name: str) -> bool:
+    return bool(Path(name).suffix) or Path(name).is_file()
 
 
 def _number_or_text(text: str) -> int | float | str:

@@ -3,6 +3,7 @@
 __all__ = [
     "ControllerError",
     "LhpostError",
+    "LinkError",
     "MotionError",
     "OutOfRangeError",
     "ParameterError",
@@ -22,6 +23,10 @@ class ParameterError(LhpostError):
 
 class ControllerError(LhpostError):
     """A user's own controller cannot be loaded, or returned no command; the message names it and the sample."""
+
+
+class LinkError(LhpostError):
+    """A link cannot be opened, nobody answers, or a datagram is no frame; the message says where and what to do."""
 
 
 class RecordError(LhpostError):

@@ -68,7 +68,7 @@ class SineTest:
 def with_cancellers(
     controller: Controller, axis: str, frequency: float, count: int, time_constant: float
 ) -> Controller:
-    """Controller with cancellers of the first `count` multiples of a frequency [Hz] on one axis.
+    """Controller with cancellers of the first `count` multiples of a frequency [Hz] on one axis; constant in [s].
 
     Raises SimulationError for an axis that the machine has not, or multiples beyond the linear model's reach.
     """
@@ -82,7 +82,7 @@ def with_cancellers(
     table = np.zeros(count, CANCELLER)
     table["axis"] = a
     table["turn"] = 2.0 * np.pi * multiples / SAMPLE_RATE
-    table["advance"] = np.angle(response)
+    table["cosine"], table["sine"] = np.cos(np.angle(response)), np.sin(np.angle(response))
     table["rate"] = 2.0 / (time_constant * SAMPLE_RATE) / np.abs(response)
     return controller._replace(canceller=table)
 

@@ -146,7 +146,9 @@ def print_motions(name: str | None = None) -> None:
     if name is None:
         table = Table(Column("name", no_wrap=True), "kind", "what it is", Column("needs", no_wrap=True))
         for m in known:
-            table.add_row(" ".join((m.name, *m.aliases)), m.kind, m.title, escape(m.remedy) or "[green]ready[/]")
+            needs = [escape(m.remedy) or "[green]ready[/]"]
+            needs += [f"or your file: {m.wanted.record}"] if m.wanted and m.kind != "file" else []
+            table.add_row(" ".join((m.name, *m.aliases)), m.kind, m.title, "\n".join(needs))
         console.print(table)
         console.print("lhpost6 motions NAME says what can be chosen about one of them")
         return
@@ -159,8 +161,8 @@ def print_motions(name: str | None = None) -> None:
     for option in chosen:
         table.add_row(*map(escape, option))
     console.print(table if chosen else "options: none")
-    if found.remedy:
-        console.print(f"not installed: {found.remedy}", markup=False)
+    if found.request or found.remedy:
+        console.print(found.request or f"not installed: {found.remedy}", markup=False, soft_wrap=True)
 
 
 def print_findings(file: str, findings: "Sequence[Finding]") -> None:

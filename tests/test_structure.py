@@ -27,7 +27,7 @@ LAYERS = [
     {"simulate"},
     {"batch", "outputs", "check", "ledger", "running", "inverse", "distortion"},
     {"energy"},
-    {"rehearse", "tables", "doctor"},
+    {"rehearse", "tables", "doctor", "fmi", "link"},
     {"report", "viewer_page"},
     {"viewer"},
     {"cli"},

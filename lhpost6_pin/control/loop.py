@@ -71,7 +71,8 @@ CANCELLER = np.dtype(
     [
         ("axis", np.float64),  # place among the free axes
         ("turn", np.float64),  # phase per sample [rad]
-        ("advance", np.float64),  # phase of the path from drive to feedback at this frequency [rad]
+        ("cosine", np.float64),  # of the phase of the path from drive to feedback at this frequency
+        ("sine", np.float64),
         ("rate", np.float64),  # adaptation per sample over that path's gain
     ]
 )
@@ -137,10 +138,10 @@ def cancel(canceller, sample, a, error, weights):
         row = canceller[h]
         if int(row.axis) != a:
             continue
-        phase = row.turn * sample
-        weights[h, 0] += row.rate * error * np.cos(phase + row.advance)
-        weights[h, 1] += row.rate * error * np.sin(phase + row.advance)
-        correction += weights[h, 0] * np.cos(phase) + weights[h, 1] * np.sin(phase)
+        c, s = np.cos(row.turn * sample), np.sin(row.turn * sample)
+        weights[h, 0] += row.rate * error * (c * row.cosine - s * row.sine)
+        weights[h, 1] += row.rate * error * (s * row.cosine + c * row.sine)
+        correction += weights[h, 0] * c + weights[h, 1] * s
     return correction
 
 

@@ -53,6 +53,8 @@ def per_actuator(commands: Array, counts: Counts, curves: Array) -> Array:
     that of their mean opening. Opened to opposite sides (oil runs from supply to return past the actuator) that is an
     approximation. Equal commands come back as they are, to the last bit.
     """
+    if len(commands) == len(counts):
+        return commands
     first = np.cumsum(counts) - counts
     found = commands[first]
     if np.array_equal(per_valve(found, counts), commands):

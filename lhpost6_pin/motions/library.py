@@ -1,6 +1,7 @@
-"""Ground motions by name: shipped records, tests made from a few numbers, records of an optional package."""
+"""Ground motions by name: shipped records, tests made from a few numbers, records of a package or of the user."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -13,8 +14,10 @@ from .csv import load_csv
 from .motion import GroundMotion
 from .options import MotionOption, checked_options, options_of
 from .pulse_records import INSTALL, load_pulse_record, missing_package
+from .readers import MotionFiles, load_motion
 from .synthetic import sine, six_axial, triangle, white_noise
 from .toml import load_toml, values_of
+from .wanted import WantedRecord, request
 
 __all__ = ["MotionEntry", "find_motion", "list_motions", "motion_options"]
 
@@ -31,12 +34,21 @@ class MotionEntry(NamedTuple):
     """A line of the table of motions."""
 
     name: str
-    kind: str  # "record", "package" or the kind of generator
+    kind: str  # "record", "package", "file" (the user's) or the kind of generator
     title: str
     aliases: tuple[str, ...]
     available: bool
-    remedy: str  # what to install where not available
+    remedy: str  # what to install or to bring where not available
     options: tuple[str, ...]  # names of what `find_motion` takes for it; see `motion_options`
+    wanted: WantedRecord | None = None  # the record that may come from the user's own files
+
+    @property
+    def request(self) -> str:
+        """Message that asks for the user's files, "" where none are wanted."""
+        if self.wanted is None:
+            return ""
+        first = f"{self.remedy or 'ready'} for its horizontal components, or " if self.kind == "package" else ""
+        return request(self.name, self.wanted, first)
 
 
 @cache
@@ -58,9 +70,15 @@ def list_motions() -> tuple[MotionEntry, ...]:
             entries.append(MotionEntry(name, test["kind"], test["title"], (), True, "", options))
     package = index["package"]
     remedy = INSTALL if missing_package(package["module"]) else ""
+    wanted = {
+        name: WantedRecord(*(record[key] for key in WantedRecord._fields)) for name, record in index["wanted"].items()
+    }
     for name, record in package["records"].items():
-        aliases = tuple(record.get("aliases", ()))
-        entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, ()))
+        aliases, own = tuple(record.get("aliases", ())), wanted.pop(name, None)
+        entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, (), own))
+    for name, own in wanted.items():
+        record, remedy = index["wanted"][name], f"your file: {own.record}"
+        entries.append(MotionEntry(name, "file", record["title"], tuple(record["aliases"]), False, remedy, (), own))
     return tuple(entries)
 
 
@@ -73,16 +91,22 @@ def motion_options(name: str) -> tuple[MotionOption, ...]:
     return options_of(_tables()[1], entry.name) if entry.options else ()
 
 
-def find_motion(name: str, **options: Any) -> GroundMotion:
+def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> GroundMotion:
     """Ground motion by name or alias, as `list_motions` shows them.
 
     `options` replace numbers of a test made by name, in SI, as in ``find_motion("ac156", sds=5.0, seed=2)``;
-    `motion_options` lists them.
+    `motion_options` lists them. A test whose record is not shipped is read from the user's `files`, as in
+    ``find_motion("tabas", ["x.AT2", "y.AT2", "z.AT2"])``; files and options are then those of `load_motion`.
 
     Raises UnknownNameError for a name that does not exist, MotionError for an option the motion does not
-    take, a value that it cannot have (named), numbers that do not go together, or a package that is not installed.
+    take, a value that it cannot have (named), numbers that do not go together, files that cannot be read or are
+    missing (with the record wanted and where it can be had), or a package that is not installed.
     """
     entry = _entry(name)
+    if files:
+        return _from_files(entry, files, options)
+    if entry.wanted and not entry.available:
+        raise MotionError(entry.request)
     unknown = sorted(set(options) - set(entry.options))
     if unknown:
         takes = ", ".join(entry.options) or "none"
@@ -105,6 +129,15 @@ def find_motion(name: str, **options: Any) -> GroundMotion:
             return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **chosen})
     except (ArithmeticError, MemoryError, TypeError, ValueError) as error:
         raise MotionError(f"{name}: options {options}: {error}") from error
+
+
+def _from_files(entry: MotionEntry, files: MotionFiles, options: Mapping[str, Any]) -> GroundMotion:
+    """Motion of a test from the user's files, with the test's name and title."""
+    if entry.wanted is None:
+        takers = ", ".join(known.name for known in list_motions() if known.wanted)
+        raise MotionError(f"{entry.name} takes no files; give a file without a name, or with one of {takers}")
+    motion = load_motion(files, **{"name": entry.name, **options})
+    return replace(motion, source=f"{entry.title}; {motion.source}")
 
 
 def _entry(name: str) -> MotionEntry:

@@ -11,17 +11,22 @@ from .motion import GroundMotion
 from .text import read_text
 from .v1 import is_v1, load_v1
 
-__all__ = ["load_motion"]
+__all__ = ["MotionFiles", "load_motion"]
+
+MotionFiles = Path | str | Sequence[Path | str] | Mapping[str, Path | str]
+"""One file, components for x, y, z in this order, or components by axis."""
 
 
-def load_motion(paths: "Path | str | Sequence[Path | str] | Mapping[str, Path | str]", **options: Any) -> GroundMotion:
+def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
     """Read a motion from a PEER .AT2, COSMOS/CSMIP V1 or CSV file, told apart by what is in it.
 
-    Several paths (a sequence for x, y, z or a mapping by axis) are components in PEER files. `options` go to
-    the reader of the kind found: `load_at2`, `load_v1` or `load_csv`.
+    Several paths (a sequence for x, y, z or a mapping by axis) are components in PEER files; one alone may hold all
+    axes. `options` go to the reader of the kind found: `load_at2`, `load_v1` or `load_csv`.
 
     Raises MotionError naming the file and what to do.
     """
+    if isinstance(paths, Sequence) and not isinstance(paths, str) and len(paths) == 1:
+        paths = paths[0]
     if not isinstance(paths, str | Path):
         return _call(load_at2, paths, options)
     text = read_text(paths)

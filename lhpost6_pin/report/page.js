@@ -2,7 +2,7 @@
 // Draws each figure when it scrolls into view; keeps all time axes on the same window; keys move and zoom a focused figure.
 (function () {
   const PRINT_WIDTH = 850; // CSS px of an A4 or Letter page between its margins, at the print zoom of page.css
-  const NARROW = 560; // CSS px below which legends stand under the row titles instead of beside them
+  const NARROW = 720; // CSS px below which legends stand under the row titles instead of beside them
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const plots = Array.from(document.querySelectorAll(".plot"));
   const visible = new Set();

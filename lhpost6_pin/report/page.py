@@ -136,9 +136,9 @@ def details(summary: str, *blocks: Markup) -> Markup:
     return Markup(f"<details><summary>{text(summary)}</summary>{''.join(blocks)}</details>")
 
 
-def grid(*blocks: Markup) -> Markup:
-    """Return blocks side by side where the screen is wide enough."""
-    return Markup(f'<div class="grid">{"".join(blocks)}</div>')
+def grid(*blocks: Markup, pairs: bool = False) -> Markup:
+    """Return blocks side by side where the screen is wide enough, with `pairs` never more than two."""
+    return Markup(f'<div class="{"grid pairs" if pairs else "grid"}">{"".join(blocks)}</div>')
 
 
 def bar(fraction: float, tolerance: float = 0.0) -> Markup:

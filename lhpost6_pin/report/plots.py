@@ -20,8 +20,8 @@ from .page import Figure
 __all__ = [
     "ACHIEVED",
     "BUCKETS",
+    "RECORDED",
     "SCALES",
-    "SHIFTED",
     "SUPPLY",
     "TARGET",
     "Row",
@@ -58,7 +58,7 @@ GREY = "#a8aeb4"  # the target, a broad band under what was achieved
 DASHES = ("solid", "dash", "dot", "dashdot")
 TARGET: dict[str, Any] = {"color": GREY, "width": 3.2}
 ACHIEVED: dict[str, Any] = {"color": BLUE, "width": 1.2}
-SHIFTED: dict[str, Any] = {"color": VERMILLION, "width": 1.2, "dash": "dot"}
+RECORDED: dict[str, Any] = {"color": VERMILLION, "width": 1.2, "dash": "dot"}
 SUPPLY: dict[str, Any] = {"color": BLACK, "width": 1.2, "dash": "dash"}
 
 
@@ -103,6 +103,7 @@ class Row:
     scale: Scale
     lines: Mapping[str, float] = field(default_factory=dict)  # label: level of a horizontal line, SI
     span: tuple[float, float] | None = None  # limits of the value axis, SI
+    note: str = ""  # said after the title and its unit
 
 
 def envelope(values: NDArray[np.float64], buckets: int = BUCKETS) -> NDArray[np.int64]:
@@ -140,13 +141,14 @@ def time_figure(
     step: float,
     buckets: int = BUCKETS,
     bands: Sequence[tuple[float, float]] = (),
+    band_color: str = SKY,
     alone: bool = False,
     row_height: int = ROW,
 ) -> Figure:
     """Return a figure of `rows` over one time axis, zoomed with all others of the page unless `alone`.
 
     `start` and `step` are the first sample's time and the sample interval [s]; `bands` shades stretches of
-    time, for instance the one a close-up shows. Names are escaped: plotly reads HTML in its labels.
+    time, for instance the one a close-up shows, in `band_color`. Names are escaped: plotly reads HTML in its labels.
     """
     height = TOP + len(rows) * row_height + (len(rows) - 1) * GAP + BOTTOM
     inner = height - TOP - BOTTOM
@@ -170,7 +172,7 @@ def time_figure(
         if suffix == last:
             xaxis["title"] = {"text": "Time [s]", "standoff": 6}
         layout[f"xaxis{suffix}"] = xaxis | ({} if k == 0 else {"matches": "x"})
-        layout["annotations"].append(_row_title(_titled(row.title, row.scale), top))
+        layout["annotations"].append(_row_title(_titled(row.title, row.scale) + row.note, top))
         legend = {
             "orientation": "h",
             "x": 1,
@@ -186,7 +188,7 @@ def time_figure(
             layout["shapes"].append(_level(level * row.scale.factor, suffix))
             layout["annotations"].append(_level_label(label, level * row.scale.factor, suffix))
         for begin, end in bands:
-            layout["shapes"].append(_band(begin, end, suffix))
+            layout["shapes"].append(_band(begin, end, suffix, band_color))
     return Figure(name, title, description, traces, layout, height)
 
 
@@ -313,7 +315,7 @@ def _level_label(label: str, level: float, suffix: str) -> dict[str, Any]:
     return place | {"text": html.escape(label), "showarrow": False, "font": {"size": 11}}
 
 
-def _band(begin: float, end: float, suffix: str) -> dict[str, Any]:
+def _band(begin: float, end: float, suffix: str, color: str) -> dict[str, Any]:
     place = {
         "type": "rect",
         "xref": f"x{suffix}",
@@ -323,4 +325,4 @@ def _band(begin: float, end: float, suffix: str) -> dict[str, Any]:
         "y0": 0,
         "y1": 1,
     }
-    return place | {"fillcolor": SKY, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}
+    return place | {"fillcolor": color, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}

@@ -1,4 +1,4 @@
-"""Sections of a run report on the machine's components: actuators, chambers, servovalves, struts."""
+"""Sections of a run report on the machine's components: actuators, chambers, struts."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .page import Markup, bar, figure, missing, number, table
 from .plots import SCALES, SUPPLY, Row, Scale, Trace, palette, time_figure
-from .run_metrics import SpoolUse, channel, peaks, sampling
+from .run_metrics import channel, peaks, sampling
 
 __all__ = [
     "TOLERANCE",
@@ -21,9 +21,9 @@ __all__ = [
     "draw_over_time",
     "force_blocks",
     "force_use",
+    "kinds",
     "pressure_blocks",
     "share_of_limit",
-    "spool_blocks",
     "strut_blocks",
 ]
 
@@ -81,26 +81,6 @@ def pressure_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
             words += " The dashed line is the supply; where all stay far below it, the legend switches it on."
         blocks.append(draw_over_time(record, "pressure", "Chamber pressures over time", words, rows))
     return blocks
-
-
-def spool_blocks(record: xr.Dataset, spools: Sequence[SpoolUse]) -> list[Markup]:
-    """Return the utilisation of the valves and their spools over time against the limits ±1."""
-    names = ("spool_position", "spool_command")
-    shown = [name for name in names if name in record]
-    if not shown:
-        return [missing(names, "Servovalves are not drawn.")]
-    blocks = [missing([n for n in names if n not in record], "Only the other is drawn.")] if len(shown) == 1 else []
-    rows = _group_rows(record, "Spool", shown[0], "actuator", SCALES["ratio"])
-    words = "Fourth-stage spool as a share of its stroke, against its limits ±1."
-    if len(shown) == 2:
-        commands = _group_rows(record, "Spool", shown[1], "actuator", SCALES["ratio"])
-        rows = [replace(f, traces=[*f.traces, *map(_command, c.traces)]) for f, c in zip(rows, commands, strict=True)]
-        words += " Lines are feedback; dotted commands can be switched on in the legend."
-    rows = [replace(row, lines={"+1": 1.0, "−1": -1.0}, span=(-1.25, 1.25)) for row in rows]
-    used = [[s.actuator, bar(s.peak), f"{number(100 * s.rms)} %", f"{number(100 * s.saturated)} %"] for s in spools]
-    header = ("Actuator", "Largest opening", "RMS opening", "Time at the limit")
-    drawing = draw_over_time(record, "spool", "Servovalve spools over time", words, rows)
-    return [*blocks, table("Valve utilisation", header, used), drawing]
 
 
 def strut_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
@@ -191,19 +171,19 @@ def _with_supply(row: Row, supply: NDArray[np.float64]) -> Row:
     return replace(row, traces=[*row.traces, Trace("supply", supply, SUPPLY, folded="supply" if far else "")])
 
 
-def _command(trace: Trace) -> Trace:
-    return replace(trace, line={**trace.line, "dash": "dot"}, folded="commands")
-
-
 def _group_rows(record: xr.Dataset, title: str, name: str, dim: str, scale: Scale) -> list[Row]:
     """One row per kind of component: H1 to H4 in one, V1 to V6 in the next."""
     values = channel(record, name, dim)
     labels = [str(label) for label in record[dim].values]
     rows = []
-    for kind, members in groupby(range(len(labels)), key=lambda k: re.sub(r"\d+$", "", labels[k])):
-        own = list(members)
-        lines = palette(len(own))
-        traces = [Trace(labels[k], values[:, k], line) for k, line in zip(own, lines, strict=True)]
-        span = kind if len(own) == 1 else f"{labels[own[0]]}–{labels[own[-1]]}"
-        rows.append(Row(f"{title} {span}", traces, scale))
+    for own in kinds(labels):
+        traces = [Trace(labels[k], values[:, k], line) for k, line in zip(own, palette(len(own)), strict=True)]
+        first, last = labels[own[0]], labels[own[-1]]
+        rows.append(Row(f"{title} {first if len(own) == 1 else f'{first}–{last}'}", traces, scale))
     return rows
+
+
+def kinds(labels: Sequence[str]) -> list[list[int]]:
+    """Return the places of the components of each kind, by their names less the number: H1 to H4, V1 to V6."""
+    places = groupby(range(len(labels)), key=lambda k: re.sub(r"\d+$", "", labels[k]))
+    return [list(own) for _, own in places]

@@ -21,6 +21,7 @@ __all__ = [
     "asked_axes",
     "channel",
     "drift",
+    "peak_window",
     "peaks",
     "sampling",
     "spool_use",
@@ -155,3 +156,14 @@ def peaks(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Greatest finite |value| of each column (n, ...) -> (...); not-a-number for a column without any."""
     size = np.where(np.isfinite(values), np.abs(values), -np.inf).max(axis=0)
     return np.where(size >= 0.0, size, np.nan)
+
+
+def peak_window(values: NDArray[np.float64], step: float, duration: float) -> tuple[int, int] | None:
+    """First and last sample of the `duration` [s] around the peak of (n,); nothing if the record is hardly longer."""
+    n, length = len(values), int(duration / step)
+    if n <= 2 * length:
+        return None
+    values = np.nan_to_num(values)
+    peak = int(np.abs(values - values.mean()).argmax())
+    first = min(max(peak - length // 2, 0), n - length)
+    return first, first + length

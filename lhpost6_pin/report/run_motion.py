@@ -10,8 +10,8 @@ from ..motions.spectra import response_spectrum
 from .page import Figure, Markup, details, figure, grid, missing, number, paragraph, table
 from .plots import (
     ACHIEVED,
+    RECORDED,
     SCALES,
-    SHIFTED,
     TARGET,
     Row,
     Scale,
@@ -21,7 +21,7 @@ from .plots import (
     time_figure,
 )
 from .run_components import draw_over_time
-from .run_metrics import QUANTITIES, Tracking, asked_axes, channel, drift, sampling
+from .run_metrics import QUANTITIES, Tracking, asked_axes, channel, drift, peak_window, sampling
 
 __all__ = ["axis_scale", "drift_blocks", "percent", "shown_as", "spectrum_blocks", "tracking_blocks"]
 
@@ -58,8 +58,9 @@ def tracking_blocks(record: xr.Dataset, found: Sequence[Tracking]) -> list[Marku
     if len(absent) == len(names):
         return blocks
     how = (
-        "RRMSE = √(Σ error² ∕ Σ target²), as recorded and after removing the delay, the shift that brings "
-        "achieved and target together. Dragging over a plot zooms the time axes of all plots; a double click "
+        "RRMSE = √(Σ error² ∕ Σ target²). The achieved motion is drawn, and judged in the title of each plot, after "
+        "removing its delay, the shift that brings achieved and target together; the legend switches on what was "
+        "recorded. Dragging over a plot zooms the time axes of all plots; a double click "
         "shows all again. The shaded stretch is drawn at the full rate below its plot."
     )
     blocks.append(paragraph(how))
@@ -131,9 +132,10 @@ def _axis_figure(
     start, step = sampling(record)
     rows, words = [], []
     for quantity in QUANTITIES:
-        traces = _pair(record, axis, quantity, slice(None))
-        rows += [Row(quantity.capitalize(), traces, axis_scale(axis, quantity))] if traces else []
         row = _tracked(found, axis, quantity)
+        traces = _traces(record, row, axis, quantity, slice(None), folded="as recorded")
+        note = f", RRMSE {percent(row.rrmse_aligned)}" if row else ""
+        rows += [Row(quantity.capitalize(), traces, axis_scale(axis, quantity), note=note)] if traces else []
         if row:
             after = f"{percent(row.rrmse_aligned)} after removing {shown_as(row.delay, SCALES['time'])}"
             words.append(f"{quantity} RRMSE {percent(row.rrmse)} as recorded, {after}")
@@ -144,21 +146,18 @@ def _axis_figure(
 
 
 def _close_up(record: xr.Dataset, found: Sequence[Tracking], axis: str, window: tuple[int, int]) -> Figure:
-    """Return the highest derivative there is around its peak, every sample, also with the delay removed."""
+    """Return the highest derivative there is around its peak, every sample, also as recorded."""
     start, step = sampling(record)
-    part = slice(*window)
-    quantity = next(q for q in reversed(QUANTITIES) if _pair(record, axis, q, part))
-    traces = _pair(record, axis, quantity, part)
+    quantity = next(q for q in reversed(QUANTITIES) if {f"platen_{q}", f"reference_{q}"} & set(record.variables))
     row = _tracked(found, axis, quantity)
     words = f"{quantity.capitalize()} around its peak, every sample."
-    if row and row.aligned is not None:
-        traces.append(Trace("delay removed", row.aligned[part], SHIFTED))
-        words += f" The dotted line is the achieved motion {shown_as(row.delay, SCALES['time'])} earlier."
+    if row:
+        words += f" The dotted line is as recorded, {shown_as(row.delay, SCALES['time'])} later."
     return time_figure(
         f"close-{axis}",
         f"{_title(axis)}, close-up",
         words,
-        [Row(quantity.capitalize(), traces, axis_scale(axis, quantity))],
+        [Row(quantity.capitalize(), _traces(record, row, axis, quantity, slice(*window)), axis_scale(axis, quantity))],
         start=start + window[0] * step,
         step=step,
         buckets=window[1] - window[0],
@@ -172,22 +171,24 @@ def _peak_window(record: xr.Dataset, axis: str) -> tuple[int, int] | None:
     names = [f"{who}_{quantity}" for quantity in reversed(QUANTITIES) for who in ("reference", "platen")]
     name = next(name for name in names if name in record)
     _, step = sampling(record)
-    n, length = record.sizes["time"], int(CLOSE_UP / step)
-    if n <= 2 * length:
-        return None
-    motion = np.nan_to_num(_of_axis(record, name, axis))
-    peak = int(np.abs(motion - motion.mean()).argmax())
-    first = min(max(peak - length // 2, 0), n - length)
-    return first, first + length
+    return peak_window(_of_axis(record, name, axis), step, CLOSE_UP)
 
 
-def _pair(record: xr.Dataset, axis: str, quantity: str, part: slice) -> list[Trace]:
-    kinds = (("reference", "target", TARGET), ("platen", "achieved", ACHIEVED))
-    return [
-        Trace(label, _of_axis(record, f"{who}_{quantity}", axis)[part], line)
-        for who, label, line in kinds
-        if f"{who}_{quantity}" in record
-    ]
+def _traces(
+    record: xr.Dataset, row: Tracking | None, axis: str, quantity: str, part: slice, folded: str = ""
+) -> list[Trace]:
+    """Return target and achieved motion; where its delay is known, without it and then, maybe folded, as recorded."""
+    traces = []
+    if f"reference_{quantity}" in record:
+        traces.append(Trace("target", _of_axis(record, f"reference_{quantity}", axis)[part], TARGET))
+    if f"platen_{quantity}" in record:
+        achieved = _of_axis(record, f"platen_{quantity}", axis)[part]
+        if row and row.aligned is not None:
+            traces.append(Trace("achieved, delay removed", row.aligned[part], ACHIEVED))
+            traces.append(Trace("as recorded", achieved, RECORDED, folded))
+        else:
+            traces.append(Trace("achieved", achieved, ACHIEVED))
+    return traces
 
 
 def _of_axis(record: xr.Dataset, name: str, axis: str) -> NDArray[np.float64]:

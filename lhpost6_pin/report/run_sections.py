@@ -14,7 +14,6 @@ from .run_components import (
     force_blocks,
     pressure_blocks,
     share_of_limit,
-    spool_blocks,
     strut_blocks,
 )
 from .run_metrics import QUANTITIES, SpoolUse, Tracking
@@ -26,6 +25,7 @@ from .run_motion import (
     spectrum_blocks,
     tracking_blocks,
 )
+from .run_spools import spool_blocks
 
 __all__ = ["run_sections"]
 

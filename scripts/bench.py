@@ -50,20 +50,20 @@ class Bench:
     """Collects rows (what, value, unit)."""
 
     def __init__(self, repeats: int) -> None:
-        """Prepare the plant, a reference motion and its spools."""
+        """Prepare the plant, the drive of a motion and its spools."""
         self.repeats = repeats
         self.rows: list[tuple[str, float, str]] = []
         self.plant = make_plant(load_machine())
         self.rest = find_equilibrium(self.plant)
         self.loop = make_controller(self.plant, self.rest, load_controller("lhpost6"))
         target = make_target(find_motion("ridgecrest"), rate=float(SAMPLE_RATE))
-        self.reference = np.hstack([target.displacement, target.velocity])
-        run = simulate(self.plant, self.closed(len(self.reference)), samples=len(self.reference), engine="fused")
+        self.drive = self.loop.drive_for(target.displacement, target.velocity, target.acceleration)
+        run = simulate(self.plant, self.closed(len(self.drive)), samples=len(self.drive), engine="fused")
         self.spool = run.spool
 
     def closed(self, samples: int) -> ClosedLoop:
         """Closed loop on the first samples of the motion's strong part."""
-        return ClosedLoop(self.loop, np.ascontiguousarray(self.reference[:samples]), self.rest)
+        return ClosedLoop(self.loop, self.drive[:samples], self.rest)
 
     def open(self, samples: int) -> OpenLoop:
         """Open loop on the spools of that motion."""

@@ -70,11 +70,12 @@ def every_step(machine: Machine, rate: int, duration: float = 0.5, scheme: str =
 
 
 def reference(amplitude: list[float], frequency: list[float], duration: float) -> np.ndarray:
-    """Sine motions of C and Euler angles that rise in a second, with their velocity (n, 12)."""
+    """Sine motions of C and Euler angles that rise in a second, with velocity and acceleration (3, n, 6)."""
     t = np.arange(int(duration * SAMPLE_RATE)) / SAMPLE_RATE
     rise = np.clip(t, 0, 1) ** 2 * (3 - 2 * np.clip(t, 0, 1))
     x = np.array(amplitude) * np.sin(2 * np.pi * np.outer(t, frequency)) * rise[:, None]
-    return np.hstack([x, np.gradient(x, 1 / SAMPLE_RATE, axis=0)])
+    v = np.gradient(x, 1 / SAMPLE_RATE, axis=0)
+    return np.array([x, v, np.gradient(v, 1 / SAMPLE_RATE, axis=0)])
 
 
 def closed_loop(machine: Machine, target: np.ndarray) -> Run:
@@ -82,7 +83,8 @@ def closed_loop(machine: Machine, target: np.ndarray) -> Run:
     plant = make_plant(machine)
     rest = find_equilibrium(plant)
     loop = make_controller(plant, rest, load_controller("lhpost6"))
-    run = simulate(plant, ClosedLoop(loop, target, rest), samples=len(target), engine="fused")
+    drive = ClosedLoop(loop, loop.drive_for(*target), rest)
+    run = simulate(plant, drive, samples=target.shape[1], engine="fused")
     assert run.trouble is None
     return run
 

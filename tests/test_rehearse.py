@@ -9,7 +9,7 @@ from machine_cases import DATA, machine_named
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import OutOfRangeError, ParameterError, RecordError, SimulationError
+from lhpost6_pin.errors import ControllerError, OutOfRangeError, ParameterError, RecordError, SimulationError
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import make_plant
@@ -141,7 +141,7 @@ def test_progress_rises_to_one(engine):
 
 def test_a_controller_of_another_rate_is_refused():
     slow = replace(load_controller("lhpost6"), rate=1024.0)
-    with pytest.raises(SimulationError, match="1024 Hz is not the samples' 2048 Hz"):
+    with pytest.raises(ControllerError, match="1024 Hz is not the samples' 2048 Hz"):
         rehearse(load_machine(), sine_target(), slow, attrs={})
 
 

@@ -16,7 +16,7 @@ from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.errors import SimulationError
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import platen_motion
+from lhpost6_pin.pose import PlatenMotion, platen_motion
 from lhpost6_pin.records import load_record
 from lhpost6_pin.rehearse import replay
 from lhpost6_pin.schemes import SCHEMES, spool_windows
@@ -34,27 +34,30 @@ def reference():
 
 
 def six_axis(seconds, size=1.0):
-    """A smooth six-axis motion that starts at rest: reference (n, 12)."""
-    n = int(seconds * SAMPLE_RATE)
-    t = np.arange(n) / SAMPLE_RATE
+    """A smooth six-axis motion that starts at rest."""
+    t = np.arange(int(seconds * SAMPLE_RATE))[:, None] / SAMPLE_RATE
     rise = np.clip(t / 1.5, 0.0, 1.0)
-    envelope, slope = rise**2 * (3 - 2 * rise), 6 * rise * (1 - rise) / 1.5
-    out = np.zeros((n, 12))
-    for k, (peak, hertz) in enumerate([(0.2, 0.7), (0.1, 0.9), (0.02, 1.1), (0.004, 1.1), (0.003, 0.8), (0.02, 0.6)]):
-        w = 2 * np.pi * hertz
-        out[:, k] = size * peak * envelope * np.sin(w * t)
-        out[:, 6 + k] = size * peak * (slope * np.sin(w * t) + envelope * w * np.cos(w * t))
-    return out
+    envelope, slope, bend = rise**2 * (3 - 2 * rise), 6 * rise * (1 - rise) / 1.5, 6 * (1 - 2 * rise) / 1.5**2
+    bend[rise == 1.0] = 0.0
+    peak = size * np.array([0.2, 0.1, 0.02, 0.004, 0.003, 0.02])
+    w = 2 * np.pi * np.array([0.7, 0.9, 1.1, 1.1, 0.8, 0.6])
+    sine, cosine = np.sin(w * t), np.cos(w * t)
+    return PlatenMotion(
+        peak * envelope * sine,
+        peak * (slope * sine + envelope * w * cosine),
+        peak * (bend * sine + 2 * slope * w * cosine - envelope * w**2 * sine),
+    )
 
 
-def closed_loop(plant, rest, reference):
-    return ClosedLoop(make_controller(plant, rest, load_controller("lhpost6")), reference, rest)
+def closed_loop(plant, rest, motion):
+    loop = make_controller(plant, rest, load_controller("lhpost6"))
+    return ClosedLoop(loop, loop.drive_for(*motion), rest)
 
 
 def spools_of(plant, rest, seconds):
     """Spool positions of a closed-loop run, to drive open-loop ones."""
-    reference = six_axis(seconds)
-    run = simulate(plant, closed_loop(plant, rest, reference), samples=len(reference), engine="fused")
+    motion = six_axis(seconds)
+    run = simulate(plant, closed_loop(plant, rest, motion), samples=len(motion.displacement), engine="fused")
     assert run.trouble is None
     return run.spool
 
@@ -101,13 +104,13 @@ def test_default_scheme_at_the_controller_rate_is_closer_than_the_reports_at_fou
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_both_engines_give_the_same_run(plant, rest, scheme):
     """The fused engine's rigid-body algebra against Pinocchio's, over some seconds of every axis."""
-    reference = six_axis(3.0)
+    motion = six_axis(3.0)
     rate = (8 if scheme == "euler" else 4) * SAMPLE_RATE
     runs = [
         simulate(
             plant,
-            closed_loop(plant, rest, reference),
-            samples=len(reference),
+            closed_loop(plant, rest, motion),
+            samples=len(motion.displacement),
             scheme=scheme,
             steps_per_second=rate,
             engine=engine,
@@ -121,21 +124,18 @@ def test_both_engines_give_the_same_run(plant, rest, scheme):
 
 
 def test_both_engines_give_the_same_run_over_twenty_seconds(plant, rest):
-    reference = six_axis(20.0)
-    a, b = (
-        simulate(plant, closed_loop(plant, rest, reference), samples=len(reference), engine=engine)
-        for engine in ENGINES
-    )
+    motion = six_axis(20.0)
+    n = len(motion.displacement)
+    a, b = (simulate(plant, closed_loop(plant, rest, motion), samples=n, engine=engine) for engine in ENGINES)
     for name in ("q", "v", "z", "spool"):
         scale = np.maximum(np.abs(getattr(a, name)).max(axis=0), 1e-6)
         assert (np.abs(getattr(a, name) - getattr(b, name)).max(axis=0) / scale).max() < 1e-9, name
 
 
 def test_batch_gives_bit_for_bit_the_same_whatever_the_threads(plant, rest):
-    reference = six_axis(0.5)
-    jobs = [(plant, closed_loop(plant, rest, s * reference)) for s in (0.3, 0.6, 1.0)]
-    one, many = (simulate_many(jobs, samples=len(reference), threads=n) for n in (1, 3))
-    alone = simulate(*jobs[2], samples=len(reference), engine="fused")
+    jobs = [(plant, closed_loop(plant, rest, six_axis(0.5, size))) for size in (0.3, 0.6, 1.0)]
+    one, many = (simulate_many(jobs, samples=1024, threads=n) for n in (1, 3))
+    alone = simulate(*jobs[2], samples=1024, engine="fused")
     for a, b in zip(one, many, strict=True):
         assert np.array_equal(a.q, b.q) and np.array_equal(a.z, b.z)
     assert np.array_equal(many[2].q, alone.q)
@@ -224,7 +224,7 @@ def test_five_milliseconds_are_ten_and_a_quarter_samples():
 
 def test_machine_at_rest_stays_at_rest_for_ten_seconds(plant, rest):
     n = 10 * SAMPLE_RATE
-    run = simulate(plant, closed_loop(plant, rest, np.zeros((n, 12))), samples=n, engine="fused")
+    run = simulate(plant, closed_loop(plant, rest, PlatenMotion(*np.zeros((3, n, 6)))), samples=n, engine="fused")
     motion = platen_motion(plant, run.q, run.v, run.a)
     assert np.abs(motion.displacement).max() < 1e-9  # required: 1e-6 m
 
@@ -239,7 +239,7 @@ def test_internal_forces_do_not_drift(plant, rest):
 
     def left(gain):
         loop = make_controller(plant, start, replace(settings, balance_gain=gain))
-        run = simulate(plant, ClosedLoop(loop, np.zeros((n, 12)), start), samples=n, engine="fused")
+        run = simulate(plant, ClosedLoop(loop, np.zeros((n, 6)), start), samples=n, engine="fused")
         force = run.z[:, 0:8:2] * 0.2027 - run.z[:, 1:8:2] * 0.1297
         return np.abs(force[-1]).max() / np.abs(force[0]).max()
 

@@ -1,6 +1,6 @@
 """A controller made ready for a plant: the tables that the compiled step reads, and the step for one sample."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ..rigid_body import platen_inertia
 from ..schemes import SAMPLE_RATE
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
 from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, control_step_flat
+from .plug import Sensors
 from .settings import ControllerSettings
 
 __all__ = ["Controller", "make_controller"]
@@ -39,16 +40,17 @@ class Controller(NamedTuple):
         width = max(6, self.plant.spools)
         return np.zeros((MEMORY_ROWS + len(self.canceller), width))
 
-    def step(self, memory: Array, sample: int, drive: Array, sensors: tuple[Array, Array, Array]) -> Array:
-        """Command (n_actuators,) of a sample from drive (n, 6) and sensors (displacement, acceleration, force).
+    def step(self, memory: Array, sample: int, drive: Array, sensors: Sensors) -> Array:
+        """Command (n_actuators,) of a sample from drive (n, 6) and the sensors.
 
         memory is changed in place. For one sample at a time: runs call the compiled step themselves.
         """
         command = np.empty(self.plant.spools)
-        control_step_flat(sample, drive, *sensors, *self.flat_tables(), memory, command)
+        arguments: Any = (sample, drive, *sensors, *self.flat_tables(), memory, command)
+        control_step_flat(*arguments)
         return command
 
-    def flat_tables(self) -> tuple[Array, ...]:
+    def flat_tables(self) -> tuple[NDArray[Any], ...]:
         """Legs, body, axes, axis, actuator, balance and canceller as plain numbers."""
         plant = self.plant
         legs, body, axis, actuator, canceller = (

@@ -30,6 +30,10 @@ class Notch:
 class ControllerSettings:
     """Three-variable control, force feedback and force balance (`loop`, `filters`)."""
 
+    name: str
+    mode: str
+    notches: tuple[Notch, ...]
+    stated: Parameters = field(compare=False, repr=False)  # numbers as read, with evidence and source
     rate: float = quantity_field("Hz", bound="positive")
     spool_limit: float = quantity_field("1", bound="fraction")
     master_gain: Six = quantity_field("1", length=6, bound="nonnegative")
@@ -49,10 +53,6 @@ class ControllerSettings:
     force_damping: Six = quantity_field("1", length=6, bound="nonnegative")
     force_cut_in: float = quantity_field("Hz", bound="positive")
     balance_gain: float = quantity_field("1/s", bound="nonnegative")
-    mode: str
-    notches: tuple[Notch, ...]
-    name: str
-    stated: Parameters = field(compare=False, repr=False)  # numbers as read, with evidence and source
 
 
 _SECTIONS = {

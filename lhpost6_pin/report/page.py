@@ -60,6 +60,7 @@ class Figure:
     traces: Sequence[Mapping[str, Any]]
     layout: Mapping[str, Any]
     height: int  # [CSS px]
+    least_width: int = 0  # [CSS px] below which it scrolls sideways inside its own box
 
 
 @dataclass(frozen=True)
@@ -176,12 +177,17 @@ def figure(drawing: Figure) -> Markup:
     data = json.dumps({"traces": drawing.traces, "layout": drawing.layout}, separators=(",", ":"))
     data = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     name = text(drawing.name)
+    size = f"height:{drawing.height}px"
+    before, after = "", ""
+    if drawing.least_width:
+        size += f";min-width:{drawing.least_width}px"
+        before, after = f'<div class="scroll" tabindex="0" role="region" aria-labelledby="{name}-caption">', "</div>"
     return Markup(
         f'<figure><figcaption id="{name}-caption"><h3>{text(drawing.title)}</h3>'
         f"<p>{text(drawing.description)}</p></figcaption>"
-        f'<div class="plot" id="{name}" style="height:{drawing.height}px" tabindex="0" role="group" '
+        f'{before}<div class="plot" id="{name}" style="{size}" tabindex="0" role="group" '
         f'aria-roledescription="interactive plot" aria-labelledby="{name}-caption" '
-        'aria-describedby="keys"></div>'
+        f'aria-describedby="keys"></div>{after}'
         f'<script type="application/json" data-for="{name}">{data}</script></figure>'
     )
 

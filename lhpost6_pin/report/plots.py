@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.constants import g
 
+from .layout import ROW, axis_suffix, level_label, level_line, on_row, stacked_layout, time_band
 from .page import Figure
 
 __all__ = [
     "ACHIEVED",
+    "AFTER",
+    "BEFORE",
     "BUCKETS",
     "RECORDED",
     "SCALES",
@@ -28,19 +31,13 @@ __all__ = [
     "Scale",
     "Trace",
     "envelope",
+    "packed",
     "palette",
     "spectrum_figure",
     "time_figure",
 ]
 
 BUCKETS = 1500  # stretches a channel is divided into; about one per pixel of a wide screen
-ROW, GAP, TOP, BOTTOM = (
-    170,
-    48,
-    40,
-    44,
-)  # [CSS px] height of a row, between rows, above the first, below the last
-
 PERIOD_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)  # [s]
 
 # Okabe and Ito's colours, told apart with any colour vision; their yellow is left out, too pale on white.
@@ -59,6 +56,8 @@ DASHES = ("solid", "dash", "dot", "dashdot")
 TARGET: dict[str, Any] = {"color": GREY, "width": 3.2}
 ACHIEVED: dict[str, Any] = {"color": BLUE, "width": 1.2}
 RECORDED: dict[str, Any] = {"color": VERMILLION, "width": 1.2, "dash": "dot"}
+BEFORE: dict[str, Any] = {"color": ORANGE, "width": 1.4}
+AFTER: dict[str, Any] = {"color": BLUE, "width": 1.4}
 SUPPLY: dict[str, Any] = {"color": BLACK, "width": 1.2, "dash": "dash"}
 
 
@@ -150,46 +149,19 @@ def time_figure(
     `start` and `step` are the first sample's time and the sample interval [s]; `bands` shades stretches of
     time, for instance the one a close-up shows, in `band_color`. Names are escaped: plotly reads HTML in its labels.
     """
-    height = TOP + len(rows) * row_height + (len(rows) - 1) * GAP + BOTTOM
-    inner = height - TOP - BOTTOM
-    layout: dict[str, Any] = {
-        "height": height,
-        "margin": {"l": 52, "r": 14, "t": TOP, "b": BOTTOM},
-        "annotations": [],
-        "shapes": [],
-        "meta": {"linked": not alone, "row": row_height},
-    }
+    titles = [_titled(row.title, row.scale) + row.note for row in rows]
+    layout = stacked_layout(titles, "Time [s]", row_height=row_height, linked=not alone)
     traces: list[dict[str, Any]] = []
-    last = "" if len(rows) == 1 else str(len(rows))
     for k, row in enumerate(rows):
-        suffix = "" if k == 0 else str(k + 1)
-        top = 1.0 - k * (row_height + GAP) / inner
-        bottom = max(top - row_height / inner, 0.0)
-        layout[f"yaxis{suffix}"] = {"domain": [bottom, top], "anchor": f"x{suffix}", "nticks": 6}
         if row.span:
-            layout[f"yaxis{suffix}"]["range"] = [level * row.scale.factor for level in row.span]
-        xaxis: dict[str, Any] = {"anchor": f"y{suffix}", "showticklabels": suffix == last}
-        if suffix == last:
-            xaxis["title"] = {"text": "Time [s]", "standoff": 6}
-        layout[f"xaxis{suffix}"] = xaxis | ({} if k == 0 else {"matches": "x"})
-        layout["annotations"].append(_row_title(_titled(row.title, row.scale) + row.note, top))
-        legend = {
-            "orientation": "h",
-            "x": 1,
-            "xanchor": "right",
-            "y": top,
-            "yanchor": "bottom",
-            "tracegroupgap": 0,
-        }
-        layout[f"legend{suffix}"] = legend | {"bgcolor": "rgba(0,0,0,0)", "font": {"size": 11}}
-        axes = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "legend": f"legend{suffix}"}
-        traces += [lines | axes for lines in _time_traces(row, start, step, buckets)]
+            layout[f"yaxis{axis_suffix(k)}"]["range"] = [level * row.scale.factor for level in row.span]
+        traces += [lines | on_row(k) for lines in _time_traces(row, start, step, buckets)]
         for label, level in row.lines.items():
-            layout["shapes"].append(_level(level * row.scale.factor, suffix))
-            layout["annotations"].append(_level_label(label, level * row.scale.factor, suffix))
+            layout["shapes"].append(level_line(level * row.scale.factor, k))
+            layout["annotations"].append(level_label(label, level * row.scale.factor, k))
         for begin, end in bands:
-            layout["shapes"].append(_band(begin, end, suffix, band_color))
-    return Figure(name, title, description, traces, layout, height)
+            layout["shapes"].append(time_band(begin, end, k, band_color))
+    return Figure(name, title, description, traces, layout, layout["height"])
 
 
 def spectrum_figure(
@@ -201,36 +173,21 @@ def spectrum_figure(
     scale: Scale,
 ) -> Figure:
     """Return response spectra, `curves` of label: (spectral values SI (n,), line), over `periods` [s]."""
-    row = 230
-    height = TOP + row + BOTTOM
     traces = [
         {
             "type": "scatter",
             "mode": "lines",
             "name": html.escape(label),
-            "x": _packed(periods),
-            "y": _packed(values * scale.factor),
+            "x": packed(periods),
+            "y": packed(values * scale.factor),
             "line": dict(line),
         }
         for label, (values, line) in curves.items()
     ]
-    layout = {
-        "height": height,
-        "margin": {"l": 52, "r": 14, "t": TOP, "b": BOTTOM},
-        "meta": {"linked": False, "row": row},
-        "xaxis": {"type": "log", "title": {"text": "Period [s]", "standoff": 6}, "tickvals": PERIOD_TICKS},
-        "yaxis": {"rangemode": "tozero", "nticks": 6},
-        "annotations": [_row_title(_titled("PSA", scale), 1.0)],
-        "legend": {
-            "orientation": "h",
-            "x": 1,
-            "xanchor": "right",
-            "y": 1,
-            "yanchor": "bottom",
-            "font": {"size": 11},
-        },
-    }
-    return Figure(name, title, description, traces, layout, height)
+    layout = stacked_layout([_titled("PSA", scale)], "Period [s]", row_height=230)
+    layout["xaxis"] |= {"type": "log", "tickvals": PERIOD_TICKS}
+    layout["yaxis"] |= {"rangemode": "tozero"}
+    return Figure(name, title, description, traces, layout, layout["height"])
 
 
 def _time_traces(row: Row, start: float, step: float, buckets: int) -> list[dict[str, Any]]:
@@ -255,12 +212,13 @@ def _time_trace(trace: Trace, scale: Scale, start: float, step: float, buckets: 
         "mode": "lines",
         "name": html.escape(trace.name),
         "x": {"start": start, "step": step, "dtype": dtype, "bdata": _base64(jumps.astype(f"<{dtype}"))},
-        "y": _packed(trace.values[kept] * scale.factor),
+        "y": packed(trace.values[kept] * scale.factor),
         "line": dict(trace.line),
     }
 
 
-def _packed(values: NDArray[np.float64]) -> dict[str, str]:
+def packed(values: NDArray[np.float64]) -> dict[str, str]:
+    """Return values as plotly reads them from base64: float32, little-endian."""
     return {"dtype": "f4", "bdata": _base64(values.astype("<f4"))}
 
 
@@ -270,59 +228,3 @@ def _base64(values: NDArray[Any]) -> str:
 
 def _titled(words: str, scale: Scale) -> str:
     return words if scale.unit == "1" else f"{words} [{scale.unit}]"
-
-
-def _row_title(words: str, top: float) -> dict[str, Any]:
-    place = {
-        "x": 0,
-        "xref": "paper",
-        "xanchor": "left",
-        "y": top,
-        "yref": "paper",
-        "yanchor": "bottom",
-        "yshift": 5,
-    }
-    return place | {
-        "name": "title",
-        "text": f"<b>{html.escape(words)}</b>",
-        "showarrow": False,
-        "font": {"size": 12},
-    }
-
-
-def _level(level: float, suffix: str) -> dict[str, Any]:
-    place = {
-        "type": "line",
-        "xref": "paper",
-        "x0": 0,
-        "x1": 1,
-        "yref": f"y{suffix}",
-        "y0": level,
-        "y1": level,
-    }
-    return place | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}}
-
-
-def _level_label(label: str, level: float, suffix: str) -> dict[str, Any]:
-    place = {
-        "x": 1,
-        "xref": "paper",
-        "xanchor": "right",
-        "y": level,
-        "yref": f"y{suffix}",
-        "yanchor": "bottom",
-    }
-    return place | {"text": html.escape(label), "showarrow": False, "font": {"size": 11}}
-
-
-def _band(begin: float, end: float, suffix: str, color: str) -> dict[str, Any]:
-    place = {
-        "type": "rect",
-        "xref": f"x{suffix}",
-        "x0": begin,
-        "x1": end,
-        "yref": f"y{suffix} domain",
-        "y0": 0,
-        "y1": 1,
-    }
-    return place | {"fillcolor": color, "opacity": 0.18, "line": {"width": 0}, "layer": "below"}

@@ -1,0 +1,10 @@
+"""The command line `lhpost6`.
+
+Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the input cannot be used or a file cannot be
+read or written, 130 interrupted.
+"""
+
+from . import connect, controllers, look, runs  # each adds its commands
+from .app import app, main
+
+__all__ = ["app", "connect", "controllers", "look", "main", "runs"]

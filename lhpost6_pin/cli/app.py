@@ -1,0 +1,82 @@
+"""The application that the commands are added to, its entry point, and what it shows while it works."""
+
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING
+
+import typer
+
+from ..errors import LhpostError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["app", "main", "progress_bar", "stderr"]
+
+app = typer.Typer(
+    help="The UC San Diego LHPOST6 shake table, modelled from first principles on Pinocchio.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+
+
+def main() -> None:
+    """Entry point: errors that a user can act on are printed without a traceback."""
+    from rich.logging import RichHandler
+
+    handler = RichHandler(console=stderr(), show_path=False, show_time=False)
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
+    try:
+        app()
+    except LhpostError as error:
+        _fail(str(error))
+    except OSError as error:  # disk full, no permission, a file where a folder should be
+        where = f"cannot read or write {error.filename}" if error.filename else "cannot read or write a file"
+        _fail(f"{where}: {os.strerror(error.errno) if error.errno else error}")
+    except SystemExit as end:
+        if end.code == _INTERRUPTED:
+            stderr().print("interrupted; nothing half-written is left behind")
+        raise
+
+
+_INTERRUPTED = 130
+"""Exit code that typer gives to Ctrl-C."""
+
+
+def _fail(message: str) -> None:
+    stderr().print("[bold red]error:[/] ", end="")
+    stderr().print(message, markup=False, highlight=False)
+    sys.exit(2)
+
+
+@cache
+def stderr() -> "Console":
+    """One console for errors, warnings and progress, so that they do not overwrite each other."""
+    from rich.console import Console
+
+    return Console(stderr=True, soft_wrap=True)
+
+
+@contextmanager
+def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar with remaining time on stderr; yields what to call with the share done."""
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    name = TextColumn("{task.description}", markup=False)
+    with Progress(
+        name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=stderr()
+    ) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)

@@ -1,0 +1,138 @@
+"""Commands that connect the virtual table to others: serve, link, export-fmu."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import app, progress_bar, stderr
+from .options import (
+    Axes,
+    ControllerName,
+    Locked,
+    MachineName,
+    Motion,
+    Out,
+    Override,
+    Scale,
+    Set,
+    SpecimenAt,
+    SpecimenName,
+    Valves,
+    find_controller,
+    find_table,
+    find_target,
+    folder_for,
+)
+
+__all__ = ["export_fmu", "link", "serve"]
+
+
+@app.command("export-fmu")
+def export_fmu(
+    out: Annotated[Path, typer.Option(help="File to write, ending in .fmu.")] = Path("lhpost6.fmu"),
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Export the plant as an FMU (FMI 2.0, co-simulation) for Simulink, Modelica and other tools."""
+    from ..fmi import export_fmu as write_fmu
+
+    write_fmu(find_table(machine, override, valves, specimen, specimen_at, locked), out)
+    typer.echo(f"wrote {out}")
+
+
+@app.command()
+def serve(
+    mode: Annotated[str, typer.Option(help="lock-step, real-time, or free: as fast as the plant goes.")] = "lock-step",
+    host: Annotated[str, typer.Option(help="Address to listen at; others than this computer only if given.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
+    seconds: Annotated[float | None, typer.Option(help="End after so long; without it Ctrl-C ends.")] = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Let a controller in another process or on another computer drive the virtual table over UDP."""
+    from dataclasses import asdict
+
+    from ..equilibrium import find_equilibrium
+    from ..link import ServedPlant, find_mode, open_socket
+    from ..link import serve as serve_link
+    from ..link.summary import print_link
+    from ..plant import make_plant
+
+    chosen = find_mode(mode)
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    with open_socket(host, port) as sock:
+        plant = make_plant(table)
+        served = ServedPlant(plant, find_equilibrium(plant), chosen)
+        address, at = sock.getsockname()
+        typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends")
+        timing = serve_link(sock, served, seconds=seconds)
+    times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
+    print_link(f"{table.name}, {mode}", asdict(served.counts), {**times, "answer of the client": served.answer_time})
+
+
+@app.command()
+def link(
+    motion: Motion,
+    host: Annotated[str, typer.Option(help="Where `lhpost6 serve` listens.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="And its UDP port.")] = 46946,
+    scale: Scale = 1.0,
+    axes: Axes = None,
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: ControllerName = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    set_: Set = None,
+) -> None:
+    """Run the virtual 469D, or your own controller, here and the table behind `lhpost6 serve`; leaves record.nc."""
+    from ..control import ControllerSettings, make_controller
+    from ..equilibrium import find_equilibrium
+    from ..link import LinkClient, record_of_link_run, run_over_link
+    from ..link.summary import print_link
+    from ..plant import make_plant
+    from ..records import save_record
+    from ..rehearse import target_within_limits
+    from ..simulate import ClosedLoop, PluggedLoop
+
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    target = find_target(motion, set_, table, scale=scale, axes=axes)
+    chosen = find_controller(controller, table)
+    moved = target.reference.motion
+    name = moved.replace("/", "_") + "_link"
+    folder = folder_for(out, name)
+    plant = make_plant(table)
+    target_within_limits(plant, target)
+    rest = find_equilibrium(plant)
+    wanted = (target.displacement, target.velocity, target.acceleration)
+    loop: ClosedLoop | PluggedLoop
+    if isinstance(chosen, ControllerSettings):
+        virtual = make_controller(plant, rest, chosen)
+        loop = ClosedLoop(virtual, virtual.drive_for(*wanted), rest)
+    else:
+        loop = PluggedLoop(chosen, *wanted, rest)
+    with LinkClient(host, port) as client, progress_bar(f"{name} at {host}:{port}") as progress:
+        done = run_over_link(client, plant, loop, progress=progress)
+        counts = dict(client.close())
+    counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
+    counts["unanswered"] = int((~done.answered).sum())
+    attrs = {"test": name, "title": f"{moved} x {scale:g} over the link", "link_mode": client.mode.label}
+    save_record(record_of_link_run(done, plant, {**attrs, **counts}), folder / "record.nc")
+    print_link(f"{name}, {client.mode.label}", counts, {"command to sensors": client.round_trip})
+    typer.echo(f"wrote {folder / 'record.nc'}")
+    if done.tripped:
+        stderr().print("the plant tripped: a leg left its stroke, or the run diverged; the server says which")
+        raise typer.Exit(1)

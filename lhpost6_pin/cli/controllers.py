@@ -1,0 +1,142 @@
+"""Commands of the virtual 469D: tune, iterate, sine."""
+
+from typing import Annotated
+
+import typer
+
+from .app import app, progress_bar
+from .options import (
+    Axes,
+    Beyond,
+    HighPass,
+    Locked,
+    LowPass,
+    MachineName,
+    Motion,
+    Out,
+    Override,
+    Scale,
+    Set,
+    SettingsName,
+    SpecimenAt,
+    SpecimenName,
+    Valves,
+    find_settings,
+    find_table,
+    find_target,
+    folder_for,
+)
+from .runs import repeating_command
+
+__all__ = ["iterate", "sine", "tune"]
+
+
+@app.command()
+def tune(
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: SettingsName = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Tune the three-variable controller for a machine and specimen; leaves controller.toml and report.html."""
+    from dataclasses import replace
+
+    from ..control import save_controller
+    from ..control_tables import print_tuning
+    from ..report import write_tune_report
+    from ..tuning import tune as tune_controller
+
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    settings = find_settings(controller, table)
+    load = table.specimen.name if table.specimen else "bare"
+    folder = folder_for(out, f"tune_{table.name}")
+    with progress_bar(f"tuning {table.name}") as progress:
+        found = tune_controller(table, settings, progress=progress)
+    named = replace(found.after, name=f"tuned for {table.name}, {load}")
+    save_controller(named, folder / "controller.toml", f"lhpost6 tune on {table.name}, {load}")
+    write_tune_report(found, folder / "report.html", command=repeating_command())
+    print_tuning(found, folder)
+    if not found.doubled:
+        raise typer.Exit(1)
+
+
+@app.command()
+def iterate(
+    motion: Motion,
+    scale: Scale = 1.0,
+    axes: Axes = None,
+    most: Annotated[int | None, typer.Option(min=1, help="Iterations after the first run.")] = None,
+    gain: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Gain of the drive's update.")] = None,
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: SettingsName = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    high_pass: HighPass = None,
+    low_pass: LowPass = None,
+    set_: Set = None,
+    beyond: Beyond = False,
+) -> None:
+    """Iterate on a motion until the table does what is wanted; leaves drive.nc, inverse.nc and report.html."""
+    from ..control_tables import print_iterations
+    from ..drives import save_drive
+    from ..inverse import save_inverse
+    from ..iterate import iterate as iterate_drive
+    from ..plant import make_plant
+    from ..rehearse import target_within_limits
+    from ..report import write_iterate_report
+
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    target = find_target(motion, set_, table, scale=scale, axes=axes, high_pass=high_pass, low_pass=low_pass)
+    settings = find_settings(controller, table)
+    name = target.reference.motion.replace("/", "_")
+    folder = folder_for(out, f"{name}_iterated")
+    if not beyond:
+        target_within_limits(make_plant(table), target)
+    with progress_bar(f"iterating {name} on {table.name}") as progress:
+        result = iterate_drive(table, target, settings, most=most, gain=gain, progress=progress)
+    facts = {"machine": table.name, "controller": settings.name, "iteration": result.best}
+    save_drive(result.drive, settings.mode, target, folder / "drive.nc", facts)
+    save_inverse(result.table.inverse, folder / "inverse.nc")
+    write_iterate_report(result, folder / "report.html", command=repeating_command())
+    print_iterations(result, folder)
+
+
+@app.command()
+def sine(
+    amplitude: Annotated[float, typer.Option(min=0.0, help="Amplitude [m, or rad].")] = 0.75,
+    frequency: Annotated[float, typer.Option(min=0.0, help="Frequency [Hz].")] = 0.5,
+    axis: Annotated[str, typer.Option(help="Axis: x y z roll pitch or yaw.")] = "x",
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: SettingsName = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    beyond: Beyond = False,
+) -> None:
+    """Run a sine without and with amplitude-phase control and harmonic cancellation; leaves report.html."""
+    from ..control_tables import print_sine
+    from ..plant import make_plant
+    from ..rehearse import target_within_limits
+    from ..report import write_sine_report
+    from ..sine import sine_target, sine_test
+
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    settings = find_settings(controller, table)
+    folder = folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz")
+    if not beyond:
+        target_within_limits(make_plant(table), sine_target(axis, amplitude, frequency)[0])
+    with progress_bar(f"sine in {axis} on {table.name}") as progress:
+        found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
+    write_sine_report(found, folder / "report.html", command=repeating_command())
+    print_sine(found, folder)

@@ -1,0 +1,156 @@
+"""Options that commands share, and the machine, motion and controller that they name."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import MotionError, ParameterError
+
+if TYPE_CHECKING:
+    from ..control import ControllerSettings
+    from ..control.plug import UserController
+    from ..machine import Machine
+    from ..motions import GroundMotion, Target
+
+__all__ = ["Axes", "Beyond", "ControllerName", "EngineName", "HighPass", "Locked", "LowPass", "MachineName", "Motion"]
+__all__ += ["Out", "Override", "Rate", "Scale", "Scheme", "Set", "SettingsName", "SpecimenAt", "SpecimenName", "Valves"]
+__all__ += ["find_controller", "find_machine", "find_settings", "find_target", "find_table", "folder_for"]
+
+MachineName = Annotated[str, typer.Option("--machine", help="Shipped machine name, or a TOML file.")]
+Override = Annotated[Path | None, typer.Option("--override", help="TOML file with parameters to replace.")]
+Scheme = Annotated[str, typer.Option(help="Integration scheme: semi_implicit, euler or rk4.")]
+Rate = Annotated[int, typer.Option(help="Model steps per second, a multiple of 2048.")]
+EngineName = Annotated[str, typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).")]
+SpecimenName = Annotated[
+    str | None, typer.Option("--specimen", help="Specimen bolted to the platen: shipped name, or a URDF file.")
+]
+SpecimenAt = Annotated[
+    str | None,
+    typer.Option("--specimen-at", help="Its root on the platen's top: x,y,z [m], or with r,p,y [rad]."),
+]
+Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
+Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
+Valves = Annotated[
+    int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+]
+Motion = Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).")]
+Scale = Annotated[float, typer.Option(help="Factor on the motion.")]
+Axes = Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")]
+HighPass = Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")]
+LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")]
+Set = Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")]
+Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion that is more than the table can give.")]
+SettingsName = Annotated[
+    str | None, typer.Option("--controller", help="Controller settings: name or TOML file; else the machine's.")
+]
+ControllerName = Annotated[
+    str | None, typer.Option("--controller", help="Controller settings: name or TOML file; or your own, FILE.py:NAME.")
+]
+
+
+def find_machine(name: str, override: Path | None) -> "Machine":
+    """Machine by shipped name or file, with the numbers of an override file."""
+    from ..machine import load_machine
+
+    return load_machine(name, override)
+
+
+def find_table(
+    machine: str, override: Path | None, valves: int, specimen: str | None, at: str | None, locked: bool
+) -> "Machine":
+    """Machine with its open valves, and the specimen that the options name, if any."""
+    from ..rehearse import with_valves
+
+    table = with_valves(find_machine(machine, override), valves)
+    if specimen is None:
+        if locked or at:
+            raise ParameterError("--locked and --specimen-at are about a specimen; name it with --specimen")
+        return table
+    try:
+        place = [float(x) for x in at.split(",")] if at else [0.0] * 3
+    except ValueError:
+        place = []
+    if len(place) not in (3, 6):
+        raise ParameterError(f"--specimen-at {at}: write x,y,z in metres, or x,y,z,roll,pitch,yaw with radians")
+    x, y, z, roll, pitch, yaw = (*place, 0.0, 0.0, 0.0)[:6]
+    return table.with_specimen(specimen, (x, y, z), (roll, pitch, yaw), locked=locked)
+
+
+def find_settings(name: str | None, table: "Machine") -> "ControllerSettings":
+    """Settings by name or file, or those that the machine names."""
+    from ..control import load_controller
+
+    chosen = name or table.controller
+    if not chosen:
+        raise ParameterError(f"{table.name} names no controller; give one with --controller")
+    return load_controller(chosen)
+
+
+def find_controller(name: str | None, table: "Machine") -> "ControllerSettings | UserController":
+    """A user's own controller as FILE.py:NAME, else settings as `find_settings`."""
+    from ..control.plug import is_plugged, load_plugged
+
+    return load_plugged(name) if name and is_plugged(name) else find_settings(name, table)
+
+
+def find_target(
+    names: list[str],
+    settings: list[str] | None,
+    table: "Machine",
+    *,
+    scale: float,
+    axes: str | None,
+    high_pass: float | None = None,
+    low_pass: float | None = None,
+) -> "Target":
+    """Target at the controller's rate from a motion by name, file(s), or name and file(s)."""
+    from ..motions import make_target
+    from ..schemes import SAMPLE_RATE
+
+    ground = _motion(names, settings or [])
+    own = None if table.motion == "free" else table.motion
+    return make_target(
+        ground, scale=scale, axes=axes or own, high_pass=high_pass, low_pass=low_pass, rate=float(SAMPLE_RATE)
+    )
+
+
+def folder_for(out: Path | None, name: str) -> Path:
+    """Folder for results, out/NAME unless given; raises OSError at once if none can be written there."""
+    from ..files import refuse_folder
+
+    folder = out or Path("out") / name
+    refuse_folder(folder)
+    return folder
+
+
+def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
+    """Motion by name, from one file or three component files, or by name from such files."""
+    from ..motions import find_motion, load_motion
+
+    options: dict[str, Any] = {}
+    for item in settings:
+        key, equals, value = item.partition("=")
+        if not equals:
+            raise MotionError(f"--set {item}: write key=value")
+        options[key.strip()] = _number_or_text(value.strip())
+    first, *files = names
+    if not _is_file(first) and files and not any(map(_is_file, files)):
+        raise MotionError(f"one motion at a time; got {', '.join(names)}, none of which is a file")
+    try:
+        return load_motion(names, **options) if _is_file(first) else find_motion(first, files, **options)
+    except (AttributeError, TypeError, ValueError) as error:  # an option of the wrong kind
+        raise MotionError(f"{' '.join(names)}: --set {' --set '.join(settings)}: {error}") from error
+
+
+def _is_file(name: str) -> bool:
+    return bool(Path(name).suffix) or Path(name).is_file()
+
+
+def _number_or_text(text: str) -> int | float | str:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

@@ -1,0 +1,213 @@
+"""Commands that run the virtual table: run, replay, open-loop."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import RecordError, SimulationError
+from .app import app, progress_bar
+from .options import (
+    Axes,
+    Beyond,
+    ControllerName,
+    EngineName,
+    HighPass,
+    Locked,
+    LowPass,
+    MachineName,
+    Motion,
+    Out,
+    Override,
+    Rate,
+    Scale,
+    Scheme,
+    Set,
+    SettingsName,
+    SpecimenAt,
+    SpecimenName,
+    Valves,
+    find_controller,
+    find_settings,
+    find_table,
+    find_target,
+    folder_for,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..machine import Machine
+    from ..simulate import Run
+
+__all__ = ["open_loop", "repeating_command", "replay", "run"]
+
+
+@app.command()
+def run(
+    motion: Motion,
+    scale: Scale = 1.0,
+    axes: Axes = None,
+    scheme: Scheme = "semi_implicit",
+    rate: Rate = 8192,
+    engine: EngineName = "pinocchio",
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: ControllerName = None,
+    aic: Annotated[
+        Path | None, typer.Option(help="Condition the drive with this inverse.nc of `lhpost6 iterate`.")
+    ] = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    high_pass: HighPass = None,
+    low_pass: LowPass = None,
+    set_: Set = None,
+    beyond: Beyond = False,
+    record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
+) -> None:
+    """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
+    from ..inverse import load_inverse
+    from ..plant import make_plant
+    from ..rehearse import rehearse, target_within_limits
+    from ..schemes import SAMPLE_RATE
+
+    if record_rate < 1 or SAMPLE_RATE % record_rate:
+        raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    target = find_target(motion, set_, table, scale=scale, axes=axes, high_pass=high_pass, low_pass=low_pass)
+    chosen = find_controller(controller, table)
+    inverse = load_inverse(aic) if aic else None
+    name = target.reference.motion.replace("/", "_")
+    folder = folder_for(out, name)
+    if not beyond:
+        target_within_limits(make_plant(table), target)
+    with progress_bar(f"{name} on {table.name}") as progress:
+        run_, record = rehearse(
+            table,
+            target,
+            chosen,
+            attrs={"test": name, "title": f"{name} x {scale:g} on {table.name}"},
+            inverse=inverse,
+            scheme=scheme,
+            steps_per_second=rate,
+            engine=engine,
+            record_every=SAMPLE_RATE // record_rate,
+            beyond_limits=True,
+            progress=progress,
+        )
+    _save(table, run_, record, folder, report=True)
+
+
+@app.command()
+def replay(
+    drive: Annotated[Path, typer.Argument(help="Drive file that `lhpost6 iterate` left.")],
+    scheme: Scheme = "semi_implicit",
+    rate: Rate = 8192,
+    engine: EngineName = "pinocchio",
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    controller: SettingsName = None,
+    valves: Valves = 0,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Replay a drive file in closed loop; leaves record.nc and report.html against the motion it is for."""
+    from ..drives import load_drive
+    from ..rehearse import rehearse
+
+    table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    settings = find_settings(controller, table)
+    found = load_drive(drive)
+    if found.mode != settings.mode:
+        raise SimulationError(
+            f"{drive} is for reference generators in {found.mode} mode; {settings.name} has {settings.mode} mode"
+        )
+    name = f"{found.target.reference.motion.replace('/', '_')}_replay"
+    folder = folder_for(out, name)
+    with progress_bar(f"{name} on {table.name}") as progress:
+        run_, record = rehearse(
+            table,
+            found.target,
+            settings,
+            attrs={"test": name, "title": f"{name} on {table.name}", "drive": str(drive)},
+            drive=found.values,
+            scheme=scheme,
+            steps_per_second=rate,
+            engine=engine,
+            beyond_limits=True,
+            progress=progress,
+        )
+    _save(table, run_, record, folder, report=True)
+
+
+@app.command("open-loop")
+def open_loop(
+    record: Annotated[Path, typer.Argument(help="Record whose spool positions drive the plant.")],
+    scheme: Scheme = "semi_implicit",
+    rate: Rate = 8192,
+    engine: EngineName = "pinocchio",
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+) -> None:
+    """Drive the plant with a record's spools from its first sample's pressures; leaves record.nc."""
+    from ..records import load_record
+    from ..rehearse import replay as replay_spools
+    from ..tables import print_comparison
+
+    table = find_table(machine, override, 0, specimen, specimen_at, locked)
+    measured = load_record(record, {"actuator": table.actuator_names})
+    test = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record"))
+    name = f"{test}_open_loop"
+    if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():
+        raise RecordError(f"{record} would be replaced by its own replay; choose another folder with --out")
+    folder = folder_for(out, name)
+    with progress_bar(f"{name} on {table.name}") as progress:
+        run_, simulated = replay_spools(
+            table,
+            measured,
+            attrs={"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"},
+            scheme=scheme,
+            steps_per_second=rate,
+            engine=engine,
+            progress=progress,
+        )
+    print_comparison(measured, simulated)
+    _save(table, run_, simulated, folder, report=False)
+
+
+def repeating_command() -> str:
+    """The command line that repeats this one."""
+    return shlex.join(["lhpost6", *sys.argv[1:]])
+
+
+def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, report: bool) -> None:
+    from ..records import save_record
+    from ..tables import machine_rows, print_saved, report_limits
+
+    save_record(record, folder / "record.nc")
+    summary = None
+    if report:
+        from ..report import write_run_report
+
+        summary = write_run_report(
+            record,
+            folder / "report.html",
+            limits=report_limits(run_.plant),
+            notes=[run_.trouble] if run_.trouble else [],
+            command=repeating_command(),
+            machine_table=machine_rows(table),
+        )
+    print_saved(folder, run_, summary)
+    if run_.trouble:
+        raise typer.Exit(1)

@@ -1,0 +1,110 @@
+"""The link from the command line: `lhpost6 serve` in one process, `lhpost6 link` in another."""
+
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from lhpost6_pin import cli
+from lhpost6_pin.link import Mode, ServedPlant, open_socket, serve
+from lhpost6_pin.records import load_record
+
+SERVE = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {!r}; main()"
+SHORT = (
+    "sine",
+    "--scale",
+    "0.2",
+    *"--set amplitude=0.02 --set cycles=0.5 --set ramp_cycles=0.5 --set period=1".split(),
+)
+SCRIPT = Path(__file__).parent.parent / "scripts" / "link_round_trip.py"
+GUARD = 120  # [s] no wait is meant to last so long
+
+
+@pytest.fixture
+def lhpost6(capsys, monkeypatch, tmp_path):
+    """Run a command as the entry point does, in a folder of its own; returns exit code and text."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        told = capsys.readouterr()
+        return int(end.value.code or 0), " ".join((told.out + told.err).split())
+
+    return run
+
+
+@pytest.fixture
+def port(plant, rest):
+    """Port of a plant served in lock-step by a thread."""
+    stop = threading.Event()
+    with open_socket(port=0) as sock:
+        table = ServedPlant(plant, rest, Mode.LOCK_STEP)
+        thread = threading.Thread(target=serve, args=(sock, table), kwargs={"stop": stop})
+        thread.start()
+        yield sock.getsockname()[1]
+        stop.set()
+        thread.join(GUARD)
+
+
+@pytest.mark.parametrize("mode", [m.label for m in Mode])
+def test_a_server_says_where_it_listens_and_what_it_met(lhpost6, mode):
+    code, told = lhpost6("serve", "--mode", mode, "--port", 0, "--seconds", 0.05)
+    assert code == 0
+    assert "listens at 127.0.0.1:" in told and f", {mode}; Ctrl-C ends" in told
+    assert "missed deadlines" in told and "malformed" in told
+
+
+def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6):
+    command = [sys.executable, "-c", SERVE.format(["serve", "--port", "0", "--seconds", str(GUARD)])]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            where = server.stdout.readline()
+            port = where.split("127.0.0.1:")[1].split(",")[0]
+            code, told = lhpost6("link", *SHORT, "--port", port, "--out", tmp_path / "out")
+        finally:
+            server.kill()
+    assert code == 0, told
+    record = load_record(tmp_path / "out" / "record.nc")
+    assert record.attrs["link_mode"] == "lock-step" and record.attrs["lost"] == 0
+    assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in told.replace(" ", "")
+
+
+def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6, port):
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n"
+        "    def init(self, plant, rest):\n        return rest.spool\n"
+        "    def step(self, memory, wanted, sensors):\n        return memory\n"
+    )
+    code, told = lhpost6("link", *SHORT, "--port", port, "--controller", "mine.py:Mine")
+    assert code == 0, told
+    assert abs(load_record(tmp_path / "out" / "sine_link" / "record.nc")["actuator_displacement"]).max() < 1e-6
+
+
+def test_a_plant_that_trips_ends_the_command_with_one(tmp_path, lhpost6, port):
+    (tmp_path / "wild.py").write_text(
+        "class Wild:\n"
+        "    def init(self, plant, rest):\n        pass\n"
+        "    def step(self, memory, wanted, sensors):\n        return [0.0] * 4 + [1.0] * 6\n"
+    )
+    code, told = lhpost6("link", *SHORT, "--port", port, "--controller", "wild.py:Wild")
+    assert code == 1 and "the plant tripped" in told
+
+
+def test_what_cannot_be_done_is_said_and_ends_with_two(lhpost6, port):
+    code, told = lhpost6("serve", "--port", port)
+    assert code == 2 and f"cannot listen on 127.0.0.1:{port}" in told
+    code, told = lhpost6("serve", "--mode", "fast")
+    assert code == 2 and "free, lock-step, real-time" in told
+    code, told = lhpost6("link", *SHORT, "--port", port, "--valves", 2)
+    assert code == 2 and "choose --valves alike" in told
+
+
+def test_the_round_trip_script_measures_and_keeps_its_figures(tmp_path):
+    command = [sys.executable, str(SCRIPT), "--seconds", "0.2", "--out", str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=GUARD)
+    assert ended.returncode == 0, ended.stderr
+    assert "deadlines missed" in ended.stdout and (tmp_path / "link_round_trip.json").is_file()

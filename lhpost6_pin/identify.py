@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 
 
 def tuning_numbers() -> Parameters:
-    """Numbers of `models/controllers/tuning.toml`."""
-    return load_parameters(models_folder() / "controllers" / "tuning.toml")
+    """Numbers of `models/procedures/tuning.toml`."""
+    return load_parameters(models_folder() / "procedures" / "tuning.toml")
 
 
 def noise_target(axes: Sequence[str], seed: int = 1, *, slow: bool = False, duration: float | None = None) -> Target:

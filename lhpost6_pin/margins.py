@@ -115,18 +115,15 @@ def expected_response(model: LoopModel, controller: Controller) -> Complex:
 
 def margins(model: LoopModel, controller: Controller) -> tuple[Margin, ...]:
     """Gain and phase margin of each free axis, the others closed; of a loop that is stable as it is."""
-    returned = np.eye(len(controller.axis)) + loop_gain(model, controller)
-    whole = np.linalg.det(returned)
-    found = []
-    for k in range(len(controller.axis)):
-        others = np.delete(np.delete(returned, k, axis=1), k, axis=2)
-        alone = whole / (np.linalg.det(others) if others.size else 1.0)
-        found.append(_margin(model.frequency, alone - 1.0))
-    return tuple(found)
+    inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(model, controller))
+    alone = 1.0 / np.einsum("mkk->mk", inner) - 1.0  # what an axis sees of itself around its own loop, others closed
+    return tuple(_margin(model.frequency, loop) for loop in alone.T)
 
 
 def _margin(frequency: Array, loop: Complex) -> Margin:
     """Smallest margins of a scalar loop: where it crosses the negative real axis inside, and the unit circle."""
+    if not loop.any():
+        return Margin(np.inf, np.nan, np.inf, np.nan)
     turn, size = np.unwrap(np.angle(loop)), np.log(np.abs(loop))
     gain, at_gain, phase, at_phase = np.inf, np.nan, np.inf, np.nan
     half_turns = np.floor((turn / np.pi - 1.0) / 2.0)  # changes where the loop crosses the negative real axis

@@ -57,7 +57,8 @@ class OpenLoop(NamedTuple):
 class ClosedLoop(NamedTuple):
     """Drive by the 469D: drive (n, 6) goes into its reference generators (`Controller.drive_for`).
 
-    With sine cancellers drive is (n, 12): columns 6 to 11 hold the wanted acceleration of C and Euler angles.
+    With sine cancellers drive is (n, 13): columns 6 to 11 hold the wanted acceleration of C and Euler angles, column 12
+    the level, 0 to 1, at which they act.
     """
 
     controller: Controller
@@ -200,7 +201,7 @@ def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, eng
             at, which = np.argwhere(~np.isfinite(drive.spool))[0]
             raise SimulationError(f"spool of {plant.machine.actuator_names[which]} is not finite at row {at}")
     elif isinstance(drive, ClosedLoop):
-        columns = 12 if len(drive.controller.canceller) else 6
+        columns = 13 if len(drive.controller.canceller) else 6
         _check_shape("drive", drive.drive, (samples, columns))
     else:
         for name in ("displacement", "velocity", "acceleration"):

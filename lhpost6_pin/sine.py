@@ -4,8 +4,8 @@ Both are the same least-mean-squares law, one canceller per multiple h of the fu
 
     c(t) = w_c cos(h w t) + w_s sin(h w t),   (w_c, w_s)' = (2 / tau |T|) e (cos, sin)(h w t + arg T),
 
-e = wanted - achieved acceleration and T the response from drive to feedback at that frequency, from the linear model
-(`margins`). The fundamental's canceller (APC) brings amplitude and phase to what is wanted; the others (AHC) take out
+at the level of the sine's envelope and not while spool commands are clipped. e = wanted - achieved acceleration and T the response from drive to acceleration at that frequency: that of the reference
+generator, then from reference to feedback, from the linear model (`margins`). The fundamental's canceller (APC) brings amplitude and phase to what is wanted; the others (AHC) take out
 what friction, valve flow and geometry add.
 """
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .control import Controller, ControllerSettings, make_controller
+from .control.filters import sampled_response
 from .control.loop import CANCELLER
 from .distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
 from .equilibrium import find_equilibrium
@@ -24,7 +25,7 @@ from .errors import SimulationError
 from .identify import tuning_numbers
 from .machine import Machine
 from .margins import expected_response, make_loop_model
-from .motions import Target, find_motion, make_target, motion_options
+from .motions import Target, find_motion, make_target, motion_options, smooth_step
 from .names import AXES
 from .plant import make_plant
 from .pose import platen_motion
@@ -78,7 +79,11 @@ def with_cancellers(
         raise SimulationError(f"{controller.plant.machine.name} cannot move in {axis}")
     a = int(np.flatnonzero(axes == k)[0])
     multiples = np.asarray(frequency * np.arange(1, count + 1), np.float64)
-    response = expected_response(make_loop_model(controller, multiples), controller)[:, a, a]
+    row = controller.axis[a]
+    generator = row["generator_a"], row["generator_b"], row["generator_c"], row["generator_d"]
+    reference = sampled_response(generator, multiples, float(SAMPLE_RATE))[:, 0, 0]
+    followed = expected_response(make_loop_model(controller, multiples), controller)[:, a, a]
+    response = (2j * np.pi * multiples) ** 2 * followed * reference
     table = np.zeros(count, CANCELLER)
     table["axis"] = a
     table["turn"] = 2.0 * np.pi * multiples / SAMPLE_RATE
@@ -87,8 +92,8 @@ def with_cancellers(
     return controller._replace(canceller=table)
 
 
-def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, slice]:
-    """Target of a sine that lasts long enough for cancellers to learn, and the samples to judge it by."""
+def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, Array, slice]:
+    """Target of a sine that lasts long enough for cancellers to learn, its level 0 to 1, and the samples to judge by."""
     numbers = tuning_numbers()
     cycles = int(numbers.number("sine.measured_cycles"))
     settle = numbers.number("sine.settling") * numbers.number("sine.time_constant")
@@ -96,9 +101,10 @@ def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, 
     whole = int(np.ceil(settle * frequency)) + cycles
     motion = find_motion("sine", axis=axis, amplitude=amplitude, period=1.0 / frequency, cycles=whole, ramp_cycles=ramp)
     target = make_target(motion, axes=axis)
-    start = -target.reference.start + (ramp + whole - cycles) / frequency
-    first = round(start * SAMPLE_RATE)
-    return target, slice(first, first + int(np.ceil(cycles / frequency * SAMPLE_RATE)))
+    periods = (target.time + target.reference.start) * frequency  # since the sine begins
+    level = smooth_step(periods / ramp)[0] * smooth_step((whole + 2 * ramp - periods) / ramp)[0]
+    first = int(np.searchsorted(periods, ramp + whole - cycles))
+    return target, level, slice(first, first + int(np.ceil(cycles / frequency * SAMPLE_RATE)))
 
 
 def sine_test(
@@ -125,11 +131,12 @@ def sine_test(
     if count < 1:
         raise SimulationError(f"a sine of {frequency:g} Hz lies above the table's band")
     learning = with_cancellers(alone, axis, frequency, count, numbers.number("sine.time_constant"))
-    target, measured = sine_target(axis, amplitude, frequency)
+    target, level, measured = sine_target(axis, amplitude, frequency)
     wanted = alone.drive_for(target.displacement, target.velocity, target.acceleration)
     options = {"engine": "fused" if plant.model.nv == plant.axes.size else "pinocchio", **options}
     found = []
-    for n, (controller, drive) in enumerate(((alone, wanted), (learning, np.hstack([wanted, target.acceleration])))):
+    learnt_from = np.column_stack([wanted, target.acceleration, level])
+    for n, (controller, drive) in enumerate(((alone, wanted), (learning, learnt_from))):
         run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
         if run.trouble:
             raise SimulationError(f"{'with' if n else 'without'} cancellers {run.trouble}")

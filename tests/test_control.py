@@ -1,21 +1,25 @@
-"""The displacement loop: valve linearisation, force balance, following, and settings files."""
+"""Three-variable control: each term of its law, valve linearisation, force balance, following, both engines."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
-from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.control.loop import control_step
+from lhpost6_pin.control import Notch, load_controller, make_controller
+from lhpost6_pin.control.loop import CANCELLER, MEMORY_ROWS, cancel, control_step
 from lhpost6_pin.equilibrium import hydraulic_rows, unloaded_speeds
-from lhpost6_pin.errors import ParameterError
+from lhpost6_pin.errors import ControllerError, SimulationError
 from lhpost6_pin.laws.orifice import opening, spool_for_opening
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.pose import leg_displacements, platen_motion
 from lhpost6_pin.rehearse import rehearse
 from lhpost6_pin.signals import align, delay, rrmse
-from lhpost6_pin.simulate import SAMPLE_RATE, OpenLoop, simulate
+from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, simulate
+
+SIX = np.ones(6)
+NOTHING = tuple(np.zeros(6))
 
 
 @pytest.fixture(scope="module")
@@ -23,32 +27,52 @@ def loop(plant, rest):
     return make_controller(plant, rest, load_controller("lhpost6"))
 
 
-def step(plant, loop, pose, force, reference, memory=None):
+def law(**changes):
+    """Settings whose law has only the terms given, and no force balance."""
+    names = [f"{x}_feedforward" for x in ("displacement", "velocity", "acceleration", "jerk")]
+    names += [f"{x}_gain" for x in ("displacement", "velocity", "acceleration", "reset")] + ["force_damping"]
+    bare = dict.fromkeys(names, NOTHING)
+    return replace(load_controller("lhpost6"), balance_gain=0.0, notches=(), **{**bare, **changes})
+
+
+def legs_at(plant, pose):
+    """Displacements (n_actuators,) of a platen's actuators."""
+    return np.ascontiguousarray(leg_displacements(plant, pose)[0][0, : plant.spools])
+
+
+def step(plant, loop, pose, force, drive, memory=None):
     """Command of one sample for a platen at rest in a pose."""
-    memory = loop.fresh_memory() if memory is None else memory
+    memory = loop.init() if memory is None else memory
     memory[0, :6] = pose
-    displacement = np.zeros(len(plant.ports))
-    legs, _ = leg_displacements(plant, pose)
-    displacement[: plant.legs.size] = legs[0]
-    command = np.zeros(plant.spools)
-    control_step(
-        0, reference, displacement, force, plant.legs, plant.body, plant.axes,
-        loop.axis, loop.actuator, loop.balance, memory, command,
-    )  # fmt: skip
-    return command
+    return loop.step(memory, 0, drive, (legs_at(plant, pose), np.zeros(6), force))
+
+
+def with_speed(loop, k, speed):
+    """Memory of a controller whose reference moves on one axis at a speed [m/s, rad/s] (acceleration mode)."""
+    memory = loop.init()
+    memory[5, k] = speed
+    return memory
+
+
+def asked_speed(plant, loop, pose, command):
+    """Velocity (6,) asked for at a pose, back from the spools."""
+    row = loop.actuator
+    at = np.array([opening(x, c) for x, c in zip(command, row["flow_curve"], strict=True)])
+    flow, leak = (x * np.where(x >= 0.0, row["extend"], row["retract"]) for x in (at, row["bias"]))
+    jacobian = leg_displacements(plant, np.tile(pose, (6, 1)), np.eye(6))[1].T[: plant.spools]
+    return np.linalg.lstsq(jacobian, flow - leak, rcond=None)[0]
 
 
 def test_at_rest_the_command_is_the_spool_that_feeds_the_leak(plant, rest, loop):
-    command = step(plant, loop, np.zeros(6), rest.force, np.zeros((1, 12)))
+    command = step(plant, loop, np.zeros(6), rest.force, np.zeros((1, 6)))
     assert np.allclose(command, rest.spool, rtol=0.0, atol=1e-12)  # rounding of the pose estimate times the gain
 
 
-def test_valve_linearisation_gives_the_asked_piston_speed_in_the_steady_state(plant, rest, loop):
+def test_valve_linearisation_gives_the_asked_piston_speed_in_the_steady_state(plant, rest):
     """Spools commanded for a slow vertical speed move the platen at that speed, up and down."""
+    loop = make_controller(plant, rest, law(velocity_feedforward=tuple(SIX)))
     for speed in (0.05, -0.05):
-        reference = np.zeros((1, 12))
-        reference[0, 8] = speed
-        spool = step(plant, loop, np.zeros(6), rest.force, reference)
+        spool = step(plant, loop, np.zeros(6), rest.force, np.zeros((1, 6)), with_speed(loop, 2, speed))
         run = simulate(plant, OpenLoop(np.tile(spool, (1024, 1)), rest.state), samples=1024, engine="fused")
         moved = platen_motion(plant, run.q, run.v, run.a).displacement[:, 2]
         mean = (moved[-1] - moved[512]) / (511 / SAMPLE_RATE)  # over several periods of the oil column
@@ -79,24 +103,27 @@ def test_balance_acts_only_where_the_platen_does_not_move(plant, loop):
     assert np.linalg.matrix_rank(loop.balance) == 4
 
 
-def test_command_beyond_full_stroke_is_clipped(plant, rest, loop):
-    reference = np.zeros((1, 12))
-    reference[0, 6] = 5.0
-    command = step(plant, loop, np.zeros(6), rest.force, reference)
-    assert np.all(np.abs(command[:4]) == 1.0)
-    # H1 and H2 shorten when the platen moves to +X
-    assert np.all(np.sign(command[:4]) == [-1, -1, 1, 1])
+def test_command_beyond_its_limit_is_clipped_and_counted(plant, rest):
+    for limit in (1.0, 0.6):
+        loop = make_controller(plant, rest, replace(law(velocity_feedforward=tuple(SIX)), spool_limit=limit))
+        command = step(plant, loop, np.zeros(6), rest.force, np.zeros((1, 6)), with_speed(loop, 0, 5.0))
+        assert np.all(np.abs(command[:4]) == limit)
+        # H1 and H2 shorten when the platen moves to +X
+        assert np.all(np.sign(command[:4]) == [-1, -1, 1, 1])
+        legs, memory = legs_at(plant, np.zeros(6)), with_speed(loop, 0, 5.0)
+        clipped = call(control_step, plant, loop, 0, np.zeros((1, 6)), legs, np.zeros(6), rest.force, memory, command)
+        assert clipped == 4  # along X the vertical actuators stand still
 
 
 def test_force_feedback_passes_no_static_force(plant, rest, loop):
     """A steady load changes the command at first, then not at all: the feedback is high-passed."""
-    memory = loop.fresh_memory()
+    memory = loop.init()
     loaded = rest.force + 1e5
-    reference = np.zeros((1, 12))
-    first = step(plant, loop, np.zeros(6), loaded, reference, memory)
+    drive = np.zeros((1, 6))
+    first = step(plant, loop, np.zeros(6), loaded, drive, memory)
     for _ in range(8 * SAMPLE_RATE):
-        last = step(plant, loop, np.zeros(6), loaded, reference, memory)
-    balance = step(plant, loop._replace(axis=no_feedback(loop.axis)), np.zeros(6), loaded, reference)
+        last = step(plant, loop, np.zeros(6), loaded, drive, memory)
+    balance = step(plant, loop._replace(axis=no_feedback(loop.axis)), np.zeros(6), loaded, drive)
     assert np.abs(last - balance).max() < 1e-3 * np.abs(first - balance).max()
 
 
@@ -107,19 +134,16 @@ def no_feedback(axis):
 
 
 def test_an_earthquake_is_reproduced_tri_axially(plant):
-    """Ridgecrest's strongest seconds: displacement within 3 %, acceleration within 30 % with the delay removed.
-
-    Required of a first loop is that it reproduces an earthquake; the figures it reaches are in the report.
-    """
+    """Ridgecrest's strongest seconds, not iterated: displacement within 3 %, acceleration within 25 %, no delay."""
     target = make_target(find_motion("ridgecrest"), window=(8.0, 22.0), rate=float(SAMPLE_RATE))
     test = rehearse(load_machine(), target, load_controller("lhpost6"), attrs={"test": "ridgecrest"}, engine="fused")
     assert test.run.trouble is None and test.run.clipped == 0
-    for name, allowed in (("displacement", 0.03), ("acceleration", 0.30)):
+    for name, allowed in (("displacement", 0.03), ("acceleration", 0.25)):
         asked = getattr(target, name)[:, :3]
         achieved = test.record[f"platen_{name}"].values[:, :3]
         late = delay(asked, achieved, 1 / SAMPLE_RATE)
         assert np.all(rrmse(asked, align(achieved, late, 1 / SAMPLE_RATE)) < allowed)
-        assert np.all(late > 0.0) and np.all(late < 0.04)  # the real table: 25 to 30 ms
+        assert np.all(np.abs(late) < 0.02)  # the real table: 25 to 30 ms; feed-forward brings it forward
     rotations = np.abs(test.record["platen_displacement"].values[:, 3:]).max()
     assert rotations < 1e-3  # nobody asked for any
 
@@ -153,16 +177,234 @@ def test_oil_column_would_ring_without_force_feedback(plant, rest):
     assert roughness(settings.force_damping) < 0.5 * roughness((0.0,) * 6)
 
 
-def test_settings_that_cannot_be_are_refused_by_key(tmp_path):
-    with pytest.raises(ParameterError, match="no controller settings named 'nobody'; valid names: lhpost6, uniaxial"):
-        load_controller("nobody")
-    from lhpost6_pin.files import models_folder
+# The law, term by term -----------------------------------------------------------------------------------------------
 
-    text = (models_folder() / "controllers" / "lhpost6.toml").read_text(encoding="utf-8")
-    path = tmp_path / "loop.toml"
-    path.write_text(text.replace("balance_gain = { value = 3.0", "balance_gain = { value = -3.0"), encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"loop.toml: loop.balance_gain: -3.0 is impossible"):
-        load_controller(path)
-    path.write_text(text.replace("reset_gain", "rest_gain"), encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"loop.reset_gain is missing"):
-        load_controller(path)
+SAMPLES = 400
+NOTCHES = (
+    Notch((12.0,) * 6, (3.0,) * 6, (-0.7, 0.0, -0.5, 0.3, -0.9, -0.2)),
+    Notch((30.0,) * 6, (5.0,) * 6, (0.0, -0.6, -0.5, 0.0, 0.4, -0.2)),
+)
+GAINS = {
+    "displacement_feedforward": 0.3 * SIX,
+    "velocity_feedforward": 1.1 * SIX,
+    "acceleration_feedforward": 0.008 * SIX,
+    "jerk_feedforward": 2e-4 * SIX,
+    "displacement_gain": np.array([5.0, 6.0, 7.0, 3.0, 4.0, 5.0]),
+    "velocity_gain": 0.4 * SIX,
+    "acceleration_gain": 0.01 * SIX,
+    "reset_gain": 30.0 * SIX,
+    "force_damping": np.array([0.4, 0.3, 0.1, 0.05, 0.1, 0.4]),
+}
+
+
+def call(function, plant, loop, sample, drive, displacement, acceleration, force, memory, command):
+    """The compiled step, or its original in Python."""
+    tables = plant.legs, plant.body, plant.axes, loop.axis, loop.actuator, loop.balance, loop.canceller
+    if function is not control_step:
+        tables = tuple(t.view(np.recarray) if t.dtype.names else t for t in tables)
+    return function(sample, drive, displacement, acceleration, force, *tables, memory, command)
+
+
+def signals(plant, rest, seed=4):
+    """A slow random pose (n, 6) with its velocity and acceleration, a random drive, and forces (n, n_actuators)."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(SAMPLES)[:, None, None] / SAMPLE_RATE
+    w, phase = 2 * np.pi * rng.uniform(2.0, 15.0, (2, 4, 6))
+    size = np.array([5e-6, 5e-6, 5e-6, 1e-6, 1e-6, 1e-6])
+    pose, acceleration = ((f(w * t + phase) * g).sum(axis=1) * size for f, g in ((np.sin, 1.0), (np.sin, -(w**2))))
+    drive = 1e3 * size * np.sin(w * t).sum(axis=1)
+    force = rest.force + 1e3 * rng.normal(size=(SAMPLES, plant.spools)).cumsum(axis=0)
+    return pose, acceleration, drive, force
+
+
+def marched(a, b, c, d, u):
+    """Outputs of sampled matrices from rest."""
+    b, d = b.reshape(len(b), -1), d.reshape(len(d), -1)
+    return signal.dlsim((a, b, c, d, 1.0), u)[1]
+
+
+def expected_speed(plant, loop, settings, pose, acceleration, drive, force):
+    """What the law says, signal by signal, in NumPy (n, 6)."""
+    out = np.zeros((SAMPLES, 6))
+    jacobians = [leg_displacements(plant, np.tile(x, (6, 1)), np.eye(6))[1].T[: plant.spools] for x in pose]
+    for k in range(6):
+        row = loop.axis[k]
+        asked = marched(*(row[f"generator_{x}"] for x in "abcd"), drive[:, k])
+        met = marched(*(row[f"feedback_{x}"] for x in "abcd"), np.column_stack([pose[:, k], acceleration[:, k]]))
+        total = np.array([j[:, k] @ (f - loop.actuator["force"]) for j, f in zip(jacobians, force, strict=True)])
+        pole = 1.0 / (1.0 + 2.0 * np.pi * settings.force_cut_in / SAMPLE_RATE)
+        passed = signal.lfilter([pole, -pole], [1.0, -pole], total)
+        error = asked[:, 0] - met[:, 0]
+        reset, limit = 0.0, settings.reset_limit[k]
+        resets = []
+        for e in error:
+            reset = np.clip(reset + settings.reset_gain[k] / SAMPLE_RATE * e, -limit, limit)
+            resets.append(reset)
+        ahead = [getattr(settings, f"{x}_feedforward")[k] for x in ("displacement", "velocity", "acceleration", "jerk")]
+        gains = [getattr(settings, f"{x}_gain")[k] for x in ("displacement", "velocity", "acceleration")]
+        u = asked @ ahead + (asked[:, :3] - met) @ gains + resets - row["force_gain"] * passed
+        for j in range(int(row["notches"])):
+            b0, b1, b2, a1, a2 = row["notch"][j]
+            u = signal.lfilter([b0, b1, b2], [1.0, a1, a2], u)
+        out[:, k] = settings.master_gain[k] * u
+    return out
+
+
+def commands(plant, loop, pose, acceleration, drive, force, function=control_step):
+    memory, out = loop.init(), np.zeros((SAMPLES, plant.spools))
+    memory[0, :6] = pose[0]
+    legs = np.ascontiguousarray(leg_displacements(plant, pose)[0][:, : plant.spools])
+    for n in range(SAMPLES):
+        call(function, plant, loop, n, drive, legs[n], acceleration[n], force[n], memory, out[n])
+    return out
+
+
+@pytest.mark.parametrize("term", [*GAINS, "all of them"])
+def test_each_term_of_the_law_acts_as_its_formula_says(plant, rest, term):
+    """Alone, and all together with notches and master gain; the law written once more with SciPy's filters."""
+    if term == "all of them":
+        given = {name: tuple(values) for name, values in GAINS.items()}
+        settings = replace(law(**given), master_gain=(0.8, 0.9, 1.0, 1.1, 0.7, 0.6), notches=NOTCHES)
+    else:
+        settings = law(**{term: tuple(GAINS[term])})
+    loop = make_controller(plant, rest, settings)
+    pose, acceleration, drive, force = signals(plant, rest)
+    command = commands(plant, loop, pose, acceleration, drive, force)
+    assert np.abs(command).max() < 1.0
+    found = np.array([asked_speed(plant, loop, x, c) for x, c in zip(pose, command, strict=True)])
+    wanted = expected_speed(plant, loop, settings, pose, acceleration, drive, force)
+    assert np.abs(wanted).max() > 1e-6  # the term acts
+    # the Jacobian is that of the sample before; the platen moves by 2e-7 m and turns by 4e-8 rad a sample
+    assert np.all(np.abs(found - wanted).max(axis=0) < 1e-5 * np.abs(wanted).max(axis=0))
+
+
+def test_the_compiled_step_is_its_original_in_python(plant, rest):
+    settings = replace(law(**{name: tuple(values) for name, values in GAINS.items()}), notches=NOTCHES)
+    loop = make_controller(plant, rest, replace(settings, balance_gain=3.0))
+    pose, acceleration, drive, force = (x[:12] for x in signals(plant, rest))
+    memories, found = [], []
+    for function in (control_step, control_step.py_func):
+        memory, command = loop.init(), np.zeros((12, plant.spools))
+        for n in range(12):
+            call(
+                function, plant, loop, n, drive, legs_at(plant, pose[n]), acceleration[n], force[n], memory, command[n]
+            )
+        memories.append(memory)
+        found.append(command)
+    # fused multiply-adds round otherwise; numbers here are of the order of one, forces in memory of 1e6
+    assert np.abs(found[0] - found[1]).max() < 1e-12
+    assert np.allclose(memories[0], memories[1], rtol=1e-12, atol=1e-9)
+
+
+def test_the_reset_integrator_stops_at_its_authority(plant, rest):
+    limit = (0.05, 0.05, 0.02, 0.01, 0.01, 0.02)
+    loop = make_controller(plant, rest, law(reset_gain=tuple(50.0 * SIX), reset_limit=limit))
+    memory, far = loop.init(), np.array([0.1, -0.1, 0.05, 0.02, -0.02, 0.1])
+    for _ in range(2 * SAMPLE_RATE):
+        command = step(plant, loop, far, rest.force, np.zeros((1, 6)), memory)
+    # a Jacobian that is stretched by the pose, exactly; the platen is beyond its reference, so it is asked back
+    assert np.allclose(asked_speed(plant, loop, far, command), -np.sign(far) * limit, rtol=1e-6)
+    step(plant, loop, -far, rest.force, np.zeros((1, 6)), memory)
+    for _ in range(SAMPLE_RATE // 2):
+        command = step(plant, loop, -far, rest.force, np.zeros((1, 6)), memory)
+    assert np.all(np.sign(asked_speed(plant, loop, -far, command)) == np.sign(far))  # it did not wind up
+
+
+def test_force_feedback_yields_to_a_push_and_master_gain_scales_all(plant, rest):
+    """Actuators that push the platen along an axis are asked to move back: that damps."""
+    for master in (1.0, 0.5):
+        settings = replace(law(force_damping=tuple(0.1 * SIX)), master_gain=tuple(master * SIX))
+        loop = make_controller(plant, rest, settings)
+        jacobian = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))[1].T[: plant.spools]
+        for k in range(6):
+            push = np.linalg.pinv(jacobian.T)[:, k] * 1e4  # 10 kN, 10 kN m along axis k alone
+            command = step(plant, loop, np.zeros(6), rest.force + push, np.zeros((1, 6)))
+            pole = 1.0 / (1.0 + 2.0 * np.pi * settings.force_cut_in / SAMPLE_RATE)
+            wanted = np.zeros(6)
+            wanted[k] = -master * loop.axis["force_gain"][k] * pole * 1e4
+            assert np.allclose(asked_speed(plant, loop, np.zeros(6), command), wanted, rtol=0.0, atol=1e-9)
+            assert wanted[k] < 0.0
+
+
+def test_settings_of_another_rate_are_refused(plant, rest):
+    with pytest.raises(ControllerError, match="rate 1024 Hz is not the samples' 2048 Hz"):
+        make_controller(plant, rest, replace(load_controller("lhpost6"), rate=1024.0))
+
+
+# Sine cancellers -----------------------------------------------------------------------------------------------------
+
+
+def test_a_canceller_learns_a_pure_tone_with_its_time_constant():
+    """Through a path of gain 0.6 and phase -1.2 rad: after tau 1/e of the error is left, after 5 tau less than 1 %."""
+    gain, phase, turn, tau = 0.6, -1.2, 2 * np.pi * 4.0 / SAMPLE_RATE, 1.5
+    table = np.zeros(1, CANCELLER)
+    table["turn"], table["cosine"], table["sine"] = turn, np.cos(phase), np.sin(phase)
+    table["rate"] = 2.0 / (tau * SAMPLE_RATE) / gain
+    row, weights = table.view(np.recarray), np.zeros((1, 6))
+    n = int(5 * tau * SAMPLE_RATE)
+    error = np.zeros(n)
+    for k in range(n):
+        at = turn * k + phase
+        error[k] = np.cos(turn * k + 0.4) - gain * (weights[0, 0] * np.cos(at) + weights[0, 1] * np.sin(at))
+        correction = cancel.py_func(row, k, 0, error[k], weights)
+        assert correction == pytest.approx(
+            weights[0, 0] * np.cos(turn * k) + weights[0, 1] * np.sin(turn * k), abs=1e-12
+        )
+    cycle = SAMPLE_RATE // 4
+    left = np.array([np.sqrt(2 * np.mean(error[k : k + cycle] ** 2)) for k in range(0, n - cycle, cycle)])
+    middle = (np.arange(len(left)) + 0.5) * cycle / SAMPLE_RATE
+    # LMS is a first-order lag only on average over half a period, an eighth of a second of 1.5 s
+    assert np.allclose(left, np.exp(-middle / tau), rtol=0.0, atol=0.03)
+    assert cancel.py_func(row, 5, 1, 1.0, weights.copy()) == 0.0  # another axis is left alone
+
+
+# Whole runs ----------------------------------------------------------------------------------------------------------
+
+
+def test_both_engines_agree_with_every_feature_on(plant, rest):
+    """Notches, velocity and acceleration feedback, balance, cancellers: three seconds of motion on every axis."""
+    settings = replace(
+        load_controller("lhpost6"),
+        velocity_gain=tuple(0.05 * SIX),
+        acceleration_gain=tuple(1e-3 * SIX),
+        notches=NOTCHES,
+    )
+    loop = make_controller(plant, rest, settings)
+    table = np.zeros(3, CANCELLER)
+    table["axis"], table["turn"] = [0, 2, 0], 2 * np.pi * np.array([1.0, 1.0, 3.0]) / SAMPLE_RATE
+    table["cosine"], table["rate"] = 1.0, 1e-4
+    loop = loop._replace(canceller=table)
+    target = make_target(find_motion("sfu-like"), scale=0.5)
+    n = 3 * SAMPLE_RATE
+    begin = int(np.argmax(np.abs(target.acceleration[:, 0]))) - n // 2
+    motion = [x[begin : begin + n] for x in (target.displacement, target.velocity, target.acceleration)]
+    rise = np.clip(np.arange(n) / SAMPLE_RATE, 0.0, 1.0)[:, None]
+    drive = np.ascontiguousarray(np.hstack([rise * loop.drive_for(*motion), rise * motion[2]]))
+    a, b = (simulate(plant, ClosedLoop(loop, drive, rest), samples=n, engine=engine) for engine in ENGINES)
+    assert a.trouble is None and np.abs(a.command).max() > 0.05
+    for name in ("q", "v", "z", "command"):
+        scale = np.maximum(np.abs(getattr(a, name)).max(axis=0), 1e-6)
+        # rounding of two rigid-body algorithms, which stiff hysteresis amplifies
+        assert (np.abs(getattr(a, name) - getattr(b, name)).max(axis=0) / scale).max() < 1e-8, name
+
+
+def test_a_drive_of_the_wrong_width_is_refused(plant, rest, loop):
+    with pytest.raises(SimulationError, match=r"drive has shape \(4, 12\); \(4, 6\) is needed"):
+        simulate(plant, ClosedLoop(loop, np.zeros((4, 12)), rest), samples=4)
+    learning = loop._replace(canceller=np.zeros(1, CANCELLER))
+    with pytest.raises(SimulationError, match=r"drive has shape \(4, 6\); \(4, 12\) is needed"):
+        simulate(plant, ClosedLoop(learning, np.zeros((4, 6)), rest), samples=4)
+    assert learning.init().shape == (MEMORY_ROWS + 1, 10)
+
+
+@pytest.mark.parametrize("mode", ["velocity", "displacement"])
+def test_the_other_modes_reproduce_a_motion_too(plant, rest, mode):
+    target = make_target(find_motion("sine", axis="x", amplitude=0.05, period=1.0), pad=0.5)
+    motion = target.displacement, target.velocity, target.acceleration
+    found = []
+    for settings in (load_controller("lhpost6"), replace(load_controller("lhpost6"), mode=mode)):
+        loop = make_controller(plant, rest, settings)
+        run = simulate(plant, ClosedLoop(loop, loop.drive_for(*motion), rest), samples=len(target.time), engine="fused")
+        found.append(platen_motion(plant, run.q, run.v, run.a).displacement[:, 0])
+    late = 2.2e-3  # about what the low-passes of 200 Hz add
+    assert rrmse(found[0], align(found[1], late, 1 / SAMPLE_RATE)) < 0.01  # of 1.5 % a millisecond

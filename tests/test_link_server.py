@@ -296,6 +296,13 @@ def test_a_controller_for_another_machine_is_refused(plant, rest):
             run_over_link(client, plant, loop)
 
 
+def test_a_run_begins_with_a_plant_at_rest(plant, rest):
+    with served(plant, rest) as (_, address), LinkClient(*address) as client:
+        client.exchange(rest.spool)
+        with pytest.raises(LinkError, match="connect once more"):
+            run_over_link(client, plant, PluggedLoop(Proportional(), *wanted(10), rest))
+
+
 def test_commands_may_be_given_per_actuator_or_per_valve_and_in_no_other_number(plant):
     twin = make_plant(with_valves(load_machine(), 2))
     rest = find_equilibrium(twin)

@@ -7,7 +7,16 @@ from machine_cases import MACHINES, machine_named, plant_named, random_poses, sm
 
 from lhpost6_pin import kinematics as kin
 from lhpost6_pin.errors import RecordError
-from lhpost6_pin.pose import forward_kinematics, leg_displacements, plant_motion, platen_motion, rotation
+from lhpost6_pin.pose import (
+    PlatenMotion,
+    forward_kinematics,
+    frame_of_pose,
+    leg_displacements,
+    plant_motion,
+    platen_motion,
+    pose_acceleration,
+    rotation,
+)
 
 T = np.arange(400) / 200.0  # 2 s of a motion below 2 Hz
 
@@ -128,3 +137,19 @@ def test_forward_kinematics_names_the_sample_that_is_not_finite():
     legs[3, 2] = np.nan
     with pytest.raises(RecordError, match="sample 3"):
         forward_kinematics(plant_named("lhpost6"), legs)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_accelerometers_tell_at_one_sample_what_a_record_holds(name):
+    """The compiled sensors against the whole-record formula, over the travel range, turning fast."""
+    plant = plant_named(name)
+    poses = random_poses(plant.machine, 200, seed=3)
+    rng = np.random.default_rng(4)
+    state = plant_motion(plant, PlatenMotion(poses, np.zeros_like(poses), np.zeros_like(poses)))
+    v, a = rng.normal(size=(2, 200, plant.axes.size))
+    wanted = platen_motion(plant, state.q, v, 10 * a).acceleration
+    frame, found = np.zeros((8, 3)), np.zeros((200, 6))
+    for k in range(200):
+        frame_of_pose(poses[k], plant.body, frame)
+        pose_acceleration(frame, plant.body, plant.axes, v[k], 10 * a[k], found[k])
+    assert np.abs(found - wanted).max() < 1e-12 * np.abs(wanted).max()  # rounding

@@ -14,7 +14,8 @@ Feedback generator: xf = L xs + H as / s^2, vf = s xf, af = s^2 xf with L + H = 
 the lowest order whose three outputs are all proper. Notch: N = 1 + d B s / (s^2 + B s + w0^2).
 
 Low-passes are Bessel filters: what they pass they delay as a whole. Inputs are taken as straight between samples
-(first-order hold), notches by the bilinear transform that is exact at w0.
+(first-order hold), but for a generator with a low-pass: by the bilinear transform, so that each output stays the
+derivative of the one before at all frequencies. Notches by the bilinear transform that is exact at w0.
 """
 
 from functools import cache
@@ -22,7 +23,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["MODES", "NOTCHES", "drive_for", "feedback_generator", "notch_section", "reference_generator"]
+__all__ = ["MODES", "NOTCHES", "drive_for"]
+__all__ += ["feedback_generator", "notch_section", "reference_generator", "sampled_response"]
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array]
@@ -48,16 +50,16 @@ def reference_generator(mode: str, high_pass: float, damping: float, low_pass: f
         c[0, 0] = c[1, 1] = 1.0
         c[2], d[2] = spring, 1.0
         c[3], d[3] = a[2], b[2]
-    elif mode == "velocity":  # states: xr, low-passed d and its derivatives
+    elif mode == "velocity":  # states: xr, then the chain
         a[0, 0], a[0, 1] = -w, 1.0
         _chain(a[1:, 1:], b[1:], w2)
         c[0, 0] = 1.0
         for k in range(1, 4):  # vr = s xr, and so on
             c[k] = c[k - 1] @ a
-    else:  # states: xr and its derivatives
+    else:
         _chain(a, b, w2)
-        np.fill_diagonal(c, 1.0)
-    a, b, c, d = _sampled(a, b, c, d, rate)
+        np.fill_diagonal(c, w2 ** np.arange(4))
+    a, b, c, d = _sampled(a, b, c, d, rate, "foh" if mode == "acceleration" else "bilinear")
     return a, b[:, 0], c, d[:, 0]
 
 
@@ -74,6 +76,14 @@ def drive_for(
     return velocity + w * displacement if mode == "velocity" else displacement.copy()
 
 
+def sampled_response(matrices: Matrices, frequency: Array, rate: float) -> NDArray[np.complex128]:
+    """Frequency response (m, outputs, inputs) of sampled matrices at `frequency` (m,) [Hz]; one input may be flat."""
+    a, b, c, d = (np.asarray(x) for x in matrices)
+    b, d = b.reshape(len(b), -1), d.reshape(len(d), -1)
+    z = np.exp(2j * np.pi * np.asarray(frequency) / rate)[:, None, None]
+    return np.asarray(c @ np.linalg.solve(z * np.eye(len(a)) - a, b + 0 * z) + d)
+
+
 @cache
 def feedback_generator(crossover: float, rate: float) -> Matrices:
     """Sampled matrices a (3, 3), b (3, 2), c (3, 3), d (3, 2); inputs xs, as; outputs xf, vf, af; crossover [Hz].
@@ -85,7 +95,7 @@ def feedback_generator(crossover: float, rate: float) -> Matrices:
     b = np.array([[0.0, 0.0], [3.0 * w**2, 1.0], [-8.0 * w**3, 0.0]])
     c = np.vstack([np.eye(3)[:2], a[1]])
     d = np.vstack([np.zeros((2, 2)), b[1]])
-    return _sampled(a, b, c, d, rate)
+    return _sampled(a, b, c, d, rate, "foh")
 
 
 def notch_section(frequency: float, bandwidth: float, depth: float, rate: float) -> Array:
@@ -98,18 +108,17 @@ def notch_section(frequency: float, bandwidth: float, depth: float, rate: float)
 
 
 def _chain(a: Array, b: Array, corner: float) -> None:
-    """Fill a (n, n), b (n, 1) with a Bessel low-pass whose states are its output and its derivatives."""
+    """Fill a (n, n), b (n, 1) with a Bessel low-pass: state k is the k-th derivative of its output over corner^k."""
     from scipy import signal
 
-    order = len(a)
-    _, poles = signal.bessel(order, corner, analog=True, norm="mag")
-    np.fill_diagonal(a[:, 1:], 1.0)
-    a[-1] = -np.asarray(poles)[:0:-1]
-    b[-1] = poles[-1]
+    _, poles = signal.bessel(len(a), 1.0, analog=True, norm="mag")
+    np.fill_diagonal(a[:, 1:], corner)
+    a[-1] = -corner * np.asarray(poles)[:0:-1]
+    b[-1] = corner * poles[-1]
 
 
-def _sampled(a: Array, b: Array, c: Array, d: Array, rate: float) -> Matrices:
+def _sampled(a: Array, b: Array, c: Array, d: Array, rate: float, method: str) -> Matrices:
     from scipy import signal
 
-    a, b, c, d, _ = signal.cont2discrete((a, b, c, d), 1.0 / rate, method="foh")
+    a, b, c, d, _ = signal.cont2discrete((a, b, c, d), 1.0 / rate, method=method)
     return a, b, c, d

@@ -78,11 +78,12 @@ CANCELLER = np.dtype(
 )
 """Table row of a sine canceller: one harmonic of one axis."""
 
-_POSE, _RESET, _FORCE, _HIGH_PASSED = range(4)
-_GENERATOR, _FEEDBACK, _NOTCH = 4, 8, 11
+_POSE, _RESET, _FORCE, _HIGH_PASSED, _CLIPPED = range(5)
+_GENERATOR, _FEEDBACK, _NOTCH = 5, 9, 12
 MEMORY_ROWS = _NOTCH + 2 * NOTCHES
-"""Rows of the memory: pose estimate, reset integral, force of the last sample, its high-passed value, states of the
-reference generator (4), of the feedback generator (3) and of the notches (2 each); then two weights a canceller."""
+"""Rows of the memory: pose estimate, reset integral, force of the last sample, its high-passed value, how many commands
+the last sample clipped, states of the reference generator (4), of the feedback generator (3) and of the notches (2
+each); then two weights a canceller."""
 
 
 @compiled_inline
@@ -127,11 +128,11 @@ def compose(row, displacement, acceleration, state, k, out):
 
 
 @compiled_inline
-def cancel(canceller, sample, a, error, weights):
+def cancel(canceller, sample, a, error, level, weights):
     """Correction of the drive of free axis a at a sample, whose weights (n, ...) learn from the error by LMS.
 
-    Each row adds w_c cos(theta) + w_s sin(theta); its weights move against the gradient of the squared error, seen
-    through the path from drive to feedback.
+    Each row adds level (w_c cos(theta) + w_s sin(theta)); its weights move against the gradient of the squared error,
+    seen through the path from drive to feedback.
     """
     correction = 0.0
     for h in range(canceller.size):
@@ -141,7 +142,7 @@ def cancel(canceller, sample, a, error, weights):
         c, s = np.cos(row.turn * sample), np.sin(row.turn * sample)
         weights[h, 0] += row.rate * error * (c * row.cosine - s * row.sine)
         weights[h, 1] += row.rate * error * (s * row.cosine + c * row.sine)
-        correction += weights[h, 0] * c + weights[h, 1] * s
+        correction += level * (weights[h, 0] * c + weights[h, 1] * s)
     return correction
 
 
@@ -164,8 +165,9 @@ def control_step(
 ):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
-    drive (n, 6 or 12): what goes into the reference generators, in their mode's quantity; a canceller reads the wanted
-    acceleration from columns 6 to 11. displacement, force (n_actuators,) the actuators' [m, N]; acceleration (6,) the
+    drive (n, 6 or 13): what goes into the reference generators, in their mode's quantity; a canceller reads the wanted
+    acceleration from columns 6 to 11 and from column 12 the level, 0 to 1, at which it acts. It does not learn while
+    commands are clipped. displacement, force (n_actuators,) the actuators' [m, N]; acceleration (6,) the
     platen's, of C and Euler angles. Commands beyond their limit are clipped to it. Returns how many.
     """
     n = command.size
@@ -190,7 +192,9 @@ def control_step(
         compose(row, pose[k], acceleration[k], memory[_FEEDBACK:], a, met)
         wanted = drive[sample, k]
         if canceller.size > 0:
-            wanted += cancel(canceller, sample, a, drive[sample, 6 + k] - met[2], memory[MEMORY_ROWS:])
+            level = drive[sample, 12]
+            learnt = level * (drive[sample, 6 + k] - met[2]) if memory[_CLIPPED, 0] == 0.0 else 0.0
+            wanted += cancel(canceller, sample, a, learnt, level, memory[MEMORY_ROWS:])
         generate(row, wanted, memory[_GENERATOR:], a, asked)
         total = 0.0
         for i in range(n):
@@ -227,13 +231,14 @@ def control_step(
         for j in range(n):
             rate[i] -= balance[i, j] * (force[j] - actuator[j].force)
         row = actuator[i]
-        # which orifices open follows from the opening, so that is what decides on the speed at full opening
-        full = row.extend if rate[i] + row.bias * row.extend >= 0.0 else row.retract
-        spool = spool_for_opening(rate[i] / full + row.bias, row.flow_curve)
+        # the opening's sign says which orifices open, and so the speed at full opening; the leak asks for its share
+        flow = rate[i] + row.bias * (row.extend if row.bias >= 0.0 else row.retract)
+        spool = spool_for_opening(flow / (row.extend if flow >= 0.0 else row.retract), row.flow_curve)
         if abs(spool) > row.limit:
             clipped += 1
             spool = row.limit if spool > 0.0 else -row.limit
         command[i] = spool
+    memory[_CLIPPED, 0] = clipped
     return clipped
 
 

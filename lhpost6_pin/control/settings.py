@@ -1,5 +1,6 @@
 """Controller settings: what a panel holds, in TOML."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -78,8 +79,15 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
     mode = str(stated.words.get("controller.mode", ""))
     if mode not in MODES:
         raise ParameterError(f"{stated.origin}: controller.mode {mode!r} is not one of {', '.join(MODES)}")
-    numbers = [k for k in range(1, NOTCHES + 1) if f"notch_{k}.depth" in stated]
-    notches = tuple(build_section(Notch, stated, (f"notch_{k}",)) for k in numbers)
+    sections = {key.split(".")[0] for key in stated} - set(_SECTIONS)
+    names = [f"notch_{k}" for k in range(1, NOTCHES + 1)][: len(sections)]
+    if sections != set(names):
+        wrong = sorted(sections - set(names)) or sorted(sections)
+        raise ParameterError(
+            f"{stated.origin}: no place for [{wrong[0]}]; besides {', '.join(_SECTIONS)} there are notches, numbered "
+            f"from notch_1 without a gap, {NOTCHES} at most"
+        )
+    notches = tuple(build_section(Notch, stated, (name,)) for name in names)
     settings = build_section(
         ControllerSettings,
         stated,
@@ -89,8 +97,11 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
         name=str(stated.words.get("controller.name", path.stem)),
         stated=stated,
     )
-    for key in ("reference_low_pass", "reference_high_pass", "crossover"):
-        if max(getattr(settings, key)) >= settings.rate / 2:
+    corners = {key: getattr(settings, key) for key in ("reference_low_pass", "reference_high_pass", "crossover")}
+    corners["force_cut_in"] = (settings.force_cut_in,)
+    corners |= {f"{name}.frequency": notch.frequency for name, notch in zip(names, notches, strict=True)}
+    for key, values in corners.items():
+        if max(values) >= settings.rate / 2:
             raise ParameterError(f"{stated.origin}: {key} must lie below half the controller's rate")
     return settings
 
@@ -105,8 +116,8 @@ def save_controller(settings: ControllerSettings, path: Path, changed: Mapping[s
         "# Settings of a three-variable controller; lists are per degree of freedom, x y z roll pitch yaw.",
         "",
         "[controller]",
-        f'name = "{settings.name}"',
-        f'mode = "{settings.mode}"',
+        f"name = {_text(settings.name)}",
+        f"mode = {_text(settings.mode)}",
     ]
     for section, names in _SECTIONS.items():
         lines += ["", f"[{section}]"]
@@ -127,10 +138,10 @@ def _line(holder: Any, stated: Parameters, key: str, changed: Mapping[str, str] 
     if as_read is None or as_read.value != value:
         source = changed if isinstance(changed, str) else changed.get(name, "set by hand")
         as_read = Quantity(value, unit, "calibrated", source)
-    numbers = list(value) if isinstance(value, tuple) else value
-    texts = ", ".join(f'{k} = "{_escaped(getattr(as_read, k))}"' for k in ("unit", "evidence", "source"))
+    numbers = list(map(float, value)) if isinstance(value, tuple) else float(value)
+    texts = ", ".join(f"{k} = {_text(getattr(as_read, k))}" for k in ("unit", "evidence", "source"))
     return f"{name} = {{ value = {numbers!r}, {texts} }}"
 
 
-def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)  # TOML's basic strings are JSON's

@@ -17,7 +17,7 @@ from ..records import make_record
 from ..schemes import SAMPLE_RATE
 from ..simulate import ClosedLoop, PluggedLoop, Progress
 from .client import LinkClient
-from .clock import undisturbed
+from .clock import SECOND, now, undisturbed
 from .protocol import Mode, PlantState
 
 __all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
@@ -40,6 +40,7 @@ class LinkRun:
     state: NDArray[np.int8]  # protocol.PlantState
     answered: NDArray[np.bool_]
     tripped: bool
+    seconds: float  # from the first command to the last sensors [s]
 
 
 def run_over_link(
@@ -48,7 +49,7 @@ def run_over_link(
     """Drive the served plant through a motion; `plant` is the one that the controller believes it drives.
 
     Each sample's command answers the newest sensors, with the drive of their sample. Ends early if the plant trips.
-    Raises LinkError if plant and server are not alike, or the server falls silent.
+    Raises LinkError if the plant is no longer at rest, differs from the server's, or the server falls silent.
     """
     _check(client, plant)
     samples = len(loop.drive if isinstance(loop, ClosedLoop) else loop.displacement)
@@ -61,8 +62,9 @@ def run_over_link(
         state=np.zeros(samples, np.int8),
         answered=np.zeros(samples, np.bool_),
         tripped=False,
+        seconds=0.0,
     )
-    reading, reported = client.reading, 0
+    reading, reported, begin = client.reading, 0, 0
     with undisturbed() if client.mode != Mode.LOCK_STEP else nullcontext():
         while reading.sample < samples and reading.state != PlantState.TRIPPED:
             at, sensors = reading.sample, reading.sensors
@@ -70,14 +72,17 @@ def run_over_link(
             run.command[at], run.displacement[at] = command, sensors.displacement
             run.acceleration[at], run.force[at] = sensors.acceleration, sensors.force
             run.state[at], run.answered[at] = reading.state, True
+            begin = begin or now()
             reading = client.exchange(command)
             if progress is not None and at >= reported:
                 progress(at / samples)
                 reported = at + _CHUNK
+        seconds = (now() - begin) / SECOND
     done = int(np.flatnonzero(run.answered)[-1]) + 1 if run.answered.any() else 0
     last = np.maximum.accumulate(np.where(run.answered, np.arange(samples), 0))[:done]
     rows = {name: getattr(run, name)[last] for name in ("command", "displacement", "acceleration", "force", "state")}
-    return LinkRun(**rows, answered=run.answered[:done], tripped=reading.state == PlantState.TRIPPED)
+    tripped = reading.state == PlantState.TRIPPED
+    return LinkRun(**rows, answered=run.answered[:done], tripped=tripped, seconds=seconds)
 
 
 def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> xr.Dataset:
@@ -104,6 +109,8 @@ def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> 
 
 def _check(client: LinkClient, plant: Plant) -> None:
     machine = plant.machine
+    if client.reading.sample:
+        raise LinkError("the plant has moved since this client said hello; a run begins at rest: connect once more")
     if (client.machine, client.actuators) != (machine.name, machine.actuator_names):
         raise LinkError(f"the server's machine is {client.machine}, the controller's {machine.name}; choose --machine")
     if not np.array_equal(client.counts, valve_counts(machine)):

@@ -13,7 +13,7 @@ from .limits import (
 )
 from .motion import AXES, GroundMotion, make_motion
 from .options import MotionOption
-from .process import Reference, Target, make_target, with_scale
+from .process import Reference, Target, make_target, smooth_step, with_scale
 from .readers import load_motion
 from .spectra import ResponseSpectrum, response_spectrum
 from .v1 import load_v1
@@ -42,5 +42,6 @@ __all__ = [
     "motion_options",
     "required_spectrum",
     "response_spectrum",
+    "smooth_step",
     "with_scale",
 ]

@@ -1,9 +1,13 @@
 """Self-contained HTML reports: one page design for every command that reports something.
 
-`page` knows how a report looks and `plots` turns channels into light interactive figures; the `run_*` modules
-say what one test is judged by. A report of another kind is another set of sections on the same `Page`.
+`page` knows how a report looks; `plots` turns channels into light interactive figures and `charts` draws over
+frequencies, iterations and harmonics. The `run_*` modules say what one test is judged by, `tune_*`, `iterate_*` and
+`sine_*` what the tools of the controller found. A report of another kind is another set of sections on the same `Page`.
 """
 
+from .iterate_report import write_iterate_report
 from .run_report import write_run_report
+from .sine_report import write_sine_report
+from .tune_report import write_tune_report
 
-__all__ = ["write_run_report"]
+__all__ = ["write_iterate_report", "write_run_report", "write_sine_report", "write_tune_report"]

@@ -64,14 +64,16 @@ def chart_figure(
     x: XAxis,
     *,
     row_height: int = ROW,
-    mark: float | None = None,
+    marks: Sequence[float] = (),
 ) -> Figure:
-    """Return a figure of `panels`; a vertical line at `mark`. Curves of one name share a legend entry."""
+    """Return a figure of `panels`; dotted vertical lines at `marks`. Curves of one name share a legend entry."""
     layout = stacked_layout([panel.title for panel in panels], x.title, row_height=row_height)
     traces, named = [], set()
     for k, panel in enumerate(panels):
         layout[f"xaxis{axis_suffix(k)}"] |= _scaled(x.log, x.span) | ({"tickvals": list(x.ticks)} if x.ticks else {})
         layout[f"yaxis{axis_suffix(k)}"] |= _scaled(panel.log, panel.span)
+        if panel.log:
+            layout[f"yaxis{axis_suffix(k)}"] |= _decades(panel)
         for curve in panel.curves:
             traces.append(_trace(curve) | on_row(k) | {"showlegend": curve.name not in named})
             named.add(curve.name)
@@ -81,8 +83,7 @@ def chart_figure(
             layout["shapes"].append(level_line(level, k))
             place = float(np.log10(level)) if panel.log else level  # an annotation's place is in decades
             layout["annotations"].append(level_label(label, place, k))
-        if mark is not None:
-            layout["shapes"].append(_mark(mark, k))
+        layout["shapes"] += [_mark(place, k) for place in marks]
     return Figure(name, title, description, traces, layout, layout["height"])
 
 
@@ -98,8 +99,14 @@ def matrix_figure(
 ) -> Figure:
     """Return small plots of y (m, n, n) over x (m,) [Hz] on one scale, rows outputs, columns inputs."""
     n = len(labels)
-    layout = stacked_layout([], "", row_height=CELL) | {"height": n * CELL + 84, "showlegend": False}
-    layout["margin"] = {"l": 64, "r": 10, "t": 30, "b": 50}
+    above, below = 30, 50
+    layout: dict[str, Any] = {
+        "height": above + n * CELL + below,
+        "margin": {"l": 64, "r": 10, "t": above, "b": below},
+        "meta": {"linked": False, "row": CELL},
+        "annotations": [],
+        "showlegend": False,
+    }
     traces = []
     for row in range(n):
         for column in range(n):
@@ -132,10 +139,17 @@ def _trace(curve: Curve) -> dict[str, Any]:
 
 def _scaled(log: bool, span: tuple[float, float] | None) -> dict[str, Any]:
     """Type and range of an axis; plotly wants the ends of a logarithmic one in decades."""
-    scale: dict[str, Any] = {"type": "log", "dtick": 1} if log else {}
+    scale: dict[str, Any] = {"type": "log"} if log else {}
     if span:
         scale["range"] = [float(v) for v in (np.log10(span) if log else span)]
     return scale
+
+
+def _decades(panel: Panel) -> dict[str, Any]:
+    """Ticks of a logarithmic value axis: at 1, 2 and 5 over a few decades, at powers of ten over many."""
+    drawn = np.concatenate([np.ravel(curve.y) for curve in panel.curves]) if panel.curves else np.ones(1)
+    low, high = panel.span or (np.min(drawn[drawn > 0.0], initial=np.inf), np.max(drawn, initial=0.0))
+    return {"dtick": "D2"} if high < 300.0 * low else {"dtick": 1, "exponentformat": "power"}
 
 
 def _value_band(low: float, high: float, k: int) -> dict[str, Any]:

@@ -40,10 +40,10 @@
   }
 
   // On a narrow screen title and legend of a row do not fit side by side: make room above each row for both.
-  function stackTitles(plot, layout, traces) {
+  function stackTitles(width, layout, traces) {
     const entries = {};
     for (const t of traces) if (t.showlegend !== false) (entries[t.legend || "legend"] ||= []).push(t.name.length);
-    const lines = Math.max(...Object.values(entries).map((e) => Math.ceil(e.length * (52 + 6.5 * Math.max(...e)) / plot.clientWidth)));
+    const lines = Math.max(...Object.values(entries).map((e) => Math.ceil(e.length * (52 + 6.5 * Math.max(...e)) / width)));
     const titles = layout.annotations.filter((a) => a.name === "title");
     const { row } = layout.meta, above = 22 + 19 * lines, bottom = layout.margin.b;
     const inner = titles.length * row + (titles.length - 1) * (above + 12);
@@ -74,7 +74,8 @@
       paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "x unified", hoverlabel: { namelength: -1 }, autosize: true,
       dragmode: coarse ? false : "zoom" };
     if (width) base.width = width;
-    else if (plot.clientWidth < NARROW) stackTitles(plot, layout, traces);
+    const room = width || plot.clientWidth;
+    if (room < NARROW) stackTitles(room, layout, traces);
     plot.style.height = `${layout.height}px`;
     Plotly.newPlot(plot, traces, { ...base, ...layout }, {
       responsive: true, displaylogo: false, doubleClick: "reset+autosize",

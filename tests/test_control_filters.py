@@ -1,0 +1,202 @@
+"""Reference generator, feedback generator and notches against their transfer functions in continuous time."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import signal
+
+from lhpost6_pin.control.filters import (
+    MODES,
+    drive_for,
+    feedback_generator,
+    notch_section,
+    reference_generator,
+    sampled_response,
+)
+
+RATE = 2048.0
+BAND = np.geomspace(0.01, 33.0, 60)
+"""The table's band [Hz], and below it."""
+
+corners = st.floats(0.01, 400.0)
+
+
+def bessel(order, corner, s):
+    b, a = signal.bessel(order, corner, analog=True, norm="mag")
+    return np.polyval(b, s) / np.polyval(a, s)
+
+
+def reference(mode, high, damping, low, s):
+    """Xr over d in continuous time."""
+    w, w2 = 2 * np.pi * high, 2 * np.pi * low
+    if mode == "acceleration":
+        return 1 / (s**2 + 2 * damping * w * s + w**2)
+    return bessel(3, w2, s) / (s + w) if mode == "velocity" else bessel(4, w2, s)
+
+
+def run(matrices, inputs):
+    """Outputs (n, outputs) of sampled matrices from rest, for inputs (n, ...)."""
+    a, b, c, d = matrices
+    x, out = np.zeros(len(a)), []
+    for u in inputs:
+        out.append(c @ x + d @ np.atleast_1d(u) if d.ndim == 2 else c @ x + d * u)
+        x = a @ x + (b @ np.atleast_1d(u) if b.ndim == 2 else b * u)
+    return np.array(out)
+
+
+# Reference generator --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_sampled_reference_is_the_continuous_one_within_the_tables_band(mode):
+    s = 2j * np.pi * BAND
+    found = sampled_response(reference_generator(mode, 0.05, 0.7, 200.0, RATE), BAND, RATE)[:, :3, 0]
+    wanted = reference(mode, 0.05, 0.7, 200.0, s)[:, None] * s[:, None] ** np.arange(3)
+    # a sampled derivative is off by (pi f / rate)^2 / 3, 0.09 % at 33 Hz: up to twice in acceleration, and as much in
+    # the low-pass's phase, which is of the order of one radian there
+    assert np.allclose(found, wanted, rtol=3e-3, atol=0.0)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_jerk_is_the_derivative_of_acceleration_as_far_as_the_low_pass_lets_it(mode):
+    s = 2j * np.pi * BAND
+    response = sampled_response(reference_generator(mode, 0.05, 0.7, 200.0, RATE), BAND, RATE)[:, :, 0]
+    low = 1 / (1 + s / (2 * np.pi * 200.0)) if mode == "acceleration" else 1.0
+    # as above, and the corner at 200 Hz is turned by a tenth of the angle per sample
+    assert np.allclose(response[:, 3], s * response[:, 2] * low, rtol=6e-3, atol=0.0)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_each_output_is_the_derivative_of_the_one_before_sample_by_sample(mode):
+    t = np.arange(2048) / RATE
+    drive = np.sin(2 * np.pi * 3.0 * t) * np.clip(t, 0, 1) ** 3
+    found = run(reference_generator(mode, 0.05, 0.7, 200.0, RATE), drive)
+    for k in range(2):
+        slope = (found[2:, k] - found[:-2, k]) * RATE / 2
+        # central differences are short by (2 pi f / rate)^2 / 6, 1.4e-5 at 3 Hz
+        assert np.abs(slope - found[1:-1, k + 1]).max() < 1e-4 * np.abs(found[:, k + 1]).max()
+
+
+def test_displacement_and_velocity_mode_pass_a_standing_drive_as_their_names_say():
+    ones = np.ones(2048)
+    # jerk is of the order of (2 pi 200 Hz)^3, 2e9, in the transient: its rounding is left
+    still = run(reference_generator("displacement", 0.05, 0.7, 200.0, RATE), ones)[-1]
+    assert np.allclose(still, [1, 0, 0, 0], rtol=0.0, atol=1e-5)
+    xr, vr, ar, jr = run(reference_generator("velocity", 0.05, 0.7, 200.0, RATE), ones)[-1]
+    w = 2 * np.pi * 0.05
+    # 1 m/s for a second: the low-pass holds it up for about its delay, 2 ms
+    assert xr == pytest.approx((1 - np.exp(-w)) / w, abs=2e-3)
+    assert vr == pytest.approx(1 - w * xr) and abs(ar + w * vr) < 1e-9 and abs(jr + w * ar) < 1e-5
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_drive_made_for_a_motion_gives_that_motion_as_reference(mode):
+    """Through the high-pass at 0.05 Hz, over ten seconds; late by the low-pass where a mode has one."""
+    t = np.arange(10 * 2048) / RATE
+    rise = np.clip(t / 2.0, 0.0, 1.0)
+    window, w = rise**4 * (35 - 84 * rise + 70 * rise**2 - 20 * rise**3), 2 * np.pi * 0.8
+    x = (window * (0.1 * np.sin(w * t) + 0.2))[:, None] * np.ones(6)
+    v = np.gradient(x, 1 / RATE, axis=0)
+    a = np.gradient(v, 1 / RATE, axis=0)
+    drive = drive_for(mode, x, v, a, np.full(6, 0.05), np.full(6, 0.7))
+    found = run(reference_generator(mode, 0.05, 0.7, 200.0, RATE), drive[:, 2])[:, 0]
+    order = {"acceleration": 0, "velocity": 3, "displacement": 4}[mode]
+    late = 0.0
+    if order:
+        b, den = signal.bessel(order, 2 * np.pi * 200.0, analog=True, norm="mag")
+        late = den[-2] / den[-1]  # group delay at 0 Hz
+        assert b[-1] == pytest.approx(den[-1])
+    # numerical derivatives err by (2 pi f / rate)^2 / 6 of the motion, 1e-6; Bessel delays are flat to more than that
+    assert np.allclose(found, np.interp(t - late, t, x[:, 0]), rtol=0.0, atol=2e-5)
+
+
+# Feedback generator ---------------------------------------------------------------------------------------------------
+
+
+def feedback(crossover, s):
+    """L and H in continuous time."""
+    c = 2 * np.pi * crossover
+    return (3 * c**2 * s + c**3) / (s + c) ** 3, (s**3 + 3 * c * s**2) / (s + c) ** 3
+
+
+@pytest.mark.parametrize("crossover", [0.3, 1.0, 5.0])
+def test_the_feedback_generator_is_l_of_displacement_and_h_of_acceleration(crossover):
+    s = 2j * np.pi * BAND
+    low, high = feedback(crossover, s)
+    found = sampled_response(feedback_generator(crossover, RATE), BAND, RATE)
+    for k in range(3):
+        # as for the reference generator; from displacement it matters only far above the crossover, where L is small
+        assert np.allclose(found[:, k, 0], s**k * low, rtol=2e-3, atol=0.0)
+        assert np.allclose(found[:, k, 1], s ** (k - 2) * high, rtol=2e-3, atol=0.0)
+
+
+@given(st.floats(0.05, 10.0))
+def test_l_and_h_of_the_feedback_generator_sum_to_one(crossover):
+    """Fed with a motion and its true acceleration it gives displacement, velocity and acceleration back."""
+    s = 2j * np.pi * BAND
+    found = sampled_response(feedback_generator(crossover, RATE), BAND, RATE)
+    for k in range(3):
+        whole = found[:, k, 0] + s**2 * found[:, k, 1]
+        # what straight lines between samples leave: (pi f / rate)^2 / 3, and (2 pi 10 Hz / rate)^2 / 4 at the crossover
+        assert np.allclose(whole, s**k, rtol=2e-3, atol=0.0)
+
+
+def test_above_the_crossover_acceleration_counts_and_below_it_displacement():
+    c = 1.0
+    found = np.abs(sampled_response(feedback_generator(c, RATE), np.array([0.05, 20.0]), RATE))
+    w = 2 * np.pi * np.array([0.05, 20.0])
+    by_displacement, by_acceleration = found[:, 0, 0], found[:, 0, 1] * w**2
+    assert by_displacement[0] == pytest.approx(1.0, abs=0.01) and by_acceleration[0] < 0.01
+    assert by_displacement[1] < 0.01 and by_acceleration[1] == pytest.approx(1.0, abs=0.01)
+
+
+def test_an_offset_of_the_accelerometer_leaves_a_bounded_offset_of_the_displacement():
+    """3 as / c^2 at rest: no integrator runs away."""
+    inputs = np.tile([0.0, 0.01], (10 * 2048, 1))
+    found = run(feedback_generator(1.0, RATE), inputs)[-1]
+    assert found[0] == pytest.approx(3 * 0.01 / (2 * np.pi) ** 2, rel=1e-6) and abs(found[1]) < 1e-9
+
+
+# Notches --------------------------------------------------------------------------------------------------------------
+
+
+def notch(frequency, bandwidth, depth, at):
+    b0, b1, b2, a1, a2 = notch_section(frequency, bandwidth, depth, RATE)
+    z = np.exp(-2j * np.pi * np.asarray(at) / RATE)
+    return (b0 + b1 * z + b2 * z**2) / (1 + a1 * z + a2 * z**2)
+
+
+@given(st.floats(1.0, 900.0), st.floats(0.1, 50.0), st.floats(-1.0, 3.0))
+def test_a_notch_has_its_depth_at_its_frequency_and_is_one_at_both_ends(frequency, bandwidth, depth):
+    assert notch(frequency, bandwidth, depth, frequency) == pytest.approx(1 + depth, abs=1e-7)
+    assert np.allclose(notch(frequency, bandwidth, depth, [0.0, RATE / 2]), 1.0, rtol=0.0, atol=1e-7)
+
+
+def test_a_notch_is_as_wide_as_it_says():
+    """At w0 +- B/2 the part taken out is down by a root of two, where B is small beside w0."""
+    taken = np.abs(notch(40.0, 2.0, -0.8, [39.0, 41.0]) - 1.0)
+    assert np.allclose(taken, 0.8 / np.sqrt(2), rtol=0.02)  # half a bandwidth over the centre frequency
+    assert np.abs(notch(40.0, 2.0, -0.8, [10.0, 160.0]) - 1.0).max() < 0.05
+
+
+def test_a_notch_is_its_continuous_transfer_function_far_below_the_rate():
+    s, w0, breadth = 2j * np.pi * BAND, 2 * np.pi * 12.0, 2 * np.pi * 3.0
+    wanted = 1 - 0.7 * breadth * s / (s**2 + breadth * s + w0**2)
+    # the bilinear transform shifts frequencies by (pi f / rate)^2 / 3, 1e-3 at 33 Hz, and the notch is exact at w0
+    assert np.allclose(notch(12.0, 3.0, -0.7, BAND), wanted, rtol=0.0, atol=1e-3)
+
+
+# Stability ------------------------------------------------------------------------------------------------------------
+
+
+@given(st.sampled_from(MODES), corners, st.floats(0.1, 2.0), corners)
+def test_every_generator_is_stable_whatever_its_corners(mode, high, damping, low):
+    for a in (reference_generator(mode, high, damping, low, RATE)[0], feedback_generator(high, RATE)[0]):
+        assert np.isfinite(a).all() and np.abs(np.linalg.eigvals(a)).max() < 1.0
+
+
+@given(st.floats(0.1, 1000.0), st.floats(0.01, 500.0), st.floats(-1.0, 1.0))
+def test_every_notch_is_stable(frequency, bandwidth, depth):
+    *_, a1, a2 = notch_section(frequency, bandwidth, depth, RATE)
+    assert abs(a2) < 1.0 and abs(a1) < 1.0 + a2  # the stability triangle

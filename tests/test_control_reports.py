@@ -1,0 +1,301 @@
+"""Reports of the control tools: what they conclude from good and bad findings, complete, self-contained."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.iterate import identify_inverse, iterate
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.margins import LoopModel, Margin
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.report import write_iterate_report, write_sine_report, write_tune_report
+from lhpost6_pin.report.charts import Curve, Panel, XAxis, chart_figure, matrix_figure
+from lhpost6_pin.report.control_blocks import decibels, degrees
+from lhpost6_pin.report.iterate_plots import compare
+from lhpost6_pin.signals import rrmse
+from lhpost6_pin.sine import sine_test
+from lhpost6_pin.transfer import Transfer
+from lhpost6_pin.tuning import AxisTuning, Tuning, TuningStep
+
+DELAY = 0.006
+NO_NUMBER = re.compile(r"\b(nan|inf|none)\b", re.IGNORECASE)
+LINE = {"color": "#000000"}
+
+
+@pytest.fixture(scope="module")
+def machine():
+    """A table of one axis: its runs take a second."""
+    return load_machine("uniaxial")
+
+
+@pytest.fixture(scope="module")
+def settings():
+    return load_controller("uniaxial")
+
+
+@pytest.fixture(scope="module")
+def iterated(machine, settings):
+    """Two iterations on six seconds of noise."""
+    noise = find_motion("white-noise", duration=6.0, rms=0.5, low=0.5, high=30.0, seed=3)
+    target = make_target(noise, axes="x")
+    return iterate(machine, target, settings, table=identify_inverse(machine, settings), most=2)
+
+
+@pytest.fixture(scope="module")
+def sine(machine, settings):
+    """A sine that the valves can follow."""
+    return sine_test(machine, settings, axis="x", amplitude=0.05, frequency=1.0)
+
+
+def delayed(gain: float = 1.0, coherence: float = 1.0) -> Transfer:
+    """Return a table that only delays, from 1/16 to 64 Hz."""
+    f = np.arange(1, 1025) / 16
+    response = gain * np.exp(-2j * np.pi * f * DELAY)
+    return Transfer(f, response[:, None, None], np.full((len(f), 1), coherence), ("x",))
+
+
+def make_tuning(machine, settings, **changes) -> Tuning:
+    """Return a tuning whose axis follows from 1/16 to 40 Hz, but for what `changes` its axis."""
+    good = {
+        "axis": "x",
+        "before": delayed(0.5),
+        "after": delayed(),
+        "band_before": (np.nan, np.nan),
+        "band_after": (0.0625, 40.0),
+        "delay_before": np.nan,
+        "delay_after": DELAY,
+        "margin_before": Margin(np.inf, np.nan, np.inf, np.nan),
+        "margin_after": Margin(4.0, 48.0, 1.0, 5.0),
+        "limited_by": "follows to 33 Hz and beyond",
+    }
+    axis = AxisTuning(**(good | changes))
+    model = LoopModel(delayed().frequency, delayed().response, delayed().response)
+    tuned = replace(settings, velocity_feedforward=tuple(1.5 * g for g in settings.velocity_feedforward))
+    step = TuningStep("Kvf", "x", 1.0, 1.5, "expected error 0.05 <b>")
+    return Tuning(machine, settings, tuned, DELAY, (axis,), (step,), 3.0, 0.8, True, model, delayed().response)
+
+
+def words_of(page: Path) -> str:
+    """Return what a page says, without its scripts, styles and marks."""
+    text = page.read_text(encoding="utf-8")
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", re.sub(r"<(script|style).*?</\1>", "", text, flags=re.DOTALL)))
+
+
+def verdict_of(page: Path) -> tuple[str, str]:
+    """Return level and words of a page's verdict."""
+    found = re.search(r'<p class="verdict (\w+)">.*?<span>(.*?)</span></p>', page.read_text(encoding="utf-8"))
+    assert found
+    return found[1], found[2]
+
+
+def figures_of(page: Path) -> dict[str, dict]:
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(r'<script type="application/json" data-for="([^"]+)">(.*?)</script>', text, flags=re.DOTALL)
+    assert len({name for name, _ in found}) == len(found)
+    return {name: json.loads(data) for name, data in found}
+
+
+def numbers(packed: dict[str, str]) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}")
+
+
+def test_every_page_is_complete_self_contained_and_says_no_nan(tmp_path, machine, settings, iterated, sine):
+    pages = {
+        write_tune_report(make_tuning(machine, settings), tmp_path / "t.html", "lhpost6 tune --out <x>"): (
+            ("Bands and margins", "What limits 20 to 33 Hz", "Bode plots", "Numbers chosen", "Steps in order"),
+            {"overview", "bode-x"},
+        ),
+        write_iterate_report(iterated, tmp_path / "i.html", "lhpost6 iterate noise --out <x>"): (
+            ("Error per iteration", "Target and achieved", "Spectra of the error", "Drive and reference", "stopped"),
+            {"errors", "motion-x", "close-x", "error-x", "drive-x", "table", "coherence"},
+        ),
+        write_sine_report(sine, tmp_path / "s.html", "lhpost6 sine --out <x>"): (
+            ("Amplitude, phase and distortion", "Harmonics", "The last cycles", "Convergence", "Spool commands"),
+            {"harmonics", "cycles", "convergence", "spool-1"},
+        ),
+    }
+    for page, (titles, figures) in pages.items():
+        words = words_of(page)
+        for title in (*titles, "Assumptions and sources", "Versions and how to repeat", "--out &lt;x&gt;", "numpy"):
+            assert title in words, (page.name, title)
+        assert not NO_NUMBER.search(words), page.name
+        assert figures_of(page).keys() == figures
+        assert page.stat().st_size < 5e6
+        assert "default-src 'none'" in page.read_text(encoding="utf-8")
+
+
+# ------------------------------------------------------------------------------------------ tuning
+def test_a_tuning_that_follows_with_margin_is_good(tmp_path, machine, settings):
+    level, verdict = verdict_of(write_tune_report(make_tuning(machine, settings), tmp_path / "t.html"))
+    assert level == "good"
+    assert "Every axis is within 3 dB" in verdict and "at least 6 dB" in verdict and "stable" in verdict
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "said"),
+    [
+        (
+            {"margin_after": Margin(1.9, 48.0, 1.0, 5.0)},
+            "attention",
+            "Gain margin below 6 dB: x 5.6\N{NO-BREAK SPACE}dB",
+        ),
+        ({"margin_after": Margin(np.nan, 48.0, 1.0, 5.0)}, "attention", "Gain margin below 6 dB: x –"),
+        ({"band_after": (0.0625, 19.0)}, "attention", "Not every axis is within 3 dB"),
+        ({"band_after": (0.25, 40.0)}, "attention", "x 0.25 to 40.0\N{NO-BREAK SPACE}Hz"),
+        ({"band_after": (np.nan, np.nan), "limited_by": ""}, "bad", "x no band"),
+    ],
+)
+def test_a_tuning_that_falls_short_says_where(tmp_path, machine, settings, changes, level, said):
+    page = write_tune_report(make_tuning(machine, settings, **changes), tmp_path / "t.html")
+    assert verdict_of(page)[0] == level
+    assert said in verdict_of(page)[1]
+    assert not NO_NUMBER.search(words_of(page))
+
+
+def test_a_loop_that_is_unstable_with_doubled_gains_is_pointed_out(tmp_path, machine, settings):
+    page = write_tune_report(replace(make_tuning(machine, settings), doubled=False), tmp_path / "t.html")
+    assert verdict_of(page)[0] == "attention" and "doubled at once the loop is unstable" in verdict_of(page)[1]
+
+
+def test_a_pure_delay_has_no_phase_left_without_it(tmp_path, machine, settings):
+    page = write_tune_report(make_tuning(machine, settings), tmp_path / "t.html")
+    rows = [t for t in figures_of(page)["bode-x"]["traces"] if t["name"] == "after"]
+    size, left, raw, coherence = (numbers(t["y"]) for t in rows)
+    frequency = numbers(rows[0]["x"])
+    # single precision of values up to 90
+    np.testing.assert_allclose(size, 0.0, atol=1e-5)
+    np.testing.assert_allclose(left, 0.0, atol=1e-5)
+    np.testing.assert_allclose(raw, -360.0 * DELAY * frequency, atol=1e-4)
+    np.testing.assert_array_equal(coherence, 1.0)
+    assert frequency[0] == 0.125 and frequency[-1] == 40.0  # what is measured of 0.1 to 40 Hz
+
+
+def test_settings_that_changed_are_shown_before_and_after(tmp_path, machine, settings):
+    words = words_of(write_tune_report(make_tuning(machine, settings), tmp_path / "t.html"))
+    old = settings.velocity_feedforward[0]
+    assert f"velocity feedforward {old:#.3g} → {1.5 * old:#.3g}" in words
+
+
+# --------------------------------------------------------------------------------------- iteration
+def test_an_iteration_that_reaches_its_goal_is_good(tmp_path, iterated):
+    level, verdict = verdict_of(write_iterate_report(iterated, tmp_path / "i.html"))
+    assert iterated.history[iterated.best].acceleration[0] < 0.05  # else the verdict is right to differ
+    assert level == "good" and "at most 5 % after iterating: x" in verdict
+
+
+def with_best(iterated, **changes):
+    history = [i._replace(**changes) if i.number == iterated.best else i for i in iterated.history]
+    return replace(iterated, history=tuple(history))
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "said"),
+    [
+        ({"acceleration": np.array([0.3, *[np.nan] * 5])}, "attention", "More than half of the error"),
+        ({"acceleration": np.array([0.06, *[np.nan] * 5])}, "attention", "above 5 % after iterating: x 6.00"),
+        ({"clipped": 7}, "bad", "7 spool commands of the best drive were clipped"),
+    ],
+)
+def test_an_iteration_that_falls_short_says_how(tmp_path, iterated, changes, level, said):
+    found = verdict_of(write_iterate_report(with_best(iterated, **changes), tmp_path / "i.html"))
+    assert found[0] == level and said in found[1]
+
+
+def test_an_iteration_that_never_improved_says_so(tmp_path, iterated):
+    page = write_iterate_report(replace(iterated, best=0, best_run=iterated.first_run), tmp_path / "i.html")
+    assert verdict_of(page)[0] == "attention" and "No drive was better than the reference itself" in verdict_of(page)[1]
+
+
+def test_the_drawn_error_is_the_one_judged(iterated):
+    (one,) = compare(iterated, 33.0)
+    # what is drawn is low-passed and aligned in the other order than what is judged: the ends differ
+    assert float(rrmse(one.target, one.first)) == pytest.approx(one.errors[0], rel=0.01)
+    assert float(rrmse(one.target, one.best)) == pytest.approx(one.errors[1], rel=0.01)
+
+
+# -------------------------------------------------------------------------------------------- sine
+def test_a_sine_within_its_goals_is_good(tmp_path, sine):
+    assert sine.after.run.clipped == 0 and sine.after.distortion < 0.5 * sine.before.distortion
+    level, verdict = verdict_of(write_sine_report(sine, tmp_path / "s.html"))
+    assert level == "good" and "within 1 % and 2°" in verdict and "at most half" in verdict
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "said"),
+    [
+        ({"amplitude_error": -0.05}, "attention", "not within 1 %"),
+        ({"phase_error": 0.1}, "attention", "5.73° off, not within"),
+        ({"distortion": 1.0}, "attention", "does not fall"),
+        ({"distortion": np.nan}, "attention", "does not fall"),
+    ],
+)
+def test_a_sine_off_its_goals_says_which(tmp_path, sine, changes, level, said):
+    page = write_sine_report(replace(sine, after=replace(sine.after, **changes)), tmp_path / "s.html")
+    assert verdict_of(page)[0] == level and said in verdict_of(page)[1]
+    assert not NO_NUMBER.search(words_of(page))
+
+
+def test_saturated_valves_are_bad_and_shaded(tmp_path, sine):
+    command = sine.after.run.command.copy()
+    command[sine.measured, 0] = np.clip(5.0 * command[sine.measured, 0] / np.abs(command).max(), -1.0, 1.0)
+    run = replace(sine.after.run, command=command, clipped=int((np.abs(command) >= 1.0).sum()))
+    page = write_sine_report(replace(sine, after=replace(sine.after, run=run)), tmp_path / "s.html")
+    assert verdict_of(page)[0] == "bad" and f"{run.clipped} with them" in verdict_of(page)[1]
+    assert [s for s in figures_of(page)["spool-1"]["layout"]["shapes"] if s["type"] == "rect"]
+
+
+def test_cancellers_that_diverge_are_found_out(tmp_path, sine):
+    growing = np.exp(0.2 * np.arange(len(sine.after.run.a)) / 2048)[:, None]  # two thirds more after 2.5 s
+    run = replace(sine.after.run, a=sine.after.run.a * growing)
+    page = write_sine_report(replace(sine, after=replace(sine.after, run=run)), tmp_path / "s.html")
+    assert verdict_of(page)[0] == "bad" and "still grows from cycle to cycle" in verdict_of(page)[1]
+
+
+def test_runs_without_spool_commands_say_what_is_missing(tmp_path, sine):
+    bare = [replace(found, run=replace(found.run, command=None)) for found in (sine.before, sine.after)]
+    page = write_sine_report(replace(sine, before=bare[0], after=bare[1]), tmp_path / "s.html")
+    assert "Not in the runs: spool commands" in words_of(page)
+    assert "spool-1" not in figures_of(page)
+
+
+# ------------------------------------------------------------------------------------------ charts
+def test_logarithmic_axes_get_their_ranges_in_decades():
+    panel = Panel("p", [Curve("c", [1, 10], [0.1, 100], LINE)], log=True, span=(0.1, 100), lines={"two": 2.0})
+    layout = chart_figure("n", "t", "d", [panel], XAxis("f", log=True, span=(1, 10)), marks=[5.0]).layout
+    assert layout["yaxis"]["range"] == [-1.0, 2.0] and layout["xaxis"]["range"] == [0.0, 1.0]
+    level, mark = layout["shapes"]
+    assert level["y0"] == 2.0 and mark["x0"] == 5.0  # plotly's shapes are placed by value
+    label = next(a for a in layout["annotations"] if a["text"] == "two")
+    assert label["y"] == pytest.approx(np.log10(2.0), rel=1e-12)  # and its annotations by decade
+
+
+def test_a_curve_has_one_legend_entry_however_many_panels_show_it():
+    panel = Panel("p", [Curve("c", [1], [1], LINE)])
+    traces = chart_figure("n", "t", "d", [panel, panel], XAxis("f")).traces
+    assert [t["showlegend"] for t in traces] == [True, False]
+
+
+def test_each_cell_of_a_matrix_has_axes_of_its_own_in_its_own_place():
+    y = np.arange(3 * 4.0).reshape(3, 2, 2)
+    layout = matrix_figure("n", "t", "d", ["a", "b"], np.array([1.0, 2.0, 3.0]), y, LINE, (-1.0, 1.0)).layout
+    places = {(tuple(layout[f"xaxis{k}"]["domain"]), tuple(layout[f"yaxis{k}"]["domain"])) for k in ("", "2", "3", "4")}
+    assert len(places) == 4
+    assert all(0.0 <= low < high <= 1.0 for place in places for low, high in place)
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [(2.0, "6.0\N{NO-BREAK SPACE}dB"), (0.5, "−6.0\N{NO-BREAK SPACE}dB"), (np.inf, "∞"), (np.nan, "–"), (0.0, "–")],
+)
+def test_factors_in_decibels_are_always_words(factor, said):
+    assert decibels(factor) == said
+
+
+def test_angles_without_bound_or_number_are_words():
+    assert (degrees(np.pi), degrees(np.inf), degrees(np.nan)) == ("180°", "∞", "–")

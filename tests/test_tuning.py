@@ -1,0 +1,198 @@
+"""Tuning without hand work: bands, margins, other machines, and what it says of a loop that is not stable.
+
+The noise is shorter than `tuning.toml` has it, so that a tuning takes seconds: fewer averages, the same law.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lhpost6_pin import identify, tuning
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.errors import SimulationError
+from lhpost6_pin.identify import noise_target, tuning_numbers
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.names import AXES
+from lhpost6_pin.parameters import override_parameters
+from lhpost6_pin.transfer import Transfer
+from lhpost6_pin.tuning import stays_stable, tune
+
+SHORT = {"noise.duration": 32.0, "noise.slow_duration": 80.0, "feedforward_targets.rounds": 2.0}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_noise():
+    """Numbers of `tuning.toml` with shorter noise and a round less, in every module that reads them."""
+    numbers = override_parameters(tuning_numbers(), SHORT)
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (identify, tuning):
+            patch.setattr(module, "tuning_numbers", lambda: numbers)
+        yield
+
+
+def with_number(monkeypatch, **changes):
+    numbers = override_parameters(tuning_numbers(), SHORT | {k.replace("__", "."): v for k, v in changes.items()})
+    for module in (identify, tuning):
+        monkeypatch.setattr(module, "tuning_numbers", lambda: numbers)
+
+
+@pytest.fixture(scope="module")
+def uniaxial():
+    return tune(load_machine("uniaxial"), load_controller("uniaxial"))
+
+
+def test_a_guided_table_is_tuned_to_follow_over_the_whole_band(uniaxial):
+    (axis,) = uniaxial.axes
+    low, high = axis.band_after
+    assert low <= 0.1 and high >= 33.0 and axis.limited_by == "follows to 33 Hz and beyond"
+    assert axis.band_before[1] < 20.0  # it was not so before
+    f, T = axis.after.frequency, axis.after.response[:, 0, 0]
+    inside = (f >= 0.5) & (f <= 33.0)
+    near = np.abs(T[inside] * np.exp(2j * np.pi * f[inside] * uniaxial.delay) - 1.0)
+    assert np.sqrt(np.mean(near**2)) < 0.1  # |T| and phase near one, but for the delay
+    assert abs(axis.delay_after - uniaxial.delay) < 2e-3 < axis.delay_before
+
+
+def test_tuning_keeps_the_margins_it_was_asked_for(uniaxial):
+    (axis,) = uniaxial.axes
+    numbers = tuning_numbers()
+    assert axis.margin_after.gain >= numbers.number("feedback_targets.gain_margin") > 2.0
+    assert uniaxial.doubled and stays_stable(uniaxial.machine, uniaxial.after)
+
+
+def test_tuning_changes_what_it_tunes_and_nothing_else(uniaxial):
+    tuned = {"displacement_gain", "reset_gain", "force_damping"}
+    tuned |= {f"{x}_feedforward" for x in ("velocity", "acceleration", "jerk")}
+    before, after = (
+        {k: v for k, v in vars(s).items() if k not in ("stated", "notches")} for s in (uniaxial.before, uniaxial.after)
+    )
+    assert {k for k in before if before[k] != after[k]} == tuned
+    for name in tuned:  # the machine has no other axis
+        assert getattr(uniaxial.after, name)[1:] == getattr(uniaxial.before, name)[1:]
+    assert uniaxial.after.notches == uniaxial.before.notches
+    kx, ki = uniaxial.after.displacement_gain[0], uniaxial.after.reset_gain[0]
+    assert ki == pytest.approx(tuning_numbers().number("feedback_targets.reset_ratio") * kx**2)
+
+
+def test_every_step_of_the_tuning_leads_to_the_settings_found(uniaxial):
+    names = {"Kx": "displacement_gain", "KF": "force_damping", "Kvf": "velocity_feedforward"}
+    names |= {"Kaf": "acceleration_feedforward", "Kjf": "jerk_feedforward"}
+    last = {s.stage: s for s in uniaxial.steps}
+    assert set(last) == {*names, "delay"}
+    for stage, name in names.items():
+        assert last[stage].after == getattr(uniaxial.after, name)[0]
+    assert last["delay"].after == uniaxial.delay
+
+
+def test_tuning_again_from_its_own_result_finds_the_same(uniaxial):
+    """It does not depend on where it starts from."""
+    again = tune(uniaxial.machine, uniaxial.after)
+    assert again.after == uniaxial.after and again.delay == uniaxial.delay
+
+
+def test_settings_that_are_unstable_on_a_machine_are_tuned_all_the_same(uniaxial):
+    """Ten times the gain it can take: there is no response to show, but a tuning."""
+    wild = replace(uniaxial.before, displacement_gain=(800.0,) * 6)
+    assert not stays_stable(uniaxial.machine, wild)
+    found = tune(uniaxial.machine, wild)
+    assert found.after.displacement_gain[0] == uniaxial.after.displacement_gain[0]
+    (axis,) = found.axes
+    assert np.isnan(axis.before.response).all() and np.isnan([*axis.band_before, axis.delay_before]).all()
+    assert np.isnan(axis.margin_before.gain) and axis.margin_after.gain > 2.0
+
+
+def test_a_machine_that_no_gain_can_hold_is_refused(monkeypatch):
+    with_number(monkeypatch, feedback_targets__first_gain=40.0)
+    with pytest.raises(SimulationError, match="unstable even with the lowest gains tried"):
+        tune(load_machine("uniaxial"), load_controller("uniaxial"))
+
+
+def test_progress_is_reported_in_order_to_the_end(monkeypatch):
+    with_number(monkeypatch, noise__duration=20.0, noise__slow_duration=40.0, feedforward_targets__rounds=1.0)
+    told = []
+    tune(load_machine("uniaxial"), load_controller("uniaxial"), progress=told.append)
+    assert told == sorted(told) and 0.0 < told[0] and told[-1] == pytest.approx(1.0)
+
+
+# ------------------------------------------------------------------------------------------ other machines
+CHANGES = {
+    "a platen half as heavy again": lambda m: m.with_params({"platen.mass": [252e3, 252e3, 262e3]}),
+    "softer oil and a longer valve delay": lambda m: m.with_params(
+        {
+            "hydraulics.bulk_modulus": 0.8 * m.parameters.number("hydraulics.bulk_modulus"),
+            "horizontal.valve_delay": 0.007,
+            "vertical.valve_delay": 0.007,
+        }
+    ),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_a_changed_table_is_tuned_without_hand_work(change):
+    """From the settings of the table as it was."""
+    found = tune(change(load_machine()), load_controller("lhpost6"))
+    for axis in found.axes:
+        assert axis.margin_after.gain > 2.0
+    assert found.doubled
+    for name in "xyz":
+        axis = found.axes[AXES.index(name)]
+        before, after = axis.band_before, axis.band_after
+        assert after[1] > 8.0 and not after[1] < before[1] - 1.0, name
+
+
+def test_the_shipped_settings_came_of_this_machine(plant, rest):
+    settings = load_controller("lhpost6")
+    machine = load_machine()
+    assert stays_stable(machine, replace(settings, master_gain=tuple(2.0 * g for g in settings.master_gain)))
+    controller = make_controller(plant, rest, settings)
+    targets = [noise_target((name,), seed=7) for name in "xyz"]
+    runs = identify.run_noise(plant, rest, [controller] * 3, targets)
+    for k, (target, achieved) in enumerate(zip(targets, runs, strict=True)):
+        found = tuning.estimate_transfer(target.acceleration[:, [k]], achieved[:, [k]], 2048.0, segment=4.0, axes="x")
+        low, high = tuning.band_within(found, 0, 3.0, 0.7)
+        assert low <= 0.75 and high > 15.0, AXES[k]
+
+
+# ------------------------------------------------------------------------------------------- small pieces
+def test_a_limit_cycle_is_not_taken_for_stability():
+    """Valves that saturate bound an unstable loop: it swings for ever, neither growing nor dying away."""
+    settings = load_controller("lhpost6")
+    master = list(settings.master_gain)
+    master[1] *= 12.0
+    assert not stays_stable(load_machine(), replace(settings, master_gain=tuple(master)))
+
+
+def test_what_limits_a_band_is_said_even_where_there_is_none(plant):
+    f = np.arange(1, 400) / 8.0
+    ones = np.ones((len(f), 1, 1), complex)
+    good = np.ones((len(f), 1))
+
+    def words(response, coherence, band):
+        return tuning._limit(plant, Transfer(f, response, coherence, ("x",)), band, 3.0, 0.8, 33.0)
+
+    assert words(ones, good, (0.125, 40.0)) == "follows to 33 Hz and beyond"
+    assert words(3 * ones, good, (np.nan, np.nan)).startswith("gain +9.5 dB at 1 Hz, more than")
+    assert words(ones, 0.5 * good, (np.nan, np.nan)).startswith("coherence 0.50 at 1 Hz")
+    both = words(0.5 * ones, 0.5 * good, (0.125, 20.0))
+    assert "coherence 0.50 at 20.1 Hz" in both and "gain -6.0 dB at 20.1 Hz, less than" in both
+
+
+def test_noise_has_the_level_and_the_band_it_says():
+    numbers = tuning_numbers()
+    target = noise_target(("x", "roll"))
+    x, roll = target.acceleration[:, 0], target.acceleration[:, 3]
+    moving = np.abs(x) > 0.0
+    rms = np.sqrt(np.mean(x[moving] ** 2))
+    # 32 s of noise over 40 Hz are some two thousand free values; it rises and falls at its ends
+    assert rms == pytest.approx(numbers.number("noise.rms"), rel=0.1)
+    assert np.sqrt(np.mean(roll[moving] ** 2)) == pytest.approx(rms / numbers.number("noise.rotation_radius"), rel=0.1)
+    assert not target.acceleration[:, [1, 2, 4, 5]].any()
+    assert abs(np.corrcoef(x, roll)[0, 1]) < 0.1  # independent of each other
+    assert not np.allclose(x, noise_target(("x", "roll"), seed=2).acceleration[:, 0])
+    slow = noise_target(("x",), slow=True)
+    spectrum = np.abs(np.fft.rfft(slow.acceleration[:, 0])) ** 2
+    f = np.fft.rfftfreq(len(slow.acceleration), 1 / 2048)
+    inside = (f > numbers.number("noise.slow_low")) & (f < numbers.number("noise.high") * 1.05)
+    assert spectrum[inside].sum() > 0.99 * spectrum.sum()
+    assert np.abs(slow.displacement[:, 0]).max() < 0.2

@@ -4,9 +4,10 @@ Both are the same least-mean-squares law, one canceller per multiple h of the fu
 
     c(t) = w_c cos(h w t) + w_s sin(h w t),   (w_c, w_s)' = (2 / tau |T|) e (cos, sin)(h w t + arg T),
 
-at the level of the sine's envelope and not while spool commands are clipped. e = wanted - achieved acceleration and T the response from drive to acceleration at that frequency: that of the reference
-generator, then from reference to feedback, from the linear model (`margins`). The fundamental's canceller (APC) brings amplitude and phase to what is wanted; the others (AHC) take out
-what friction, valve flow and geometry add.
+at the level of the sine's envelope; e = wanted - achieved acceleration, T the response from drive to acceleration at
+that frequency: that of the reference generator, then from reference to feedback, from the linear model (`margins`).
+Nothing is learnt while spool commands are clipped. The fundamental's canceller (APC) brings amplitude and phase to what
+is wanted; the others (AHC) take out what friction, valve flow and geometry add.
 """
 
 from collections.abc import Callable
@@ -71,9 +72,12 @@ def with_cancellers(
 ) -> Controller:
     """Controller with cancellers of the first `count` multiples of a frequency [Hz] on one axis; constant in [s].
 
-    Raises SimulationError for an axis that the machine has not, or multiples beyond the linear model's reach.
+    Raises SimulationError for an axis that the machine has not, and in another mode than acceleration: there the
+    generator differentiates what cancellers add, and above their harmonics the loop through them becomes unstable.
     """
-    axes = controller.plant.axes
+    axes, mode = controller.plant.axes, controller.settings.mode
+    if mode != "acceleration":
+        raise SimulationError(f"cancellers need a reference generator in acceleration mode; this one is in {mode} mode")
     k = AXES.index(axis)
     if k not in axes:
         raise SimulationError(f"{controller.plant.machine.name} cannot move in {axis}")
@@ -93,7 +97,7 @@ def with_cancellers(
 
 
 def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, Array, slice]:
-    """Target of a sine that lasts long enough for cancellers to learn, its level 0 to 1, and the samples to judge by."""
+    """Target of a sine long enough for cancellers to learn, its level 0 to 1 (n,), and the samples to judge it by."""
     numbers = tuning_numbers()
     cycles = int(numbers.number("sine.measured_cycles"))
     settle = numbers.number("sine.settling") * numbers.number("sine.time_constant")

@@ -108,9 +108,9 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
     job.done(9)
     final = job.controller(tuned)
     new = margins(model, final)
-    try:
+    if stays_stable(machine, settings):
         before, old = job.measure(settings, noise, segment), margins(model, start)
-    except SimulationError:  # unstable on this machine: there is nothing to show
+    else:  # on this machine: there is nothing to show
         before = [replace(t, response=np.nan * t.response, coherence=0.0 * t.coherence) for t in after]
         old = (Margin(*(np.nan,) * 4),) * len(after)
     job.done(11)

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
-from lhpost6_pin.control.loop import CANCELLER, MEMORY_ROWS, cancel, control_step
+from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, cancel, control_step
 from lhpost6_pin.equilibrium import hydraulic_rows, unloaded_speeds
 from lhpost6_pin.errors import ControllerError, SimulationError
 from lhpost6_pin.laws.orifice import opening, spool_for_opening
@@ -50,7 +50,7 @@ def step(plant, loop, pose, force, drive, memory=None):
 def with_speed(loop, k, speed):
     """Memory of a controller whose reference moves on one axis at a speed [m/s, rad/s] (acceleration mode)."""
     memory = loop.init()
-    memory[5, k] = speed
+    memory[_GENERATOR + 1, k] = speed
     return memory
 
 
@@ -346,7 +346,7 @@ def test_a_canceller_learns_a_pure_tone_with_its_time_constant():
     for k in range(n):
         at = turn * k + phase
         error[k] = np.cos(turn * k + 0.4) - gain * (weights[0, 0] * np.cos(at) + weights[0, 1] * np.sin(at))
-        correction = cancel.py_func(row, k, 0, error[k], weights)
+        correction = cancel.py_func(row, k, 0, error[k], 1.0, weights)
         assert correction == pytest.approx(
             weights[0, 0] * np.cos(turn * k) + weights[0, 1] * np.sin(turn * k), abs=1e-12
         )
@@ -355,7 +355,9 @@ def test_a_canceller_learns_a_pure_tone_with_its_time_constant():
     middle = (np.arange(len(left)) + 0.5) * cycle / SAMPLE_RATE
     # LMS is a first-order lag only on average over half a period, an eighth of a second of 1.5 s
     assert np.allclose(left, np.exp(-middle / tau), rtol=0.0, atol=0.03)
-    assert cancel.py_func(row, 5, 1, 1.0, weights.copy()) == 0.0  # another axis is left alone
+    assert cancel.py_func(row, 5, 1, 1.0, 1.0, weights.copy()) == 0.0  # another axis is left alone
+    whole, half = (cancel.py_func(row, 5, 0, 0.0, level, weights.copy()) for level in (1.0, 0.5))
+    assert half == 0.5 * whole != 0.0  # the level fades what it adds
 
 
 # Whole runs ----------------------------------------------------------------------------------------------------------
@@ -379,7 +381,7 @@ def test_both_engines_agree_with_every_feature_on(plant, rest):
     begin = int(np.argmax(np.abs(target.acceleration[:, 0]))) - n // 2
     motion = [x[begin : begin + n] for x in (target.displacement, target.velocity, target.acceleration)]
     rise = np.clip(np.arange(n) / SAMPLE_RATE, 0.0, 1.0)[:, None]
-    drive = np.ascontiguousarray(np.hstack([rise * loop.drive_for(*motion), rise * motion[2]]))
+    drive = np.ascontiguousarray(np.hstack([rise * loop.drive_for(*motion), rise * motion[2], rise]))
     a, b = (simulate(plant, ClosedLoop(loop, drive, rest), samples=n, engine=engine) for engine in ENGINES)
     assert a.trouble is None and np.abs(a.command).max() > 0.05
     for name in ("q", "v", "z", "command"):
@@ -392,9 +394,24 @@ def test_a_drive_of_the_wrong_width_is_refused(plant, rest, loop):
     with pytest.raises(SimulationError, match=r"drive has shape \(4, 12\); \(4, 6\) is needed"):
         simulate(plant, ClosedLoop(loop, np.zeros((4, 12)), rest), samples=4)
     learning = loop._replace(canceller=np.zeros(1, CANCELLER))
-    with pytest.raises(SimulationError, match=r"drive has shape \(4, 6\); \(4, 12\) is needed"):
+    with pytest.raises(SimulationError, match=r"drive has shape \(4, 6\); \(4, 13\) is needed"):
         simulate(plant, ClosedLoop(learning, np.zeros((4, 6)), rest), samples=4)
     assert learning.init().shape == (MEMORY_ROWS + 1, 10)
+
+
+def test_cancellers_do_not_learn_from_a_sample_after_one_that_clipped(plant, rest, loop):
+    """What an actuator at its limit misses is not theirs to make up."""
+    table = np.zeros(1, CANCELLER)
+    table["turn"], table["cosine"], table["rate"] = 0.01, 1.0, 1e-3
+    learning = loop._replace(canceller=table)
+    drive = np.zeros((1, 13))
+    drive[0, 6], drive[0, 12] = 1.0, 1.0
+    for speed, learns in ((0.0, True), (5.0, False)):
+        memory = with_speed(learning, 0, speed)
+        step(plant, learning, np.zeros(6), rest.force, drive, memory)
+        before = memory[MEMORY_ROWS:].copy()
+        step(plant, learning, np.zeros(6), rest.force, drive, memory)
+        assert (memory[MEMORY_ROWS, 0] != before[0, 0]) == learns
 
 
 @pytest.mark.parametrize("mode", ["velocity", "displacement"])

@@ -172,21 +172,21 @@ def test_what_limits_a_band_is_said_even_where_there_is_none(plant):
         return tuning._limit(plant, Transfer(f, response, coherence, ("x",)), band, 3.0, 0.8, 33.0)
 
     assert words(ones, good, (0.125, 40.0)) == "follows to 33 Hz and beyond"
-    assert words(3 * ones, good, (np.nan, np.nan)).startswith("gain +9.5 dB at 1 Hz, more than")
+    assert words(3 * ones, good, (np.nan, np.nan)).startswith("gain +9.5 dB at 1 Hz")
     assert words(ones, 0.5 * good, (np.nan, np.nan)).startswith("coherence 0.50 at 1 Hz")
     both = words(0.5 * ones, 0.5 * good, (0.125, 20.0))
-    assert "coherence 0.50 at 20.1 Hz" in both and "gain -6.0 dB at 20.1 Hz, less than" in both
+    assert "coherence 0.50 at 20.1 Hz" in both and "gain -6.0 dB at 20.1 Hz" in both
 
 
 def test_noise_has_the_level_and_the_band_it_says():
     numbers = tuning_numbers()
     target = noise_target(("x", "roll"))
     x, roll = target.acceleration[:, 0], target.acceleration[:, 3]
-    moving = np.abs(x) > 0.0
-    rms = np.sqrt(np.mean(x[moving] ** 2))
-    # 32 s of noise over 40 Hz are some two thousand free values; it rises and falls at its ends
+    middle = slice(len(x) // 2 - 20000, len(x) // 2 + 20000)  # it rises and falls at its ends
+    rms = np.sqrt(np.mean(x[middle] ** 2))
+    # 20 s of noise over 40 Hz are some 1600 free values
     assert rms == pytest.approx(numbers.number("noise.rms"), rel=0.1)
-    assert np.sqrt(np.mean(roll[moving] ** 2)) == pytest.approx(rms / numbers.number("noise.rotation_radius"), rel=0.1)
+    assert np.sqrt(np.mean(roll[middle] ** 2)) == pytest.approx(rms / numbers.number("noise.rotation_radius"), rel=0.1)
     assert not target.acceleration[:, [1, 2, 4, 5]].any()
     assert abs(np.corrcoef(x, roll)[0, 1]) < 0.1  # independent of each other
     assert not np.allclose(x, noise_target(("x", "roll"), seed=2).acceleration[:, 0])

@@ -159,7 +159,8 @@ def _with_peaks(time: np.ndarray, peaks: np.ndarray, generator: np.random.Genera
         start = np.log([displacement / 2, velocity / np.sqrt(slow * fast) / 2, acceleration / fast**2 / 2])
         found = least_squares(misfit, start, xtol=1e-12, ftol=1e-12)
         if np.abs(found.fun).max() < 1e-6:
-            return waves[0] @ np.exp(found.x)
+            tail = time[-1] / 20  # led to rest: a step of the wavelets' tails would be a spike of acceleration
+            return waves[0] @ np.exp(found.x) * smooth_step(time / tail)[0] * smooth_step(time[::-1] / tail)[0]
     raise MotionError(f"{where}: no motion found with peaks {peaks}; peak velocity is too large or too small for them")
 
 

@@ -1,0 +1,90 @@
+"""Sine tests: amplitude, phase and distortion with and without cancellers, and which samples they are judged by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lhpost6_pin import identify as identify_module
+from lhpost6_pin import sine as module
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.errors import SimulationError
+from lhpost6_pin.identify import tuning_numbers
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.parameters import override_parameters
+from lhpost6_pin.schemes import SAMPLE_RATE
+from lhpost6_pin.sine import sine_target, sine_test, with_cancellers
+
+QUICK = {"sine.time_constant": 1.5, "sine.harmonics": 15.0, "sine.settling": 6.0}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick():
+    """Faster learning of fewer harmonics than `tuning.toml` has."""
+    numbers = override_parameters(tuning_numbers(), QUICK)
+    with pytest.MonkeyPatch.context() as patch:
+        for changed in (identify_module, module):
+            patch.setattr(changed, "tuning_numbers", lambda: numbers)
+        yield
+
+
+def test_cancellers_bring_a_sine_to_its_amplitude_and_phase_and_halve_its_distortion():
+    """0.1 m at 1 Hz along X."""
+    test = sine_test(load_machine(), load_controller("lhpost6"), axis="x", amplitude=0.1, frequency=1.0)
+    before, after = test.before, test.after
+    assert abs(after.amplitude_error) < 0.01 and abs(np.degrees(after.phase_error)) < 2.0
+    assert after.distortion < 0.5 * before.distortion
+    assert abs(after.amplitude_error) < abs(before.amplitude_error) or abs(before.amplitude_error) < 0.002
+    assert after.displacement.amplitude[0] == pytest.approx(0.1, rel=0.01)
+    assert after.peak_spool < 1.0 and after.run.clipped == 0
+
+
+def test_a_turn_is_brought_to_its_amplitude_too():
+    test = sine_test(load_machine(), load_controller("lhpost6"), axis="yaw", amplitude=0.01, frequency=2.0)
+    assert abs(test.after.amplitude_error) < 0.01 and abs(np.degrees(test.after.phase_error)) < 2.0
+    assert test.after.distortion < 0.5 * test.before.distortion
+
+
+@pytest.mark.parametrize("amplitude, frequency", [(0.1, 1.0), (0.75, 0.5), (0.02, 3.3)])
+def test_a_sine_is_judged_over_whole_cycles_at_full_amplitude_after_learning(amplitude, frequency):
+    numbers = module.tuning_numbers()
+    target, level, measured = sine_target("x", amplitude, frequency)
+    assert np.all(level[measured] == 1.0) and level[0] == level[-1] == 0.0 and level.shape == target.time.shape
+    x, a = target.displacement[measured, 0], target.acceleration[measured, 0]
+    cycles = numbers.number("sine.measured_cycles")
+    assert len(x) == np.ceil(cycles / frequency * SAMPLE_RATE)
+    t = np.arange(len(x)) / SAMPLE_RATE
+    waves = np.column_stack([np.cos(2 * np.pi * frequency * t), np.sin(2 * np.pi * frequency * t)])
+    (c, s), *_ = np.linalg.lstsq(waves, x, rcond=None)
+    assert np.hypot(c, s) == pytest.approx(amplitude, rel=2e-3)  # the target's high-pass at a fraction of the sine's
+    assert np.abs(x - waves @ [c, s]).max() < 2e-3 * amplitude
+    # the full sine lasts as long before, for the cancellers to learn
+    settle = numbers.number("sine.settling") * numbers.number("sine.time_constant")
+    before = target.displacement[measured.start - int(0.95 * settle * SAMPLE_RATE) : measured.start, 0]
+    assert np.abs(before).max() < 1.01 * amplitude
+    for part in np.array_split(before, max(1, int(0.9 * settle * frequency))):
+        assert np.ptp(part) > 1.8 * amplitude
+    assert measured.stop <= len(target.displacement) and np.abs(a).max() == pytest.approx(
+        amplitude * (2 * np.pi * frequency) ** 2, rel=5e-3
+    )
+
+
+def test_cancellers_sit_on_the_multiples_of_their_axis(plant, rest):
+    alone = make_controller(plant, rest, load_controller("lhpost6"))
+    found = with_cancellers(alone, "z", 2.0, 5, 3.0)
+    assert np.array_equal(found.canceller["axis"], [2.0] * 5)
+    assert np.allclose(found.canceller["turn"] * SAMPLE_RATE / (2 * np.pi), [2.0, 4.0, 6.0, 8.0, 10.0])
+    assert np.allclose(found.canceller["cosine"] ** 2 + found.canceller["sine"] ** 2, 1.0)
+    assert len(alone.canceller) == 0  # a changed copy
+
+
+def test_a_sine_that_cannot_be_is_refused():
+    with pytest.raises(SimulationError, match="cannot move in y"):
+        sine_test(load_machine("uniaxial"), load_controller("uniaxial"), axis="y", amplitude=0.01, frequency=1.0)
+    with pytest.raises(SimulationError, match="a sine of 40 Hz lies above the table's band"):
+        sine_test(load_machine(), load_controller("lhpost6"), axis="x", amplitude=1e-4, frequency=40.0)
+    displacement = replace(load_controller("lhpost6"), mode="displacement")
+    with pytest.raises(SimulationError, match="cancellers need a reference generator in acceleration mode"):
+        sine_test(load_machine(), displacement, axis="x", amplitude=0.1, frequency=1.0)
+    with pytest.raises(SimulationError, match=r"without cancellers stopped at .* V. left its stroke"):
+        sine_test(load_machine(), load_controller("lhpost6"), axis="z", amplitude=0.3, frequency=0.5)

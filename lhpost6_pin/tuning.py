@@ -312,66 +312,80 @@ def _tune_feedforward(
     for k in job.plant.axes:  # a start that the fit can see through, whatever was there before
         for name, value in zip(_FEEDFORWARD, (1.0, 0.0, 0.0), strict=True):
             tuned = _with(tuned, name, int(k), value)
-    stages = [("Kvf", (0,)), ("Kjf", (0, 2))] + [("Kaf", (0, 1, 2))] * int(numbers.number("feedforward_targets.rounds"))
+    low, high = numbers.number("feedforward_targets.low"), numbers.number("feedforward_targets.high")
+    bands = (low, slowest * numbers.number("feedforward_targets.integrator_band")), (low, high)
+    rounds = int(numbers.number("feedforward_targets.rounds"))
+    stages: list[tuple[str, tuple[int, ...]]] = [("Kvf", ()), ("Kjf", (2,)), *[("Kaf", (1, 2))] * rounds]
     delay = 0.0
     for n, (stage, terms) in enumerate(stages):
         found = job.measure(tuned, targets, segment)
-        high = numbers.number("feedforward_targets.high")
-        if stage == "Kvf":
-            high = slowest * numbers.number("feedforward_targets.integrator_band")
-        band = numbers.number("feedforward_targets.low"), high
-        fits = [_Fit(t, tuned, int(k), terms, band) for t, k in zip(found, job.plant.axes, strict=True)]
+        fits = [_Fit(t, tuned, int(k), bands, terms) for t, k in zip(found, job.plant.axes, strict=True)]
         if stage == "Kaf":
             delay = _best_delay(fits, numbers.number("feedforward_targets.largest_delay"))
         for fit, name in zip(fits, job.names, strict=True):
             gains, error = fit.gains(delay)
             k = AXES.index(name)
-            for term, gain in zip(terms, gains.tolist(), strict=True):
-                old = getattr(tuned, _FEEDFORWARD[term])[k]
-                tuned = _with(tuned, _FEEDFORWARD[term], k, gain)
-                if n == len(stages) - 1 or (stage != "Kaf" and term == terms[-1]):
-                    steps.append(
-                        TuningStep(("Kvf", "Kaf", "Kjf")[term], name, old, gain, f"expected error {error:.3f}")
-                    )
+            for term in (0, *terms):
+                symbol, old = ("Kvf", "Kaf", "Kjf")[term], getattr(tuned, _FEEDFORWARD[term])[k]
+                tuned = _with(tuned, _FEEDFORWARD[term], k, gains[term])
+                if n == len(stages) - 1 or symbol == stage != "Kaf":
+                    steps.append(TuningStep(symbol, name, old, gains[term], f"expected error {error:.3f}"))
         job.done(3 + n)
     steps.append(TuningStep("delay", "all", 0.0, delay, "one for all axes, least error in sum"))
     return tuned, delay
 
 
 class _Fit:
-    """Least squares of the feed-forward of one axis to its measured response."""
+    """Least squares of the feed-forward of one axis to its measured response.
+
+    Kvf where the table answers a velocity like an integrator, the other terms (1 Kaf, 2 Kjf) given that over the whole
+    band: an oil column inside the band must not spoil what lies below it.
+    """
 
     def __init__(
         self,
         transfer: Transfer,
         settings: ControllerSettings,
         k: int,
-        terms: Sequence[int],
-        band: tuple[float, float],
+        bands: tuple[tuple[float, float], tuple[float, float]],
+        terms: tuple[int, ...],
     ) -> None:
         f = transfer.frequency
-        inside = (f >= band[0]) & (f <= band[1])
-        self.s = s = 2j * np.pi * f[inside]
-        self.weight = np.sqrt(transfer.coherence[inside, 0])
-        fixed = settings.displacement_feedforward[k] + settings.displacement_gain[k]
-        gains = [getattr(settings, name)[k] for name in _FEEDFORWARD]
-        asked = fixed + sum(g * s ** (n + 1) for n, g in enumerate(gains))
-        self.plant = transfer.response[inside, 0, 0] / asked
-        kept = fixed + sum(g * s ** (n + 1) for n, g in enumerate(gains) if n not in terms)
-        self.rest = self.plant * kept
-        self.columns = np.column_stack([self.plant * s ** (n + 1) for n in terms])
+        self.bands, self.terms = [(f >= low) & (f <= high) for low, high in bands], terms
+        self.s = 2j * np.pi * f
+        self.weight = np.sqrt(transfer.coherence[:, 0])
+        self.fixed = settings.displacement_feedforward[k] + settings.displacement_gain[k]
+        self.before = [float(getattr(settings, name)[k]) for name in _FEEDFORWARD]
+        self.plant = transfer.response[:, 0, 0] / (self.fixed + self._ahead(self.before))
 
-    def gains(self, delay: float) -> tuple[Array, float]:
-        """Gains nearest to a pure delay [s], and the relative error that they leave."""
-        wanted = np.exp(-self.s * delay) - self.rest
-        size = np.abs(self.columns).max(axis=0)  # s^3 is a million times s
-        left = (self.columns / size) * self.weight[:, None]
-        right = wanted * self.weight
+    def gains(self, delay: float) -> tuple[list[float], float]:
+        """Gains on s, s^2, s^3 nearest to a pure delay [s], and the relative error that they leave."""
+        found = self._solve(self.before, (0,), self.bands[0], delay)
+        found = self._solve(found, self.terms, self.bands[1], delay)
+        inside = self.bands[1 if self.terms else 0]
+        error = (self.plant * (self.fixed + self._ahead(found)) - np.exp(-self.s * delay)) * self.weight
+        return found, float(np.linalg.norm(error[inside]) / np.linalg.norm(self.weight[inside]))
+
+    def _ahead(self, gains: Sequence[float]) -> NDArray[np.complex128]:
+        return np.asarray(sum(g * self.s ** (n + 1) for n, g in enumerate(gains)))
+
+    def _solve(
+        self, gains: Sequence[float], terms: tuple[int, ...], inside: NDArray[np.bool_], delay: float
+    ) -> list[float]:
+        """Gains with those of `terms` fitted."""
+        out = [0.0 if n in terms else g for n, g in enumerate(gains)]
+        if not terms:
+            return out
+        missing = (np.exp(-self.s * delay) - self.plant * (self.fixed + self._ahead(out)))[inside]
+        columns = np.column_stack([self.plant * self.s ** (n + 1) for n in terms])[inside]
+        size = np.abs(columns).max(axis=0)  # s^3 is a million times s
+        left, right = columns / size * self.weight[inside, None], missing * self.weight[inside]
         found, *_ = np.linalg.lstsq(
             np.vstack([left.real, left.imag]), np.concatenate([right.real, right.imag]), rcond=None
         )
-        error = np.abs(left @ found - right) / np.sqrt(np.mean(self.weight**2))
-        return found / size, float(np.sqrt(np.mean(error**2)))
+        for n, gain in zip(terms, (found / size).tolist(), strict=True):
+            out[n] = gain
+        return out
 
 
 def _best_delay(fits: Sequence[_Fit], largest: float) -> float:

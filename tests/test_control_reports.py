@@ -223,7 +223,7 @@ def test_the_drawn_error_is_the_one_judged(iterated):
 def test_a_sine_within_its_goals_is_good(tmp_path, sine):
     assert sine.after.run.clipped == 0 and sine.after.distortion < 0.5 * sine.before.distortion
     level, verdict = verdict_of(write_sine_report(sine, tmp_path / "s.html"))
-    assert level == "good" and "within 1 % and 2°" in verdict and "at most half" in verdict
+    assert level == "good" and "within 1 % and 2°" in verdict and "half or less" in verdict
 
 
 @pytest.mark.parametrize(
@@ -239,6 +239,13 @@ def test_a_sine_off_its_goals_says_which(tmp_path, sine, changes, level, said):
     page = write_sine_report(replace(sine, after=replace(sine.after, **changes)), tmp_path / "s.html")
     assert verdict_of(page)[0] == level and said in verdict_of(page)[1]
     assert not NO_NUMBER.search(words_of(page))
+
+
+def test_errors_too_small_to_matter_are_rounded_with_their_sign(tmp_path, sine):
+    after = replace(sine.after, amplitude_error=6.9e-6, phase_error=-1e-5, distortion_displacement=6.6e-7)
+    words = words_of(write_sine_report(replace(sine, after=after), tmp_path / "s.html"))
+    assert "amplitude is +0.001 % and the phase 0.00° off" in words
+    assert "&lt; 0.0001 %" in words
 
 
 def test_saturated_valves_are_bad_and_shaded(tmp_path, sine):
@@ -273,6 +280,15 @@ def test_logarithmic_axes_get_their_ranges_in_decades():
     assert level["y0"] == 2.0 and mark["x0"] == 5.0  # plotly's shapes are placed by value
     label = next(a for a in layout["annotations"] if a["text"] == "two")
     assert label["y"] == pytest.approx(np.log10(2.0), rel=1e-12)  # and its annotations by decade
+
+
+def test_a_logarithmic_value_axis_names_1_2_5_over_few_decades_and_powers_of_ten_else():
+    def axis(*values):
+        panel = Panel("p", [Curve("c", range(len(values)), values, LINE)], log=True)
+        return chart_figure("n", "t", "d", [panel], XAxis("f")).layout["yaxis"]
+
+    assert {0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0} <= set(axis(0.2, 30.0)["tickvals"])
+    assert axis(1e-4, 1.0)["dtick"] == 1 and axis(0.0, 0.0)["dtick"] == 1  # nothing to take a logarithm of
 
 
 def test_a_curve_has_one_legend_entry_however_many_panels_show_it():

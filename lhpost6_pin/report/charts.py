@@ -19,6 +19,7 @@ __all__ = ["FREQUENCY_TICKS", "Curve", "Panel", "XAxis", "chart_figure", "matrix
 
 FREQUENCY_TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40)  # [Hz]
 BAND_COLOR = "#009e73"
+LABEL_COLOR = "rgba(255,255,255,0.8)"  # behind words on a line: curves may cross them
 CELL = 92  # [CSS px] height of one plot of a matrix
 MATRIX_WIDTH = 720  # [CSS px] below which a matrix scrolls sideways
 
@@ -82,7 +83,7 @@ def chart_figure(
         for label, level in panel.lines.items():
             layout["shapes"].append(level_line(level, k))
             place = float(np.log10(level)) if panel.log else level  # an annotation's place is in decades
-            layout["annotations"].append(level_label(label, place, k))
+            layout["annotations"].append(level_label(label, place, k) | {"bgcolor": LABEL_COLOR})
         layout["shapes"] += [_mark(place, k) for place in marks]
     return Figure(name, title, description, traces, layout, layout["height"])
 
@@ -149,7 +150,10 @@ def _decades(panel: Panel) -> dict[str, Any]:
     """Ticks of a logarithmic value axis: at 1, 2 and 5 over a few decades, at powers of ten over many."""
     drawn = np.concatenate([np.ravel(curve.y) for curve in panel.curves]) if panel.curves else np.ones(1)
     low, high = panel.span or (np.min(drawn[drawn > 0.0], initial=np.inf), np.max(drawn, initial=0.0))
-    return {"dtick": "D2"} if high < 300.0 * low else {"dtick": 1, "exponentformat": "power"}
+    if not 0.0 < high < 300.0 * low:
+        return {"dtick": 1, "exponentformat": "power"}
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    return {"tickvals": [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]}
 
 
 def _value_band(low: float, high: float, k: int) -> dict[str, Any]:

@@ -76,23 +76,29 @@ def gain_table(before: ControllerSettings, after: ControllerSettings, axes: Sequ
 
 
 def assumption_blocks(machine: Machine, sections: Sequence[str]) -> list[Markup]:
-    """Return the numbers of `tuning.toml` that were used, with unit, evidence and source."""
+    """Return the numbers of `tuning.toml` that were used, whole sections or single ones, with evidence and source."""
     numbers = tuning_numbers()
     rows = [
-        (path, q.printed or _shown(q.value), q.unit, q.evidence, q.source)
+        (
+            path,
+            q.printed or f"{_shown(q.value)}{f' {q.unit}' if q.unit != '1' else ''}",
+            q.evidence,
+            q.source.replace("`", ""),
+        )
         for path, q in numbers.items()
-        if path.split(".")[0] in sections
+        if path in sections or path.split(".")[0] in sections
     ]
-    guessed = sum(evidence == "assumed" for *_, evidence, _ in rows)
+    guessed = sum(evidence == "assumed" for _, _, evidence, _ in rows)
     doubt = sum(q.assumed for q in machine.parameters.values())
     said = bullet_list(
         [
             f"{guessed} of the {len(rows)} numbers below are assumed: nobody has published them.",
             f"{doubt} of the {len(machine.parameters)} numbers of {machine.name} are assumed as well; "
-            "lhpost6 info lists them.",
+            "“lhpost6 info” lists them.",
         ]
     )
-    return [said, table("Numbers used", ("Number", "Value", "Unit", "Evidence", "Source"), rows)]
+    caption = "Numbers used, where the command gives no other"
+    return [said, table(caption, ("Number", "Value", "Evidence", "Source"), rows)]
 
 
 def _shown(value: Value) -> str:

@@ -35,6 +35,8 @@ __all__ = ["write_iterate_report"]
 # Judgement, not physics: largest acceleration RRMSE of an axis, and its share of the error before iterating.
 REACHED = 0.05
 LEFT = 0.5
+# Numbers of `tuning.toml` that identify the table and iterate on it.
+NUMBERS = ("noise.rms", "noise.rotation_radius", "noise.low", "noise.high", "noise.segment", "iteration")
 
 
 def write_iterate_report(result: Iterated, path: Path | str, command: str = "") -> Path:
@@ -128,7 +130,7 @@ def _sections(result: Iterated, found: Sequence[Comparison]) -> list[Section]:
         Section("spectra", "Spectra of the error", spectrum_blocks(found)),
         Section("drive", "Drive and reference", drive_blocks(result, found)),
         Section("table", "Transfer function of the table", table_blocks(result.table)),
-        Section("assumptions", "Assumptions and sources", assumption_blocks(machine, ("noise", "iteration"))),
+        Section("assumptions", "Assumptions and sources", assumption_blocks(machine, NUMBERS)),
     ]
 
 

@@ -21,6 +21,7 @@ __all__ = [
     "error_per_cycle",
     "harmonic_blocks",
     "history_block",
+    "percent_of_fundamental",
     "spool_blocks",
 ]
 
@@ -48,14 +49,18 @@ def harmonic_blocks(test: SineTest) -> list[Markup]:
             columns.append(share)
             curves.append(Curve(name, np.arange(2, len(share) + 1), np.maximum(share[1:], FLOOR), line, "bar"))
         top = max(float(column[1:].max()) for column in columns[-2:])
-        title = f"Harmonics of the {quantity} [% of the fundamental]"
+        title = f"{quantity.capitalize()} [% of the fundamental]"
         panels.append(Panel(title, curves, log=True, span=(FLOOR, max(2.0 * top, 1.0))))
     words = f"Amplitudes of the multiples of {number(test.frequency)} Hz over that of the fundamental."
     drawing = chart_figure(
         "harmonics", "Harmonics relative to the fundamental", words, panels, XAxis("Multiple"), row_height=200
     )
     rows = [
-        (str(n + 1), f"{number(float(test.before.acceleration.frequency[n]))} Hz", *(_percent(c[n]) for c in columns))
+        (
+            str(n + 1),
+            f"{number(float(test.before.acceleration.frequency[n]))} Hz",
+            *(percent_of_fundamental(c[n]) for c in columns),
+        )
         for n in range(1, count)
     ]
     header = (
@@ -174,6 +179,11 @@ def achieved_motion(found: SineResult) -> PlatenMotion:
     return platen_motion(found.run.plant, found.run.q, found.run.v, found.run.a)
 
 
+def percent_of_fundamental(share: float) -> str:
+    """Return a share [%] of the fundamental's amplitude; what is too small to be drawn is not told apart."""
+    return f"< {FLOOR:.4f}\N{NO-BREAK SPACE}%" if share <= FLOOR else percent(share / 100.0)
+
+
 def _last_cycles(test: SineTest) -> tuple[slice, float]:
     """Samples of the last cycles measured, and the time of the first [s]."""
     stop = min(test.measured.stop, len(test.target.time))
@@ -194,7 +204,3 @@ def _shares(found: Harmonics) -> Array:
     """Amplitudes over the fundamental's [%]; zero where there is none."""
     first = found.amplitude[0]
     return 100.0 * found.amplitude / first if first > 0.0 else np.zeros(len(found.amplitude))
-
-
-def _percent(share: float) -> str:
-    return percent(share / 100.0)

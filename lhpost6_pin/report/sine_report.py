@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..names import AXES
 from ..sine import SineResult, SineTest
-from .control_blocks import assumption_blocks, degrees, load_of
+from .control_blocks import assumption_blocks, load_of
 from .page import Headline, Level, Markup, Page, Section, number, save_page, table, versions
 from .run_motion import axis_scale, percent, shown_as
 from .sine_plots import (
@@ -17,6 +17,7 @@ from .sine_plots import (
     error_per_cycle,
     harmonic_blocks,
     history_block,
+    percent_of_fundamental,
     spool_blocks,
 )
 
@@ -52,7 +53,9 @@ def write_sine_report(test: SineTest, path: Path | str, command: str = "") -> Pa
             Section("convergence", "Convergence", [convergence_block(test)]),
             Section("spools", "Spool commands", spool_blocks(test)),
             Section(
-                "assumptions", "Assumptions and sources", assumption_blocks(machine, ("sine", "feedforward_targets"))
+                "assumptions",
+                "Assumptions and sources",
+                assumption_blocks(machine, ("sine", "feedforward_targets.high")),
             ),
         ],
         command=command or None,
@@ -74,14 +77,14 @@ def _judge(test: SineTest) -> tuple[str, Level]:
     halved = after.distortion <= DISTORTION_LEFT * before.distortion
     words = [
         f"With the cancellers the amplitude is {_signed(after.amplitude_error)} and the phase "
-        f"{degrees(after.phase_error)} off, {'within' if near else 'not within'} {100 * AMPLITUDE:g} % and "
+        f"{_angle(after.phase_error)} off, {'within' if near else 'not within'} {100 * AMPLITUDE:g} % and "
         f"{np.degrees(PHASE):g}°.",
         f"The distortion of the acceleration falls from {percent(before.distortion)} to {percent(after.distortion)}"
         if after.distortion < before.distortion
         else f"The distortion of the acceleration does not fall: {percent(before.distortion)} without, "
         f"{percent(after.distortion)} with them",
     ]
-    words[1] += ", at most half." if halved else ", more than half of it is left."
+    words[1] += ", to half or less." if halved else ", more than half of it is left."
     if not (near and halved):
         level = "attention"
     if _growing(test):
@@ -119,9 +122,9 @@ def _headlines(test: SineTest) -> list[Headline]:
             "good" if near else "attention",
         ),
         Headline(
-            degrees(after.phase_error),
+            _angle(after.phase_error),
             "Phase error with cancellers",
-            f"without {degrees(before.phase_error)}; negative is late",
+            f"without {_angle(before.phase_error)}; negative is late",
             "good" if abs(after.phase_error) <= PHASE else "attention",
         ),
         Headline(
@@ -137,9 +140,9 @@ def _numbers(test: SineTest) -> Markup:
     fading = slice(test.measured.stop, None)
     rows = (
         ("Amplitude error of the displacement", *_both(test, lambda r: _signed(r.amplitude_error))),
-        ("Phase error of the displacement", *_both(test, lambda r: degrees(r.phase_error))),
+        ("Phase error of the displacement", *_both(test, lambda r: _angle(r.phase_error))),
         ("THD of the acceleration", *_both(test, lambda r: percent(r.distortion))),
-        ("THD of the displacement", *_both(test, lambda r: percent(r.distortion_displacement))),
+        ("THD of the displacement", *_both(test, lambda r: percent_of_fundamental(100.0 * r.distortion_displacement))),
         ("Largest acceleration error, cycles measured", *_both(test, lambda r: _largest(test, r, test.measured))),
         ("Largest acceleration error, fading out", *_both(test, lambda r: _largest(test, r, fading))),
         ("Largest spool command", *_both(test, lambda r: percent(r.peak_spool))),
@@ -159,4 +162,18 @@ def _largest(test: SineTest, found: SineResult, part: slice) -> str:
 
 
 def _signed(fraction: float) -> str:
-    return f"{'+' if fraction > 0.0 else ''}{percent(fraction)}"
+    """A share to a thousandth of a per cent, as the command prints it."""
+    return f"{_rounded(100.0 * fraction, 3)}\N{NO-BREAK SPACE}%"
+
+
+def _angle(angle: float) -> str:
+    """An angle [rad] in degrees to a hundredth, as the command prints it."""
+    return f"{_rounded(float(np.degrees(angle)), 2)}°"
+
+
+def _rounded(value: float, digits: int) -> str:
+    """A number with its sign, none on a rounded zero; an en dash where it is not finite."""
+    if not np.isfinite(value):
+        return "–"
+    value = round(value, digits) + 0.0  # no negative zero
+    return f"{value:{'+' if value else ''}.{digits}f}".replace("-", "−")

@@ -198,9 +198,10 @@ def _steps(tuning: Tuning) -> list[Markup]:
     ]
     how = (
         "Feedback first, displacement gain Kx and force feedback KF, on the linear model; then feed-forward of "
-        "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured."
+        "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured. The error expected of a fit is "
+        "that of the response to a pure delay, relative, over the band that it is fitted in."
     )
-    return [paragraph(how), table("Decisions", ("Step", "Axis", "Before", "After", "Reason"), rows)]
+    return [paragraph(how), table("Decisions, SI", ("Step", "Axis", "Before", "After", "Reason"), rows)]
 
 
 def _band(band: tuple[float, float]) -> str:

@@ -4,6 +4,7 @@ A drive file is netCDF-4 with `drive` (time, axis), the signal that goes into th
 the motion that it is to produce (`wanted_displacement`, `wanted_velocity`, `wanted_acceleration`).
 """
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,12 +16,15 @@ from numpy.typing import NDArray
 from .control.filters import MODES
 from .errors import RecordError
 from .files import write_whole
+from .machine import Machine
 from .motions import Reference, Target
 from .names import AXES
 from .records import open_record
 from .schemes import SAMPLE_RATE
 
-__all__ = ["Drive", "load_drive", "save_drive"]
+__all__ = ["Drive", "check_circumstances", "circumstances", "load_drive", "save_drive"]
+
+log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 
@@ -38,6 +42,31 @@ class Drive(NamedTuple):
     mode: str
     target: Target
     attrs: Mapping[str, Any]
+
+
+def circumstances(machine: Machine, controller: str) -> dict[str, str]:
+    """What a drive or an inverse is good for: machine, specimen, open servovalves, and the name of the settings."""
+    return {
+        "machine": machine.name,
+        "specimen": machine.specimen.name if machine.specimen else "none",
+        "servovalves": str(sum(a.valves for a in machine.actuators)),
+        "controller": controller,
+    }
+
+
+def check_circumstances(origin: str, made_with: Mapping[str, Any], machine: Machine, controller: str) -> None:
+    """Refuse what was made on another machine, with a RecordError that names its `origin`; warn of other differences.
+
+    What `made_with` does not say is not judged.
+    """
+    now = circumstances(machine, controller)
+    differs = {key: str(made_with[key]) for key, value in now.items() if str(made_with.get(key, value)) != value}
+    if "machine" in differs:
+        raise RecordError(
+            f"{origin}: was made on {differs['machine']}, not on {now['machine']}; choose --machine, or make it again"
+        )
+    for key, value in differs.items():
+        log.warning("%s: was made with %s %s, this run has %s", origin, key, value, now[key])
 
 
 def save_drive(values: Array, mode: str, target: Target, path: Path, attrs: Mapping[str, Any]) -> Path:
@@ -74,6 +103,8 @@ def save_drive(values: Array, mode: str, target: Target, path: Path, attrs: Mapp
 def load_drive(path: Path | str) -> Drive:
     """Read a drive file; raises RecordError naming the file and what it lacks."""
     data = open_record(path)
+    if data.attrs.get("kind") != "drive":
+        raise RecordError(f"{path}: is no drive file; make one with `lhpost6 iterate`")
     try:
         mode = str(data.attrs["mode"])
         arrays = {
@@ -92,14 +123,14 @@ def load_drive(path: Path | str) -> Drive:
             start=float(data.attrs["start_s"]),
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise RecordError(f"{path}: is no drive file: {error}; make one with `lhpost6 iterate`") from error
+        raise RecordError(f"{path}: is damaged or incomplete: {error}; make it again with `lhpost6 iterate`") from error
     if mode not in MODES:
         raise RecordError(f"{path}: mode {mode!r} is not one of {', '.join(MODES)}")
     for name, values in arrays.items():
         if not np.isfinite(values).all():
             at, axis = np.argwhere(~np.isfinite(values))[0]
             raise RecordError(f"{path}: {name} is not finite in {AXES[axis]} at sample {at}; make the file again")
-    if len(time) < 2 or np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() > 1e-6:
+    if len(time) < 2 or not np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() <= 1e-6:  # nan is none of them either
         raise RecordError(f"{path}: its samples are not those of the controller, {SAMPLE_RATE} Hz; make the file again")
     displacement, velocity, acceleration = (arrays[f"wanted_{q}"] for q in ("displacement", "velocity", "acceleration"))
     target = Target(time, displacement, velocity, acceleration, reference)

@@ -135,7 +135,7 @@ def energy_audit(run: Run) -> Audit:
         add(f"delivered.{name}", delivered[:, i])
     for name, rate, energy in zip(("kinetic", "gravity"), *_rigid_energies(run), strict=True):
         add(f"stored.{name}", rate, energy - energy[0])
-    if plant.model.nv > plant.axes.size:
+    if plant.articulated:
         joints = slice(plant.axes.size, None)
         add("dissipated.specimen_joints", run.v[:, joints] ** 2 @ plant.model.damping[joints])
     for i, name in enumerate(CREATED):

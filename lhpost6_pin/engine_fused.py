@@ -4,8 +4,6 @@ It calls the same stages as the per-step engine; only the rigid-body algebra is 
 specimen), and Pinocchio is its oracle.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +11,7 @@ from .compiled import compiled, compiled_inline
 from .control.loop import control_sample
 from .errors import SimulationError
 from .plant import Plant
+from .platen_steps import integrate_platen
 from .rigid_body import platen_inertia
 from .schemes import (
     DQ,
@@ -27,7 +26,7 @@ from .schemes import (
     staggered_stage,
 )
 
-__all__ = ["INERTIA", "inertia_table", "integrate_platen", "platen_acceleration", "run_fused"]
+__all__ = ["INERTIA", "inertia_table", "platen_acceleration", "run_fused"]
 
 Array = NDArray[np.float64]
 
@@ -42,7 +41,7 @@ INERTIA = np.dtype(
 
 def inertia_table(plant: Plant) -> NDArray[np.void]:
     """Table (one row) of the rigid body; raises SimulationError for an articulated specimen."""
-    if plant.model.nv != plant.axes.size:
+    if plant.articulated:
         raise SimulationError(
             "the fused engine takes a platen with a rigid specimen at most; "
             "use engine='pinocchio' for free joints, or mount the specimen with locked joints"
@@ -97,47 +96,6 @@ def platen_acceleration(inertia, axes, frame, tau, work, a):
         for j in range(6):
             value += inverse[i, j] * total[j]
         a[k] = value
-
-
-@compiled_inline
-def integrate_platen(q, dq, axes, out):
-    """Pose after the body displacement dq: q exp(dq) on SE(3), quaternion kept unit (pin.integrate's oracle)."""
-    if axes.size != 6:
-        out[0] = q[0] + dq[0]
-        return
-    x, y, z, w = q[3], q[4], q[5], q[6]
-    w0, w1, w2 = dq[3], dq[4], dq[5]
-    v0, v1, v2 = dq[0], dq[1], dq[2]
-    square = w0 * w0 + w1 * w1 + w2 * w2
-    if square < 1e-4:  # series in the turn: the next terms are below 1e-16
-        half = 0.5 * (1.0 - square / 24.0 * (1.0 - square / 80.0))
-        cosine = 1.0 - square / 8.0 * (1.0 - square / 48.0)
-        first = 0.5 - square / 24.0 * (1.0 - square / 30.0)
-        second = 1.0 / 6.0 - square / 120.0 * (1.0 - square / 42.0)
-    else:
-        turn = math.sqrt(square)
-        half = math.sin(0.5 * turn) / turn
-        cosine = math.cos(0.5 * turn)
-        first = (1.0 - math.cos(turn)) / square
-        second = (turn - math.sin(turn)) / (square * turn)
-    # translation in body axes: v + first (w x v) + second w x (w x v)
-    c0, c1, c2 = w1 * v2 - w2 * v1, w2 * v0 - w0 * v2, w0 * v1 - w1 * v0
-    t0 = v0 + first * c0 + second * (w1 * c2 - w2 * c1)
-    t1 = v1 + first * c1 + second * (w2 * c0 - w0 * c2)
-    t2 = v2 + first * c2 + second * (w0 * c1 - w1 * c0)
-    # turned by the quaternion: t + 2 w (u x t) + 2 u x (u x t)
-    u0, u1, u2 = y * t2 - z * t1, z * t0 - x * t2, x * t1 - y * t0
-    out[0] = q[0] + t0 + 2.0 * (w * u0 + y * u2 - z * u1)
-    out[1] = q[1] + t1 + 2.0 * (w * u1 + z * u0 - x * u2)
-    out[2] = q[2] + t2 + 2.0 * (w * u2 + x * u1 - y * u0)
-    e0, e1, e2 = half * w0, half * w1, half * w2
-    n3 = w * e0 + x * cosine + y * e2 - z * e1
-    n4 = w * e1 + y * cosine + z * e0 - x * e2
-    n5 = w * e2 + z * cosine + x * e1 - y * e0
-    n6 = w * cosine - x * e0 - y * e1 - z * e2
-    # one Newton step to unit length is exact to rounding so close to it
-    scale = 1.5 - 0.5 * (n3 * n3 + n4 * n4 + n5 * n5 + n6 * n6)
-    out[3], out[4], out[5], out[6] = n3 * scale, n4 * scale, n5 * scale, n6 * scale
 
 
 @compiled

@@ -74,10 +74,10 @@ def run_noise(
         for c, t in zip(controllers, targets, strict=True)
     ]
     samples = len(targets[0].time)
-    if plant.model.nv == plant.axes.size:
-        runs = simulate_many([(plant, drive) for drive in drives], samples=samples)
-    else:  # a specimen with joints of its own
+    if plant.articulated:
         runs = [simulate(plant, drive, samples=samples) for drive in drives]
+    else:
+        runs = simulate_many([(plant, drive) for drive in drives], samples=samples)
     for run in runs:
         if run.trouble:
             raise SimulationError(f"white noise: {run.trouble}; the loop is unstable, lower its gains")

@@ -5,7 +5,8 @@ impulse response, so it is stable whatever the table; it looks ahead by the tabl
 acts on a whole record at once.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ class InverseFilter:
     rate: float  # [Hz]
     band: tuple[float, float]  # [Hz] where it inverts; unit gain below, nothing above
     axes: tuple[str, ...]  # (n,) names of the axes it acts on
+    made_with: Mapping[str, str] = field(default_factory=dict)  # machine, controller and so on (`drives`)
 
     @property
     def delay(self) -> float:
@@ -151,7 +153,7 @@ def save_inverse(inverse: InverseFilter, path: Path | str) -> None:
     data = xr.Dataset(
         {"inverse_taps": (("tap", "drive_axis", "reference_axis"), inverse.taps)},
         {"drive_axis": list(inverse.axes), "reference_axis": list(inverse.axes)},
-        {"sample_rate_hz": inverse.rate, "band_hz": list(inverse.band)},
+        {"kind": "inverse", "sample_rate_hz": inverse.rate, "band_hz": list(inverse.band), **inverse.made_with},
     )
     with write_whole(path) as beside, memoryview(data.to_netcdf(engine="h5netcdf")) as content:
         beside.write_bytes(content)
@@ -160,14 +162,17 @@ def save_inverse(inverse: InverseFilter, path: Path | str) -> None:
 def load_inverse(path: Path | str) -> InverseFilter:
     """Read an inverse that `save_inverse` wrote. Raises `RecordError`, naming the file, if it is none."""
     data = open_record(path)
+    if data.attrs.get("kind") != "inverse":
+        raise RecordError(f"{path}: is not a saved inverse; make one with `lhpost6 iterate`")
     try:
         taps = data["inverse_taps"].transpose("tap", "drive_axis", "reference_axis").values.astype(float)
         axes = tuple(map(str, data["drive_axis"].values))
         low, high = map(float, data.attrs["band_hz"])
         rate = float(data.attrs["sample_rate_hz"])
     except (KeyError, TypeError, ValueError) as error:
-        raise RecordError(f"{path}: is not a saved inverse: {error}; make it again") from error
+        raise RecordError(f"{path}: is damaged or incomplete: {error}; make it again with `lhpost6 iterate`") from error
     fits = taps.shape[1:] == (len(axes),) * 2 and len(taps) % 2 and set(axes) <= set(AXES) and rate > 0
     if not (fits and np.isfinite(taps).all()):
         raise RecordError(f"{path}: holds an inverse of shape {taps.shape} for {' '.join(axes)}; make it again")
-    return InverseFilter(taps, rate, (low, high), axes)
+    made_with = {key: str(value) for key, value in data.attrs.items() if isinstance(value, str) and key != "kind"}
+    return InverseFilter(taps, rate, (low, high), axes, made_with)

@@ -29,7 +29,7 @@ from .plant import make_plant
 from .pose import PlatenMotion, platen_motion
 from .schemes import SAMPLE_RATE
 from .signals import align, delay, lowpass_zero_phase, rrmse
-from .simulate import ClosedLoop, Run, simulate
+from .simulate import ClosedLoop, Run, fastest_engine, simulate
 from .transfer import Transfer, delay_of
 
 __all__ = ["Iterated", "Iteration", "TableInverse", "identify_inverse", "iterate"]
@@ -109,17 +109,20 @@ def iterate(
 ) -> Iterated:
     """Iterate on a target from rest; options go to `simulate`.
 
-    table is identified first unless it is given. Raises SimulationError, naming the iteration, if a run does not last.
+    table is identified first unless it is given. Raises SimulationError, naming the iteration, if a run does not last,
+    and for a gain that is not above 0 and 1 at most.
     """
     numbers = tuning_numbers()
     most = int(numbers.number("iteration.most")) if most is None else most
     gain = numbers.number("iteration.gain") if gain is None else gain
+    if not 0.0 < gain <= 1.0:
+        raise SimulationError(f"a gain of {gain:g} is no gain of a drive's update; give one above 0, 1 at most")
     report = progress or (lambda share: None)
     plant = make_plant(machine)
     rest = find_equilibrium(plant)
     controller = make_controller(plant, rest, settings)
     table = table or identify_inverse(machine, settings)
-    options = {"engine": "fused" if plant.model.nv == plant.axes.size else "pinocchio", **options}
+    options = {"engine": fastest_engine(plant), **options}
     wanted = controller.drive_for(target.displacement, target.velocity, target.acceleration)
     goal = align(wanted, -table.delay, 1.0 / SAMPLE_RATE)  # D r
     search = _Search(table, gain, goal)

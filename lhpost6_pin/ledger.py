@@ -10,13 +10,13 @@ Inertia = sum of all effects and the weight (Eqs. 4-24 to 4-26), each as a wrenc
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .errors import UnknownNameError
 from .plant import Plant
 from .schemes import V_SEEN, forces_stage, pose_stage
@@ -26,11 +26,22 @@ from .workspace import make_workspace
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Ledger", "force_ledger", "number_of", "stage_arguments"]
+__all__ = ["Ledger", "States", "add_at_c", "force_ledger", "number_of", "stage_arguments"]
 
 Array = NDArray[np.float64]
 
 WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+class States(NamedTuple):
+    """States of a plant over time, wherever they come from; n samples."""
+
+    plant: Plant
+    time: Array  # (n,) [s]
+    q: Array  # (n, nq)
+    v: Array  # (n, nv), as forces see it
+    a: Array  # (n, nv)
+    z: Array  # (n, n_states)
 
 
 @dataclass(frozen=True)
@@ -80,7 +91,7 @@ class Ledger:
         return data.assign_coords(time=("time", self.time, {"units": "s"}))
 
 
-def force_ledger(run: Run) -> Ledger:
+def force_ledger(run: "Run | States") -> Ledger:
     """Forces of every effect at every recorded sample, and the inertia that they balance."""
     plant = run.plant
     effects = plant.machine.effects
@@ -112,7 +123,7 @@ def number_of(kind: str, name: str, valid: Sequence[str]) -> int:
     return list(valid).index(name)
 
 
-def stage_arguments(run: Run, *more: Array) -> tuple[Any, ...]:
+def stage_arguments(run: "Run | States", *more: Array) -> tuple[Any, ...]:
     """States of a run, tables and scratch for the stages, and more, in the order of the compiled loops below."""
     plant = run.plant
     ws = make_workspace(plant, plant.zero_state())
@@ -138,36 +149,57 @@ def _forces(q, v, z, axes, legs, body, rows, damping, frame, port, JB, force, mo
                 p = rows[i].port if side == 0 else rows[i].port_2
                 if p < 0:
                     continue
-                f = force[i, side]
-                # from B to C: the moment less rho_c x force
-                mx = B[p, 3] - (rho[1] * B[p, 2] - rho[2] * B[p, 1])
-                my = B[p, 4] - (rho[2] * B[p, 0] - rho[0] * B[p, 2])
-                mz = B[p, 5] - (rho[0] * B[p, 1] - rho[1] * B[p, 0])
-                for j in range(3):
-                    out[j] += f * (frame[j, 0] * B[p, 0] + frame[j, 1] * B[p, 1] + frame[j, 2] * B[p, 2])
-                    out[3 + j] += f * (frame[j, 0] * mx + frame[j, 1] * my + frame[j, 2] * mz)
+                add_at_c(force[i, side], B, p, rho, frame, out)
 
 
-def _rigid_wrenches(run: Run) -> tuple[Array, Array]:
+@compiled_inline
+def add_at_c(force, B, port, rho, frame, out):
+    """Add the wrench at C in {c} of a force on a port to out (6,); B (n_ports, 6) at B in platen axes, rho its C."""
+    b0, b1, b2 = B[port, 0], B[port, 1], B[port, 2]
+    # from B to C: the moment less rho x force
+    mx = B[port, 3] - (rho[1] * b2 - rho[2] * b1)
+    my = B[port, 4] - (rho[2] * b0 - rho[0] * b2)
+    mz = B[port, 5] - (rho[0] * b1 - rho[1] * b0)
+    for j in range(3):
+        out[j] += force * (frame[j, 0] * b0 + frame[j, 1] * b1 + frame[j, 2] * b2)
+        out[3 + j] += force * (frame[j, 0] * mx + frame[j, 1] * my + frame[j, 2] * mz)
+
+
+def _rigid_wrenches(run: "Run | States") -> tuple[Array, Array]:
     """Inertial wrench and weight (n, 6) of platen and specimen at B in platen axes (Eqs. 4-24, 4-26)."""
     plant = run.plant
-    model, data = plant.model, plant.model.createData()
     body = plant.body[0]
-    moving, resting = np.zeros((2, len(run.time), 6))
-    zero = np.zeros(model.nv)
-    down = np.zeros((len(run.time), 3))
+    weightless = plant.model.copy()
+    weightless.gravity = pin.Motion.Zero()
+    data, rnea = weightless.createData(), pin.rnea
+    inertia = np.zeros((len(run.time), 6))
     for k, (q, v, a) in enumerate(zip(run.q, run.v, run.a, strict=True)):
-        pin.rnea(model, data, q, v, a)
-        moving[k] = data.f[1].vector
-        pin.rnea(model, data, q, zero, zero)
-        resting[k] = data.f[1].vector
-        down[k] = data.liMi[1].rotation[2]
+        rnea(weightless, data, q, v, a)
+        inertia[k] = data.f[1].vector
     twist, rise = np.zeros((2, len(run.time), 6))
     twist[:, plant.axes], rise[:, plant.axes] = (x[:, : plant.axes.size] for x in (run.v, run.a))
-    inertia, gravity = moving - resting, -resting
     inertia[:, :3] += body["mass_extra"] * (rise[:, :3] + np.cross(twist[:, 3:], twist[:, :3]))
+    gravity, down = _weight(plant, run.q)
     gravity[:, :3] -= body["weight_extra"] * down
     return inertia, gravity
+
+
+def _weight(plant: Plant, poses: Array) -> tuple[Array, Array]:
+    """Weight (n, 6) of the Inertias at B in platen axes, and the vertical (n, 3) in platen axes, at poses (n, nq)."""
+    model, data = plant.model, plant.model.createData()
+    zero = np.zeros(model.nv)
+    weight, down = np.zeros((len(poses), 6)), np.zeros((len(poses), 3))
+    if plant.model.nv != 6:
+        for k, q in enumerate(poses):
+            pin.rnea(model, data, q, zero, zero)
+            weight[k], down[k] = -data.f[1].vector, data.liMi[1].rotation[2]
+        return weight, down
+    # one rigid body: its weight is linear in the direction of the vertical, which is the last row of s_R_b
+    x, y, z, w = poses[:, 3:7].T
+    down = np.stack([2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)], axis=1)
+    fall = np.zeros((6, 3))
+    fall[:3] = -plant.machine.platen.gravity * np.eye(3)
+    return down @ (model.inertias[1].matrix() @ fall).T, down
 
 
 def _at_c(turn: Array, plant: Plant, wrench: Array) -> Array:

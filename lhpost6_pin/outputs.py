@@ -63,7 +63,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
             about = {"units": unit, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
             channels[f"reference_{name}"] = (("time", "axis"), values, about)
     channels |= _hidden_states(run)
-    if plant.model.nv > plant.axes.size:
+    if plant.articulated:
         about = {"units": "m or rad", "long_name": "configuration of the specimen's joints, Pinocchio order"}
         platen_q = 7 if plant.axes.size == 6 else 1
         channels["specimen_joint_position"] = (("time", "specimen_joint"), run.q[:, platen_q:], about)

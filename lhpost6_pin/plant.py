@@ -47,6 +47,11 @@ class Plant:
         """Number of valve spools, one an actuator."""
         return len(self.machine.actuators)
 
+    @property
+    def articulated(self) -> bool:
+        """Whether a specimen on the platen moves on joints of its own."""
+        return bool(self.model.nv > self.axes.size)
+
     def zero_state(self) -> State:
         """State in the control zero-position at rest with all hidden states zero (no pressure)."""
         q = pin.neutral(self.model)

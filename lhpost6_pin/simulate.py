@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from .control import Controller
 from .control.loop import ACTUATOR, AXIS, CANCELLER, control_sample_flat, sense_flat
-from .control.plug import Sensors, UserController, Wanted, checked_command
+from .control.plug import Sensors, UserController, start_plugged, step_plugged, wanted_from
 from .engine_fused import inertia_table, run_fused
 from .engine_pinocchio import make_stepper, settle
 from .equilibrium import Equilibrium, hydraulic_rows
@@ -29,7 +29,8 @@ from .plant import Plant, State
 from .schemes import SAMPLE_RATE, SCHEMES, A, V, spool_windows
 from .workspace import Workspace, make_workspace
 
-__all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis", "simulate"]
+__all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis"]
+__all__ += ["check_drive", "fastest_engine", "simulate"]
 
 log = logging.getLogger(__name__)
 
@@ -120,7 +121,7 @@ def simulate(
     Raises SimulationError for a scheme, engine, rate or drive that cannot be. A run that goes wrong on the way does
     not raise: see `Run.trouble`.
     """
-    steps = _check(plant, drive, samples, scheme, steps_per_second, engine)
+    steps = _check(plant, drive, samples, scheme, steps_per_second, engine, record_every)
     dt = 1.0 / steps_per_second
     closed = not isinstance(drive, OpenLoop)
     if isinstance(drive, OpenLoop):
@@ -165,6 +166,11 @@ def simulate(
     )
 
 
+def fastest_engine(plant: Plant) -> str:
+    """Name of the engine that runs the 469D fastest on a plant: the fused one, unless a specimen's joints are free."""
+    return "pinocchio" if plant.articulated else "fused"
+
+
 class _Log:
     """Arrays that a run fills, one row a recorded sample."""
 
@@ -180,7 +186,7 @@ class _Log:
         self.spool[at] = spool
 
 
-def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, engine: str) -> int:
+def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, engine: str, record_every: int) -> int:
     if scheme not in SCHEMES:
         raise SimulationError(f"no scheme named {scheme!r}; valid names: {', '.join(SCHEMES)}")
     if engine not in ENGINES:
@@ -191,6 +197,8 @@ def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, eng
         )
     if samples < 1:
         raise SimulationError("nothing to simulate: the drive has no sample")
+    if record_every < 1:
+        raise SimulationError(f"every {record_every}-th sample cannot be recorded; give a number, one or more")
     steps = rate // SAMPLE_RATE
     if isinstance(drive, OpenLoop):
         if drive.spool.ndim != 2 or drive.spool.shape[1] != plant.spools:
@@ -200,20 +208,36 @@ def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, eng
         if not np.all(np.isfinite(drive.spool)):
             at, which = np.argwhere(~np.isfinite(drive.spool))[0]
             raise SimulationError(f"spool of {plant.machine.actuator_names[which]} is not finite at row {at}")
-    elif isinstance(drive, ClosedLoop):
-        columns = 13 if len(drive.controller.canceller) else 6
-        _check_shape("drive", drive.drive, (samples, columns))
+        _check_state(plant, drive.start)
     else:
-        for name in ("displacement", "velocity", "acceleration"):
-            _check_shape(f"wanted {name}", getattr(drive, name), (samples, 6))
-        if engine == "fused":
+        check_drive(plant, drive, samples)
+        if isinstance(drive, PluggedLoop) and engine == "fused":
             raise SimulationError("the fused engine runs compiled controllers; use engine='pinocchio' for your own")
     return steps
 
 
+def check_drive(plant: Plant, drive: ClosedLoop | PluggedLoop, samples: int) -> None:
+    """Raise SimulationError if a closed loop was made for another plant, or its motion has not these samples."""
+    name = plant.machine.name
+    _check_state(plant, drive.rest.state)
+    if isinstance(drive, PluggedLoop):
+        for quantity in ("displacement", "velocity", "acceleration"):
+            _check_shape(f"wanted {quantity}", getattr(drive, quantity), (samples, 6))
+        return
+    if drive.controller.plant.spools != plant.spools or not np.array_equal(drive.controller.plant.axes, plant.axes):
+        raise SimulationError(f"the controller was made for {drive.controller.plant.machine.name}; make one for {name}")
+    _check_shape("drive", drive.drive, (samples, drive.controller.columns))
+
+
+def _check_state(plant: Plant, state: State) -> None:
+    sizes = plant.model.nq, plant.model.nv, len(plant.states)
+    if any(np.shape(x) != (n,) for x, n in zip(state, sizes, strict=True)):
+        raise SimulationError(f"the run would start from a state of another plant than {plant.machine.name}")
+
+
 def _check_shape(name: str, values: Array, shape: tuple[int, int]) -> None:
-    if values.shape != shape:
-        raise SimulationError(f"{name} has shape {values.shape}; {shape} is needed")
+    if np.shape(values) != shape:
+        raise SimulationError(f"{name} has shape {np.shape(values)}; {shape} is needed")
     if not np.isfinite(values).all():
         at, axis = np.argwhere(~np.isfinite(values))[0]
         raise SimulationError(f"{name} is not finite at sample {at}, column {axis}")
@@ -280,21 +304,22 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
         loop = drive.controller
         state = ws.port, ws.force, fed, ws.frame, ws.motion
         call: Any = control_sample_flat
-        rest = (drive.drive, *state, *loop.flat_tables(), loop.init(), command, plant.delays, rate)
+        values = np.ascontiguousarray(drive.drive, float)  # any other kind would be compiled for anew
+        rest = (values, *state, *loop.flat_tables(), loop.init(), command, plant.delays, rate)
 
         def compiled_loop(sample: int, window: Array) -> int:
             return int(call(sample, *rest, window))
 
         return compiled_loop
     users = drive.controller
-    own = users.init(plant, drive.rest)
+    wanted = wanted_from(drive.displacement, drive.velocity, drive.acceleration)
+    own = start_plugged(users, plant, drive.rest)
     sensors = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
     body = plant.body.view(float)
 
     def plugged(sample: int, window: Array) -> int:
         sense_flat(ws.port, ws.force, fed, body, plant.axes, ws.frame, ws.motion, *sensors)
-        wanted = Wanted(drive.displacement[sample], drive.velocity[sample], drive.acceleration[sample])
-        asked = checked_command(users, users.step(own, wanted, sensors), sample, plant.spools)
+        asked = step_plugged(users, own, sample, wanted(sample), sensors)
         command[sample], clipped = _clip(asked)
         spool_windows(command, 0, sample, plant.delays, rate, window)
         return clipped
@@ -310,7 +335,8 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     fed = hydraulic_rows(plant)
     if isinstance(drive, ClosedLoop):
         loop = drive.controller
-        tables = (True, loop.axis, loop.actuator, loop.balance, loop.canceller, loop.init(), drive.drive)
+        values = np.ascontiguousarray(drive.drive, float)
+        tables = (True, loop.axis, loop.actuator, loop.balance, loop.canceller, loop.init(), values)
     else:
         none = np.zeros((1, 1))
         tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER), none, none)

@@ -28,12 +28,12 @@ from .machine import Machine
 from .margins import expected_response, make_loop_model
 from .motions import Target, find_motion, make_target, motion_options, smooth_step
 from .names import AXES
-from .plant import make_plant
+from .plant import Plant, make_plant
 from .pose import platen_motion
 from .schemes import SAMPLE_RATE
-from .simulate import ClosedLoop, Run, simulate
+from .simulate import ClosedLoop, Run, fastest_engine, simulate
 
-__all__ = ["SineResult", "SineTest", "sine_target", "sine_test", "with_cancellers"]
+__all__ = ["SineResult", "SineTest", "axis_row", "sine_target", "sine_test", "with_cancellers"]
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -67,6 +67,14 @@ class SineTest:
     after: SineResult
 
 
+def axis_row(plant: Plant, axis: str) -> int:
+    """Number of an axis among those free; raises SimulationError that names these if it is none of them."""
+    free = [AXES[k] for k in plant.axes]
+    if axis not in free:
+        raise SimulationError(f"{plant.machine.name} cannot move in {axis}; choose --axis from {', '.join(free)}")
+    return free.index(axis)
+
+
 def with_cancellers(
     controller: Controller, axis: str, frequency: float, count: int, time_constant: float
 ) -> Controller:
@@ -75,13 +83,13 @@ def with_cancellers(
     Raises SimulationError for an axis that the machine has not, and in another mode than acceleration: there the
     generator differentiates what cancellers add, and above their harmonics the loop through them becomes unstable.
     """
-    axes, mode = controller.plant.axes, controller.settings.mode
+    mode = controller.settings.mode
     if mode != "acceleration":
-        raise SimulationError(f"cancellers need a reference generator in acceleration mode; this one is in {mode} mode")
-    k = AXES.index(axis)
-    if k not in axes:
-        raise SimulationError(f"{controller.plant.machine.name} cannot move in {axis}")
-    a = int(np.flatnonzero(axes == k)[0])
+        raise SimulationError(
+            f"cancellers need a reference generator in acceleration mode; that of {controller.settings.name} is in "
+            f"{mode} mode: choose other settings"
+        )
+    a = axis_row(controller.plant, axis)
     multiples = np.asarray(frequency * np.arange(1, count + 1), np.float64)
     row = controller.axis[a]
     generator = row["generator_a"], row["generator_b"], row["generator_c"], row["generator_d"]
@@ -97,8 +105,16 @@ def with_cancellers(
 
 
 def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, Array, slice]:
-    """Target of a sine long enough for cancellers to learn, its level 0 to 1 (n,), and the samples to judge it by."""
+    """Target of a sine long enough for cancellers to learn, its level 0 to 1 (n,), and the samples to judge it by.
+
+    Raises SimulationError for a frequency outside the band in which the table is tuned, MotionError for no amplitude.
+    """
     numbers = tuning_numbers()
+    low, high = numbers.number("noise.slow_low"), numbers.number("feedforward_targets.high")
+    if not low <= frequency <= high:
+        raise SimulationError(
+            f"a sine of {frequency:g} Hz lies outside the table's band; choose a frequency from {low:g} to {high:g} Hz"
+        )
     cycles = int(numbers.number("sine.measured_cycles"))
     settle = numbers.number("sine.settling") * numbers.number("sine.time_constant")
     ramp = next(int(o.default) for o in motion_options("sine") if o.name == "ramp_cycles")
@@ -130,14 +146,12 @@ def sine_test(
     plant = make_plant(machine)
     rest = find_equilibrium(plant)
     alone = make_controller(plant, rest, settings)
+    target, level, measured = sine_target(axis, amplitude, frequency)
     counted = int(numbers.number("feedforward_targets.high") / frequency)
     count = min(int(numbers.number("sine.harmonics")), counted)
-    if count < 1:
-        raise SimulationError(f"a sine of {frequency:g} Hz lies above the table's band")
     learning = with_cancellers(alone, axis, frequency, count, numbers.number("sine.time_constant"))
-    target, level, measured = sine_target(axis, amplitude, frequency)
     wanted = alone.drive_for(target.displacement, target.velocity, target.acceleration)
-    options = {"engine": "fused" if plant.model.nv == plant.axes.size else "pinocchio", **options}
+    options = {"engine": fastest_engine(plant), **options}
     found = []
     learnt_from = np.column_stack([wanted, target.acceleration, level])
     for n, (controller, drive) in enumerate(((alone, wanted), (learning, learnt_from))):

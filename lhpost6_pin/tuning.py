@@ -31,7 +31,7 @@ from .names import AXES
 from .parameters import Parameters
 from .plant import Plant, make_plant
 from .schemes import SAMPLE_RATE
-from .simulate import ClosedLoop, simulate
+from .simulate import ClosedLoop, fastest_engine, simulate
 from .transfer import Transfer, band_within, delay_of, estimate_transfer
 
 __all__ = ["AxisTuning", "Tuning", "TuningStep", "stays_stable", "tune"]
@@ -185,8 +185,7 @@ def stays_stable(machine: Machine, settings: ControllerSettings, seconds: float 
     burst = np.vstack([burst, np.zeros((round(seconds * SAMPLE_RATE), burst.shape[1]))])
     controller = make_controller(plant, rest, settings)
     drive = ClosedLoop(controller, controller.drive_for(burst[:, :6], burst[:, 6:12], burst[:, 12:]), rest)
-    engine = "fused" if plant.model.nv == plant.axes.size else "pinocchio"
-    run = simulate(plant, drive, samples=len(burst), engine=engine)
+    run = simulate(plant, drive, samples=len(burst), engine=fastest_engine(plant))
     if run.trouble:
         return False
     speed = run.v[:, : plant.axes.size]
@@ -227,7 +226,9 @@ def _tune_feedback(
     for k in axes:
         tuned = _with(_with_displacement_gain(job, tuned, int(k), first), "force_damping", int(k), 0.0)
     if not stays_stable(job.plant.machine, tuned):
-        raise SimulationError("the loop is unstable even with the lowest gains tried: check delays, valves and notches")
+        raise SimulationError(
+            "unstable even with the lowest gains tried: check master gains, delays, valves and notches"
+        )
     reached = None
     while tuned != reached:  # damping the columns lets the displacement gains grow, and so on
         reached = tuned

@@ -22,7 +22,7 @@ from lhpost6_pin.schemes import SAMPLE_RATE
 
 
 def main(
-    seconds: Annotated[float, typer.Option(help="Length of the test [s].")] = 2.0,
+    seconds: Annotated[float, typer.Option(help=r"Length of the test \[s].")] = 2.0,
     out: Annotated[Path, typer.Option(help="Folder for the FMU.")] = Path("out/fmu"),
 ) -> None:
     """Export the nominal table, drive it through FMPy, and print the largest difference of each kind of output."""

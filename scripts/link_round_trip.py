@@ -60,7 +60,7 @@ def shares(times: Histogram) -> dict[str, float]:
 
 
 def main(
-    seconds: Annotated[float, typer.Option(min=0.1, help="Length of the run [s].")] = 60.0,
+    seconds: Annotated[float, typer.Option(min=0.1, help=r"Length of the run \[s].")] = 60.0,
     mode: Annotated[str, typer.Option(help="real-time, lock-step or free.")] = "real-time",
     out: Annotated[Path, typer.Option(help="Folder for the figures.")] = Path("out/link"),
 ) -> None:

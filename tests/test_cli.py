@@ -21,8 +21,10 @@ import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli, rehearse
 from lhpost6_pin.check import check_record
 from lhpost6_pin.compiled import cache_folder
+from lhpost6_pin.drives import circumstances, save_drive
+from lhpost6_pin.inverse import InverseFilter, save_inverse
 from lhpost6_pin.machine import load_machine
-from lhpost6_pin.motions import find_motion, list_motions
+from lhpost6_pin.motions import find_motion, list_motions, make_target
 from lhpost6_pin.records import load_record, save_record
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
@@ -342,6 +344,53 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
 def test_what_cannot_be_run_is_refused_with_a_clear_message_and_leaves_nothing(lhpost6, tmp_path, arguments, phrases):
     assert refused(lhpost6("run", *arguments), *phrases)
     assert everything(tmp_path) == []
+
+
+@pytest.mark.parametrize("command", [("tune",), ("iterate", "sine"), ("sine",), ("replay", "drive.nc")])
+def test_commands_of_the_469d_say_why_they_take_no_other_controller(lhpost6, tmp_path, command):
+    assert refused(lhpost6(*command, "--controller", "mine.py:Mine"), "469D's own settings", "`lhpost6 run`")
+    assert everything(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "arguments, phrases",
+    [
+        (("--axis", "foo"), ("LHPOST6 cannot move in foo", "--axis from x, y, z, roll, pitch, yaw")),
+        (("--axis", "y", "--machine", "uniaxial"), ("uniaxial cannot move in y", "--axis from x")),
+        (("--frequency", "0"), ("0 Hz lies outside the table's band", "0.07 to 33 Hz")),
+        (("--frequency", "0.0001"), ("0.0001 Hz lies outside the table's band",)),
+        (("--frequency", "nan"), ("--frequency",)),
+        (("--amplitude", "0"), ("amplitude is 0.0", "above zero")),
+        (("--amplitude", "-1"), ("--amplitude",)),
+    ],
+)
+@pytest.mark.parametrize("beyond", [(), ("--beyond-limits",)])
+def test_a_sine_that_cannot_be_is_refused(lhpost6, tmp_path, arguments, phrases, beyond):
+    assert refused(lhpost6("sine", *arguments, *beyond), *phrases)
+    assert everything(tmp_path) == []
+
+
+def test_a_sine_that_the_table_cannot_reach_is_refused_with_the_scale_that_fits(lhpost6, tmp_path):
+    assert refused(lhpost6("sine", "--amplitude", "10", "--frequency", "5"), "largest scale that fits")
+    assert everything(tmp_path) == []
+
+
+def test_a_drive_and_an_inverse_of_another_machine_are_refused(lhpost6, tmp_path):
+    facts = circumstances(load_machine(), "any")
+    target = make_target(find_motion("sine", cycles=1, ramp_cycles=1))
+    save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", facts)
+    save_inverse(InverseFilter(np.ones((1, 1, 1)), 2048.0, (0.5, 33.0), ("x",), facts), tmp_path / "inverse.nc")
+    said = "was made on LHPOST6, not on uniaxial"
+    assert refused(lhpost6("replay", "drive.nc", "--machine", "uniaxial"), "drive.nc", said)
+    uniaxial = ("run", "sine", "--machine", "uniaxial")
+    assert refused(lhpost6(*uniaxial, "--aic", "inverse.nc"), "inverse.nc", said)
+    assert refused(lhpost6(*uniaxial, "--aic", "drive.nc"), "drive.nc: is not a saved inverse")
+    (tmp_path / "mine.py").write_text(
+        "class Mine:\n    def init(self, p, r): pass\n    def step(self, m, w, s): pass\n"
+    )
+    assert refused(
+        lhpost6("run", "sine", "--aic", "inverse.nc", "--controller", "mine.py:Mine"), "--aic", "does without"
+    )
 
 
 @pytest.mark.parametrize("option", ["columns=x", "units=5", "time_step=slow", "colour=red"])

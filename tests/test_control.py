@@ -8,6 +8,7 @@ from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
 from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, cancel, control_step
+from lhpost6_pin.control.plug import Sensors
 from lhpost6_pin.equilibrium import hydraulic_rows, unloaded_speeds
 from lhpost6_pin.errors import ControllerError, SimulationError
 from lhpost6_pin.laws.orifice import opening, spool_for_opening
@@ -329,6 +330,24 @@ def test_force_feedback_yields_to_a_push_and_master_gain_scales_all(plant, rest)
 def test_settings_of_another_rate_are_refused(plant, rest):
     with pytest.raises(ControllerError, match="rate 1024 Hz is not the samples' 2048 Hz"):
         make_controller(plant, rest, replace(load_controller("lhpost6"), rate=1024.0))
+
+
+def test_arrays_that_do_not_fit_a_controller_are_refused_before_compiled_code_sees_them(loop, rest):
+    sensors, drive, memory = Sensors(np.zeros(10), np.zeros(6), rest.force), np.zeros((5, 6)), loop.init()
+    loop.step(loop.init(), 4, drive, sensors)
+    for change, message in (
+        ({"drive": np.zeros((5, 3))}, r"drive is ndarray of shape \(5, 3\); an array of shape \(5, 6\) is needed"),
+        ({"drive": np.zeros(6)}, r"drive is ndarray of shape \(6,\)"),
+        ({"drive": drive.tolist()}, r"drive is list of shape \(5, 6\); an array"),
+        ({"sample": 5}, "sample 5 is none of the drive's 5"),
+        ({"sample": -1}, "sample -1 is none of the drive's 5"),
+        ({"memory": np.zeros((3, 3))}, "memory is ndarray"),
+        ({"sensors": sensors._replace(force=np.zeros(9))}, r"sensors' force is .* shape \(10,\) is needed"),
+    ):
+        with pytest.raises(ControllerError, match=message):
+            loop.step(**{"memory": memory, "sample": 0, "drive": drive, "sensors": sensors, **change})
+    with pytest.raises(ControllerError, match=r"wanted velocity is ndarray of shape \(4, 6\)"):
+        loop.drive_for(drive, drive[1:], drive)
 
 
 # Sine cancellers -----------------------------------------------------------------------------------------------------

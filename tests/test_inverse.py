@@ -188,6 +188,9 @@ def test_a_saved_inverse_comes_back_the_same(tmp_path: Path) -> None:
     back = load_inverse(tmp_path / "table.nc")
     np.testing.assert_array_equal(back.taps, inverse.taps)
     assert (back.rate, back.band, back.axes) == (inverse.rate, inverse.band, inverse.axes)
+    assert back.made_with == {}
+    save_inverse(replace(inverse, made_with={"machine": "mine"}), tmp_path / "table.nc")
+    assert load_inverse(tmp_path / "table.nc").made_with == {"machine": "mine"}
 
 
 def test_a_file_that_is_no_inverse_is_refused_by_name(tmp_path: Path) -> None:

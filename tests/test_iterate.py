@@ -86,6 +86,12 @@ def test_a_run_that_leaves_its_stroke_names_the_iteration(table):
         iterate(load_machine(), far, load_controller("lhpost6"), table=table, most=1)
 
 
+@pytest.mark.parametrize("gain", [0.0, -0.5, 1.5, np.nan])
+def test_a_gain_that_is_none_is_refused(table, strong, gain):
+    with pytest.raises(SimulationError, match="is no gain of a drive's update"):
+        iterate(load_machine(), strong, load_controller("lhpost6"), table=table, gain=gain)
+
+
 def test_progress_is_told_in_order(table, strong):
     told = []
     iterate(load_machine(), strong, load_controller("lhpost6"), table=table, most=1, progress=told.append)

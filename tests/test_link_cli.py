@@ -108,3 +108,10 @@ def test_the_round_trip_script_measures_and_keeps_its_figures(tmp_path):
     ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=GUARD)
     assert ended.returncode == 0, ended.stderr
     assert "deadlines missed" in ended.stdout and (tmp_path / "link_round_trip.json").is_file()
+
+
+def test_a_controller_that_fails_during_a_link_is_named(tmp_path, lhpost6, port):
+    text = "class Mine:\n    def init(self, plant, rest): pass\n    def step(self, *seen): return 1 / 0\n"
+    (tmp_path / "mine.py").write_text(text)
+    code, told = lhpost6("link", *SHORT, "--port", port, "--controller", "mine.py:Mine")
+    assert code == 2 and "Mine.step failed at sample 0: ZeroDivisionError" in told

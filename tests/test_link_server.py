@@ -3,6 +3,7 @@
 Nothing here depends on how fast things go: waits are guards against a hanging test.
 """
 
+import math
 import socket
 import threading
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ import pytest
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import LinkError
+from lhpost6_pin.errors import LinkError, SimulationError
 from lhpost6_pin.link import (
     HOST,
     Kind,
@@ -271,6 +272,19 @@ def test_a_server_ends_when_its_time_is_over(plant, rest, mode):
     with open_socket(port=0) as sock:
         timing = serve(sock, ServedPlant(plant, rest, mode), seconds=0.05)
     assert timing.lateness.count == 0  # nobody came: no sample, no deadline
+
+
+@pytest.mark.parametrize("seconds", [-1.0, math.nan, math.inf])
+def test_a_time_that_is_none_is_refused(plant, rest, seconds):
+    with open_socket(port=0) as sock, pytest.raises(LinkError, match="cannot be served for"):
+        serve(sock, ServedPlant(plant, rest, Mode.FREE), seconds=seconds)
+
+
+def test_a_run_over_the_link_refuses_a_drive_of_another_width(plant, rest):
+    loop = make_controller(plant, rest, load_controller("lhpost6"))
+    with served(plant, rest) as (_, where), LinkClient(*where) as client:
+        with pytest.raises(SimulationError, match=r"drive has shape \(8, 3\); \(8, 6\) is needed"):
+            run_over_link(client, plant, ClosedLoop(loop, np.zeros((8, 3)), rest))
 
 
 def test_a_server_interrupted_by_the_keyboard_ends_and_keeps_its_counts(plant, rest, monkeypatch):

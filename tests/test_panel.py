@@ -76,6 +76,11 @@ def test_any_settings_come_back_to_the_last_bit(tmp_path_factory, gain, notches,
     assert load_controller(save_controller(changed, path, changed="a test")) == changed
 
 
+def test_a_panel_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ParameterError, match=r"absent.toml: no such file of controller settings"):
+        load_controller(tmp_path / "absent.toml")
+
+
 def test_an_unknown_panel_is_answered_with_the_names_that_exist():
     names = "lhpost6, uniaxial, untuned"
     with pytest.raises(ParameterError, match=f"no controller settings named 'nobody'; valid names: {names}"):
@@ -112,6 +117,19 @@ def test_a_missing_number_is_named_with_its_file(file, name):
         ("[notch_5]", "[notch_6]", r"no place for \[notch_6\]; .* there are notches, numbered from notch_1"),
         ("[notch_1]", "[noch_1]", r"no place for \[noch_1\]"),
         ("[loop]", "[loop", "not a TOML file"),
+        ("balance_gain = {", "balance_gian = {", "force.balance_gain is missing"),
+        (
+            "[force]",
+            '[force]\nlag = { value = 1.0, unit = "s", evidence = "assumed", source = "x" }',
+            "force.lag is no set",
+        ),
+        ("[controller]", '[controller]\ncomment = "mine"', "controller.comment is no setting of a controller"),
+        (
+            "_high_pass = { value = [0.05",
+            "_high_pass = { value = [300.0",
+            "high_pass must lie below reference_low_pass",
+        ),
+        ("depth = { value = [0.0", "depth = { value = [-1.5", "notch_1.depth is below -1"),
     ],
 )
 def test_a_panel_that_cannot_be_is_refused_by_file_and_key(file, old, new, message):

@@ -182,11 +182,35 @@ def test_a_file_that_is_no_use_is_refused(file, text, message):
         ("full speed", "Hold returned no numbers at sample 7"),
         (None, r"Hold returned shape \(\) at sample 7"),
         ([[0.0], [0.0, 1.0]], "Hold returned no numbers at sample 7"),
+        (np.zeros(10) * 1j, "Hold returned no numbers at sample 7: they are complex"),
     ],
 )
 def test_what_is_no_command_is_refused_with_controller_and_sample(command, message):
     with pytest.raises(ControllerError, match=message):
         checked_command(Hold(), command, 7, 10)
+
+
+@pytest.mark.parametrize(
+    "init, step, message",
+    [
+        ("return 1 / 0", "return [0.0] * 10", r"Mine.init failed: ZeroDivisionError: .*mine.py, line 2\)"),
+        ("return 1", "raise KeyError('gain')", r"Mine.step failed at sample 0: KeyError: 'gain' .*mine.py, line 3\)"),
+        ("return 1", "raise SystemExit('left')", "Mine.step failed at sample 0: SystemExit: left"),
+        ("return 1", "w.displacement[:] = 1.0", "Mine.step failed at sample 0: ValueError: .*read-only"),
+    ],
+)
+def test_what_a_users_own_code_raises_is_told_with_its_line(file, plant, rest, init, step, message):
+    file.write_text(f"class Mine:\n    def init(self, p, r): {init}\n    def step(self, m, w, s): {step}\n")
+    motion = standing(4)
+    with pytest.raises(ControllerError, match=message):
+        simulate(plant, PluggedLoop(load_plugged(f"{file}:Mine"), *motion, rest), samples=4)
+    assert not np.any(motion)  # what is wanted stays as it was
+
+
+def test_a_controller_with_other_arguments_than_the_plug_points_is_told_so(file, plant, rest):
+    file.write_text("class Mine:\n    def init(self): pass\n    def step(self): pass\n")
+    with pytest.raises(ControllerError, match=r"Mine.init failed: TypeError: .*takes 1 positional argument"):
+        simulate(plant, PluggedLoop(load_plugged(f"{file}:Mine"), *standing(4), rest), samples=4)
 
 
 def test_a_faulty_command_stops_a_run_at_its_sample(plant, rest):

@@ -19,9 +19,10 @@ from scipy.special import ellipk
 
 from lhpost6_pin import kinematics as kin
 from lhpost6_pin.effects import LAWS, Effect
-from lhpost6_pin.engine_fused import inertia_table, integrate_platen, platen_acceleration
+from lhpost6_pin.engine_fused import inertia_table, platen_acceleration
 from lhpost6_pin.errors import ParameterError, SimulationError
 from lhpost6_pin.plant import make_plant
+from lhpost6_pin.platen_steps import integrate_platen, platen_difference
 from lhpost6_pin.ports import PLATEN_PORTS
 from lhpost6_pin.rigid_body import lumped_inertia, make_model, platen_inertia
 from lhpost6_pin.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
@@ -166,6 +167,23 @@ def test_fused_pose_step_is_pinocchios(turn):
         assert np.linalg.norm(out[3:]) == pytest.approx(1.0, abs=1e-15)
 
 
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 1e-4, 1.9e-2, 2.1e-2, 0.3, 2.0])  # series below a sine of 0.01
+def test_difference_of_poses_undoes_a_pose_step_and_is_pinocchios(turn):
+    plant = plant_named("lhpost6")
+    rng = np.random.default_rng(8)
+    for _, q, _, _ in random_states(plant, 8):
+        axis = rng.standard_normal(3)
+        dq = np.concatenate([rng.uniform(-0.1, 0.1, 3), turn * axis / np.linalg.norm(axis)])
+        after, out = np.zeros(7), np.zeros(6)
+        integrate_platen(q, dq, plant.axes, after)
+        platen_difference(q, after, plant.axes, out)
+        assert np.allclose(out, dq, rtol=0.0, atol=4e-15)  # rounding of positions and quaternions of order one
+        assert np.allclose(out, pin.difference(plant.model, q, after), rtol=0.0, atol=1e-8)  # Jlog of 4.1.0 is off by 3e-9
+        after[3:] *= -1.0  # the other quaternion of the same pose
+        platen_difference(q, after, plant.axes, out)
+        assert np.allclose(out, dq, rtol=0.0, atol=4e-15)
+
+
 def test_fused_pose_step_may_write_over_its_input():
     plant = plant_named("lhpost6")
     _, q, v, _ = list(random_states(plant, 4))[-1]
@@ -190,6 +208,8 @@ def test_guided_platen_moves_along_its_guide_only():
     out = np.zeros(1)
     integrate_platen(np.array([0.2]), np.array([0.05]), plant.axes, out)
     assert out[0] == 0.25
+    platen_difference(np.array([0.2]), np.array([0.25]), plant.axes, out)
+    assert out[0] == pytest.approx(0.05, abs=1e-16)
     assert plant.model.nq == plant.model.nv == 1
     # its mass is the one along the guide
     assert pin.crba(plant.model, plant.model.createData(), np.zeros(1))[0, 0] == plant.machine.platen.mass[0]

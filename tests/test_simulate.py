@@ -21,7 +21,7 @@ from lhpost6_pin.records import load_record
 from lhpost6_pin.rehearse import replay
 from lhpost6_pin.schemes import SCHEMES, spool_windows
 from lhpost6_pin.signals import rrmse
-from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, simulate
+from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, fastest_engine, simulate
 from lhpost6_pin.workspace import make_workspace
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
@@ -297,6 +297,7 @@ def test_run_that_diverges_stops_and_names_a_remedy(plant, rest, engine):
         ({"steps_per_second": 3000}, "3000 model steps"),
         ({"samples": 0}, "nothing to simulate"),
         ({"samples": 3}, "spool has 4 rows"),
+        ({"record_every": 0}, "every 0-th sample cannot be recorded"),
     ],
 )
 def test_what_cannot_be_run_is_refused(plant, rest, change, message):
@@ -312,6 +313,41 @@ def test_spools_that_are_not_finite_or_of_the_wrong_width_are_refused(plant, res
         simulate(plant, OpenLoop(spool, rest.state), samples=4)
     with pytest.raises(SimulationError, match="takes \\(n, 10\\)"):
         simulate(plant, OpenLoop(np.zeros((4, 9)), rest.state), samples=4)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_drive_of_another_size_or_machine_is_refused(plant, rest, engine):
+    motion = np.zeros((8, 6))
+    loop = closed_loop(plant, rest, (motion,) * 3)
+    small = make_plant(load_machine("uniaxial"))
+    other = closed_loop(small, find_equilibrium(small), (motion,) * 3)
+    for drive, message in (
+        (loop._replace(drive=np.zeros((8, 5))), r"drive has shape \(8, 5\); \(8, 6\) is needed"),
+        (loop._replace(drive=np.zeros((8, 13))), r"drive has shape \(8, 13\)"),
+        (loop._replace(drive=np.zeros((7, 6))), r"drive has shape \(7, 6\)"),
+        (loop._replace(controller=other.controller), "the controller was made for uniaxial; make one for LHPOST6"),
+        (loop._replace(rest=other.rest), "start from a state of another plant than LHPOST6"),
+        (OpenLoop(np.zeros((8, 10)), other.rest.state), "start from a state of another plant than LHPOST6"),
+    ):
+        with pytest.raises(SimulationError, match=message):
+            simulate(plant, drive, samples=8, engine=engine)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_drive_of_whole_numbers_in_another_order_runs_alike(plant, rest, engine):
+    loop = closed_loop(plant, rest, (np.zeros((8, 6)),) * 3)
+    runs = [
+        simulate(plant, loop._replace(drive=drive), samples=8, engine=engine)
+        for drive in (np.ones((8, 6)), np.ones((8, 6), int, order="F"))
+    ]
+    assert np.array_equal(runs[0].command, runs[1].command)
+
+
+def test_only_free_joints_of_a_specimen_need_the_per_step_engine(plant):
+    assert not plant.articulated and fastest_engine(plant) == "fused"
+    for locked, engine in ((True, "fused"), (False, "pinocchio")):
+        loaded = make_plant(load_machine().with_specimen(str(PENDULUM), locked=locked))
+        assert loaded.articulated == (not locked) and fastest_engine(loaded) == engine
 
 
 # Effects and specimens -----------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ LAYERS = [
     {"components", "inverse"},
     {"effects", "ports"},
     {"machine"},
-    {"rigid_body", "kinematics", "stage", "urdf"},
+    {"rigid_body", "platen_steps", "kinematics", "stage", "urdf"},
     {"plant", "schemes"},
     {"pose", "workspace"},
     {"equilibrium", "engine_pinocchio", "bodies"},

@@ -36,7 +36,8 @@ def main() -> None:
     except LhpostError as error:
         _fail(str(error))
     except OSError as error:  # disk full, no permission, a file where a folder should be
-        where = f"cannot read or write {error.filename}" if error.filename else "cannot read or write a file"
+        path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
+        where = f"cannot read or write {path}" if path else "cannot read or write a file"
         _fail(f"{where}: {os.strerror(error.errno) if error.errno else error}")
     except SystemExit as end:
         if end.code == _INTERRUPTED:

@@ -52,7 +52,7 @@ def serve(
         "127.0.0.1"
     ),
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
-    seconds: Annotated[float | None, typer.Option(help="End after so long; without it Ctrl-C ends.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; without it Ctrl-C ends.")] = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
     valves: Valves = 0,

@@ -85,8 +85,10 @@ def iterate(
     beyond: Beyond = False,
 ) -> None:
     """Iterate on a motion until the table does what is wanted; leaves drive.nc, inverse.nc and report.html."""
+    from dataclasses import replace
+
     from ..control_tables import print_iterations
-    from ..drives import save_drive
+    from ..drives import circumstances, save_drive
     from ..inverse import save_inverse
     from ..iterate import iterate as iterate_drive
     from ..plant import make_plant
@@ -102,16 +104,16 @@ def iterate(
         target_within_limits(make_plant(table), target)
     with progress_bar(f"iterating {name} on {table.name}") as progress:
         result = iterate_drive(table, target, settings, most=most, gain=gain, progress=progress)
-    facts = {"machine": table.name, "controller": settings.name, "iteration": result.best}
-    save_drive(result.drive, settings.mode, target, folder / "drive.nc", facts)
-    save_inverse(result.table.inverse, folder / "inverse.nc")
+    facts = circumstances(table, settings.name)
+    save_drive(result.drive, settings.mode, target, folder / "drive.nc", {**facts, "iteration": result.best})
+    save_inverse(replace(result.table.inverse, made_with=facts), folder / "inverse.nc")
     write_iterate_report(result, folder / "report.html", command=repeating_command())
     print_iterations(result, folder)
 
 
 @app.command()
 def sine(
-    amplitude: Annotated[float, typer.Option(min=0.0, help="Amplitude [m, or rad].")] = 0.75,
+    amplitude: Annotated[float, typer.Option(min=0.0, help=r"Amplitude \[m, or rad].")] = 0.75,
     frequency: Annotated[float, typer.Option(min=0.0, help="Frequency [Hz].")] = 0.5,
     axis: Annotated[str, typer.Option(help="Axis: x y z roll pitch or yaw.")] = "x",
     out: Out = None,
@@ -129,13 +131,15 @@ def sine(
     from ..plant import make_plant
     from ..rehearse import target_within_limits
     from ..report import write_sine_report
-    from ..sine import sine_target, sine_test
+    from ..sine import axis_row, sine_target, sine_test
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
+    plant = make_plant(table)
+    axis_row(plant, axis)
     settings = find_settings(controller, table)
     folder = folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz")
     if not beyond:
-        target_within_limits(make_plant(table), sine_target(axis, amplitude, frequency)[0])
+        target_within_limits(plant, sine_target(axis, amplitude, frequency)[0])
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
     write_sine_report(found, folder / "report.html", command=repeating_command())

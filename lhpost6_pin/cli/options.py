@@ -27,7 +27,7 @@ SpecimenName = Annotated[
 ]
 SpecimenAt = Annotated[
     str | None,
-    typer.Option("--specimen-at", help="Its root on the platen's top: x,y,z [m], or with r,p,y [rad]."),
+    typer.Option("--specimen-at", help=r"Its root on the platen's top: x,y,z \[m], or with r,p,y \[rad]."),
 ]
 Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
@@ -80,7 +80,13 @@ def find_table(
 def find_settings(name: str | None, table: "Machine") -> "ControllerSettings":
     """Settings by name or file, or those that the machine names."""
     from ..control import load_controller
+    from ..control.plug import is_plugged
 
+    if name and is_plugged(name):
+        raise ParameterError(
+            f"--controller {name}: this command works with the 469D's own settings, a name or a TOML file; "
+            "your own controller goes with `lhpost6 run` and `lhpost6 link`"
+        )
     chosen = name or table.controller
     if not chosen:
         raise ParameterError(f"{table.name} names no controller; give one with --controller")

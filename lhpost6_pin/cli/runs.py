@@ -71,6 +71,8 @@ def run(
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
 ) -> None:
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
+    from ..control import ControllerSettings
+    from ..drives import check_circumstances
     from ..inverse import load_inverse
     from ..plant import make_plant
     from ..rehearse import rehearse, target_within_limits
@@ -82,6 +84,10 @@ def run(
     target = find_target(motion, set_, table, scale=scale, axes=axes, high_pass=high_pass, low_pass=low_pass)
     chosen = find_controller(controller, table)
     inverse = load_inverse(aic) if aic else None
+    if inverse is not None:
+        if not isinstance(chosen, ControllerSettings):
+            raise SimulationError(f"--aic is for the 469D's drive, which --controller {controller} does without")
+        check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     name = target.reference.motion.replace("/", "_")
     folder = folder_for(out, name)
     if not beyond:
@@ -119,12 +125,13 @@ def replay(
     locked: Locked = False,
 ) -> None:
     """Replay a drive file in closed loop; leaves record.nc and report.html against the motion it is for."""
-    from ..drives import load_drive
+    from ..drives import check_circumstances, load_drive
     from ..rehearse import rehearse
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     settings = find_settings(controller, table)
     found = load_drive(drive)
+    check_circumstances(str(drive), found.attrs, table, settings.name)
     if found.mode != settings.mode:
         raise SimulationError(
             f"{drive} is for reference generators in {found.mode} mode; {settings.name} has {settings.mode} mode"

@@ -15,7 +15,7 @@ from ..rigid_body import platen_inertia
 from ..schemes import SAMPLE_RATE
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
 from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, control_step_flat
-from .plug import Sensors
+from .plug import Sensors, Wanted
 from .settings import ControllerSettings
 
 __all__ = ["Controller", "make_controller"]
@@ -35,20 +35,38 @@ class Controller(NamedTuple):
     jacobian: Array  # (n_actuators, 6) leg rates per motion of C and Euler angles, zero-position
     lever: Array  # (6, 6) motion of C and Euler angles per twist at B, zero-position
 
+    @property
+    def columns(self) -> int:
+        """Columns of its drive: six, and with sine cancellers what they learn from and their level."""
+        return 13 if len(self.canceller) else 6
+
     def init(self) -> Array:
         """The controller's memory at rest, for one run."""
         width = max(6, self.plant.spools)
         return np.zeros((MEMORY_ROWS + len(self.canceller), width))
 
     def step(self, memory: Array, sample: int, drive: Array, sensors: Sensors) -> Array:
-        """Command (n_actuators,) of a sample from drive (n, 6) and the sensors.
+        """Command (n_actuators,) of a sample from drive (n, columns) and the sensors.
 
-        memory is changed in place. For one sample at a time: runs call the compiled step themselves.
+        memory is changed in place. For one sample at a time: runs call the compiled step themselves. Raises
+        ControllerError for arrays of another shape and a sample that the drive has not: compiled code does not look.
         """
+        n = self.plant.spools
+        self._check("drive", drive, (len(drive), self.columns))
+        self._check("memory", memory, (MEMORY_ROWS + len(self.canceller), max(6, n)))
+        for name, values, size in zip(Sensors._fields, sensors, (n, 6, n), strict=True):
+            self._check(f"sensors' {name}", values, (size,))
+        if not 0 <= sample < len(drive):
+            raise ControllerError(f"{self.settings.name}: sample {sample} is none of the drive's {len(drive)}")
         command = np.empty(self.plant.spools)
         arguments: Any = (sample, drive, *sensors, *self.flat_tables(), memory, command)
         control_step_flat(*arguments)
         return command
+
+    def _check(self, name: str, values: Array, shape: tuple[int, ...]) -> None:
+        if not isinstance(values, np.ndarray) or values.shape != shape:
+            what = f"{type(values).__name__} of shape {np.shape(values)}"
+            raise ControllerError(f"{self.settings.name}: {name} is {what}; an array of shape {shape} is needed")
 
     def flat_tables(self) -> tuple[NDArray[Any], ...]:
         """Legs, body, axes, axis, actuator, balance and canceller as plain numbers."""
@@ -59,8 +77,13 @@ class Controller(NamedTuple):
         return legs, body, plant.axes, axis, actuator, self.balance, canceller
 
     def drive_for(self, displacement: Array, velocity: Array, acceleration: Array) -> Array:
-        """Drive (n, 6) whose reference is the given motion, (n, 6) each (see `filters.drive_for`)."""
+        """Drive (n, 6) whose reference is the given motion, (n, 6) each (see `filters.drive_for`).
+
+        Raises ControllerError for another shape.
+        """
         s = self.settings
+        for name, values in zip(Wanted._fields, (displacement, velocity, acceleration), strict=True):
+            self._check(f"wanted {name}", values, (len(displacement), 6))
         corners = np.array(s.reference_high_pass), np.array(s.reference_damping)
         return np.ascontiguousarray(drive_for(s.mode, displacement, velocity, acceleration, *corners))
 
@@ -73,7 +96,8 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
     ControllerError for settings of another rate than the samples'.
     """
     if settings.rate != SAMPLE_RATE:
-        raise ControllerError(f"{settings.name}: rate {settings.rate:g} Hz is not the samples' {SAMPLE_RATE} Hz")
+        origin = settings.stated.origin
+        raise ControllerError(f"{origin}: loop.rate {settings.rate:g} Hz is not the samples' {SAMPLE_RATE} Hz")
     n, axes = plant.spools, plant.axes
     ports = len(plant.ports)
     jacobian = np.zeros((plant.legs.size, 6))

@@ -12,6 +12,8 @@
 
 import importlib.util
 import sys
+import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -19,10 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..equilibrium import Equilibrium
-from ..errors import ControllerError
+from ..errors import ControllerError, LhpostError
 from ..plant import Plant
 
 __all__ = ["Sensors", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
+__all__ += ["start_plugged", "step_plugged", "wanted_from"]
 
 Array = NDArray[np.float64]
 
@@ -36,7 +39,7 @@ class Sensors(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """What is wanted of the platen at one sample: motion of C in {s} and Euler angles, (6,) each."""
+    """What is wanted of the platen at one sample: motion of C in {s} and Euler angles, (6,) each, read only."""
 
     displacement: Array
     velocity: Array
@@ -92,10 +95,52 @@ def load_plugged(name: str) -> UserController:
     return controller
 
 
+def wanted_from(displacement: Array, velocity: Array, acceleration: Array) -> Callable[[int], Wanted]:
+    """Function that gives what is wanted at a sample of a motion, (n, 6) each, that no controller can change."""
+    motion = [values.view() for values in (displacement, velocity, acceleration)]
+    for values in motion:
+        values.flags.writeable = False
+    return lambda sample: Wanted(*(values[sample] for values in motion))
+
+
+def start_plugged(controller: UserController, plant: Plant, rest: Equilibrium) -> Any:
+    """Memory of a user's controller for one run; raises ControllerError where its init does."""
+    try:
+        return controller.init(plant, rest)
+    except LhpostError:  # it says itself what is wrong
+        raise
+    except (Exception, SystemExit) as error:  # whatever a user's code raises
+        raise _failed(controller, "init", "", error) from error
+
+
+def step_plugged(controller: UserController, memory: Any, sample: int, wanted: Wanted, sensors: Sensors) -> Array:
+    """Command (n_actuators,) of a user's controller at a sample, as finite numbers.
+
+    Raises ControllerError naming the controller, the sample and the actuator where there is none.
+    """
+    try:
+        command = controller.step(memory, wanted, sensors)
+    except LhpostError:
+        raise
+    except (Exception, SystemExit) as error:  # likewise
+        raise _failed(controller, "step", f" at sample {sample}", error) from error
+    return checked_command(controller, command, sample, sensors.displacement.size)
+
+
+def _failed(controller: UserController, method: str, when: str, error: BaseException) -> ControllerError:
+    """What a user's method raised, with the line of the file where it did."""
+    lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
+    where = f" ({lines[-1].filename}, line {lines[-1].lineno})" if lines else ""
+    name = type(controller).__name__
+    return ControllerError(f"{name}.{method} failed{when}: {type(error).__name__}: {error}{where}")
+
+
 def checked_command(controller: UserController, command: ArrayLike, sample: int, spools: int) -> Array:
     """Command (n_actuators,) as numbers; raises ControllerError naming the controller, the sample and the actuator."""
     name = type(controller).__name__
     try:
+        if np.iscomplexobj(command):
+            raise TypeError("they are complex")
         values = np.asarray(command, float)
     except (TypeError, ValueError) as error:
         raise ControllerError(f"{name} returned no numbers at sample {sample}: {error}") from error

@@ -75,6 +75,8 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
         if not path.is_file():
             valid = ", ".join(sorted(p.stem for p in path.parent.glob("*.toml")))
             raise ParameterError(f"no controller settings named {name_or_path!r}; valid names: {valid}")
+    elif not path.is_file():
+        raise ParameterError(f"{path}: no such file of controller settings")
     stated = load_parameters(path)
     mode = str(stated.words.get("controller.mode", ""))
     if mode not in MODES:
@@ -87,6 +89,13 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
             f"{stated.origin}: no place for [{wrong[0]}]; besides {', '.join(_SECTIONS)} there are notches, numbered "
             f"from notch_1 without a gap, {NOTCHES} at most"
         )
+    known = {f"{section}.{key}" for section, keys in _SECTIONS.items() for key in keys}
+    known |= {f"{name}.{f.name}" for name in names for f in fields(Notch)} | {"controller.name", "controller.mode"}
+    stray = sorted({*stated, *stated.words} - known)
+    for missing in sorted(known - {*stated, *stated.words, "controller.name"}):
+        raise ParameterError(f"{stated.origin}: {missing} is missing")
+    if stray:
+        raise ParameterError(f"{stated.origin}: {stray[0]} is no setting of a controller; take it out or correct it")
     notches = tuple(build_section(Notch, stated, (name,)) for name in names)
     settings = build_section(
         ControllerSettings,
@@ -103,6 +112,11 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
     for key, values in corners.items():
         if max(values) >= settings.rate / 2:
             raise ParameterError(f"{stated.origin}: {key} must lie below half the controller's rate")
+    if any(low >= high for low, high in zip(settings.reference_high_pass, settings.reference_low_pass, strict=True)):
+        raise ParameterError(f"{stated.origin}: reference_high_pass must lie below reference_low_pass")
+    for name, notch in zip(names, notches, strict=True):
+        if min(notch.depth) < -1.0:
+            raise ParameterError(f"{stated.origin}: {name}.depth is below -1, which would turn the sign at the notch")
     return settings
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..control.plug import Sensors, Wanted, checked_command
+from ..control.plug import Sensors, start_plugged, step_plugged, wanted_from
 from ..control.valves import valve_counts
 from ..errors import LinkError
 from ..plant import Plant
 from ..records import make_record
 from ..schemes import SAMPLE_RATE
-from ..simulate import ClosedLoop, PluggedLoop, Progress
+from ..simulate import ClosedLoop, PluggedLoop, Progress, check_drive
 from .client import LinkClient
 from .clock import SECOND, now, undisturbed
 from .protocol import Mode, PlantState
@@ -49,10 +49,12 @@ def run_over_link(
     """Drive the served plant through a motion; `plant` is the one that the controller believes it drives.
 
     Each sample's command answers the newest sensors, with the drive of their sample. Ends early if the plant trips.
-    Raises LinkError if the plant is no longer at rest, differs from the server's, or the server falls silent.
+    Raises SimulationError for a drive that cannot be, LinkError if the plant is no longer at rest, differs from the
+    server's, or the server falls silent.
     """
     _check(client, plant)
     samples = len(loop.drive if isinstance(loop, ClosedLoop) else loop.displacement)
+    check_drive(plant, loop, samples)
     step = _stepper(plant, loop)
     run = LinkRun(
         command=np.zeros((samples, plant.spools)),
@@ -128,11 +130,10 @@ def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Sen
         memory = loop.controller.init()
         return lambda sample, sensors: loop.controller.step(memory, sample, loop.drive, sensors)
     users = loop.controller
-    own = users.init(plant, loop.rest)
+    wanted = wanted_from(loop.displacement, loop.velocity, loop.acceleration)
+    own = start_plugged(users, plant, loop.rest)
 
     def plugged(sample: int, sensors: Sensors) -> Array:
-        wanted = Wanted(loop.displacement[sample], loop.velocity[sample], loop.acceleration[sample])
-        command = checked_command(users, users.step(own, wanted, sensors), sample, plant.spools)
-        return np.clip(command, -1.0, 1.0)
+        return np.clip(step_plugged(users, own, sample, wanted(sample), sensors), -1.0, 1.0)
 
     return plugged

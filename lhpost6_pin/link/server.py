@@ -1,6 +1,7 @@
 """The plant as a UDP server: sockets and clocks around a `ServedPlant`."""
 
 import logging
+import math
 import select
 import socket
 import threading
@@ -56,8 +57,10 @@ def serve(
     """Answer datagrams and move the plant until `stop` is set, Ctrl-C is pressed or `seconds` are over.
 
     Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before. The
-    counts are in `served.counts`.
+    counts are in `served.counts`. Raises LinkError for a time that is negative or not finite.
     """
+    if seconds is not None and not 0.0 <= seconds < math.inf:
+        raise LinkError(f"a plant cannot be served for {seconds:g} s; give a number, zero or more, or leave it out")
     stop, timing = stop or threading.Event(), Timing()
     end = None if seconds is None else now() + round(seconds * SECOND)
     begin, sample = 0, -1  # sample: of those due since `begin`; -1: the plant stands

@@ -16,6 +16,7 @@ from .plant import Plant
 from .ports import evaluate_ports
 
 __all__ = [
+    "PlantMotion",
     "PlatenMotion",
     "forward_kinematics",
     "leg_displacements",

@@ -5,12 +5,14 @@ column is () or (k,). `dt` is the sample interval [s]. A delay is positive where
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "Band",
     "align",
     "correlation",
     "delay",
@@ -136,6 +138,39 @@ def lowpass_zero_phase(x: ArrayLike, dt: float, cutoff: float, order: int = 8) -
     x = np.asarray(x, dtype=float)
     sos = signal.butter(order // 2, cutoff, fs=1 / dt, output="sos")
     return signal.sosfiltfilt(sos, x, axis=0, padlen=min(len(x) - 1, int(np.ceil(order / (cutoff * dt)))))
+
+
+@dataclass(frozen=True)
+class Band:
+    """Zero-phase band from `low` to `high` [Hz]: one value to filter everything alike that is compared.
+
+    The gain is 1 / (1 + (f / high)^order), one half at `high`, as of a Butterworth low-pass run both ways; `low`
+    above 0 takes off the same low-pass at `low`. Two filters of one band commute with differentiation and with
+    each other, so what was equal before is equal after.
+    """
+
+    low: float = 0.0
+    high: float = np.inf
+    order: int = 8
+
+    def __post_init__(self) -> None:
+        """Refuse a band that passes nothing."""
+        if not (0.0 <= self.low < self.high and self.order >= 2):
+            raise ValueError(f"no band from {self.low} to {self.high} Hz of order {self.order}")
+
+    def gain(self, f: ArrayLike) -> Array:
+        """Gain at frequencies [Hz], between 0 and 1."""
+        size = np.abs(np.asarray(f, dtype=float))
+        gain = 1 / (1 + np.minimum(size / self.high, 1e6) ** self.order)
+        return gain - (1 / (1 + np.minimum(size / self.low, 1e6) ** self.order) if self.low else 0.0)
+
+    def apply(self, x: ArrayLike, dt: float) -> Array:
+        """Signal within the band, without phase, by the Fourier transform as `differentiate`.
+
+        With `low` above 0 the straight line from the first to the last value is taken off as well.
+        """
+        x = np.asarray(x, dtype=float)
+        return _filtered(x, dt, lambda f: self.gain(f).reshape(-1, *[1] * (x.ndim - 1)), keep_chord=not self.low)
 
 
 def differentiate(x: ArrayLike, dt: float, cutoff: float | None = None, order: int = 8) -> Array:

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lhpost6_pin.signals import (
+    Band,
     align,
     correlation,
     delay,
@@ -211,3 +212,36 @@ def test_the_noise_of_a_derivative_is_as_stated() -> None:
     measured = np.std(differentiate(noise, DT, cutoff=50.0, order=8))
     # sqrt(3 integral of u^2 / (1 + u^8)^2) = 0.893; a band of 50 of 256 Hz has 20 000 free samples: 0.5 %
     assert measured / cut == pytest.approx(0.893, rel=0.02)
+
+
+# ----------------------------------------------------------------------------------------------- bands
+def test_a_band_passes_what_is_inside_and_stops_what_is_outside_without_phase() -> None:
+    band = Band(2.0, 30.0)
+    for f, gain in ((0.2, 0.0), (8.0, 1.0), (30.0, 0.5), (200.0, 0.0)):
+        x = np.sin(2 * np.pi * f * T)
+        # 1e-3: the skirts ((8/30)^8 = 3e-5), and ends, where a wave is not what its odd reflection makes of it
+        np.testing.assert_allclose(band.apply(x, DT)[1500:-1500], gain * x[1500:-1500], atol=1e-3)
+        assert band.gain(f) == pytest.approx(gain, abs=1e-4)
+
+
+def test_a_low_pass_band_keeps_a_line_and_is_the_butterworth_low_pass_run_both_ways() -> None:
+    np.testing.assert_allclose(Band(high=20.0).apply(3 + 2 * T, DT), 3 + 2 * T, atol=1e-12)
+    x = Waves(60)(T)
+    both = lowpass_zero_phase(x, DT, 20.0)
+    # the bilinear transform bends the digital filter's frequencies by (pi f dt)^2 / 3, 0.5 % at 20 Hz
+    np.testing.assert_allclose(Band(high=20.0).apply(x, DT)[INSIDE], both[INSIDE], atol=0.05 * x.std())
+
+
+def test_a_band_commutes_with_differentiation() -> None:
+    x, band = Waves(40)(T) * np.hanning(len(T))[:, None] ** 2, Band(1.0, 25.0)  # at rest at both ends, as a test is
+    first = band.apply(differentiate(x, DT), DT)
+    second = differentiate(band.apply(x, DT), DT)
+    np.testing.assert_allclose(
+        first, second, atol=1e-4 * second.std()
+    )  # what the taper leaves at the ends, where the low corner rings
+
+
+@pytest.mark.parametrize(("low", "high"), [(5.0, 5.0), (7.0, 5.0), (-1.0, 5.0), (0.0, float("nan"))])
+def test_a_band_that_passes_nothing_is_refused(low: float, high: float) -> None:
+    with pytest.raises(ValueError, match="no band"):
+        Band(low, high)

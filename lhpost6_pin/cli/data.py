@@ -1,0 +1,89 @@
+"""Commands for measured data: import, export."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..errors import RecordError
+from .app import app
+from .options import MachineName, Override, find_machine
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["export", "import_"]
+
+
+@app.command("import")
+def import_(
+    files: Annotated[list[Path], typer.Argument(help="Data file(s) of one test.")],
+    map_: Annotated[Path | None, typer.Option("--map", help="Channel map (TOML).")] = None,
+    guess: Annotated[bool, typer.Option("--guess", help="Write a first channel map to edit, and no record.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Record to write, or with --guess the map.")] = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+) -> None:
+    """Make a record from measured data: MTS 469D, CSV, MATLAB, HDF5, netCDF, TDMS or Parquet."""
+    from ..check import check_dataset
+    from ..importing import described_sources, guess_map, is_export, load_map, load_raw, make_imported_record, save_map
+    from ..records import save_record
+    from ..tables import print_findings
+
+    if guess and map_:
+        raise RecordError("--guess writes a map, --map uses one; give one of them")
+    table = find_machine(machine, override)
+    labels = {"actuator": table.actuator_names, "horizontal": table.double_acting, "strut": table.strut_names}
+    raws = [raw for file in files for raw in load_raw(file)]
+    if guess:
+        found, remarks = guess_map(raws, labels)
+        path = out or Path(f"{files[0].stem}_map.toml")
+        if path.exists():
+            raise RecordError(f"{path}: exists and may have been edited; remove it, or name another with --out")
+        save_map(found, path, remarks)
+        typer.echo(f"wrote {path}: {len(found.channels)} channels, {len(remarks)} remarks; read and edit it, then")
+        typer.echo(f"lhpost6 import {' '.join(map(str, files))} --map {path}")
+        return
+    if map_ is None and not is_export(raws):
+        raise RecordError(f"{files[0]}: which column is which channel? --guess writes a first map, --map uses one")
+    channels = load_map(map_) if map_ else guess_map(raws, labels).channels
+    areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
+    record = make_imported_record(raws, channels, labels, areas)
+    path = out or Path("out") / f"{record.attrs['test'].replace('/', '_')}.nc"
+    if any(path.exists() and path.samefile(file) for file in files):
+        raise RecordError(f"{path}: is one of the files to import; name another with --out")
+    save_record(record, path)
+    _print_channels(record, described_sources(raws, channels))
+    print_findings(str(path), check_dataset(record, areas))
+    typer.echo(f"wrote {path}")
+
+
+@app.command()
+def export(
+    record: Annotated[Path, typer.Argument(help="Record to export.")],
+    to: Annotated[str, typer.Option(help="Format: csv, mat or parquet.")],
+    out: Annotated[Path | None, typer.Option(help="File to write; else beside the record.")] = None,
+) -> None:
+    """Write a record as CSV, MATLAB v5 or Parquet, with the unit in every column's name."""
+    from ..importing import FORMATS, export_record
+    from ..records import load_record
+
+    path = out or record.with_suffix(FORMATS.get(to, ""))
+    export_record(load_record(record), path, to)
+    typer.echo(f"wrote {path}")
+
+
+def _print_channels(record: "xr.Dataset", sources: dict[str, str]) -> None:
+    """Print every channel with its source and range, so that a wrong unit is seen at once."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from ..importing import channel_units
+
+    rows = Table("channel", "from", "unit", "least", "most", title=escape(str(record.attrs["title"])))
+    for name, unit, values in channel_units(record):
+        cells = (name, sources.get(name, "derived"), unit, f"{values.min():.6g}", f"{values.max():.6g}")
+        rows.add_row(*map(escape, cells))
+    console = Console() if Console().is_terminal else Console(width=140)
+    console.print(rows)

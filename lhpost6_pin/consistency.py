@@ -1,0 +1,163 @@
+"""Do the sensors agree? Every quantity that was measured twice, compared by regression over a whole campaign.
+
+Each comparison is y = X theta + noise: y one column of a channel, X what it should be made of, by identity,
+kinematics or a known law, with its derivative (whose coefficient is a delay) and a constant (an offset). Both sides
+are filtered by one band. X has noise as well; its known variance is taken off X'X, so that no gain is biased low.
+
+A theta may be off by its noise, and by what calibration leaves open: each such error is a signal E (its size one
+standard deviation) that y may contain, and moves theta by (X'X)^-1 X'E. Three times the root sum of squares of these
+moves is the tolerance. What E leaves in the residual is allowed there.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .plant import Plant
+from .records import LAYOUT, require
+from .sensor_pairs import Comparison, Term, comparisons
+from .sensors import Sensors
+
+__all__ = ["SensorFinding", "check_sensors"]
+
+Array = NDArray[np.float64]
+
+CONFIDENCE = 3.0  # standard deviations
+MOST_NOISE = 0.1  # of X'X: where more is noise, its correction is worth no more than the stated noise
+
+
+@dataclass(frozen=True)
+class SensorFinding:
+    """One number by which two sensors (or a sensor and a law) were compared.
+
+    `tolerance` is what calibration and geometry may make of it, three standard deviations; `standard_error` is that
+    of the noise. The verdict on a gain or delay is "untested" where noise is more than what is
+    compared allows: a standard error beyond the tolerance, or a tenth of X'X.
+    """
+
+    check: str
+    channel: str  # as in `actuator_force[H1]`
+    quantity: str
+    unit: str
+    estimate: float
+    standard_error: float
+    expected: float
+    tolerance: float
+    verdict: Literal["ok", "suspicious", "untested"]
+
+    @property
+    def significance(self) -> float:
+        """Deviation in standard deviations of noise and calibration together [1]."""
+        spread = np.hypot(self.standard_error, self.tolerance / CONFIDENCE)
+        return float((self.estimate - self.expected) / spread) if spread > 0 else 0.0
+
+    def __str__(self) -> str:
+        """One line, as in `force against pressures, actuator_force[H1]: gain a 1.003 +- 0.001 1, ...`."""
+        value = f"{self.quantity} {self.estimate:.5g} +- {self.standard_error:.2g} {self.unit}"
+        due = f"expected {self.expected:.5g} within {self.tolerance:.2g}"
+        return f"{self.check}, {self.channel}: {value}, {due}: {self.verdict}"
+
+
+def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors) -> tuple[SensorFinding, ...]:
+    """Compare all sensors of a campaign that can be compared, pooled over its records.
+
+    Force against pressures, lengths against platen pose, parity of the lengths, velocity and acceleration against
+    displacement, strut pressure against gas law, supply pressure against nominal, spools against delayed commands.
+    What a record does not have is left out. What is suspicious need not be a broken sensor: an effect that the law
+    lacks (a leaking strut, a sagging supply) shows here too. Raises RecordError for channels without time.
+    """
+    sums: dict[tuple[str, str], _Sums] = {}
+    for record in records:
+        require(record, "time")
+        for comparison in comparisons(plant, record, sensors):
+            key = comparison.check, comparison.channel
+            sums[key] = _added(sums.get(key), comparison)
+    order = {check: k for k, check in enumerate(dict.fromkeys(check for check, _ in sums))}
+    keys = sorted(sums, key=lambda key: order[key[0]])
+    return tuple(finding for key in keys for finding in _findings(*key, sums[key], sensors.noise_range))
+
+
+# ------------------------------------------------------------------------------------------------ regression
+class _Sums(NamedTuple):
+    """Sums of products over records."""
+
+    terms: tuple[Term, ...]
+    xx: Array | float  # (p, p)
+    xy: Array | float
+    xe: Array | float  # (p, k)
+    ee: Array | float  # (k,)
+    noise: Array | float  # (p,) of X, summed over samples
+    yy: float
+    variance: float  # of y, summed over samples
+    samples: float
+    independent: float
+
+
+def _added(sums: _Sums | None, c: Comparison) -> _Sums:
+    x = np.stack([t.column for t in c.terms], axis=1) if c.terms else np.zeros((len(c.y), 0))
+    n = len(c.y)
+    s = sums or _Sums(c.terms, *(0.0,) * 9)
+    return _Sums(
+        c.terms,
+        s.xx + x.T @ x,
+        s.xy + x.T @ c.y,
+        s.xe + x.T @ c.errors,
+        s.ee + np.sum(c.errors**2, axis=0),
+        s.noise + n * np.array([t.variance for t in c.terms]),
+        s.yy + float(c.y @ c.y),
+        s.variance + n * c.variance,
+        s.samples + n,
+        s.independent + c.independent,
+    )
+
+
+def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[SensorFinding]:
+    xx, xy, xe, ee = (np.asarray(x) for x in (s.xx, s.xy, s.xe, s.ee))
+    unit = LAYOUT[channel.split("[")[0]].units.split(", ")
+    unit_y = unit[-1] if channel.endswith(("[roll]", "[pitch]", "[yaw]")) else unit[0]
+    scale = 1 / np.sqrt(np.maximum(np.diag(xx), 1e-300))  # for a well-conditioned inverse
+    inverse = scale[:, None] * np.linalg.pinv(scale[:, None] * (xx - np.diag(s.noise)) * scale) * scale
+    theta, moved = inverse @ xy, inverse @ xe
+    square = (s.yy - 2 * theta @ xy + theta @ xx @ theta) / s.samples
+    noise = (s.variance + float(theta**2 @ np.asarray(s.noise))) / s.samples
+    left = ee - 2 * np.sum(moved * xe, axis=0) + np.einsum("pk,pq,qk->k", moved, xx, moved)
+    allowed = float(np.sum(np.maximum(left, 0.0))) / s.samples
+    spread = np.sqrt(max(square, noise) * s.samples / s.independent)
+    error = spread * np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    share = np.asarray(s.noise) / np.maximum(np.diag(xx), 1e-300)  # of the noise in X'X
+    doubt = (1 + noise_range) ** 2
+    tolerance = CONFIDENCE * np.sqrt(np.sum(moved**2, axis=1)) + (doubt - 1) * share * np.abs(theta)
+    gain = theta[0] if len(theta) and theta[0] else 1.0
+    buried = bool((share > MOST_NOISE).any())
+    for term, value, sigma, range_ in zip(s.terms, theta, error, tolerance, strict=True):
+        if term.delay is not None:
+            value, sigma = term.delay - value / gain, sigma / abs(gain)
+        yield _finding(check, channel, term.quantity, term.unit or unit_y, value, sigma, term.expected, range_, buried)
+    rms, floor = np.sqrt(max(square, 0.0)), np.sqrt(noise)
+    range_ = np.sqrt(doubt * noise + CONFIDENCE**2 * allowed) - floor
+    yield _finding(check, channel, "residual", unit_y, rms, floor / np.sqrt(2 * s.independent), floor, range_)
+
+
+def _finding(
+    check: str,
+    channel: str,
+    quantity: str,
+    unit: str,
+    estimate: float,
+    error: float,
+    expected: float,
+    tolerance: float,
+    buried: bool = False,
+) -> SensorFinding:
+    level = quantity in ("offset", "residual")  # which noise does not hide
+    verdict: Literal["ok", "suspicious", "untested"] = "ok"
+    if not level and (buried or error > tolerance):
+        verdict = "untested"
+    elif abs(estimate - expected) > np.hypot(CONFIDENCE * error, tolerance):
+        verdict = "suspicious"
+    numbers = float(estimate), float(error), float(expected), float(tolerance)
+    return SensorFinding(check, channel, quantity, unit, *numbers, verdict)

@@ -1,0 +1,200 @@
+"""Inverse dynamics: from a measured motion to the forces behind it (report, Section 6.1).
+
+    found = inverse_dynamics(plant, time, motion, actuator_force, strut_pressure)
+    found.residual                          # (n, 6) [N, N m] required less measured actuator wrench, at C in {c}
+
+From the motion of C and the Euler angles follow the platen's twist and its rate in {b} (Eqs. 3-11, 3-18) and with them
+inertia (Eq. 4-26), weight, struts (Eq. 4-8), friction and viscous forces (Eqs. 4-9 to 4-19). What then balances the
+inertia is the wrench that the actuators must have given; what they did give is measured.
+
+Hidden friction states are marched along the motion by the simulation's own step rule (`stage.advance_states`), so that
+a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .compiled import compiled
+from .equilibrium import hydraulic_rows
+from .errors import RecordError, SimulationError
+from .ledger import Ledger, States, add_at_c, force_ledger
+from .plant import Plant
+from .platen_steps import platen_difference
+from .pose import PlantMotion, PlatenMotion, plant_motion
+from .schemes import DS, FORCE, SD, S, port_rates, pose_stage, set_twist
+from .stage import advance_states
+from .workspace import make_workspace
+
+__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """A motion taken apart; n samples, wrenches on the platen at C in {c}: fx fy fz mx my mz [N, N m]."""
+
+    states: States
+    ledger: Ledger  # of the model's effects; actuators are zero: what they give is measured
+    component: tuple[str, ...]  # (k,) components whose force was measured: actuators, then struts
+    component_force: Array  # (n, k) measured force along each [N], positive where it lengthens it
+    component_wrench: Array  # (n, k, 6) the same on the platen
+    actuators: int  # how many of the components are actuators
+
+    @property
+    def required(self) -> Array:
+        """Wrench that the actuators must have given (n, 6): inertia less all other effects of the model."""
+        return self.ledger.residual
+
+    @property
+    def measured(self) -> Array:
+        """Wrench that the actuators gave (n, 6), as measured."""
+        return np.asarray(self.component_wrench[:, : self.actuators].sum(axis=1))
+
+    @property
+    def residual(self) -> Array:
+        """Required less measured actuator wrench (n, 6): what the model does not explain."""
+        return self.required - self.measured
+
+    @property
+    def struts(self) -> Array:
+        """Wrench of the struts (n, 6), of the model (Eq. 4-8)."""
+        return self._of("hold_down")
+
+    @property
+    def struts_measured(self) -> Array | None:
+        """Wrench of the struts (n, 6) from their measured pressures; None where there are none."""
+        if len(self.component) == self.actuators:
+            return None
+        return np.asarray(self.component_wrench[:, self.actuators :].sum(axis=1))
+
+    @property
+    def dissipative(self) -> Array:
+        """Friction and viscous wrench of the model (n, 6)."""
+        return self._of("seal_friction") + self._of("pad_friction") + self._of("viscous")
+
+    @property
+    def dissipative_measured(self) -> Array:
+        """The same from measured forces: inertia less weight, actuators and struts (the model's without pressures)."""
+        struts = self.struts if self.struts_measured is None else self.struts_measured
+        return self.ledger.inertia - self._of("gravity") - self.measured - struts
+
+    def _of(self, effect: str) -> Array:
+        if effect not in self.ledger.effects:
+            return np.zeros_like(self.ledger.inertia)
+        return np.asarray(self.ledger.wrench[:, self.ledger.effect(effect)])
+
+
+def inverse_dynamics(
+    plant: Plant,
+    time: ArrayLike,
+    motion: PlatenMotion,
+    actuator_force: ArrayLike,
+    strut_pressure: ArrayLike | None = None,
+    *,
+    model_step: bool = False,
+) -> Decomposition:
+    """Take a motion of C and Euler angles apart, friction states starting at rest.
+
+    time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. model_step
+    says that the samples are the model steps of a semi-implicit run; forces then see the velocity that they saw there.
+    Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
+    """
+    if plant.model.nv != plant.axes.size:
+        raise SimulationError(
+            "inverse dynamics takes a platen with a rigid specimen at most: what its joints do is not measured; "
+            "lock them (--locked)"
+        )
+    t = np.asarray(time, float)
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    moved = plant_motion(plant, motion)
+    z = march_states(plant, moved, dt)
+    v = seen_velocity(moved, dt) if model_step else moved.v
+    states = States(plant, t, moved.q, v, moved.a, z)
+    measured = [np.asarray(actuator_force, float)]
+    names = list(plant.machine.actuator_names)
+    if strut_pressure is not None:
+        areas = np.array([s.area for s in plant.machine.struts])
+        measured.append(-areas * np.asarray(strut_pressure, float))
+        names += plant.machine.strut_names
+    force = np.hstack(measured)
+    wrench = leg_wrenches(plant, moved.q, force)
+    return Decomposition(states, force_ledger(states), tuple(names), force, wrench, plant.spools)
+
+
+def seen_velocity(motion: PlantMotion, dt: float) -> Array:
+    """Velocity that forces saw at each model step of a semi-implicit run (n, nv): that of the step before, extrapolated.
+
+    See `schemes.staggered_stage`.
+    """
+    return np.vstack([motion.v[:1], motion.v[:-1] + dt * motion.a[:-1]])
+
+
+def march_states(plant: Plant, motion: PlantMotion, dt: float, start: Array | None = None, *, spool: Array | None = None) -> Array:
+    """Hidden states (n, n_states) along a motion, from `start` (n_states,) or all zero, one step a sample.
+
+    Friction states only; with spool (n - 1 or more, n_actuators), the mean over each step, chamber pressures as well.
+    Raises RecordError naming the sample where a leg is out of its stroke.
+    """
+    rows = plant.rows
+    if spool is None:
+        rows = rows[rows["input"] < 0]
+        spool = np.zeros((1, plant.spools))
+    z = np.zeros((len(motion.q), len(plant.states)))
+    if start is not None:
+        z[0] = start
+    ws = make_workspace(plant, plant.zero_state())
+    held = np.ascontiguousarray(spool, float)
+    arrays = plant.axes, plant.legs, plant.body, rows, ws.frame, ws.port, ws.JB, dt, held, plant.supply, z
+    sample, status = _march(np.ascontiguousarray(motion.q), *arrays)
+    if status:
+        names = (*plant.machine.actuator_names, *plant.machine.strut_names)
+        what = f"{names[status - 1]} is out of its stroke" if status > 0 else "the motion is not finite"
+        raise RecordError(f"platen_displacement at sample {sample}: {what}; check its channels, units and offsets")
+    return z
+
+
+@compiled
+def _march(q, axes, legs, body, rows, frame, port, JB, dt, spool, supply, z):
+    """Fill z from its first row; returns (sample, status) of the first pose that cannot be, or (n, 0)."""
+    step = np.zeros(axes.size)
+    status = pose_stage(q[0], axes, legs, body, frame, port, JB)
+    if status != 0:
+        return 0, status
+    last = spool.shape[0] - 1
+    for k in range(1, q.shape[0]):
+        platen_difference(q[k - 1], q[k], axes, step)
+        set_twist(step, axes, frame)
+        port_rates(JB[0], frame, port[DS])
+        start = port[FORCE]
+        start[:] = port[S]
+        status = pose_stage(q[k], axes, legs, body, frame, port, JB)
+        if status != 0:
+            return k, status
+        port_rates(JB[0], frame, port[SD])
+        for i in range(start.size):
+            port[DS, i] = 0.5 * (port[DS, i] + port[SD, i])
+        z[k] = z[k - 1]
+        advance_states(rows, start, port[DS], dt, spool[min(k - 1, last)], supply, z[k])
+    return q.shape[0], 0
+
+
+def leg_wrenches(plant: Plant, q: Array, force: Array) -> Array:
+    """Wrenches (n, k, 6) on the platen at C in {c} of forces (n, k) [N] along the first k legs at poses q (n, nq)."""
+    out = np.zeros((*force.shape, 6))
+    ws = make_workspace(plant, plant.zero_state())
+    arrays = plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB
+    _leg_wrenches(np.ascontiguousarray(q), np.ascontiguousarray(force), *arrays, out)
+    return out
+
+
+@compiled
+def _leg_wrenches(q, force, axes, legs, body, frame, port, JB, out):
+    rho = body[0].rho_c
+    B = JB[1]
+    for k in range(q.shape[0]):
+        pose_stage(q[k], axes, legs, body, frame, port, JB)
+        for i in range(force.shape[1]):
+            add_at_c(force[k, i], B, i, rho, frame, out[k, i])

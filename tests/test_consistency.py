@@ -1,0 +1,132 @@
+"""Consistency: sensors that agree pass, each kind of error is found where it is, and only there."""
+
+import numpy as np
+import pytest
+from machine_cases import plant_named
+from sensor_cases import RATE, measured
+
+from lhpost6_pin.consistency import SensorFinding, check_sensors
+from lhpost6_pin.records import make_record
+from lhpost6_pin.sensors import add_noise, load_sensors
+from lhpost6_pin.signals import align
+
+SENSORS = load_sensors()
+
+
+@pytest.fixture(scope="module")
+def campaign(plant):
+    """Two records with noise and nothing wrong."""
+    return [add_noise(measured(plant, seed)[0], SENSORS, np.random.default_rng(seed)) for seed in (0, 10)]
+
+
+def with_change(records, name: str, change) -> list:
+    """Records with one channel's values (n, k) changed."""
+    return [r.assign({name: r[name].copy(data=change(r[name].values.copy()))}) for r in records]
+
+
+def suspicious(findings) -> set[tuple[str, str]]:
+    """Channel and quantity of everything suspicious."""
+    return {(f.channel, f.quantity) for f in findings if f.verdict == "suspicious"}
+
+
+def find(findings, channel: str, quantity: str, check: str = "") -> SensorFinding:
+    """The finding of a channel and quantity."""
+    return next(f for f in findings if (f.channel, f.quantity) == (channel, quantity) and check in f.check)
+
+
+def test_sensors_that_agree_are_not_suspected(plant, campaign) -> None:
+    findings = check_sensors(plant, campaign, SENSORS)
+    assert suspicious(findings) == set()
+    assert {f.check for f in findings} == {
+        "force against pressures",
+        "length against platen pose",
+        "kinematic parity",
+        "velocity against displacement",
+        "acceleration against displacement",
+        "strut pressure against gas law",
+        "supply pressure against nominal",
+        "spool against command",
+    }
+
+
+def test_estimates_scatter_by_their_standard_errors(plant, campaign) -> None:
+    findings = [f for f in check_sensors(plant, campaign, SENSORS) if f.quantity != "residual"]
+    z = np.array([(f.estimate - f.expected) / f.standard_error for f in findings])
+    # some 150 numbers: their spread is known to 6 %; quantities of one channel hang together
+    assert 0.7 < np.sqrt(np.mean(z**2)) < 1.3
+
+
+def test_calibration_errors_within_their_range_are_found_and_accepted(plant, campaign) -> None:
+    records = with_change(campaign, "actuator_force", lambda f: 1.005 * f + 4000.0)
+    findings = check_sensors(plant, records, SENSORS)
+    assert suspicious(findings) == set()
+    for quantity, due in (("gain a", 1.005), ("gain b", 1.005), ("offset", 4000.0)):
+        found = find(findings, "actuator_force[H2]", quantity)
+        assert found.estimate == pytest.approx(due, abs=4 * found.standard_error)  # 1 in 10^4
+        assert found.standard_error < 0.1 * found.tolerance
+
+
+def _third(column: int, factor: float, offset: float = 0.0):
+    def change(x):
+        x[:, column] = factor * x[:, column] + offset
+        return x
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "where"),
+    [
+        ("actuator_force", _third(2, 1.05), {"actuator_force[H3]"}),
+        ("actuator_force", _third(6, 1.0, 60e3), {"actuator_force[V3]"}),
+        ("chamber_pressure_b", _third(0, 0.95), {"actuator_force[H1]"}),
+        ("platen_velocity", _third(1, 1.05), {"platen_velocity[y]"}),
+        ("platen_acceleration", _third(5, -1.0), {"platen_acceleration[yaw]"}),
+        ("strut_pressure", _third(1, 1.3), {"strut_pressure[S2]"}),
+        ("spool_position", _third(8, 0.9), {"spool_position[V5]"}),
+    ],
+)
+def test_an_error_beyond_its_range_is_found_where_it_is(plant, campaign, name, change, where) -> None:
+    findings = check_sensors(plant, with_change(campaign, name, change), SENSORS)
+    assert {channel for channel, _ in suspicious(findings)} == where
+
+
+def test_a_length_that_is_off_breaks_its_own_comparison_and_parity(plant, campaign) -> None:
+    findings = check_sensors(plant, with_change(campaign, "actuator_displacement", _third(3, 1.05)), SENSORS)
+    assert ("actuator_displacement[H4]", "gain") in suspicious(findings)
+    assert any("parity" in channel for channel, _ in suspicious(findings))
+    only_lengths = [
+        r[["actuator_displacement"]] for r in with_change(campaign, "actuator_displacement", _third(3, 1.05))
+    ]
+    assert suspicious(check_sensors(plant, only_lengths, SENSORS))  # parity needs nothing else
+
+
+def test_a_channel_that_is_late_is_found(plant, campaign) -> None:
+    late = with_change(campaign, "spool_position", lambda x: align(x, -2e-3, 1 / RATE))
+    findings = check_sensors(plant, late, SENSORS)
+    found = find(findings, "spool_position[H1]", "delay")
+    assert found.verdict == "suspicious"
+    assert found.expected == plant.delays[0]
+    assert found.estimate == pytest.approx(plant.delays[0] + 2e-3, rel=0.03)  # the regression's second-order term
+
+
+def test_a_noisier_sensor_shows_in_its_residual_only(plant, campaign) -> None:
+    rng = np.random.default_rng(5)
+    noisy = with_change(campaign, "supply_pressure", lambda x: x + 2e4 * rng.standard_normal(x.shape))
+    assert suspicious(check_sensors(plant, noisy, SENSORS)) == {("supply_pressure", "residual")}
+
+
+def test_what_hardly_moves_is_untested_rather_than_right(plant, campaign) -> None:
+    still = [r.assign({n: 1e-4 * r[n] for n in r.data_vars if str(n).startswith("platen")}) for r in campaign]
+    still = [
+        add_noise(r[["platen_displacement", "platen_acceleration"]], SENSORS, np.random.default_rng(0)) for r in still
+    ]
+    assert find(check_sensors(plant, still, SENSORS), "platen_acceleration[roll]", "gain").verdict == "untested"
+
+
+def test_a_machine_without_redundant_lengths_has_no_parity() -> None:
+    plant = plant_named("uniaxial")
+    t = np.arange(2048) / RATE
+    x = 0.1 * np.sin(2 * np.pi * t)[:, None]
+    record = make_record(t, {"actuator_displacement": x}, {"actuator": plant.machine.actuator_names}, {})
+    assert check_sensors(plant, [record], SENSORS) == ()

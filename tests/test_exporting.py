@@ -1,0 +1,157 @@
+"""Exported records hold units in their names and come back the same; the two commands from end to end."""
+
+import numpy as np
+import pytest
+import scipy.io
+import xarray as xr
+from data_files import LABELS, binary_469d, header, sines, typical_channels
+from machine_cases import DATA
+
+from lhpost6_pin import cli
+from lhpost6_pin.errors import RecordError, UnknownNameError
+from lhpost6_pin.importing import export_record, guess_map, is_export, load_raw, make_imported_record
+from lhpost6_pin.records import LAYOUT, load_record, make_record
+
+PRACTICE = DATA / "records" / "practice_a_TX.nc"
+
+
+@pytest.fixture(scope="module")
+def record() -> xr.Dataset:
+    """The first second of a practice record."""
+    return load_record(PRACTICE).isel(time=slice(512))
+
+
+def imported(path) -> xr.Dataset:
+    raws = load_raw(path)
+    assert is_export(raws)
+    return make_imported_record(raws, guess_map(raws, LABELS).channels, LABELS)
+
+
+@pytest.mark.parametrize("form", ["csv", "mat", "parquet"])
+def test_an_exported_record_comes_back_without_a_map_to_the_last_bit(tmp_path, record, form):
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"run.{form}"
+    export_record(record, path, form)
+    back = imported(path)
+    for name in ("time", *(n for n in LAYOUT if n in record)):
+        assert back[name].dims == record[name].dims
+        np.testing.assert_array_equal(back[name], record[name])
+    for key in ("test", "kind", "specimen", "valves_per_horizontal_actuator", "sample_rate_hz"):
+        assert back.attrs[key] == record.attrs[key]
+
+
+def test_every_column_of_a_table_names_its_unit(tmp_path, record):
+    export_record(record, tmp_path / "run.csv", "csv")
+    head = next(line for line in (tmp_path / "run.csv").read_text().splitlines() if not line.startswith("#"))
+    names = head.split(",")
+    assert names[:2] == ["time [s]", "platen_displacement_x [m]"]
+    assert "platen_velocity_yaw [rad/s]" in names and "spool_command_H1 [1]" in names
+    assert all(name.endswith("]") for name in names)
+
+
+def test_every_matlab_variable_names_its_unit_and_is_a_column(tmp_path, record):
+    export_record(record, tmp_path / "run.mat", "mat")
+    content = scipy.io.loadmat(tmp_path / "run.mat")
+    assert content["platen_acceleration_yaw_rad_s2"].shape == (512, 1)
+    assert {"time_s", "spool_command_H1_fraction", "facts"} <= set(content)
+
+
+def test_what_a_record_holds_beyond_the_layout_is_exported_too(tmp_path, record):
+    more = record.assign(extra=(("time", "k"), np.zeros((512, 2)), {"units": "m"}), note=("k", np.zeros(2)))
+    export_record(more, tmp_path / "run.csv", "csv")
+    (raw,) = load_raw(tmp_path / "run.csv")
+    assert raw.names[-2:] == ("extra_0 [m]", "extra_1 [m]")
+
+
+def test_an_unknown_format_and_a_broken_record_are_refused(tmp_path, record):
+    with pytest.raises(UnknownNameError, match="csv, mat, parquet"):
+        export_record(record, tmp_path / "run.xls", "xls")
+    broken = make_record([0.0, 0.1], {"supply_pressure": [1.0, 2.0]}, {}, {}).assign_coords(time=[0.1, 0.0])
+    with pytest.raises(RecordError, match="does not increase"):
+        export_record(broken, tmp_path / "run.csv", "csv")
+    assert not list(tmp_path.iterdir())
+
+
+def test_parquet_without_pyarrow_says_which_extra_brings_it(tmp_path, record, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(RecordError, match=r"lhpost6-pin\[formats\]"):
+        export_record(record, tmp_path / "run.parquet", "parquet")
+
+
+# --------------------------------------------------------------------------------------------- commands
+@pytest.fixture
+def lhpost6(capsys, monkeypatch, tmp_path):
+    """Run a command as the entry point does, in a folder of its own; returns exit code and words."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> tuple[int, str]:
+        monkeypatch.setattr("sys.argv", ["lhpost6", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        text = "".join(capsys.readouterr())
+        return int(end.value.code or 0), " ".join(text.replace("│", " ").split())
+
+    return run
+
+
+def test_guess_then_import_shows_source_unit_and_range_of_every_channel(lhpost6, tmp_path):
+    typical = typical_channels()
+    values = sines(512, len(typical))
+    columns = [(t.description, t.unit, values[:, k]) for k, t in enumerate(typical)]
+    (tmp_path / "EQ1.bin").write_bytes(binary_469d(header(columns, 1 / 256), values))
+    code, words = lhpost6("import", "EQ1.bin", "--guess")
+    assert code == 0 and "lhpost6 import EQ1.bin --map EQ1_map.toml" in words
+    assert lhpost6("import", "EQ1.bin", "--guess")[0] == 2  # the map may have been edited
+    code, words = lhpost6("import", "EQ1.bin", "--map", "EQ1_map.toml", "--out", "EQ1.nc")
+    assert code == 0
+    assert "platen_displacement[x] EQ1.bin: Long Displ fbk [in] m" in words
+    assert load_record(tmp_path / "EQ1.nc", LABELS).attrs["sample_rate_hz"] == 256
+
+
+def test_a_wrong_unit_is_seen_after_the_import(lhpost6, tmp_path):
+    rows = "".join(f"{k / 256},{20 * np.sin(k / 40):.6f},0\n" for k in range(600))
+    (tmp_path / "run.csv").write_text("time [s],x,other\n" + rows)
+    zero = "\n".join(
+        f'"platen_displacement[{a}]" = {{ constant = 0.0, unit = "{u}" }}'
+        for a, u in (("y", "m"), ("z", "m"), ("roll", "rad"), ("pitch", "rad"), ("yaw", "rad"))
+    )
+    (tmp_path / "map.toml").write_text(
+        f'[channel]\n"platen_displacement[x]" = {{ column = "x", unit = "m" }}\n{zero}\n'
+    )
+    code, words = lhpost6("import", "run.csv", "--map", "map.toml")
+    assert code == 0 and "wrote out/run.nc" in words
+    assert "reaches 20: mm or in for m?" in words
+
+
+def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
+    record.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
+    assert lhpost6("export", "a.nc", "--to", "csv") == (0, "wrote a.csv")
+    code, words = lhpost6("import", "a.csv", "--out", "b.nc")
+    assert code == 0 and "0 errors" in words
+    np.testing.assert_array_equal(load_record(tmp_path / "b.nc")["actuator_force"], record["actuator_force"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "phrase"),
+    [
+        (("import", "gone.csv"), "gone.csv: no such file"),
+        (("import", "run.csv"), "--guess writes a first map"),
+        (("import", "run.csv", "--guess", "--map", "m.toml"), "give one of them"),
+        (("import", "run.csv", "--map", "gone.toml"), "gone.toml: cannot be read"),
+        (("export", "gone.nc", "--to", "csv"), "gone.nc: no such file"),
+        (("export", "gone.nc", "--to", "xls"), "no such file"),
+    ],
+)
+def test_a_command_that_cannot_go_on_says_why(lhpost6, tmp_path, arguments, phrase):
+    (tmp_path / "run.csv").write_text("time [s],x\n0,1\n1,2\n")
+    code, words = lhpost6(*arguments)
+    assert code == 2 and phrase in words
+
+
+def test_a_record_is_not_written_over_the_file_it_comes_from(lhpost6, tmp_path, record):
+    export_record(record, tmp_path / "a.csv", "csv")
+    before = (tmp_path / "a.csv").read_bytes()
+    code, words = lhpost6("import", "a.csv", "--out", "a.csv")
+    assert code == 2 and "is one of the files to import" in words
+    assert (tmp_path / "a.csv").read_bytes() == before

@@ -1,0 +1,756 @@
+"""Data files of every format give the numbers that were put in; bad ones are refused with file, place and remedy."""
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import xarray as xr
+from data_files import LABELS, binary_469d, header, raw, sines, text_469d, typical_channels
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from lhpost6_pin.errors import LhpostError, RecordError
+from lhpost6_pin.importing import (
+    ChannelMap,
+    Source,
+    TestFacts,
+    guess_map,
+    load_map,
+    load_raw,
+    make_imported_record,
+    save_map,
+)
+from lhpost6_pin.importing.units import quantity_unit, si_factor, unit_in_name
+from lhpost6_pin.records import load_record, save_record
+
+SINGLE = 2.0**-24  # relative: the rounding of a float32
+VALUES = sines(400, 3)
+NAMES = ("Long Displ fbk", "Lat Accel fbk", "H1 Press A")
+UNITS = ("in", "g", "psi")
+CHANNELS = [(name, unit, VALUES[:, k]) for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True))]
+RATE = 256.0
+TIME = np.arange(400) / RATE
+
+
+def put(folder: Path, name: str, content: bytes | str) -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def one(path: Path):
+    (found,) = load_raw(path)
+    return found
+
+
+# --------------------------------------------------------------------------------------------- 469D
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_binary_469d_file_gives_its_channels_in_either_byte_order(tmp_path, order):
+    found = one(put(tmp_path, "run.bin", binary_469d(header(CHANNELS, 1 / RATE), VALUES, order)))
+    assert (found.names, found.units) == (NAMES, UNITS)
+    np.testing.assert_allclose(found.values, VALUES, rtol=SINGLE, atol=0)
+    np.testing.assert_array_equal(found.time, TIME)
+    assert found.facts["FILE_INFO"] == "closed form"
+
+
+@pytest.mark.parametrize("announced", [True, False], ids=["EXTENDED_HEADER_RECORDS", "not announced"])
+def test_further_header_records_are_facts_and_not_samples(tmp_path, announced):
+    further = {"TABLE": "LHPOST6", "SPECIMEN": "none"}
+    extended = {"FILE_TYPE": "TIME_SERIES_WITH_EXTENDED_HEADER", "EXTENDED_HEADER_RECORDS": "2"} if announced else {}
+    found = one(put(tmp_path, "run", binary_469d(header(CHANNELS, 1 / RATE, extended | further), VALUES)))
+    assert found.facts["TABLE"] == "LHPOST6"
+    np.testing.assert_allclose(found.values, VALUES, rtol=SINGLE, atol=0)
+
+
+@pytest.mark.parametrize("between", ["", ": ", " = ", "\t", ","])
+@pytest.mark.parametrize("separator", [" ", "\t", ", "])
+def test_a_text_469d_file_is_read_however_it_separates(tmp_path, between, separator):
+    found = one(put(tmp_path, "run.txt", text_469d(header(CHANNELS, 1 / RATE), VALUES, between, separator)))
+    assert (found.names, found.units) == (NAMES, UNITS)
+    np.testing.assert_allclose(found.values, VALUES, rtol=1e-8, atol=0)  # nine digits were written
+    np.testing.assert_array_equal(found.time, TIME)
+
+
+GOOD = header(CHANNELS, 1 / RATE)
+BAD_469D = {
+    "cut in a number": (GOOD, lambda b: b[:-3], ("float32", "cut short")),
+    "cut in a sample": (GOOD, lambda b: b[:-4], ("sample 399", "2 of 3 channels")),
+    "cut in the header": (GOOD, lambda b: b[: 7 * 128 + 50], ("DESC.CHAN_2", "missing")),
+    "no samples": (GOOD, lambda b: b[: 11 * 128], ("0 sample",)),
+    "too many channels": (header(CHANNELS, 1 / RATE, {"CHANNELS": "4"}), bytes, ("CHANNELS is 4", "DESC.CHAN_4")),
+    "too few channels": (header(CHANNELS, 1 / RATE, {"CHANNELS": "2"}), bytes, ("CHANNELS is 2", "3")),
+    "channels no number": (header(CHANNELS, 1 / RATE, {"CHANNELS": "three"}), bytes, ("CHANNELS is 'three'",)),
+    "no channels": (header(CHANNELS, 1 / RATE, {"CHANNELS": None}), bytes, ("CHANNELS is missing",)),
+    "no step": (header(CHANNELS, 1 / RATE, {"DELTA_T": None}), bytes, ("DELTA_T is missing",)),
+    "step no number": (header(CHANNELS, "fast"), bytes, ("DELTA_T is 'fast'",)),
+    "step negative": (header(CHANNELS, -0.1), bytes, ("DELTA_T is '-0.1'",)),
+    "records missing": (GOOD | {"EXTENDED_HEADER_RECORDS": "9"}, bytes, ("9 more records",)),
+}
+
+
+@pytest.mark.parametrize("case", BAD_469D)
+def test_a_damaged_469d_file_is_refused_with_its_key_or_sample(tmp_path, case):
+    entries, change, phrases = BAD_469D[case]
+    path = put(tmp_path, "run.bin", change(binary_469d(entries, VALUES)))
+    with pytest.raises(RecordError) as caught:
+        load_raw(path)
+    assert str(path) in str(caught.value)
+    for phrase in phrases:
+        assert phrase in str(caught.value)
+
+
+def test_a_key_given_twice_is_refused(tmp_path):
+    content = b"FILE_TYPE".ljust(32) + b"TIME_SERIES".ljust(96)
+    with pytest.raises(RecordError, match="byte 128: FILE_TYPE is given twice"):
+        load_raw(put(tmp_path, "run.bin", content + binary_469d(GOOD, VALUES)))
+
+
+@pytest.mark.parametrize(
+    ("change", "phrase"),
+    [
+        (lambda t: t.replace(b"\r\n0 ", b"\r\nzero ", 1), "line 12, number 1: 'zero' is not a number"),
+        (lambda t: t[: t.rstrip().rfind(b" ")], "line 411: 2 numbers for 3 channels"),
+    ],
+)
+def test_a_damaged_text_469d_file_is_refused_with_its_line(tmp_path, change, phrase):
+    content = text_469d(GOOD, VALUES)
+    with pytest.raises(RecordError, match=phrase):
+        load_raw(put(tmp_path, "run.txt", change(content)))
+
+
+# --------------------------------------------------------------------------------------------- tables
+def table(separator=",", decimal=".", head=None, rows=VALUES, time=TIME) -> str:
+    head = head or ["time [s]", *(f"{n} [{u}]" for n, u in zip(NAMES, UNITS, strict=True))]
+    lines = [separator.join(head)]
+    lines += [
+        separator.join(map(repr, map(float, (t, *row)))).replace(".", decimal)
+        for t, row in zip(time, rows, strict=True)
+    ]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), (", ", ".")]
+)
+def test_a_table_in_text_is_read_to_the_last_digit_whatever_its_marks(tmp_path, separator, decimal):
+    found = one(put(tmp_path, "run.csv", "# test: EQ1\n\n" + table(separator, decimal)))
+    assert [name.split(" [")[0] for name in found.names] == list(NAMES)
+    assert found.units == UNITS
+    np.testing.assert_array_equal(found.values, VALUES)
+    np.testing.assert_array_equal(found.time, TIME)
+    assert found.facts["test"] == "EQ1"
+
+
+def test_blanks_may_separate_and_the_header_may_be_a_comment(tmp_path):
+    text = "# time_ms x_mm y_g\n" + "\n".join(
+        f"  {1000 * t:.9f}   {a:.9e}  {b:.9e}" for t, (a, b, _) in zip(TIME, VALUES, strict=True)
+    )
+    found = one(put(tmp_path, "run.txt", text))
+    assert (found.names, found.units) == (("x_mm", "y_g"), ("mm", "g"))
+    np.testing.assert_allclose(found.time, TIME, atol=1e-12)  # nine decimals of a millisecond
+
+
+@pytest.mark.parametrize("units", ["s,in,g,psi", "[s],[in],[g],[psi]", "(s),(in),(g),(psi)"])
+def test_units_may_stand_in_a_row_below_the_names(tmp_path, units):
+    text = table(head=["Time", *NAMES]).split("\n", 1)
+    found = one(put(tmp_path, "run.csv", f"recorded at noon\n{text[0]}\n{units}\n{text[1]}"))
+    assert (found.names, found.units) == (NAMES, UNITS)
+    np.testing.assert_array_equal(found.values, VALUES)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
+def test_a_degree_sign_is_read_in_each_usual_encoding(tmp_path, encoding):
+    found = one(put(tmp_path, "run.csv", "t [s],Roll [°]\n0,1\n1,2\n".encode(encoding)))
+    assert found.units == ("°",)
+
+
+def test_each_line_may_end_with_a_separator_and_holes_are_nan(tmp_path):
+    found = one(put(tmp_path, "run.csv", "time [s],a [m],b [m],\n0,1,2,\n1,,3,\n2,nan,4,\n"))
+    assert found.names == ("a [m]", "b [m]")
+    np.testing.assert_array_equal(found.values, [[1, 2], [np.nan, 3], [np.nan, 4]])
+
+
+@pytest.mark.parametrize(
+    ("text", "phrase"),
+    [
+        ("", "is empty"),
+        (" \n\n", "is empty"),
+        ("a,b\nc,d\n", "no row of numbers"),
+        ("1,2\n3,4\n", "no header row of 2 names"),
+        ("s,m\n1,2\n3,4\n", "units above the numbers, but no names"),
+        ("time [s],x [m]\n0,1\n1,2\n2,two\n", r"line 4, column 'x \[m\]': 'two' is not a number"),
+        ("time [s],x [m]\n0,1\n1,2\n2\n", "line 4: 1 fields, the header has 2"),
+        ("time [s],x [m]\n0,1\n1,2\n2,3,4\n", "line 4: 3 fields"),
+        ("time [s],t [s],x [m]\n0,0,1\n1,1,2\n", "all named as time"),
+        ("time [s],x [m]\n0,1\n", "1 sample"),
+        ("time [s]\n0\n1\n", "no channel"),
+    ],
+)
+def test_a_bad_table_is_refused_with_line_and_column(tmp_path, text, phrase):
+    with pytest.raises(RecordError, match=phrase):
+        load_raw(put(tmp_path, "run.csv", text))
+
+
+def test_a_parquet_table_is_read_with_its_units(tmp_path):
+    pd = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    frame = pd.DataFrame({"x [mm]": VALUES[:, 0], "note": "text"}, index=pd.Index(TIME, name="time [s]"))
+    frame.to_parquet(tmp_path / "run.parquet")
+    found = one(tmp_path / "run.parquet")
+    assert (found.names, found.units) == (("x [mm]",), ("mm",))
+    np.testing.assert_array_equal(found.time, TIME)
+
+
+# --------------------------------------------------------------------------------------------- MATLAB, HDF5, TDMS
+def test_matlab_variables_share_a_time_vector(tmp_path):
+    scipy.io.savemat(tmp_path / "run.mat", {"time": TIME, "x_in": VALUES[:, 0], "scalar": 3.0, "about": "a test"})
+    found = one(tmp_path / "run.mat")
+    assert (found.names, found.units) == (("x_in",), ("in",))
+    np.testing.assert_array_equal(found.time, TIME)
+    assert found.facts["about"] == "a test"
+
+
+def test_a_matlab_file_of_version_4_is_known_by_its_suffix(tmp_path):
+    scipy.io.savemat(tmp_path / "run.mat", {"time": TIME, "x_in": VALUES[:, 0]}, format="4")
+    found = one(tmp_path / "run.mat")
+    assert (found.names, found.units) == (("x_in",), ("in",))
+    np.testing.assert_array_equal(found.values[:, 0], VALUES[:, 0])
+
+
+@pytest.mark.parametrize("transposed", [False, True])
+def test_a_matlab_struct_may_hold_a_table_with_names_units_and_a_rate(tmp_path, transposed):
+    cells = np.array(NAMES, dtype=object)
+    content = {
+        "data": VALUES.T if transposed else VALUES,
+        "names": cells,
+        "units": np.array(UNITS, dtype=object),
+        "fs": RATE,
+        "calibration": np.eye(2),
+    }
+    scipy.io.savemat(tmp_path / "run.mat", {"run1": content})
+    found = load_raw(tmp_path / "run.mat")[0]
+    assert found.names == tuple(f"{n} [{u}]" for n, u in zip(NAMES, UNITS, strict=True))
+    assert found.units == UNITS
+    np.testing.assert_array_equal(found.values, VALUES)
+    np.testing.assert_array_equal(found.time, TIME)
+
+
+def test_matlab_structs_of_two_rates_are_two_samplings(tmp_path):
+    slow = {"t": TIME[::2], "x": VALUES[::2, 0]}
+    scipy.io.savemat(tmp_path / "run.mat", {"fast": {"t": TIME, "x": VALUES[:, 0]}, "slow": slow})
+    fast, slow = load_raw(tmp_path / "run.mat")
+    assert (fast.names, slow.names) == (("fast.x",), ("slow.x",))
+    np.testing.assert_array_equal(slow.time, TIME[::2])
+
+
+def test_a_matlab_file_of_version_7_3_is_read_as_one_of_version_5(tmp_path):
+    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:  # as MATLAB lays it out: axes reversed
+        names = [
+            file.create_dataset(f"#refs#/{k}", data=np.array([list(map(ord, n))], np.uint16).T)
+            for k, n in enumerate(NAMES)
+        ]
+        for text in names:
+            text.attrs["MATLAB_class"] = np.bytes_("char")
+        group = file.create_group("run1")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        group["data"] = VALUES.T
+        group["time"] = TIME[None]
+        cell = group.create_dataset("names", (1, 3), dtype=h5py.ref_dtype)
+        cell[0] = [text.ref for text in names]
+        cell.attrs["MATLAB_class"] = np.bytes_("cell")
+    with (tmp_path / "run.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116))
+    found = one(tmp_path / "run.mat")
+    assert found.names == NAMES
+    np.testing.assert_array_equal(found.values, VALUES)
+    np.testing.assert_array_equal(found.time, TIME)
+
+
+@pytest.mark.parametrize("clock", ["time", "dt of the dataset", "rate of the file"])
+def test_hdf5_datasets_take_time_from_beside_or_from_an_attribute(tmp_path, clock):
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        group = file.create_group("table")
+        data = group.create_dataset("disp", data=VALUES[:, 0])
+        data.attrs["units"] = "mm"
+        if clock == "time":
+            group["time"] = TIME
+        elif clock == "rate of the file":
+            file.attrs["sample_rate"] = RATE
+        else:
+            data.attrs["dt"] = 1 / RATE
+    found = one(tmp_path / "run.h5")
+    assert (found.names, found.units) == (("table.disp",), ("mm",))
+    np.testing.assert_array_equal(found.time, TIME)
+
+
+@pytest.mark.parametrize("engine", ["scipy", "h5netcdf"])
+def test_netcdf_tables_have_a_column_for_each_label(tmp_path, engine):
+    values = (("time", "place"), VALUES, {"units": "mm, g, psi"})
+    xr.Dataset({"sensor": values}, {"time": ("time", TIME, {"units": "s"}), "place": ["p", "q", "r"]}).to_netcdf(
+        tmp_path / "run.nc", engine=engine
+    )
+    found = one(tmp_path / "run.nc")
+    assert found.names == ("sensor_p", "sensor_q", "sensor_r")
+    assert found.units == ("mm", "g", "psi")
+    np.testing.assert_array_equal(found.values, VALUES)
+
+
+def test_tdms_channels_bring_unit_and_interval(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    about = {"wf_increment": 1 / RATE, "unit_string": "g"}
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as writer:
+        writer.write_segment([nptdms.ChannelObject("Table", "Ax", VALUES[:, 0], properties=about)])
+        writer.write_segment([nptdms.ChannelObject("Table", "slow", VALUES[:8, 0], properties={"wf_increment": 1.0})])
+    fast, slow = load_raw(tmp_path / "run.tdms")
+    assert (fast.names, fast.units, slow.names) == (("Ax",), ("g",), ("slow",))
+    np.testing.assert_array_equal(fast.values[:, 0], VALUES[:, 0])
+    np.testing.assert_array_equal(slow.time, np.arange(8))
+
+
+# --------------------------------------------------------------------------------------------- any file
+@pytest.mark.parametrize(
+    ("content", "phrase"),
+    [
+        (b"", "is empty"),
+        (b"\x00\x01\x02" * 99, "no format known here; readable are MTS 469D"),
+        (b"MATLAB 5.0 MAT-file" + b"\x07" * 200, "not a MATLAB file, or damaged"),
+        (b"MATLAB 7.3 MAT-file" + b"\x07" * 600, "not a MATLAB v7.3 file"),
+        (b"\x89HDF\r\n\x1a\n" + b"\x07" * 200, "not an HDF5 file"),
+        (b"CDF\x01" + b"\x07" * 200, "not a netCDF file"),
+        (b"TDSm" + b"\x07" * 200, "holds no array of samples"),
+        (b"PAR1" + b"\x07" * 200, "not a Parquet file"),
+    ],
+)
+def test_a_file_that_is_not_what_it_begins_as_is_refused_by_name(tmp_path, content, phrase):
+    path = put(tmp_path, "run.dat", content)
+    with pytest.raises(RecordError, match=re.escape(str(path)) + ".*" + phrase):
+        load_raw(path)
+
+
+def test_a_folder_and_a_missing_file_are_refused(tmp_path):
+    with pytest.raises(RecordError, match="is a folder"):
+        load_raw(tmp_path)
+    with pytest.raises(RecordError, match="no such file"):
+        load_raw(tmp_path / "gone.csv")
+
+
+def test_a_file_that_may_not_be_read_is_refused(tmp_path, monkeypatch):
+    def forbidden(self):
+        raise PermissionError(13, "Permission denied")
+
+    path = put(tmp_path, "run.csv", table())
+    monkeypatch.setattr(Path, "read_bytes", forbidden)
+    with pytest.raises(RecordError, match=r"run.csv: cannot be read: .*Permission denied"):
+        load_raw(path)
+
+
+@pytest.mark.parametrize(("module", "content"), [("nptdms", b"TDSm1234"), ("pyarrow", b"PAR11234")])
+def test_a_missing_package_is_named_with_the_extra_that_brings_it(tmp_path, monkeypatch, module, content):
+    monkeypatch.setitem(__import__("sys").modules, module, None)  # importing it now fails
+    with pytest.raises(RecordError, match=rf"needs {module}: pip install 'lhpost6-pin\[formats\]'"):
+        load_raw(put(tmp_path, "run.dat", content))
+
+
+PIECES = st.sampled_from(
+    [
+        *(key.ljust(32) + value.ljust(96) for key, value in ((b"CHANNELS", b"1"), (b"DELTA_T", b"0.1"), (b"A.B", b""))),
+        *(b"DESC.CHAN_1".ljust(128), b" x\n", b"CHANNELS: 1\n", b"DELTA_T=1\n", b"DESC.CHAN_1 a\n", b"1 2\n"),
+    ]
+)
+FUZZ = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=200)
+
+
+@FUZZ
+@given(st.lists(PIECES | st.binary(max_size=40), max_size=12), st.booleans())
+@example([b"CHANNELS".ljust(32) + b"9" * 9 + b" " * 87], True)
+def test_any_bytes_after_a_469d_beginning_are_channels_or_a_clear_error(tmp_path, pieces, binary):
+    path = put(tmp_path, "fuzz.bin", b"FILE_TYPE" + b" " * 119 * binary + b"".join(pieces))
+    try:
+        assert all(np.isfinite(found.time).all() for found in load_raw(path))
+    except LhpostError as error:
+        assert str(path) in str(error)
+
+
+ROWS = st.sampled_from(
+    ["time [s],x [m]", "0,1", "1;2", "1,5;2,5", "\t", '"', "1,nan", "# a: b", "s,m", "\0", "1e999,2"]
+)
+
+
+@FUZZ
+@given(st.lists(ROWS | st.text(max_size=12), max_size=12), st.sampled_from(["\n", "\r\n", "\r"]))
+def test_any_text_is_a_table_or_a_clear_error(tmp_path, lines, end):
+    path = put(tmp_path, "fuzz.csv", end.join(lines).encode("utf-8", "replace"))
+    try:
+        assert all(len(found.names) == found.values.shape[1] for found in load_raw(path))
+    except LhpostError as error:
+        assert str(path) in str(error)
+
+
+# --------------------------------------------------------------------------------------------- units
+@pytest.mark.parametrize(
+    ("unit", "si", "factor"),
+    [
+        ("in", "m", 0.0254),
+        ("IN", "m", 0.0254),
+        ("g", "m/s2", 9.80665),
+        ("G", "m/s2", 9.80665),
+        ("in/sec^2", "m/s2", 0.0254),
+        ("m_s2", "m/s2", 1),
+        ("m s-2", "m/s2", 1),
+        ("deg/s", "rad/s", np.pi / 180),
+        ("°", "rad", np.pi / 180),
+        ("mrad", "rad", 1e-3),
+        ("psi", "Pa", 6894.757293168361),
+        ("MPA", "Pa", 1e6),
+        ("mPa", "Pa", 1e-3),
+        ("kips", "N", 4448.2216152605),
+        ("KN", "N", 1e3),
+        ("%", "1", 0.01),
+        ("ms", "s", 1e-3),
+    ],
+)
+def test_units_as_facilities_spell_them_have_their_size(unit, si, factor):
+    assert quantity_unit(unit) == si
+    assert si_factor(unit, si) == pytest.approx(factor, rel=1e-12)  # products of a few floats
+
+
+@pytest.mark.parametrize(
+    "unit", ["V", "degC", "dB", "counts", "furlong/fortnight^9", "import os", "m**m", "", "1e9 m", "rad"]
+)
+def test_what_is_no_unit_of_acceleration_is_refused(unit):
+    with pytest.raises(RecordError):
+        si_factor(unit, "m/s2")
+
+
+@given(st.text(max_size=12))
+def test_any_text_is_a_unit_or_a_clear_error(text):
+    try:
+        assert si_factor(text, "m") > 0
+    except RecordError:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("time [s]", "s"),
+        ("Ax (g)", "g"),
+        ("accel_x_g", "g"),
+        ("accel_x_m_s2", "m_s2"),
+        ("H1 Press (A)", None),
+        ("chamber_pressure_b", None),
+        ("force_V6", None),
+        ("x [flob]", "flob"),
+        ("platen_displacement[x]", None),
+    ],
+)
+def test_a_name_gives_its_unit_only_if_it_holds_one(name, unit):
+    assert unit_in_name(name) == unit
+
+
+# --------------------------------------------------------------------------------------------- maps
+def mapped(channels: dict[str, Source], **test) -> ChannelMap:
+    return ChannelMap("map.toml", TestFacts(**test), channels)
+
+
+def supply(source: Source | None = None, **test) -> ChannelMap:
+    """Map of the one channel that needs no others beside it."""
+    return mapped({"supply_pressure": source or Source("c1")}, **test)
+
+
+def test_sign_gain_offset_and_unit_make_a_channel(tmp_path):
+    source = Source("c1", "psi", sign=-1, gain=2.0, offset=3.0)
+    record = make_imported_record([raw(VALUES[:, :1], ["bar"], TIME)], supply(source), LABELS)
+    expected = -2.0 * 6894.757293168361 * (VALUES[:, 0] + 3.0)
+    np.testing.assert_allclose(record["supply_pressure"], expected, rtol=1e-12)  # a few roundings
+
+
+def test_a_map_that_was_saved_is_loaded_the_same(tmp_path):
+    channels = mapped(
+        {
+            "supply_pressure": Source('P "supply" \\ *', "MPa", -1, 1.5, 0.25, "run*.csv"),
+            "platen_displacement[roll]": Source(constant=0.0, unit="rad"),
+            "platen_displacement[x]": Source(column=3),
+        },
+        name="EQ1",
+        valves_per_horizontal_actuator=2,
+        rate=512.0,
+        fill_gaps=3,
+    )
+    save_map(channels, tmp_path / "map.toml", ["a remark"])
+    loaded = load_map(tmp_path / "map.toml")
+    assert (loaded.test, loaded.channels) == (channels.test, channels.channels)
+    assert "# a remark" in (tmp_path / "map.toml").read_text()
+
+
+GOOD_MAP = '[test]\nname = "EQ1"\n[channel]\nsupply_pressure = { column = "c1", unit = "Pa" }\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "phrase"),
+    [
+        ("[test]", "[test", "not a TOML file"),
+        ("[test]", "[tests]", "unknown key 'tests'; valid are test, channel"),
+        ("name", "nmae", r"\[test\]: unknown key 'nmae'"),
+        ('"EQ1"', "1", "name = 1 must be a text"),
+        ('name = "EQ1"', "fill_gaps = 1.5", "fill_gaps = 1.5 must be a whole number"),
+        ('name = "EQ1"', "fill_gaps = -1", "fill_gaps = -1 must be 0 or more"),
+        ('name = "EQ1"', "rate = nan", "rate = nan must be a finite number"),
+        ('name = "EQ1"', "rate = 0", "rate = 0.0 must be positive"),
+        ('name = "EQ1"', 'kind = "dreamt"', "kind = 'dreamt' must be measured or simulated"),
+        ('name = "EQ1"', "valves_per_horizontal_actuator = 3", "must be 1 or 2"),
+        ('column = "c1"', 'colunm = "c1"', "supply_pressure: unknown key 'colunm'"),
+        ('column = "c1"', "column = true", "column = True must be a text or a whole number"),
+        ('column = "c1", ', "", "give a column, or else a constant"),
+        ('unit = "Pa"', "sign = 2", "sign = 2 must be 1 or -1"),
+        ('unit = "Pa"', "gain = 0.0", "gain = 0 leaves nothing"),
+        ('column = "c1", unit = "Pa"', "constant = 0.0", "a constant needs a unit"),
+        ('{ column = "c1", unit = "Pa" }', '"c1"', "supply_pressure: write"),
+        ('supply_pressure = { column = "c1", unit = "Pa" }', "", "names no channel"),
+    ],
+)
+def test_a_bad_map_is_refused_with_file_and_key(tmp_path, old, new, phrase):
+    path = put(tmp_path, "map.toml", GOOD_MAP.replace(old, new))
+    with pytest.raises(RecordError, match=phrase) as caught:
+        load_map(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("channels", "phrase"),
+    [
+        ({"supply": Source("c1")}, r"\[channel\] supply: is no channel of a record; valid are platen_displacement"),
+        ({"strut_pressure[S9]": Source("c1")}, r"valid are strut_pressure\[S1\], strut_pressure\[S2\]"),
+        ({"strut_pressure[S1]": Source("c1")}, "has S1, but not S2, S3; map them too"),
+        ({"supply_pressure": Source("c9")}, "no column 'c9' in 'run.csv'; columns are 'c1', 'c2', 'c3'"),
+        ({"supply_pressure": Source("c*")}, "'c\\*' could be any of run.csv column 1 'c1', run.csv column 2"),
+        ({"supply_pressure": Source(4)}, "no column 4; run.csv has 1 to 3"),
+        ({"supply_pressure": Source("c1", file="other*")}, "no file is called 'other\\*'; files are 'run.csv'"),
+        ({"supply_pressure": Source("c2")}, "'c2' of run.csv: unit 'g' cannot be turned into Pa"),
+        ({"supply_pressure": Source("c1", "flob")}, "unknown unit 'flob'"),
+        ({"supply_pressure": Source("c3")}, "'c3' of run.csv has no unit in the file; add unit"),
+        ({"supply_pressure": Source(constant=1.0, unit="g")}, "every channel is constant"),
+    ],
+)
+def test_a_map_that_does_not_fit_is_refused_with_its_key(channels, phrase):
+    with pytest.raises(RecordError, match=phrase) as caught:
+        make_imported_record([raw(VALUES, ["Pa", "g", None], TIME)], mapped(channels), LABELS)
+    assert "map.toml" in str(caught.value)
+
+
+def test_two_columns_of_one_name_need_a_number(tmp_path):
+    path = put(tmp_path, "run.csv", "time [s],p [Pa],p [Pa]\n0,1,2\n0.1,3,4\n")
+    with pytest.raises(RecordError, match=r"could be any of .* give the column's number"):
+        make_imported_record(load_raw(path), supply(Source("p [[]Pa]")), LABELS)
+    record = make_imported_record(load_raw(path), supply(Source(2)), LABELS)
+    np.testing.assert_array_equal(record["supply_pressure"], [2, 4])
+
+
+def test_a_channel_that_is_known_to_be_zero_is_said_to_be_stated():
+    zero = {f"platen_displacement[{axis}]": Source(constant=0.0, unit="deg") for axis in ("roll", "pitch", "yaw")}
+    zero |= {f"platen_displacement[{axis}]": Source(constant=2.0, unit="in") for axis in "yz"}
+    record = make_imported_record(
+        [raw(VALUES, ["mm"] * 3, TIME)], mapped({"platen_displacement[x]": Source("c1")} | zero), LABELS
+    )
+    assert (record["platen_displacement"].sel(axis="z") == 0.0508).all()
+    np.testing.assert_array_equal(record["platen_displacement"].sel(axis="x"), 1e-3 * VALUES[:, 0])
+    assert "platen_displacement[yaw]" in record.attrs["constant"]
+
+
+def test_forces_follow_from_pressures_where_only_these_were_measured(tmp_path):
+    names = [f"chamber_pressure_a[{a}]" for a in LABELS["actuator"]] + [
+        f"chamber_pressure_b[{a}]" for a in LABELS["horizontal"]
+    ]
+    channels = mapped({name: Source(k + 1, "MPa") for k, name in enumerate(names)})
+    columns = [raw(sines(400, 14), [None] * 14, TIME)]
+    areas = {name: (0.2, 0.1) if name[0] == "H" else (0.5, 0.0) for name in LABELS["actuator"]}
+    record = make_imported_record(columns, channels, LABELS, areas)
+    p_a, p_b = record["chamber_pressure_a"].sel(actuator="H2"), record["chamber_pressure_b"].sel(horizontal="H2")
+    np.testing.assert_allclose(record["actuator_force"].sel(actuator="H2"), 0.2 * p_a - 0.1 * p_b, rtol=1e-12)
+    assert "chamber pressures" in record.attrs["derived"]
+    assert "actuator_force" not in make_imported_record(columns, channels, LABELS)
+
+
+# --------------------------------------------------------------------------------------------- time, gaps, rates
+def test_a_file_that_says_nothing_of_time_needs_its_rate():
+    columns = [raw(VALUES[:, :1], ["Pa"], None)]
+    with pytest.raises(RecordError, match=r"says nothing about time; .* file_rate"):
+        make_imported_record(columns, supply(), LABELS)
+    assert make_imported_record(columns, supply(file_rate=RATE), LABELS).attrs["sample_rate_hz"] == RATE
+
+
+def test_stamps_with_few_decimals_stand_for_uniform_times():
+    time = np.arange(4000) / 2048  # a step of 0.488 ms, written to 0.1 ms
+    record = make_imported_record([raw(sines(4000, 1), ["Pa"], np.round(time, 4))], supply(), LABELS)
+    # the fit averages rounding errors of at most 0.05 ms over 4000 stamps
+    np.testing.assert_allclose(record["time"], time, atol=1e-5)
+
+
+def test_stamps_in_single_precision_stand_for_uniform_times():
+    time = 200 + np.arange(4000) / 2048  # float32 holds 200 s to 8 us, 1.6 % of a step
+    record = make_imported_record([raw(sines(4000, 1), ["Pa"], time.astype("f4").astype(float))], supply(), LABELS)
+    np.testing.assert_allclose(record["time"], time, atol=1e-5)  # as above
+
+
+@pytest.mark.parametrize(
+    ("change", "phrase"),
+    [
+        (lambda t: t[::-1], "sample 1: does not increase"),
+        (lambda t: np.concatenate([t[:9], t[8:-1]]), "sample 9: does not increase"),
+        (lambda t: np.where(np.arange(400) == 7, np.nan, t), "sample 7: nan is no time in seconds"),
+        (lambda t: t + 0.3 / RATE * (np.arange(400) == 50), "sample 50: .* 0.3 of a sample off its place"),
+        (lambda t: t + 5 / RATE * (np.arange(400) >= 50), r"sample 50: 5 samples are missing .* fill_gaps = 5"),
+        (lambda t: t * 1e308, "sample 1: 3.90625e.305 is no time in seconds"),
+    ],
+)
+def test_time_that_is_not_uniform_is_refused_with_the_sample(change, phrase):
+    with pytest.raises(RecordError, match=f"run.csv, time, {phrase}"):
+        make_imported_record([raw(VALUES[:, :1], ["Pa"], change(TIME))], supply(fill_gaps=2), LABELS)
+
+
+def test_a_gap_in_time_is_filled_where_the_map_allows_it_and_said():
+    keep = np.delete(np.arange(400), [100, 101, 102])
+    columns = [raw(VALUES[keep, :1], ["Pa"], TIME[keep])]
+    with pytest.raises(RecordError, match="sample 100: 3 samples are missing"):
+        make_imported_record(columns, supply(fill_gaps=2), LABELS)
+    record = make_imported_record(columns, supply(fill_gaps=3), LABELS)
+    assert record.attrs["filled"] == "interpolated samples: run.csv: 3 from sample 100"
+    np.testing.assert_allclose(record["time"], TIME, atol=1e-12)  # a straight line through exact stamps
+    # a cubic over 4 steps of h: |x''''| (4 h)^4 / 384 = (2 pi)^4 (4 / 256)^4 / 384 = 2e-7 for 1 Hz
+    np.testing.assert_allclose(record["supply_pressure"], VALUES[:, 0], atol=2.5e-7)
+
+
+def test_a_hole_in_a_channel_is_filled_where_the_map_allows_it_and_said():
+    values = VALUES[:, :1].copy()
+    values[200:202] = np.nan
+    columns = [raw(values, ["Pa"], TIME)]
+    with pytest.raises(
+        RecordError, match=r"run.csv, supply_pressure \(column 'c1'\), sample 200: 2 samples .* fill_gaps = 2"
+    ):
+        make_imported_record(columns, supply(), LABELS)
+    record = make_imported_record(columns, supply(fill_gaps=2), LABELS)
+    assert record.attrs["filled"] == "interpolated samples: supply_pressure: 2 from sample 200"
+    np.testing.assert_allclose(record["supply_pressure"], VALUES[:, 0], atol=2.5e-7)  # as above, over fewer steps
+
+
+@pytest.mark.parametrize(
+    ("place", "phrase"), [(0, "sample 0: 1 samples at the start"), (399, "sample 399: 1 samples at the end")]
+)
+def test_a_hole_at_an_end_cannot_be_interpolated(place, phrase):
+    values = VALUES[:, :1].copy()
+    values[place] = np.inf
+    with pytest.raises(RecordError, match=phrase):
+        make_imported_record([raw(values, ["Pa"], TIME)], supply(fill_gaps=9), LABELS)
+
+
+def two_rates(frequency: float) -> tuple[list, np.ndarray, np.ndarray]:
+    """A sine sampled at 2048 Hz in one file and at 512 Hz in another."""
+    fast, slow = np.arange(8192) / 2048, np.arange(2048) / 512
+    files = [
+        raw(np.sin(2 * np.pi * frequency * t)[:, None], ["Pa"], t, name) for t, name in ((fast, "fast"), (slow, "slow"))
+    ]
+    return files, fast, slow
+
+
+def struts(file: str, **test) -> ChannelMap:
+    channels = {f"strut_pressure[S{k}]": Source("c1", file=file) for k in (1, 2, 3)}
+    return mapped({"supply_pressure": Source("c1", file="fast"), **channels}, **test)
+
+
+def test_files_of_different_rates_meet_at_the_highest():
+    files, fast, _ = two_rates(20.0)
+    record = make_imported_record(files, struts("slow"), LABELS)
+    assert record.attrs["sample_rate_hz"] == 2048
+    np.testing.assert_array_equal(record["supply_pressure"], np.sin(40 * np.pi * fast)[: record.sizes["time"]])
+    inner = record.isel(time=slice(200, -200))  # clear of the ends by 48 samples of the slow file
+    expected = np.sin(40 * np.pi * inner["time"])
+    # the resampling is good to 1e-7 of the amplitude
+    np.testing.assert_allclose(inner["strut_pressure"].sel(strut="S2"), expected, atol=1e-7)
+
+
+@pytest.mark.parametrize(("frequency", "left"), [(50.0, 1.0), (400.0, 0.0)])
+def test_going_down_to_a_rate_keeps_what_it_can_hold_and_drops_what_would_fold(frequency, left):
+    files, _, _ = two_rates(frequency)
+    record = make_imported_record(files[:1], supply(rate=512.0), LABELS)
+    assert record.attrs["sample_rate_hz"] == 512
+    inner = record["supply_pressure"].isel(time=slice(100, -100))
+    # the filter at 0.4 of the new rate, 204.8 Hz, has gain 1 / (1 + (f / 204.8)^16): 1 - 2e-10 at 50 Hz, 2e-5 at 400 Hz
+    np.testing.assert_allclose(inner, left * np.sin(2 * np.pi * frequency * inner["time"]), atol=4e-5)
+
+
+def test_files_that_share_no_stretch_of_time_are_refused():
+    files, _, _ = two_rates(20.0)
+    later = raw(files[1].values, ["Pa"], files[1].time + 100, "slow")
+    with pytest.raises(RecordError, match=r"share no stretch of time: 0 to 3.99951 s, 100 to 103.998 s"):
+        make_imported_record([files[0], later], struts("slow"), LABELS)
+
+
+# --------------------------------------------------------------------------------------------- guess
+def test_a_typical_channel_list_is_guessed_right(tmp_path):
+    typical = typical_channels()
+    columns = [(t.description, t.unit, np.zeros(1)) for t in typical]
+    path = put(tmp_path, "run.bin", binary_469d(header(columns, 1 / RATE), sines(8, len(columns))))
+    channels, remarks = guess_map(load_raw(path), LABELS)
+    found = {source.column: name for name, source in channels.channels.items()}
+    assert {t.description: found.get(t.description) for t in typical} == {t.description: t.channel for t in typical}
+    unmatched = [t.description for t in typical if t.channel is None]
+    assert len(remarks) == len(unmatched)
+    assert all(any(repr(name) in remark for remark in remarks) for name in unmatched)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "channel"),
+    [
+        ("Ax (g)", "g", "platen_acceleration[x]"),
+        ("accel_x_g", "g", "platen_acceleration[x]"),
+        ("TableAccelY", "g", "platen_acceleration[y]"),
+        ("X", "mm", "platen_displacement[x]"),
+        ("rx", "deg", "platen_displacement[roll]"),
+        ("V1 Press", "psi", "chamber_pressure_a[V1]"),
+        ("P_A H3", "bar", "chamber_pressure_a[H3]"),
+        ("actuator_force_V6 [kN]", "kN", "actuator_force[V6]"),
+        ("Actuator H2 stroke", "mm", "actuator_displacement[H2]"),
+        ("H1 Press", "psi", None),  # of which chamber?
+        ("Long Displ fbk", "g", None),  # the unit says otherwise
+        ("H1 Delta P", "psi", None),
+        ("Humidity", "%", None),
+    ],
+)
+def test_one_name_is_guessed_as(name, unit, channel):
+    columns = raw(VALUES, ["Pa", unit, None], TIME)
+    columns = columns.__class__(columns.source, "table", ("Supply Press", name, "?"), columns.units, VALUES, TIME)
+    found = guess_map([columns], LABELS).channels.channels
+    assert set(found) - {"supply_pressure"} == ({channel} if channel else set())
+
+
+def test_a_guess_says_what_it_left_open(tmp_path):
+    path = put(tmp_path, "run.csv", "time,Long Displ,Long Displ fbk [in],Foo\n0,1,2,3\n1,2,3,4\n")
+    _, remarks = guess_map(load_raw(path), LABELS)
+    text = "\n".join(remarks)
+    assert "add the unit of platen_displacement[x]: column 1" in text
+    assert "also like platen_displacement[x]: column 2" in text
+    assert "not recognised: column 3" in text
+    assert 'not found: "platen_displacement[yaw]" = { constant = 0.0, unit = "rad" }' in text
+
+
+def test_columns_of_which_none_is_recognised_need_a_map_by_hand():
+    with pytest.raises(RecordError, match="no column's name is recognised among 'c1', 'c2', 'c3'"):
+        guess_map([raw(VALUES, [None] * 3, TIME)], LABELS)
+
+
+def test_a_469d_file_becomes_a_record_through_its_guessed_map(tmp_path):
+    typical = [t for t in typical_channels() if t.channel]
+    values = sines(512, len(typical))
+    columns = [(t.description, t.unit, values[:, k]) for k, t in enumerate(typical)]
+    path = put(tmp_path, "run.bin", binary_469d(header(columns, 1 / RATE), values))
+    save_map(guess_map(load_raw(path), LABELS).channels, tmp_path / "map.toml")
+    record = make_imported_record(load_raw(path), load_map(tmp_path / "map.toml"), LABELS)
+    save_record(record, tmp_path / "run.nc")
+    loaded = load_record(tmp_path / "run.nc", LABELS)
+    column = next(k for k, t in enumerate(typical) if t.channel == "platen_acceleration[y]")
+    expected = 9.80665 * values[:, column]
+    np.testing.assert_allclose(loaded["platen_acceleration"].sel(axis="y"), expected, rtol=2 * SINGLE, atol=0)
+    assert "platen_acceleration[y] = run.bin: Lat Accel fbk [g]" in loaded.attrs["columns"]

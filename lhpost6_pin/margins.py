@@ -84,7 +84,8 @@ def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> L
     force = to_force @ states
     legs = controller.jacobian[:, axes]
     rate = np.linalg.solve(np.eye(plant.spools) + controller.balance @ force, legs.astype(complex))
-    return LoopModel(frequency, to_c @ states @ rate, legs.T @ (force @ rate))
+    displacement, felt = to_c @ states @ rate, legs.T @ (force @ rate)
+    return LoopModel(frequency, np.asarray(displacement, np.complex128), np.asarray(felt, np.complex128))
 
 
 def loop_gain(model: LoopModel, controller: Controller) -> Complex:

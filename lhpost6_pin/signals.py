@@ -90,6 +90,8 @@ def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
     spectra = np.conj(fft.rfft([w * ref, w, w], size)) * fft.rfft([sig, sig**2, sig], size) / size
     cov, square, mean = size * np.roll(fft.irfft(spectra, size), margin, axis=1)[:, : 2 * margin + 1]
     variance = square - mean**2
+    if not variance.max() > 0:
+        return float("nan")
     tau = whole = float(np.argmax(cov / np.sqrt(np.maximum(variance, 1e-12 * variance.max())))) - margin
     spectra[:, 1 : (size + 1) // 2] *= 2.0  # for the negative frequencies
     for _ in range(20):
@@ -100,6 +102,8 @@ def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
             -(term.real @ omega**2),
         )
         v, v1, v2 = s - m**2, s1 - 2 * m * m1, s2 - 2 * (m1**2 + m * m2)
+        if not (c > 0 and v > 0):  # nothing but rounding varies
+            break
         slope = c1 / c - v1 / (2 * v)  # of the logarithm of cov / sqrt(variance)
         curvature = c2 / c - (c1 / c) ** 2 - (v2 / v - (v1 / v) ** 2) / 2
         if not curvature < 0:

@@ -37,7 +37,13 @@ def copy(tmp_path: Path) -> Path:
 
 def start(code: str, installed: Path, **environment: str | None) -> "subprocess.Popen[str]":
     """Start Python on the package at `installed`; a variable that is None is unset."""
-    variables = {**os.environ, "XDG_CACHE_HOME": None, "PYTHONPATH": str(installed.parent), **environment}
+    variables = {
+        **os.environ,
+        "XDG_CACHE_HOME": None,
+        "LHPOST6_CACHE_DIR": None,
+        "PYTHONPATH": str(installed.parent),
+        **environment,
+    }
     return subprocess.Popen(
         [sys.executable, "-B", "-c", code],
         env={k: v for k, v in variables.items() if v is not None},

@@ -245,3 +245,11 @@ def test_a_band_commutes_with_differentiation() -> None:
 def test_a_band_that_passes_nothing_is_refused(low: float, high: float) -> None:
     with pytest.raises(ValueError, match="no band"):
         Band(low, high)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_delay_of_what_varies_by_rounding_alone_is_no_error(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    held = 0.1 + 1e-17 * rng.integers(-3, 4, (2, 4096))  # a spool that holds: equal to the last bit, or nearly
+    late = delay(held[0], held[1], 1 / 2048)
+    assert np.isnan(late) or abs(late) <= 0.1

@@ -94,7 +94,7 @@ def spectrum_blocks(found: Sequence[Comparison]) -> list[Markup]:
             f, power = welch(scale.factor * values, SAMPLE_RATE, nperseg=length)
             inside = (f >= SHOWN[0]) & (f <= SHOWN[1]) & (power > 0.0)
             curves.append(Curve(name, f[inside], np.sqrt(power[inside]), line))
-        top = max((float(np.max(c.y)) for c in curves if np.size(c.y)), default=1.0)
+        top = max((float(np.max(np.asarray(c.y, float))) for c in curves if np.size(c.y)), default=1.0)
         panel = Panel(f"Spectral density [{scale.unit}/√Hz]", curves, log=True, span=(1e-5 * top, 2.0 * top))
         words = f"RRMSE {percent(one.errors[0])} in the first run, {percent(one.errors[1])} in the best."
         over = XAxis("Frequency [Hz]", log=True, span=SHOWN, ticks=(0.2, 0.5, 1, 2, 5, 10, 20, 50, 100))

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .compiled import compiled
-from .equilibrium import hydraulic_rows
 from .errors import RecordError, SimulationError
 from .ledger import Ledger, States, add_at_c, force_ledger
 from .plant import Plant
@@ -125,14 +124,16 @@ def inverse_dynamics(
 
 
 def seen_velocity(motion: PlantMotion, dt: float) -> Array:
-    """Velocity that forces saw at each model step of a semi-implicit run (n, nv): that of the step before, extrapolated.
+    """Velocity (n, nv) that forces saw at each model step of a semi-implicit run: the last step's, extrapolated.
 
     See `schemes.staggered_stage`.
     """
     return np.vstack([motion.v[:1], motion.v[:-1] + dt * motion.a[:-1]])
 
 
-def march_states(plant: Plant, motion: PlantMotion, dt: float, start: Array | None = None, *, spool: Array | None = None) -> Array:
+def march_states(
+    plant: Plant, motion: PlantMotion, dt: float, start: Array | None = None, *, spool: Array | None = None
+) -> Array:
     """Hidden states (n, n_states) along a motion, from `start` (n_states,) or all zero, one step a sample.
 
     Friction states only; with spool (n - 1 or more, n_actuators), the mean over each step, chamber pressures as well.

@@ -9,7 +9,8 @@ All are zero where the model is right and sensors are perfect. The laws are thos
 tables; accelerations come from the fused engine's forward dynamics, whose oracle is Pinocchio.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,7 @@ class Measured:
     pressure_rate: Array | None  # [Pa/s]
     strut_pressure: Array | None  # (n, n_struts) [Pa]
     spool: Array | None  # (n, n_actuators) at the samples' instants [1]
+    share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
 
     @property
     def samples(self) -> int:
@@ -73,7 +75,7 @@ class Residuals(NamedTuple):
 
 
 def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float) -> Measured:
-    """Make a record ready, with the platen motion that was found from it; pressures are differentiated up to `cutoff` [Hz].
+    """Make a record ready, with the platen motion found from it; pressures are differentiated up to `cutoff` [Hz].
 
     Raises RecordError if neither forces nor pressures were measured.
     """

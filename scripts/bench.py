@@ -27,9 +27,11 @@ from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.files import refuse_folder, write_whole
+from lhpost6_pin.inverse_dynamics import inverse_dynamics
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import make_plant
+from lhpost6_pin.pose import platen_motion
 from lhpost6_pin.schemes import SCHEMES
 from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, simulate
 
@@ -105,6 +107,15 @@ class Bench:
             jobs = [(self.plant, self.closed(samples))] * count
             took = best(lambda j=jobs: simulate_many(j, samples=samples), self.repeats)
             self.add(f"fused, {count} machines, {os.cpu_count()} cores", took / count, "s a machine")
+
+    def inverse(self, seconds: int) -> None:
+        """Inverse dynamics with its full ledger of a run recorded at the controller's rate."""
+        samples = seconds * SAMPLE_RATE
+        run = simulate(self.plant, self.closed(samples), samples=samples, engine="fused")
+        motion = platen_motion(self.plant, run.q, run.v, run.a)
+        force = np.zeros((len(run.time), self.plant.spools))
+        took = best(lambda: inverse_dynamics(self.plant, run.time, motion, force), self.repeats)
+        self.add(f"inverse dynamics, {seconds} s at {SAMPLE_RATE} Hz", took, "s")
 
     def against(self) -> None:
         """Ratios to a plain NumPy-and-Pinocchio loop and to SciPy's solve_ivp on the same work."""
@@ -209,6 +220,7 @@ def main(
     bench.engines(0.5 if quick else 10.0)
     bench.against()
     bench.lengths((1, 2) if quick else (5, 10, 20, 40))
+    bench.inverse(1 if quick else 20)
     bench.machines((1, 2) if quick else (1, 2, 4, 8, 16), 1 if quick else 5)
     if not quick:
         bench.first_result()

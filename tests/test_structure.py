@@ -29,10 +29,10 @@ LAYERS = [
     {"energy", "identify", "margins", "inverse_dynamics"},
     {"residuals", "sensor_pairs"},
     {"consistency", "campaign", "decompose"},
-    {"calibration"},
+    {"calibration", "validation"},
     {"tuning", "iterate", "sine"},
     {"rehearse", "tables", "doctor", "fmi", "link"},
-    {"report", "viewer_page", "control_tables"},
+    {"report", "viewer_page", "control_tables", "calibration_table"},
     {"viewer"},
     {"cli"},
 ]

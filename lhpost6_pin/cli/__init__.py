@@ -4,7 +4,7 @@ Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the in
 read or written, 130 interrupted.
 """
 
-from . import connect, controllers, data, look, runs  # each adds its commands
+from . import calibration, connect, controllers, data, forces, look, runs, validation  # each adds its commands
 from .app import app, main
 
-__all__ = ["app", "connect", "controllers", "data", "look", "main", "runs"]
+__all__ = ["app", "calibration", "connect", "controllers", "data", "forces", "look", "main", "runs", "validation"]

@@ -1,0 +1,152 @@
+"""Sensor errors as unknowns: gain and offset of every column, delay of every group, each with its prior.
+
+    measured(t) = (1 + gain) true(t - delay) + offset
+
+Displacement, velocity and acceleration of the platen are fused into one motion; each channel's gain acts on its share
+in it, to first order. Their skews have been taken out; what the others are late against is the platen's motion.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..machine import Machine
+from ..names import AXES
+from ..pose import PlatenMotion
+from ..residuals import Measured
+from ..sensors import Sensors
+from ..signals import align
+
+__all__ = ["SensorUnknown", "corrected", "sensor_unknowns"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SensorUnknown:
+    """One error of one sensor: `kind` gain [1], offset [unit of the channel] or delay [s]."""
+
+    name: str  # such as "gain actuator_force[H1]", "delay spool_position"
+    kind: str
+    channel: str
+    column: int  # -1 for all columns of a delay's group
+    sd: float  # of the prior, about zero
+    unit: str
+    alone: tuple[str, int]  # evaluated together: unknowns of one `alone[0]` act on different rows, marked by alone[1]
+
+
+_CHANNELS = {
+    "platen_displacement": "m | rad",
+    "platen_velocity": "m/s | rad/s",
+    "platen_acceleration": "m/s2 | rad/s2",
+    "actuator_force": "N",
+    "chamber_pressure_a": "Pa",
+    "chamber_pressure_b": "Pa",
+    "strut_pressure": "Pa",
+    "spool_position": "1",
+}
+_FIELDS: Mapping[str, tuple[tuple[str, int, bool], ...]] = {
+    "actuator_force": (("actuator_force", 0, True),),
+    "chamber_pressure_a": (("pressure", 0, True), ("pressure_rate", 0, False)),
+    "chamber_pressure_b": (("pressure", -1, True), ("pressure_rate", -1, False)),
+    "strut_pressure": (("strut_pressure", 0, True),),
+    "spool_position": (("spool", 0, True),),
+}
+"""Fields of a test that a channel's error is in: name, its first column (-1: after chambers A), if offsets count."""
+
+_DELAYED: Mapping[str, tuple[str, ...]] = {
+    "actuator_force": ("actuator_force",),
+    "chamber_pressure": ("pressure", "pressure_rate"),
+    "strut_pressure": ("strut_pressure",),
+    "spool_position": ("spool",),
+}
+_DELAYS = ("actuator_force", "chamber_pressure", "strut_pressure", "spool_position")
+
+
+def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple[SensorUnknown, ...]:
+    """Unknown errors of the channels that a test has, for which the sensors state a range."""
+    columns: dict[str, tuple[str, ...]] = {
+        **dict.fromkeys(("platen_displacement", "platen_velocity", "platen_acceleration"), ()),
+        **dict.fromkeys(test.share, AXES),
+        "actuator_force": machine.actuator_names if test.actuator_force is not None else (),
+        "chamber_pressure_a": machine.actuator_names if test.pressure is not None else (),
+        "chamber_pressure_b": machine.double_acting if test.pressure is not None else (),
+        "strut_pressure": machine.strut_names if test.strut_pressure is not None else (),
+        "spool_position": machine.actuator_names if test.spool is not None else (),
+    }
+    found = []
+    for channel, unit in _CHANNELS.items():
+        for kind, sd in (("gain", sensors.gain_sd(channel)), ("offset", sensors.offset_sd(channel))):
+            if channel.startswith("platen") and kind == "offset":
+                continue  # the control zero-position is where they are zero
+            for i, label in enumerate(columns[channel] if sd > 0.0 else ()):
+                if channel.startswith("platen") and not np.any(test.motion.displacement[:, i]):
+                    continue  # a guided platen
+                found.append(
+                    SensorUnknown(
+                        f"{kind} {channel}[{label}]",
+                        kind,
+                        channel,
+                        i,
+                        sd,
+                        "1" if kind == "gain" else unit,
+                        _alone(machine, kind, channel, i),
+                    )
+                )
+    for group in _DELAYS:
+        sd = sensors.delay_sd(group)
+        if sd > 0.0 and columns[{"chamber_pressure": "chamber_pressure_a"}.get(group, group)]:
+            found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
+    return tuple(found)
+
+
+def _alone(machine: Machine, kind: str, channel: str, column: int) -> tuple[str, int]:
+    """Spools and pressures act on one actuator's residuals, a strut's pressure on its own: one evaluation for all."""
+    if channel in ("chamber_pressure_a", "spool_position", "strut_pressure"):
+        return f"{kind} {channel}", column
+    if channel == "chamber_pressure_b":
+        return f"{kind} {channel}", machine.actuator_names.index(machine.double_acting[column])
+    return f"{kind} {channel} {column}", -1
+
+
+def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array) -> Measured:
+    """The test as perfect sensors would have shown it, if their errors were `values`; what has none is not copied."""
+    off = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+    arrays: dict[str, Array] = {}
+    for kind in ("offset", "gain"):
+        for unknown, value in off:
+            if unknown.kind != kind or unknown.channel in test.share:
+                continue
+            for field, first, itself in _FIELDS[unknown.channel]:
+                if kind == "offset" and not itself:
+                    continue
+                array = arrays.setdefault(field, _field(test, field).copy())
+                column = unknown.column + (first if first >= 0 else array.shape[1] - _doubles(test))
+                if kind == "gain":
+                    array[:, column] /= 1.0 + value
+                else:
+                    array[:, column] -= value
+    for unknown, value in off:
+        if unknown.kind == "delay":
+            for field in _DELAYED[unknown.channel]:
+                arrays[field] = align(arrays.get(field, _field(test, field)), value, test.dt)
+    platen = [(u, v) for u, v in off if u.channel in test.share]
+    motion = test.motion
+    if platen:
+        motion = PlatenMotion(*(x.copy() for x in motion))
+        for unknown, value in platen:
+            for moved, share in zip(motion, test.share[unknown.channel], strict=True):
+                moved[:, unknown.column] -= value * share[:, unknown.column]
+    return replace(test, motion=motion, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
+
+
+def _field(test: Measured, field: str) -> Array:
+    return np.asarray(getattr(test, field))
+
+
+def _doubles(test: Measured) -> int:
+    """Chambers B in a test."""
+    assert test.pressure is not None and test.spool is not None
+    return test.pressure.shape[1] - test.spool.shape[1]

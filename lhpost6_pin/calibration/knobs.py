@@ -1,0 +1,149 @@
+"""Knobs: the coordinates in which a machine is calibrated, each with its prior.
+
+A knob turns one number of the machine file, or several together where only their sum means anything (the heights of a
+kind's platen points). It is worth a coordinate: the logarithm of a factor for what is positive, a shift for the rest;
+zero is the machine as given, and its prior is normal with the stated standard deviation.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..machine import Machine
+from ..parameters import Quantity
+
+__all__ = ["Knob", "machine_knobs", "with_knobs"]
+
+Array = NDArray[np.float64]
+
+_OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus")
+_GAS = ("pressure", "polytropic_index")
+_MECHANICAL = (
+    *("mass", "inertia", "viscous"),
+    *("seal_friction", "seal_yield", "seal_shape"),
+    *("pad_friction", "pad_yield", "pad_shape"),
+)
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One coordinate of the machine; `sd` is its prior standard deviation."""
+
+    name: str  # such as "horizontal.flow", "platen.mass[x]", "horizontal.platen_height"
+    paths: tuple[tuple[str, int], ...]  # what it turns: path in the machine file, and component of a vector or -1
+    unit: str
+    value: float  # nominal, in `unit`
+    sd: float  # of the coordinate: relative where `relative`, else in `unit`
+    relative: bool  # coordinate ln(value / nominal), else value - nominal
+    shows_in: tuple[str, ...]  # residuals that can tell of it
+    lowest: float = -math.inf  # coordinate below which no machine can be built
+
+    def at(self, coordinate: float) -> float:
+        """Value in `unit` at a coordinate."""
+        return self.value * math.exp(coordinate) if self.relative else self.value + coordinate
+
+    def coordinate(self, value: float) -> float:
+        """Coordinate of a value in `unit`."""
+        return math.log(value / self.value) if self.relative else value - self.value
+
+
+def machine_knobs(machine: Machine) -> tuple[Knob, ...]:
+    """Knobs of all numbers of a machine that state an uncertainty: platen, oil, kinds, and heights of each kind.
+
+    Numbers that a single component overrides stay with the component; other geometry is left alone.
+    """
+    parameters = machine.parameters
+    kinds = list(dict.fromkeys(c.kind for c in machine.components))
+    sections = ("platen", "hydraulics", *kinds)
+    found: list[Knob] = []
+    for path, quantity in parameters.items():
+        section, _, name = path.partition(".")
+        if section not in sections or quantity.sd is None or name == "bearing_plane":
+            continue
+        found += _knobs_of(path, name, quantity)
+    for kind in kinds:
+        found += _heights(machine, kind)
+    free = "xyz" if machine.motion == "free" else machine.motion
+    return tuple(_with_room(k, machine) for k in found if _felt(k, free))
+
+
+def _with_room(knob: Knob, machine: Machine) -> Knob:
+    """A chamber must hold oil at the end of the stroke."""
+    kind, _, name = knob.name.partition(".")
+    if not name.startswith("chamber_"):
+        return knob
+    stroke = max(a.stroke for a in machine.actuators if a.kind == kind)
+    return replace(knob, lowest=knob.coordinate(1.001 * stroke))
+
+
+def _felt(knob: Knob, free: str) -> bool:
+    """False for a mass or inertia about an axis in which a guided platen cannot move, and for its geometry."""
+    if len(free) == 3:
+        return True
+    if knob.name.startswith("platen."):
+        return knob.name == f"platen.mass[{free}]"
+    return not knob.name.endswith("_height")
+
+
+def _knobs_of(path: str, name: str, quantity: Quantity) -> list[Knob]:
+    shows_in: tuple[str, ...] = ("flow",) if name in _OIL else ("wrench", "gas") if name in _GAS else ("wrench",)
+    if name not in _OIL + _GAS + _MECHANICAL:
+        shows_in = ("wrench", "flow", "gas")
+    values = quantity.value if isinstance(quantity.value, tuple) else (quantity.value,)
+    assert quantity.sd is not None
+    sds = quantity.sd if isinstance(quantity.sd, tuple) else (quantity.sd,) * len(values)
+    found = []
+    for i, (value, sd) in enumerate(zip(values, sds, strict=True)):
+        if sd <= 0.0:
+            continue
+        vector = isinstance(quantity.value, tuple)
+        relative = value > 0.0 and name != "centre_of_gravity"
+        label = f"{path}[{'xyz'[i]}]" if vector else path
+        at = ((path, i if vector else -1),)
+        found.append(Knob(label, at, quantity.unit, value, sd / value if relative else sd, relative, shows_in))
+    return found
+
+
+def _heights(machine: Machine, kind: str) -> list[Knob]:
+    """Height of the platen points and of the base points of a kind, its components moved together."""
+    members = [c for c in machine.components if c.kind == kind]
+    bearing = getattr(members[0], "mount", "swivel") == "bearing"
+    found = []
+    for end in ("platen_point", "base_point"):
+        if bearing and end == "base_point":
+            continue  # the leg is measured from its zero length: where its foot stands says nothing
+        paths = [(f"{c.name}.{end}", 2) for c in members]
+        if bearing:
+            paths.append(("platen.bearing_plane", 2))
+        heights = [getattr(c, end)[2] for c in members]
+        stated = [machine.parameters[path].sd for path, _ in paths[: len(members)]]
+        if any(sd is None for sd in stated):
+            continue
+        sd = float(np.mean([s[2] if isinstance(s, tuple) else s for s in stated if s is not None]))
+        name = f"{kind}.{end.split('_')[0]}_height"
+        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, False, ("wrench", "flow", "gas")))
+    return found
+
+
+def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> Machine:
+    """Copy of a machine with its knobs turned to coordinates (k,); raises ParameterError for what cannot be."""
+    return machine.with_params(knob_changes(machine, knobs, coordinates))
+
+
+def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> dict[str, float | list[float]]:
+    """New values by path, as `Machine.with_params` takes them."""
+    values: dict[str, float | list[float]] = {}
+    for knob, x in zip(knobs, coordinates, strict=True):
+        for path, i in knob.paths:
+            now = machine.parameters[path].value
+            if i < 0:
+                values[path] = knob.at(float(x))
+                continue
+            vector = values.setdefault(path, list(now) if isinstance(now, tuple) else [now])
+            assert isinstance(vector, list)
+            # points of a kind may stand at different heights: each is shifted
+            vector[i] = knob.at(float(x)) if len(knob.paths) == 1 else vector[i] + float(x)
+    return values

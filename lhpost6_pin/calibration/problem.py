@@ -1,0 +1,201 @@
+"""A campaign made ready to be fitted: residuals of all tests and their derivatives by every unknown, whitened.
+
+Unknowns are the machine's knobs and the sensors' errors, in this order: x (p,), zero where nothing is off.
+"""
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from typing import NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from ..machine import Machine
+from ..plant import Plant, make_plant
+from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow, path_key
+from ..sensors import Sensors
+from .errors import corrected, sensor_unknowns
+from .knobs import machine_knobs, with_knobs
+from .spectra import make_whitener, spectrum_of
+
+__all__ = ["Comparison", "Problem", "Term"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Comparison(NamedTuple):
+    """How residuals are compared."""
+
+    low: float  # [Hz]
+    high: float
+    edge: float  # cut off at both ends of a test [s]
+    bands: int  # of frequency, each with its own noise
+    step: float  # of an unknown, for its derivative, in prior standard deviations
+
+
+class Term(NamedTuple):
+    """What is evaluated at once: unknowns that act on different rows, each with its actuator or strut, or -1."""
+
+    members: tuple[tuple[int, int], ...]
+    residuals: tuple[str, ...]
+
+
+_SHOWS_IN = {
+    "actuator_force": ("wrench", "force"),
+    "chamber_pressure": ("flow", "force"),
+    "chamber_pressure_a": ("flow", "force"),
+    "chamber_pressure_b": ("flow", "force"),
+    "strut_pressure": ("gas",),
+    "spool_position": ("flow",),
+    "platen_displacement": ("wrench", "flow", "gas"),
+    "platen_velocity": ("wrench", "flow", "gas"),
+    "platen_acceleration": ("wrench", "flow", "gas"),
+}
+
+
+class Problem:
+    """Tests, unknowns with their priors, and the whitener of the sensors' noise."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        tests: Sequence[Measured],
+        noisy: Sequence[Measured],
+        sensors: Sensors,
+        comparison: Comparison,
+        *,
+        jobs: int = -1,
+    ) -> None:
+        """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added."""
+        self.machine, self.tests, self.comparison, self.jobs = machine, tuple(tests), comparison, jobs
+        self.knobs = machine_knobs(machine)
+        self.unknowns = sensor_unknowns(machine, sensors, tests[0])
+        self.names = (*(k.name for k in self.knobs), *(u.name for u in self.unknowns))
+        self.prior = np.array([*(k.sd for k in self.knobs), *(u.sd for u in self.unknowns)])
+        self.lowest = np.array([*(k.lowest for k in self.knobs), *(-np.inf for _ in self.unknowns)])
+        self.terms = self._terms()
+        plant = make_plant(machine)
+        clean = [evaluate_residuals(plant, t) for t in tests]
+        self.widths = tuple(x.shape[1] for x in clean[0])
+        noise = []
+        for i, test in enumerate(noisy):
+            drawn = evaluate_residuals(plant, test)
+            noise.append(self._bins(_less(drawn, clean[i % len(tests)]), test.dt))
+        self.whitener = make_whitener(noise, np.linspace(comparison.low, comparison.high, comparison.bands + 1))
+
+    def with_tests(self, tests: Sequence[Measured]) -> "Problem":
+        """The same problem with other tests."""
+        other = copy(self)
+        other.tests = tuple(tests)
+        return other
+
+    def rows(self, kind: str, *places: int) -> NDArray[np.bool_]:
+        """Columns of the stacked residuals that are of a kind, all or those at some places."""
+        at = RESIDUALS.index(kind)
+        first, width = sum(self.widths[:at]), self.widths[at]
+        mask = np.zeros(sum(self.widths), bool)
+        mask[[first + p for p in (places or range(width)) if p < width]] = True
+        return mask
+
+    def whitened(self, x: Array) -> list[Complex]:
+        """Whitened bins (m, c) of every test with the unknowns at x."""
+        plant, tests = self._plant(x), self._corrected(x)
+        found = []
+        for test in tests:
+            bins, f = self._bins(evaluate_residuals(plant, test), test.dt)
+            found.append(self.whitener.apply(bins[..., None], f)[..., 0])
+        return found
+
+    def slopes(self, x: Array, free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Complex]:
+        """Derivatives (m, c, p) of the whitened bins of every test, by differences; zero where not free."""
+        base = _Base(self, x)
+        terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
+        out = [np.zeros((len(f), sum(self.widths), len(x)), np.complex128) for f in base.frequency]
+        with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
+            for done, found in enumerate(parallel(delayed(self._difference)(x, base, term) for term in terms)):
+                for i, bins in found:
+                    for slope, change in zip(out, bins, strict=True):
+                        slope[:, :, i] = change
+                progress((done + 1) / len(terms))
+        for slope in out:
+            slope[:, :, ~free] = 0.0
+        return [self.whitener.apply(slope, f) for slope, f in zip(out, base.frequency, strict=True)]
+
+    def _difference(self, x: Array, base: "_Base", term: Term) -> list[tuple[int, list[Complex]]]:
+        knobs = len(self.knobs)
+        more = np.zeros(len(x))
+        for i, _ in term.members:
+            more[i] = self.comparison.step * self.prior[i]
+        if term.members[0][0] < knobs:
+            plant, tests = self._plant(x + more), base.tests
+        else:  # what is left of an error after correction is as good as the error itself
+            plant, tests = base.plant, [corrected(t, self.unknowns, more[knobs:]) for t in base.tests]
+        known = path_key(plant) == base.key
+        changes = []
+        for k, test in enumerate(tests):
+            path = base.paths[k] if known and test.motion is base.tests[k].motion else None
+            after = evaluate_residuals(plant, test, term.residuals, path=path)
+            changes.append(self._bins(_less(after, base.residuals[k]), test.dt)[0])
+        out = []
+        for i, place in term.members:
+            rows = np.ones(sum(self.widths), bool)
+            if place >= 0:
+                rows = self.rows("gas", place) if term.residuals == ("gas",) else self._rows_of_actuator(place)
+            out.append((i, [np.where(rows, c, 0.0) / (self.comparison.step * self.prior[i]) for c in changes]))
+        return out
+
+    def _plant(self, x: Array) -> Plant:
+        return make_plant(with_knobs(self.machine, self.knobs, x[: len(self.knobs)]))
+
+    def _corrected(self, x: Array) -> list[Measured]:
+        return [corrected(t, self.unknowns, x[len(self.knobs) :]) for t in self.tests]
+
+    def _bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
+        """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
+        c = self.comparison
+        bins, f = spectrum_of(residuals.stacked(), dt, c.low, c.high, c.edge)
+        if bins.shape[1] == sum(getattr(self, "widths", ())) or not hasattr(self, "widths"):
+            return bins, f
+        out = np.zeros((len(f), sum(self.widths)), np.complex128)
+        at = 0
+        for kind, part in zip(RESIDUALS, residuals, strict=True):
+            if part.shape[1]:
+                out[:, self.rows(kind)] = bins[:, at : at + part.shape[1]]
+                at += part.shape[1]
+        return out, f
+
+    def _rows_of_actuator(self, place: int) -> NDArray[np.bool_]:
+        names, double = self.machine.actuator_names, self.machine.double_acting
+        rows = self.rows("flow", place) | self.rows("force", place)
+        if names[place] in double:
+            rows |= self.rows("flow", len(names) + double.index(names[place]))
+        return rows
+
+    def _terms(self) -> tuple[Term, ...]:
+        terms = [Term(((i, -1),), knob.shows_in) for i, knob in enumerate(self.knobs)]
+        together: dict[str, list[tuple[int, int]]] = {}
+        for i, unknown in enumerate(self.unknowns):
+            together.setdefault(unknown.alone[0], []).append((len(self.knobs) + i, unknown.alone[1]))
+        for members in together.values():
+            unknown = self.unknowns[members[0][0] - len(self.knobs)]
+            terms.append(Term(tuple(members), _SHOWS_IN[unknown.channel]))
+        return tuple(terms)
+
+
+class _Base:
+    """What differences are taken from: everything evaluated once at x."""
+
+    def __init__(self, problem: Problem, x: Array) -> None:
+        self.plant, self.tests = problem._plant(x), problem._corrected(x)
+        self.key = path_key(self.plant)
+        self.paths = [follow(self.plant, t) for t in self.tests]
+        pairs = zip(self.tests, self.paths, strict=True)
+        self.residuals = [evaluate_residuals(self.plant, t, path=p) for t, p in pairs]
+        self.frequency = [problem._bins(r, t.dt)[1] for r, t in zip(self.residuals, self.tests, strict=True)]
+
+
+def _less(after: Residuals, before: Residuals) -> Residuals:
+    """Change of residuals; no columns where the first has none."""
+    return Residuals(*(a - b if a.shape[1] else a for a, b in zip(after, before, strict=True)))

@@ -1,0 +1,69 @@
+"""What a calibration says of each unknown, in a word, and where single groups of residuals contradict all together."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fit import Calibration
+
+__all__ = ["DEVIATIONS", "Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "far", "verdict_on"]
+
+Array = NDArray[np.float64]
+Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
+
+DEVIATIONS = 3.0  # judgement: predicted deviations beyond which an estimate differs from what it is compared with
+
+
+def far(calibration: Calibration) -> Array:
+    """Estimates (p,) in predicted deviations from the nominal machine and from sensors without error."""
+    return np.asarray(calibration.estimate / calibration.sd)
+
+
+def beyond(calibration: Calibration) -> NDArray[np.bool_]:
+    """Unknowns (p,) that differ from nominal, or from zero, by more than `DEVIATIONS`."""
+    return np.asarray(np.abs(far(calibration)) > DEVIATIONS)
+
+
+def verdict_on(calibration: Calibration, i: int) -> Verdict:
+    """The verdict on unknown i; the first that holds.
+
+    At its bound: as far from nominal as the fit lets it go. Changed: farther than `DEVIATIONS`. Unchanged: the campaign
+    has told something of it, and it is nearer than that.
+    """
+    reach = calibration.numbers.number("fit.reach") * calibration.prior[i]
+    if abs(calibration.estimate[i]) >= reach * (1.0 - 1e-6):
+        return "at its bound"
+    if beyond(calibration)[i]:
+        return "changed"
+    return "unchanged" if calibration.informed[i] else "not informed"
+
+
+def changed_knobs(calibration: Calibration) -> list[int]:
+    """Knobs that differ from nominal by more than `DEVIATIONS`, farthest first."""
+    distance = np.abs(far(calibration))[: len(calibration.knobs)]
+    return [int(i) for i in np.argsort(-distance, kind="stable") if distance[i] > DEVIATIONS]
+
+
+class Contradiction(NamedTuple):
+    """A group of residuals that by itself says something else than all together."""
+
+    subset: str
+    unknown: int
+    deviations: float  # signed distance, in deviations of what it would be if noise were all
+
+
+def contradictions(calibration: Calibration) -> list[Contradiction]:
+    """Estimates of single groups that differ from those of all by more than `DEVIATIONS`, farthest first.
+
+    The variance of the difference is that of the group less that of all (Hausman, Econometrica 46, 1978), since the
+    group is part of all; no less than what the search leaves open.
+    """
+    left_open = calibration.numbers.number("fit.converged") * calibration.sd
+    found = []
+    for subset in calibration.subsets:
+        variance = np.maximum(subset.sd**2 - calibration.sd**2, left_open**2)  # NaN where the group tells nothing
+        distance = (subset.estimate - calibration.estimate) / np.sqrt(variance)
+        for i in np.flatnonzero(np.abs(distance) > DEVIATIONS):
+            found.append(Contradiction(subset.name, int(i), float(distance[i])))
+    return sorted(found, key=lambda one: -abs(one.deviations))

@@ -1,0 +1,66 @@
+"""What a terminal shows of a calibration."""
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from .calibration import Calibration
+from .calibration.verdicts import DEVIATIONS, contradictions, far, verdict_on
+from .residuals import RESIDUALS
+
+__all__ = ["print_calibration"]
+
+
+def print_calibration(calibration: Calibration) -> None:
+    """Print parameters, sensor errors that stand out, misfits, and whether the fit converged."""
+    console = Console() if Console().is_terminal else Console(width=140)
+    console.print(_parameters(calibration))
+    console.print(_sensors(calibration))
+    console.print(_misfits(calibration))
+    pairs, apart = len(calibration.alike()), len(contradictions(calibration))
+    console.print(f"{pairs} pairs cannot be told apart; {apart} estimates by single groups contradict all together")
+    rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
+    console.print(f"converged after {rounds}" if calibration.converged else f"[bold red]not converged[/] in {rounds}")
+
+
+def _parameters(calibration: Calibration) -> Table:
+    table = _table("Parameters", "name", "nominal", "estimate", "unit", "90 % interval", "sd/prior", "verdict")
+    for i, knob in enumerate(calibration.knobs):
+        low, high = calibration.interval(i)
+        estimate = knob.at(float(calibration.estimate[i]))
+        numbers = f"{knob.value:.5g}", f"{estimate:.5g}", knob.unit, f"{low:.5g} to {high:.5g}"
+        table.add_row(escape(knob.name), *numbers, _share(calibration, i), verdict_on(calibration, i))
+    return table
+
+
+def _sensors(calibration: Calibration) -> Table:
+    first, distance = len(calibration.knobs), far(calibration)
+    order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
+    title = f"Errors of the sensors beyond {DEVIATIONS:g} predicted deviations, of {len(order)}"
+    table = _table(title, "error", "estimate", "unit", "deviations", "sd/prior")
+    for i in (i for i in order if abs(distance[i]) > DEVIATIONS):
+        unknown = calibration.unknowns[i - first]
+        numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{distance[i]:+.1f}", _share(calibration, i)
+        table.add_row(escape(unknown.name), *numbers)
+    return table
+
+
+def _misfits(calibration: Calibration) -> Table:
+    kinds = [k for k in range(len(RESIDUALS)) if np.isfinite(calibration.misfit_after[:, k]).any()]
+    title = "Misfit before, after; 1 is sensor noise alone"
+    table = _table(title, "test", *(RESIDUALS[k] for k in kinds))
+    for test, before, after in zip(calibration.tests, calibration.misfit_before, calibration.misfit_after, strict=True):
+        table.add_row(escape(test), *(f"{before[k]:.3g}, {after[k]:.3g}" for k in kinds))
+    return table
+
+
+def _share(calibration: Calibration, i: int) -> str:
+    return f"{calibration.sd[i] / calibration.prior[i]:.2g}"
+
+
+def _table(title: str, *heads: str) -> Table:
+    table = Table(title=escape(title), title_justify="left")
+    for n, head in enumerate(heads):
+        table.add_column(escape(head), justify="right" if n else "left")
+    return table

@@ -1,0 +1,52 @@
+"""Commands that find parameters from measured campaigns: calibrate."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import app, progress_bar
+from .options import Locked, MachineName, Out, Override, SpecimenAt, SpecimenName, find_table, folder_for
+from .runs import repeating_command
+
+__all__ = ["calibrate"]
+
+
+@app.command()
+def calibrate(
+    campaign: Annotated[Path, typer.Argument(help="Folder of records of one machine in one state.")],
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    sensors: Annotated[str, typer.Option(help="Sensors' noise and ranges: shipped name, or a TOML file.")] = "lhpost6",
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated sensor noise that sets weights.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Processes at a time; -1: as many as there are cores.")] = -1,
+) -> None:
+    """Calibrate the machine and its sensors on measured tests; leaves override.toml and report.html."""
+    from ..calibration import calibrate as calibrate_machine
+    from ..calibration.override import save_override
+    from ..calibration_table import print_calibration
+    from ..campaign import load_campaign
+    from ..report import write_calibrate_report
+    from ..sensors import load_sensors
+
+    table = find_table(machine, override, 0, specimen, specimen_at, locked)
+    known = load_sensors(sensors)
+    tests = load_campaign(campaign, table)
+    folder = folder_for(out, f"{tests.name}_calibration")
+    with progress_bar(f"calibrating {table.name} by {tests.name}") as progress:
+        found = calibrate_machine(
+            table, tests.records, known, campaign=tests.name, seed=seed, jobs=jobs, progress=progress
+        )
+    paths = [
+        save_override(found, folder / "override.toml"),
+        write_calibrate_report(found, folder / "report.html", command=repeating_command()),
+    ]
+    print_calibration(found)
+    for path in paths:
+        typer.echo(f"wrote {path}")
+    if not found.converged:
+        raise typer.Exit(1)

@@ -1,0 +1,43 @@
+"""Commands that take measured forces apart: decompose."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .app import app
+from .options import Locked, MachineName, Out, Override, SpecimenAt, SpecimenName, find_table, folder_for
+from .runs import repeating_command
+
+__all__ = ["decompose"]
+
+
+@app.command()
+def decompose(
+    record: Annotated[Path, typer.Argument(help="Record of a test, measured or simulated.")],
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    cutoff: Annotated[float | None, typer.Option(help="Forces are compared up to here [Hz]; else 33.")] = None,
+    no_align: Annotated[bool, typer.Option("--no-align", help="Leave skews between channels alone.")] = False,
+) -> None:
+    """Find the forces behind a test by inverse dynamics; leaves ledger.nc and report.html."""
+    from ..decompose import decompose_record, find_agreement, find_work, save_ledger
+    from ..decompose.table import print_agreement
+    from ..records import load_record
+    from ..report import write_decompose_report
+
+    table = find_table(machine, override, 0, specimen, specimen_at, locked)
+    measured = load_record(record)
+    name = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record")).replace("/", "_")
+    folder = folder_for(out, f"{name}_forces")
+    found = decompose_record(table, measured, cutoff=cutoff, align=not no_align)
+    agreement, work = find_agreement(found), find_work(found)
+    save_ledger(found, folder / "ledger.nc", work, str(record))
+    report = write_decompose_report(found, agreement, work, folder / "report.html", command=repeating_command())
+    print_agreement(found, agreement)
+    for path in (folder / "ledger.nc", report):
+        typer.echo(f"wrote {path}")

@@ -1,0 +1,65 @@
+"""Commands that hold the model against measured campaigns: validate."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import ParameterError
+from .app import app, progress_bar
+from .options import (
+    Locked,
+    MachineName,
+    Out,
+    Override,
+    SettingsName,
+    SpecimenAt,
+    SpecimenName,
+    find_settings,
+    find_table,
+    folder_for,
+)
+from .runs import repeating_command
+
+__all__ = ["validate"]
+
+
+@app.command()
+def validate(
+    campaign: Annotated[Path, typer.Argument(help="Folder of records of one machine in one state.")],
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    controller: SettingsName = None,
+    phases: Annotated[str, typer.Option(help="Phases: 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
+    jobs: Annotated[int, typer.Option(help="Tests at a time; -1: as many as there are cores.")] = -1,
+) -> None:
+    """Validate the model on measured tests in three phases; leaves report.html and metrics.json."""
+    from ..campaign import load_campaign
+    from ..report.validate_report import write_validate_report
+    from ..validation import save_metrics
+    from ..validation import validate as validate_campaign
+    from ..validation.table import print_validation
+
+    wanted = _phases(phases)
+    table = find_table(machine, override, 0, specimen, specimen_at, locked)
+    settings = find_settings(controller, table) if controller else None
+    tests = load_campaign(campaign, table)
+    folder = folder_for(out, f"{tests.name}_validation")
+    with progress_bar(f"validating {table.name} on {tests.name}") as progress:
+        found = validate_campaign(table, tests, settings=settings, phases=wanted, jobs=jobs, progress=progress)
+    save_metrics(found, folder / "metrics.json")
+    report = write_validate_report(found, folder / "report.html", command=repeating_command())
+    print_validation(found)
+    for path in (folder / "metrics.json", report):
+        typer.echo(f"wrote {path}")
+
+
+def _phases(text: str) -> tuple[int, ...]:
+    words = [word.strip() for word in text.split(",")]
+    if not words or not set(words) <= {"1", "2", "3"}:
+        raise ParameterError(f"--phases {text}: write some of 1,2,3 with commas between them")
+    return tuple(sorted({int(word) for word in words}))

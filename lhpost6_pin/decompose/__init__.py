@@ -1,0 +1,28 @@
+"""A test taken apart into the forces behind it, compared with what was measured (report, Section 6.1).
+
+    found = decompose_record(machine, record, sensors)      # forces and motion in the band that is compared
+    agreement = find_agreement(found)                       # RRMSE per axis; the residual against noise and calibration
+    save_ledger(found, "ledger.nc")
+
+`record` prepares a record and calls `inverse_dynamics`; `agreement` judges; `dataset` lays out and writes.
+"""
+
+from .agreement import Agreement, Level, Match, find_agreement
+from .dataset import ledger_dataset, save_ledger
+from .record import Comparison, Decomposed, decompose_numbers, decompose_record
+from .work import Work, find_work
+
+__all__ = [
+    "Agreement",
+    "Comparison",
+    "Decomposed",
+    "Level",
+    "Match",
+    "Work",
+    "decompose_numbers",
+    "decompose_record",
+    "find_agreement",
+    "find_work",
+    "ledger_dataset",
+    "save_ledger",
+]

@@ -1,0 +1,215 @@
+"""Sections of a calibration report: parameters, sensors, what is left, what tells of what, what is alike."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..calibration import Calibration
+from ..calibration.verdicts import DEVIATIONS, beyond, contradictions, far, verdict_on
+from ..residuals import RESIDUALS
+from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
+from .page import Markup, details, number, paragraph, table
+from .run_motion import percent
+
+__all__ = [
+    "MISFIT",
+    "alike_blocks",
+    "change_of",
+    "group_blocks",
+    "knob_blocks",
+    "misfit_blocks",
+    "sensor_blocks",
+    "test_blocks",
+]
+
+MISFIT = 1.3  # judgement: mean square up to which residuals are noise: the whitener comes from a few draws of it
+LISTED = 15  # rows of a table before the rest is folded away
+KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force": "force against pressure"}
+
+
+# ---------------------------------------------------------------------------------------- parameters and sensors
+def knob_blocks(calibration: Calibration) -> list[Markup]:
+    """Return every parameter beside its prior, drawn and in numbers."""
+    outside, informed = far(calibration), calibration.numbers.number("report.informed")
+    rows = []
+    for i, knob in enumerate(calibration.knobs):
+        low, high = calibration.interval(i, PROBABILITY)
+        rows.append(
+            (
+                knob.name,
+                _marked(calibration, i),
+                _plain(knob.value),
+                _plain(knob.at(float(calibration.estimate[i]))),
+                knob.unit,
+                change_of(calibration, i),
+                number(float(outside[i]), 2),
+                number(float(calibration.sd[i] / calibration.prior[i]), 2),
+                f"{_plain(low)} to {_plain(high)}",
+            )
+        )
+    how = (
+        f"Changed: farther from nominal than {DEVIATIONS:g} predicted deviations. Unchanged: nearer, and the campaign "
+        f"has told something of it, which is a predicted deviation below {informed:g} of the prior's. Not informed: "
+        "what stands here is mostly the prior. A height is the mean over its kind's components, which move "
+        "together."
+    )
+    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "In deviations")
+    heads = (*header, "Predicted over prior", INTERVAL)
+    return [forest_block(calibration), paragraph(how), table("All parameters", heads, rows)]
+
+
+def sensor_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the errors of the sensors, those that stand out first."""
+    first, outside = len(calibration.knobs), beyond(calibration)
+    order = sorted(range(first, len(calibration.prior)), key=lambda i: -abs(far(calibration)[i]))
+    rows = [_sensor_row(calibration, i) for i in order]
+    differ = sum(bool(outside[i]) for i in order)
+    how = paragraph(
+        "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
+        "parameters are free of these errors; the override file does not hold them."
+    )
+    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "In deviations", "Predicted over prior")
+    caption = f"Errors beyond {DEVIATIONS:g} predicted deviations from zero, the clearest first"
+    blocks = [how]
+    if differ:
+        blocks.append(table(caption, header, rows[:differ]))
+    else:
+        blocks.append(paragraph(f"None is beyond {DEVIATIONS:g} predicted deviations from zero."))
+    if differ < len(rows):
+        blocks.append(details(f"The other {len(rows) - differ}", table("Other errors", header, rows[differ:])))
+    return blocks
+
+
+def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
+    unknown = calibration.unknowns[i - len(calibration.knobs)]
+    scale, unit = {"gain": (100.0, "%"), "delay": (1e3, "ms")}.get(unknown.kind, (1.0, unknown.unit))
+    return (
+        unknown.name,
+        number(scale * float(calibration.estimate[i])),
+        number(scale * half_interval(float(calibration.sd[i])), 2),
+        unit,
+        number(float(far(calibration)[i]), 2),
+        number(float(calibration.sd[i] / calibration.prior[i]), 2),
+    )
+
+
+# ------------------------------------------------------------------------------------------- residuals and tests
+def misfit_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the misfit of every test before and after."""
+    before, after = calibration.misfit_before, calibration.misfit_after
+    kinds = [k for k in range(len(RESIDUALS)) if np.isfinite(after[:, k]).any()]
+    rows = [
+        (test, *(f"{number(float(before[t, k]))} → {_judged(float(after[t, k]))}" for k in kinds))
+        for t, test in enumerate(calibration.tests)
+    ]
+    how = (
+        "Mean square of the residuals over what sensor noise alone would leave, with the machine and the sensors as "
+        "given and as calibrated: 1 is noise. Wrench: inertia, weight and friction against what actuators and struts "
+        "deliver. Oil flow: continuity in every chamber. Gas law: strut pressures against their lengths. Force: load "
+        f"cells against chamber pressures. ! marks what is above {MISFIT:g}."
+    )
+    header = ("Test", *(KINDS[RESIDUALS[k]] for k in kinds))
+    return [paragraph(how), table("Misfit before → after", header, rows)]
+
+
+def test_blocks(calibration: Calibration) -> list[Markup]:
+    """Return what each test alone would tell."""
+    knobs, p = len(calibration.knobs), len(calibration.prior)
+    how = paragraph(
+        "What would be known if a test were the only one: predicted deviation over the prior's, so 1 is nothing and "
+        "0.1 ten times better than before. Sensor errors are unknown at the same time."
+    )
+    blocks = [how, *information_blocks(calibration, range(knobs))]
+    if p > knobs:
+        blocks.append(details("Errors of the sensors", *information_blocks(calibration, range(knobs, p))))
+    return blocks
+
+
+def group_blocks(calibration: Calibration) -> list[Markup]:
+    """Return what groups of residuals say by themselves, contradictions first."""
+    found = contradictions(calibration)
+    rows = []
+    for one in found:
+        i = one.unknown
+        subset = next(s for s in calibration.subsets if s.name == one.subset)
+        unit = calibration.knobs[i].unit if i < len(calibration.knobs) else _unit(calibration, i)
+        alone, together = (_plain(_value(calibration, i, float(x[i]))) for x in (subset.estimate, calibration.estimate))
+        rows.append((calibration.names[i], one.subset, alone, together, unit, number(one.deviations, 2)))
+    compared = sum(int(np.sum(np.isfinite(s.sd))) for s in calibration.subsets)
+    how = paragraph(
+        f"Of {compared} estimates by single groups, {len(found)} differ from that of all together by more than "
+        f"{DEVIATIONS:g} deviations of the difference. If the equations hold and noise is all, about "
+        f"{number(0.0027 * compared, 1)} would; more says that an equation lacks something. Noise that residuals share "
+        "is taken off in the order wrench, flow, gas law, force: a later group holds a little of the earlier ones."
+    )
+    header = ("Unknown", "Group", "Group alone", "All together", "Unit", "In deviations")
+    blocks = [how]
+    if rows:
+        blocks += _folded("Groups that contradict all together", header, rows)
+    return [*blocks, subset_block(calibration)]
+
+
+def alike_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the pairs of unknowns that cannot be told apart."""
+    pairs = calibration.alike()
+    limit = calibration.numbers.number("report.alike")
+    if not pairs:
+        return [paragraph(f"No two unknowns are correlated by {limit:g} or more.")]
+    own = {knob.name for knob in calibration.knobs}
+    how = paragraph(
+        f"Pairs correlated by {limit:g} or more: the campaign tells their sum (correlation negative) or difference "
+        "(positive), in prior deviations, much better than either; do not read one without the other."
+    )
+    groups = (
+        ("Parameters with each other", [p for p in pairs if p[0] in own and p[1] in own]),
+        ("A parameter with a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)]),
+        ("Sensors with each other", [p for p in pairs if p[0] not in own and p[1] not in own]),
+    )
+    blocks = [how]
+    for caption, found in groups:
+        rows = [(a, b, f"{r:+.4f}".replace("-", "−")) for a, b, r in found]
+        blocks += _folded(caption, ("One", "Other", "Correlation"), rows) if rows else []
+    return blocks
+
+
+def _folded(caption: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> list[Markup]:
+    """A table, its later rows folded away."""
+    blocks = [table(caption, header, rows[:LISTED])]
+    if len(rows) > LISTED:
+        more = f"{len(rows) - LISTED} more"
+        blocks.append(details(more, table(f"{caption}, {more}", header, rows[LISTED:])))
+    return blocks
+
+
+# --------------------------------------------------------------------------------------------------------- words
+def _judged(misfit: float) -> str:
+    return f"{number(misfit)}{' !' * (misfit > MISFIT)}"
+
+
+def _marked(calibration: Calibration, i: int) -> str:
+    verdict = verdict_on(calibration, i)
+    return {"at its bound": "! at its bound", "changed": "◆ changed"}.get(verdict, verdict)
+
+
+def _plain(value: float) -> str:
+    """A number in the unit of the machine file, with as many digits as a calibration can give."""
+    mantissa, _, power = f"{value:.4e}".partition("e")
+    plain = f"{float(f'{value:.5g}'):,.10g}" if -4 <= int(power) < 8 else f"{float(mantissa):g}e{int(power)}"
+    return plain.replace("-", "−")
+
+
+def _value(calibration: Calibration, i: int, coordinate: float) -> float:
+    return calibration.knobs[i].at(coordinate) if i < len(calibration.knobs) else coordinate
+
+
+def _unit(calibration: Calibration, i: int) -> str:
+    return calibration.unknowns[i - len(calibration.knobs)].unit
+
+
+def change_of(calibration: Calibration, i: int) -> str:
+    """How far knob i is from nominal, signed: relative, or in its unit."""
+    knob, coordinate = calibration.knobs[i], float(calibration.estimate[i])
+    if knob.relative:
+        share = float(np.expm1(coordinate))
+        return f"{'+' * (share > 0)}{percent(share)}"
+    return f"{'+' * (coordinate > 0)}{number(coordinate)}\N{NO-BREAK SPACE}{knob.unit}"

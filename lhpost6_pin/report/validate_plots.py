@@ -1,0 +1,220 @@
+"""Figures of a validation, in the kind of the report's Figures 6.1 to 6.37: measured and model's, overlaid."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..names import AXES
+from ..validation import Pair, Phase
+from ..validation.agreement import MOTIONS
+from .charts import Curve, Panel, XAxis, chart_figure
+from .control_blocks import axis_title
+from .decompose_plots import force_scale
+from .layout import axis_suffix
+from .page import Figure, Markup, figure, grid
+from .plots import BLUE, GREY, SCALES, Row, Scale, Trace, envelope, packed, time_figure
+from .run_components import kinds
+from .run_motion import axis_scale, percent
+
+__all__ = ["actuator_blocks", "force_blocks", "motion_blocks", "scale_of", "spectrum_block"]
+
+Array = NDArray[np.float64]
+
+MEASURED: dict[str, Any] = {"color": GREY, "width": 3.2}
+MODEL: dict[str, Any] = {"color": BLUE, "width": 1.2}
+BUCKETS = 320  # stretches of a channel over time, each drawn by its least and greatest sample
+FEW = 160  # the same where many actuators share a figure
+LOOP = 900  # points of a loop, evenly spaced
+ROW, SMALL_ROW = 130, 84  # [CSS px]
+CELL, BETWEEN = 170, 66  # [CSS px] height of a loop, and between rows of them
+SHOWN = (0.2, 80.0)  # [Hz] of spectra
+TICKS = (0.2, 0.5, 1, 2, 5, 10, 20, 50)
+_SCALES = {"actuator_force": "force", "chamber_pressure_a": "pressure", "chamber_pressure_b": "pressure"}
+_WORDS = {
+    "actuator_force": "Actuator forces",
+    "chamber_pressure_a": "Pressures in chambers A",
+    "chamber_pressure_b": "Pressures in chambers B",
+    "spool_command": "Fourth-stage spool commands",
+}
+_FORCES = {"wrench": "Total actuator force", "struts": "Strut force", "dissipative": "Dissipative force"}
+
+
+def scale_of(quantity: str, column: str) -> Scale:
+    """How a compared quantity is shown."""
+    if quantity in MOTIONS:
+        return axis_scale(column, quantity)
+    if quantity in _FORCES:
+        return force_scale(column)
+    return SCALES[_SCALES.get(quantity, "ratio")]
+
+
+def force_blocks(phase: Phase, motion: Phase | None, axes: Sequence[str]) -> list[Markup]:
+    """Return Section 6.1's six rows: forces over time, displacement and velocity of the axes, as a grid of loops.
+
+    The motion is that measured in a phase that compared it, else displacements and velocities are left out.
+    """
+    rows = [("wrench", "time"), ("wrench", "displacement"), ("wrench", "velocity")]
+    rows += [("struts", "displacement"), ("dissipative", "displacement"), ("dissipative", "velocity")]
+    words = "At C in {c}: measured in grey, required by the measured motion in blue."
+    name = f"forces-{phase.test}"
+    return [figure(_grid(name, "Forces by inverse dynamics", words, phase, motion, rows, axes))] if axes else []
+
+
+def motion_blocks(phase: Phase, axes: Sequence[str]) -> list[Markup]:
+    """Return motion and total force of every axis over time, and in open loop force against displacement."""
+    drawings = []
+    for axis in axes:
+        rows, said = [], []
+        for quantity in (*MOTIONS, *(["wrench"] if phase.number == 2 else [])):
+            pair = phase.pair(quantity)
+            if pair is None:
+                continue
+            word = quantity.capitalize() if quantity in MOTIONS else "Total actuator force"
+            rows.append(Row(word, _traces(pair, pair.columns.index(axis)), scale_of(quantity, axis)))
+            one = next(a for a in phase.of(quantity) if a.column == axis)
+            if one.moves:
+                said.append(f"{word.lower()} {percent(one.rrmse_aligned)}")
+        words = f"RRMSE, delay removed: {', '.join(said)}." if said else "Hardly moved."
+        drawings.append(
+            figure(_over_time(f"motion{phase.number}-{phase.test}-{axis}", axis_title(axis), words, phase, rows))
+        )
+    blocks = [grid(*drawings, pairs=True)]
+    if phase.number == 2 and phase.pair("wrench") is not None:
+        loops = [("wrench", "displacement")]
+        words = "At C in {c}, each side against its own displacement: measured in grey, model in blue."
+        name = f"loops-{phase.test}"
+        blocks.append(figure(_grid(name, "Forces against displacement", words, phase, phase, loops, axes)))
+    return blocks
+
+
+def actuator_blocks(phase: Phase, quantity: str) -> list[Markup]:
+    """Return a quantity of every actuator over time, a row each, actuators of a kind in one figure."""
+    pair = phase.pair(quantity)
+    if pair is None:
+        return []
+    drawings = []
+    for own in kinds(pair.columns):
+        rows = [Row(pair.columns[k], _traces(pair, k), scale_of(quantity, pair.columns[k])) for k in own]
+        ends = f"{pair.columns[own[0]]} to {pair.columns[own[-1]]}" if len(own) > 1 else pair.columns[own[0]]
+        name = f"{quantity}{phase.number}-{phase.test}-{pair.columns[own[0]]}"
+        title = f"{_WORDS[quantity]}, {ends}"
+        drawings.append(
+            figure(_over_time(name, title, "Measured in grey, model in blue.", phase, rows, FEW, SMALL_ROW))
+        )
+    return [grid(*drawings, pairs=True)]
+
+
+def spectrum_block(phase: Phase, axes: Sequence[str], edges: Sequence[float]) -> list[Markup]:
+    """Return amplitude spectral densities of both sides, with the oil columns of the linear model marked."""
+    spectrum = phase.spectrum
+    if spectrum is None:
+        return []
+    f = spectrum.frequency
+    inside = (f >= SHOWN[0]) & (f <= SHOWN[1])
+    expected = {r.column: r.expected for r in phase.resonances}
+    drawings = []
+    for axis in axes:
+        k = spectrum.columns.index(axis)
+        scale = scale_of(spectrum.quantity, axis)
+        sides = (("measured", spectrum.measured, MEASURED), ("model", spectrum.model, MODEL))
+        curves = [Curve(n, f[inside], scale.factor * np.sqrt(power[inside, k]), line) for n, power, line in sides]
+        curves = [
+            Curve(c.name, np.asarray(c.x)[np.asarray(c.y) > 0], np.asarray(c.y)[np.asarray(c.y) > 0], c.style)
+            for c in curves
+        ]
+        ratios = ", ".join(
+            f"{low:g}–{high:g} Hz {percent(ratio)}"
+            for low, high, ratio in zip(edges[:-1], edges[1:], spectrum.ratio[:, k], strict=True)
+            if np.isfinite(ratio)
+        )
+        words = f"Model over measured: {ratios}." if ratios else "No band rises out of the noise."
+        panel = Panel(f"Spectral density [{scale.unit}/√Hz]", curves, log=True)
+        over = XAxis("Frequency [Hz]", log=True, span=SHOWN, ticks=TICKS)
+        marks = [expected[axis]] if axis in expected else []
+        name = f"spectrum{phase.number}-{phase.test}-{axis}"
+        drawings.append(figure(chart_figure(name, axis_title(axis), words, [panel], over, row_height=200, marks=marks)))
+    return [grid(*drawings, pairs=True)] if drawings else []
+
+
+def _over_time(
+    name: str, title: str, words: str, phase: Phase, rows: Sequence[Row], buckets: int = BUCKETS, row_height: int = ROW
+) -> Figure:
+    step = float(phase.time[1] - phase.time[0])
+    return time_figure(name, title, words, rows, start=0.0, step=step, buckets=buckets, row_height=row_height)
+
+
+def _traces(pair: Pair, k: int) -> list[Trace]:
+    return [Trace("measured", pair.measured[:, k], MEASURED), Trace("model", pair.model[:, k], MODEL)]
+
+
+# -------------------------------------------------------------------------------------- force against motion
+def _grid(
+    name: str,
+    title: str,
+    words: str,
+    phase: Phase,
+    motion: Phase | None,
+    rows: Sequence[tuple[str, str]],
+    axes: Sequence[str],
+) -> Figure:
+    """Return forces over time or motion, a row each, a column for every axis."""
+    pairs = {what: phase.pair(what) for what, _ in rows}
+    against = {q: motion.pair(q) if motion else None for q in ("displacement", "velocity")}
+    rows = [(what, over) for what, over in rows if pairs[what] and (over == "time" or against[over])]
+    columns, above, below = len(axes), 44, 50
+    height = above + len(rows) * CELL + (len(rows) - 1) * BETWEEN + below
+    inner = height - above - below
+    legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 1 + 20 / inner, "yanchor": "bottom"}
+    layout: dict[str, Any] = {
+        "height": height,
+        "margin": {"l": 62, "r": 12, "t": above, "b": below},
+        "meta": {"linked": False, "row": CELL},
+        "annotations": [],
+        "hovermode": "closest",
+        "legend": legend,
+    }
+    traces = []
+    for r, (what, over) in enumerate(rows):
+        top = 1.0 - r * (CELL + BETWEEN) / inner
+        for c, axis in enumerate(axes):
+            suffix = axis_suffix(r * columns + c)
+            across = [(c + (0.10 if c else 0.0)) / columns, (c + 0.97) / columns]
+            unit = "s" if over == "time" else scale_of(over, axis).unit
+            heading = f"{over.capitalize()} [{unit}]"
+            layout[f"xaxis{suffix}"] = {"domain": across, "anchor": f"y{suffix}", "nticks": 6}
+            layout[f"xaxis{suffix}"]["title"] = {"text": heading, "standoff": 4, "font": {"size": 11}}
+            low = max(top - CELL / inner, 0.0)
+            layout[f"yaxis{suffix}"] = {"domain": [low, top], "anchor": f"x{suffix}", "nticks": 6}
+            word = _FORCES[what] if axis not in AXES[3:] else _FORCES[what].replace("force", "moment")
+            layout["annotations"].append(_heading(f"{word}, {axis} [{scale_of(what, axis).unit}]", across[0], top))
+            place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+            for side, line in (("measured", MEASURED), ("model", MODEL)):
+                trace = _loop(phase, pairs[what], against.get(over), side, axis, over, own=motion is phase)
+                shown = {"name": side, "legendgroup": side, "showlegend": r == 0 and c == 0}
+                traces.append(trace | place | shown | {"line": dict(line)})
+    return Figure(name, title, words, traces, layout, height, 300 * columns)
+
+
+def _loop(
+    phase: Phase, force: Pair | None, motion: Pair | None, side: str, axis: str, over: str, *, own: bool
+) -> dict[str, Any]:
+    """Return one side's force over time, or over its own motion, or that which was measured."""
+    assert force is not None
+    k = force.columns.index(axis)
+    y = getattr(force, side)[:, k]
+    if motion is None:
+        x, factor, kept = phase.time, 1.0, envelope(y, BUCKETS)
+    else:
+        x = getattr(motion, side if own else "measured")[:, motion.columns.index(axis)]
+        n = min(len(x), len(y))
+        x, y, factor = x[:n], y[:n], scale_of(over, axis).factor
+        kept = np.arange(0, n, -(-n // LOOP))
+    values = {"x": packed(x[kept] * factor), "y": packed(y[kept] * scale_of(force.quantity, axis).factor)}
+    return {"type": "scatter", "mode": "lines"} | values
+
+
+def _heading(words: str, x: float, y: float) -> dict[str, Any]:
+    place = {"x": x, "y": y, "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "bottom", "yshift": 3}
+    return place | {"text": f"<b>{words}</b>", "showarrow": False, "font": {"size": 12}}

@@ -1,0 +1,231 @@
+"""Sections of a validation report: the summary as a heat map, drift, oil columns, and every test phase by phase."""
+
+import numpy as np
+
+from ..names import AXES
+from ..validation import PHASES, Agreement, Phase, Validation
+from .page import Markup, details, number, paragraph, table, text
+from .plots import SCALES
+from .run_motion import percent, shown_as
+from .validate_plots import actuator_blocks, force_blocks, motion_blocks, scale_of, spectrum_block
+
+__all__ = ["ROMAN", "drift_blocks", "named", "resonance_blocks", "summary_blocks", "test_blocks", "why_not", "worst_of"]
+
+ROMAN = {1: "I", 2: "II", 3: "III"}
+SUMMED = {1: ("wrench",), 2: ("displacement", "acceleration", "wrench"), 3: ("displacement", "acceleration")}
+"""Quantities of each phase that the summary shows."""
+
+NOISE = 2.0  # judgement: times the noise, up to which an error of an axis that hardly moves is unremarkable
+SENSED = 3.0  # judgement: standard deviations of the sensors' calibration that a mean error may reach
+ACTUATORS = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
+_NAMES = {
+    "wrench": "total actuator force",
+    "struts": "strut force",
+    "dissipative": "dissipative force",
+    "actuator_force": "actuator force",
+    "chamber_pressure_a": "pressure in chamber A",
+    "chamber_pressure_b": "pressure in chamber B",
+    "spool_command": "spool command",
+}
+# A single hue from light to dark, told apart with any colour vision and in grey: RRMSE up to, ground, ink.
+_SHADES = (
+    (0.01, "#edf4fa", "#1b1f24"),
+    (0.03, "#c9dff0", "#1b1f24"),
+    (0.10, "#93c0e0", "#1b1f24"),
+    (0.30, "#2f76ad", "#ffffff"),
+    (np.inf, "#0a3358", "#ffffff"),
+)
+
+
+def named(quantity: str) -> str:
+    """A quantity in words."""
+    return _NAMES.get(quantity, quantity)
+
+
+def worst_of(found: Validation, phase: int) -> tuple[Phase, Agreement] | None:
+    """The worst of what the summary shows of a phase, among axes that moved; None if there is nothing."""
+    rows = ((p, a) for p in found.phases if p.number == phase for a in _judged(p))
+    return max(rows, key=lambda row: row[1].rrmse_aligned, default=None)
+
+
+def why_not(found: Validation, phase: int) -> str:
+    """Why there is nothing of a phase to judge, in words."""
+    reasons = {p.reason for p in found.phases if p.number == phase and p.reason}
+    if len(reasons) == 1:
+        return f"not done, since {reasons.pop()}"
+    return "not done, see the notes" if reasons else "no axis moved enough to be judged"
+
+
+def _judged(phase: Phase) -> list[Agreement]:
+    return [a for a in phase.agreement if a.quantity in SUMMED[phase.number] and a.moves]
+
+
+# --------------------------------------------------------------------------------------------- over all tests
+def summary_blocks(found: Validation) -> list[Markup]:
+    """Return the error of every phase, test and axis as a shaded table."""
+    tops = [f"up to {100 * top:g} %" for top, _, _ in _SHADES[:-1]] + [f"above {100 * _SHADES[-2][0]:g} %"]
+    key = " ".join(_shaded(words, top) for words, (top, _, _) in zip(tops, _SHADES, strict=True))
+    how = (
+        "RRMSE = √(Σ error² ∕ Σ measured²), delay removed; forces less their means, which are compared below. ▲ marks "
+        "the worst of each phase. An axis that hardly moves has no percentage: its error stands as a multiple of what "
+        f"the sensors' noise alone would leave, marked ! above {NOISE:g}; gains and offsets of sensors are not in that."
+    )
+    axes = [axis for axis in AXES if any(a.column == axis for p in found.phases for a in p.agreement)]
+    rows = []
+    for phase, quantity in ((n, q) for n in PHASES for q in SUMMED[n]):
+        worst = worst_of(found, phase)
+        for p in (p for p in found.phases if p.number == phase and not p.reason):
+            cells = {a.column: _cell(a, bool(worst and worst[1] is a)) for a in p.of(quantity)}
+            rows.append((f"{ROMAN[phase]} · {named(quantity)}", p.test, *(cells.get(axis, "") for axis in axes)))
+    skipped = [
+        paragraph(f"Phase {ROMAN[n]}, {PHASES[n]}: {why_not(found, n)}.")
+        for n in PHASES
+        if all(p.reason for p in found.phases if p.number == n) and any(p.number == n for p in found.phases)
+    ]
+    heat = table("RRMSE, delay removed", ("Phase and quantity", "Test", *axes), rows)
+    return [paragraph(how), paragraph(Markup(key)), heat, *skipped, *_spool_blocks(found), *_mean_blocks(found)]
+
+
+def _spool_blocks(found: Validation) -> list[Markup]:
+    """Return how close the spool commands of the closed loop are, by their worst actuator."""
+    rows = [(p.test, a) for p in found.phases for a in p.of("spool_command") if a.moves]
+    if not rows:
+        return []
+    test, worst = max(rows, key=lambda row: row[1].rrmse_aligned)
+    words = (
+        f"Spool commands of the closed loop: RRMSE at worst {percent(worst.rrmse_aligned)} ({test}, {worst.column})."
+    )
+    return [paragraph(words)]
+
+
+def _mean_blocks(found: Validation) -> list[Markup]:
+    """Return the mean error of the total actuator force by inverse dynamics, against what calibration may leave."""
+    phases = [p for p in found.phases if p.number == 1 and not p.reason]
+    if not phases:
+        return []
+    first = phases[0].of("wrench")
+    rows = [(p.test, *(_mean_cell(a) for a in p.of("wrench"))) for p in phases]
+    due = ("calibration, one sd", *(number(a.offset_expected * scale_of("wrench", a.column).factor, 2) for a in first))
+    how = (
+        "Mean of required less measured force by inverse dynamics. The last row is what gains and offsets of the "
+        f"force sensors leave in it, one standard deviation; ! marks more than {SENSED:g} of them: a weight, a "
+        "pressure or a sensor is off."
+    )
+    header = ("Test", *(f"{a.column} [{scale_of('wrench', a.column).unit}]" for a in first))
+    return [paragraph(how), table("Mean error of the total actuator force", header, [*rows, due])]
+
+
+def _mean_cell(one: Agreement) -> str:
+    beyond = abs(one.offset) > SENSED * one.offset_expected
+    return f"{'! ' * beyond}{number(one.offset * scale_of(one.quantity, one.column).factor)}"
+
+
+def _cell(one: Agreement, worst: bool) -> Markup:
+    if one.moves:
+        return _shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", one.rrmse_aligned)
+    if not np.isfinite(one.error_to_noise):
+        return text("hardly moves")
+    return text(f"{'! ' * (one.error_to_noise > NOISE)}{number(one.error_to_noise, 2)} × noise")
+
+
+def _shaded(words: str, ratio: float) -> Markup:
+    """Words on the shade of a ratio."""
+    _, ground, ink = next(shade for shade in _SHADES if not ratio > shade[0])
+    style = f"display:inline-block;min-width:4.6em;padding:.1em .45em;border-radius:3px;background:{ground};color:{ink}"
+    return Markup(
+        f'<span style="{style};print-color-adjust:exact;-webkit-print-color-adjust:exact">{text(words)}</span>'
+    )
+
+
+def drift_blocks(found: Validation) -> list[Markup]:
+    """Return the drift rate of every test's open loop."""
+    phases = [p for p in found.phases if p.number == 2 and not p.reason]
+    if not phases:
+        return [paragraph(f"Not known: {why_not(found, 2)}.")]
+    axes = [a.column for a in phases[0].of("displacement")]
+    rows = [
+        (p.test, *(number(1e6 * a.drift) for a in p.of("displacement")), f"{number(float(p.time[-1]))} s")
+        for p in phases
+    ]
+    how = (
+        "Least-squares slope of the displacement's error, model less measured. Nothing holds an open loop in place: "
+        "errors of pressures, spools and leakage add up."
+    )
+    header = ("Test", *(f"{axis} [{'µrad/s' if axis in AXES[3:] else 'µm/s'}]" for axis in axes), "Over")
+    return [paragraph(how), table("Drift rate", header, rows)]
+
+
+def resonance_blocks(found: Validation) -> list[Markup]:
+    """Return the oil columns as tests and model show them."""
+    rows = [
+        (
+            f"{p.test}, {PHASES[p.number]}",
+            r.column,
+            number(r.expected),
+            *(number(x.frequency, 4) for x in (r.measured, r.model)),
+            *(percent(x.sharpness) for x in (r.measured, r.model)),
+        )
+        for p in found.phases
+        for r in p.resonances
+        if np.isfinite(r.measured.frequency) and np.isfinite(r.model.frequency)
+    ]
+    how = (
+        "Where the acceleration of an axis answers its spools most, near the oil column of the linear model (undamped, "
+        "friction sliding), if it is coherent with them and above the noise. Sharpness is half the relative width at "
+        "half the power: a damping ratio, if the length of the test does not limit it. Axes that hardly moved are left "
+        "out, and peaks that only one side shows."
+    )
+    if not rows:
+        return [paragraph(how), paragraph("No test shows an oil column.")]
+    header = ("Test", "Axis", "Linear model [Hz]", "Measured [Hz]", "Model [Hz]", "Sharpness, measured", "and model")
+    return [paragraph(how), table("Oil columns", header, rows)]
+
+
+# ---------------------------------------------------------------------------------------------- test by test
+def test_blocks(found: Validation, test: str) -> list[Markup]:
+    """Return every phase of a test, folded away: numbers, figures, spectra."""
+    blocks = []
+    phases = [p for p in found.phases if p.test == test]
+    motion = next((p for p in phases if p.pair("displacement")), None)
+    for phase in phases:
+        title = f"Phase {ROMAN[phase.number]}: {PHASES[phase.number]}"
+        if phase.reason:
+            blocks.append(paragraph(Markup(f"<strong>{title}</strong>"), f" was not done: {phase.reason}."))
+            continue
+        axes = _shown_axes(motion or phase)
+        figures = force_blocks(phase, motion, axes) if phase.number == 1 else motion_blocks(phase, axes)
+        figures += actuator_blocks(phase, "spool_command")
+        for quantity in ACTUATORS:
+            drawn = actuator_blocks(phase, quantity)
+            figures += [details(f"Every actuator: {named(quantity)}", *drawn)] if drawn else []
+        spectra = details("Spectra", *spectrum_block(phase, axes, found.numbers.spectra.edges))
+        blocks.append(details(f"{title}{_short(phase)}", _metrics(phase), *figures, spectra))
+    return blocks
+
+
+def _shown_axes(phase: Phase) -> list[str]:
+    """Axes that a phase draws: those whose displacement, or else force, moved; the strongest if none did."""
+    rows = phase.of("displacement") or phase.of("wrench")
+    return [a.column for a in rows if a.moves] or [max(rows, key=lambda a: a.variation).column]
+
+
+def _short(phase: Phase) -> str:
+    worst = max(_judged(phase), key=lambda a: a.rrmse_aligned, default=None)
+    if worst is None:
+        return ", hardly moved"
+    return f", worst RRMSE {percent(worst.rrmse_aligned)} ({worst.column}, {named(worst.quantity)})"
+
+
+def _metrics(phase: Phase) -> Markup:
+    header = ("Quantity", "Column", "RRMSE", "Delay removed", "Delay", "Peak ratio", "Correlation", "RMS error")
+    rows = []
+    for a in phase.agreement:
+        scale = scale_of(a.quantity, a.column)
+        late = shown_as(a.delay, SCALES["time"]) if np.isfinite(a.delay) else "–"
+        alike = f"{a.correlation:.5f}" if np.isfinite(a.correlation) else "–"
+        column = a.column if a.moves else f"{a.column} (hardly moves)"
+        ratios = percent(a.rrmse), percent(a.rrmse_aligned), late, number(a.peak_ratio, 4), alike
+        errors = shown_as(a.error, scale), shown_as(a.offset, scale), number(a.error_to_noise, 2)
+        rows.append((named(a.quantity), column, *ratios, *errors))
+    heads = (*header, "Mean error", "RMS error over noise")
+    return details("All numbers", table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows))

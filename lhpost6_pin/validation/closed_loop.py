@@ -1,0 +1,61 @@
+"""What a record says of the closed loop it was made in: controller settings, reference or drive."""
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..control import ControllerSettings, load_controller
+from ..drives import load_drive
+from ..errors import RecordError
+from ..files import models_folder
+from ..motions import Reference, Target
+from ..names import AXES
+from ..records import require
+from ..schemes import SAMPLE_RATE
+from ..signals import differentiate, resample_band_limited
+
+__all__ = ["drive_of", "settings_of"]
+
+Array = NDArray[np.float64]
+
+
+def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> ControllerSettings:
+    """Settings that are given, else those shipped that the record's attribute `controller` names.
+
+    Raises RecordError where neither is known: without its controller a closed loop cannot be simulated.
+    """
+    if given is not None:
+        return given
+    said = record.attrs.get("controller")
+    for path in sorted((models_folder() / "controllers").glob("*.toml")):
+        settings = load_controller(path.stem)
+        if said in (path.stem, settings.name):
+            return settings
+    said = "no controller" if said is None else f"the controller {said!r}, which is not shipped"
+    raise RecordError(f"the record names {said}; give its settings as a TOML file with --controller")
+
+
+def drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:
+    """Target at the controller's rate, and the drive (n, 6) if the test replayed one.
+
+    Velocity and acceleration of the reference are those stored, else derivatives low-passed at `high` [Hz]. Raises
+    RecordError without reference_displacement, or for a drive file that is missing or of another mode.
+    """
+    if "drive" in record.attrs:
+        found = load_drive(Path(str(record.attrs["drive"])))
+        if found.mode != settings.mode:
+            raise RecordError(f"{record.attrs['drive']} is for {found.mode} mode; {settings.name} has {settings.mode}")
+        return found.target, found.values
+    require(record, "reference_displacement")
+    time = record["time"].values - float(record["time"][0])
+    dt = float(time[-1]) / (len(time) - 1)
+    clock = np.arange(int(time[-1] * SAMPLE_RATE + 1e-6) + 1) / SAMPLE_RATE
+    motion = [record["reference_displacement"].values]
+    for name in ("reference_velocity", "reference_acceleration"):
+        motion.append(record[name].values if name in record else differentiate(motion[-1], dt, high))
+    x, v, a = (resample_band_limited(values, time, clock) for values in motion)
+    axes = tuple((axis, axis) for axis in AXES)
+    name = str(record.attrs.get("test", "test"))
+    return Target(clock, x, v, a, Reference(name, "reference of the record", 1.0, axes, 0.0, high, 0.0)), None

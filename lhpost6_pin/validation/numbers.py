@@ -1,0 +1,66 @@
+"""Numbers by which tests are compared."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..files import models_folder
+from ..parameters import Parameters, load_parameters
+from ..signals import Band
+
+__all__ = ["HardlyMoving", "Numbers", "Resonances", "Spectra", "validation_numbers"]
+
+
+class HardlyMoving(NamedTuple):
+    """Below either of the first two a column hardly moves."""
+
+    noise: float  # times the sensor noise
+    share: float  # of the column that moves most
+    radius: float  # of rotations [m]
+
+
+class Spectra(NamedTuple):
+    """How spectra are estimated and summed up."""
+
+    edges: tuple[float, ...]  # of bands [Hz]
+    segment: float  # [s]
+    noise: float  # times the sensor noise in a band, below which there is no ratio
+
+
+class Resonances(NamedTuple):
+    """How an oil-column peak is looked for."""
+
+    search: float  # relative, about the model's frequency
+    prominence: float  # power over the median of the searched band
+    coherence: float  # of acceleration with spools, from which a peak counts
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of `models/procedures/validate.toml`."""
+
+    band: Band  # of all that is compared
+    edge: float  # left out at both ends [s]
+    longest_delay: float  # [s]
+    significant_skew: float  # standard errors
+    hardly: HardlyMoving
+    spectra: Spectra
+    resonance: Resonances
+    reference_high: float  # [Hz]
+    stated: Parameters
+
+
+def validation_numbers() -> Numbers:
+    """Read `models/procedures/validate.toml`."""
+    stated = load_parameters(models_folder() / "procedures" / "validate.toml")
+    n = stated.number
+    return Numbers(
+        band=Band(high=n("comparison.high"), order=int(n("comparison.order"))),
+        edge=n("comparison.edge"),
+        longest_delay=n("comparison.longest_delay"),
+        significant_skew=n("comparison.significant_skew"),
+        hardly=HardlyMoving(*(n(f"hardly_moving.{name}") for name in HardlyMoving._fields)),
+        spectra=Spectra(stated.vector("spectra.edges"), n("spectra.segment"), n("spectra.noise")),
+        resonance=Resonances(*(n(f"resonance.{name}") for name in Resonances._fields)),
+        reference_high=n("reference.high"),
+        stated=stated,
+    )

@@ -1,0 +1,71 @@
+"""The numbers of a validation as a file, for other programs."""
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from ..files import write_whole
+from .phases import PHASES, Phase
+from .resonance import Peak, Resonance
+from .spectra import Spectrum
+from .validate import Validation
+
+__all__ = ["metrics", "save_metrics"]
+
+
+def metrics(found: Validation) -> dict[str, Any]:
+    """All numbers of a validation, SI, by test and phase; None for what is not known."""
+    machine = found.machine
+    return {
+        "campaign": found.campaign,
+        "machine": machine.name,
+        "specimen": machine.specimen.name if machine.specimen else "none",
+        "low_pass": found.numbers.band.high,
+        "skews": {group: {"delay": d.delay, "standard_error": d.standard_error} for group, d in found.skews.items()},
+        "tests": {
+            test: {PHASES[p.number]: _phase(p, found) for p in found.phases if p.test == test} for test in found.tests
+        },
+    }
+
+
+def save_metrics(found: Validation, path: Path) -> None:
+    """Write `metrics` as JSON, whole or not at all."""
+    with write_whole(path) as beside:
+        beside.write_text(json.dumps(_plain(metrics(found)), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _phase(phase: Phase, found: Validation) -> dict[str, Any]:
+    if phase.reason:
+        return {"reason": phase.reason}
+    out: dict[str, Any] = {"seconds": float(phase.time[-1]), "notes": list(phase.notes), "agreement": {}}
+    for one in phase.agreement:
+        row = {**one._asdict(), "error_to_noise": one.error_to_noise}
+        out["agreement"].setdefault(row.pop("quantity"), {})[row.pop("column")] = row
+    if phase.spectrum is not None:
+        out["amplitude_ratio"] = _ratios(phase.spectrum, found.numbers.spectra.edges)
+    out["resonance"] = {r.column: _resonance(r) for r in phase.resonances}
+    return out
+
+
+def _ratios(spectrum: Spectrum, edges: tuple[float, ...]) -> dict[str, Any]:
+    bands = [f"{low:g}-{high:g} Hz" for low, high in pairwise(edges)]
+    columns = zip(spectrum.columns, spectrum.ratio.T.tolist(), strict=True)
+    return {"quantity": spectrum.quantity} | {c: dict(zip(bands, values, strict=True)) for c, values in columns}
+
+
+def _resonance(one: Resonance) -> dict[str, Any]:
+    def said(peak: Peak) -> dict[str, float]:
+        return {"frequency": peak.frequency, "sharpness": peak.sharpness}
+
+    return {"linear_model": one.expected, "measured": said(one.measured), "model": said(one.model)}
+
+
+def _plain(value: Any) -> Any:
+    """The value with None for every number that JSON has no word for."""
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_plain(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,107 @@
+"""Three-phase validation of a campaign: every test through inverse dynamics, open loop and closed loop.
+
+found = validate(machine, campaign)
+found.phase("TX", 1).of("wrench")       # agreement of required and measured actuator wrench, per axis
+"""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import xarray as xr
+from joblib import Parallel, delayed
+
+from ..alignment import Delay, align_record, group_delays
+from ..campaign import Campaign
+from ..control import ControllerSettings
+from ..errors import LhpostError, RecordError
+from ..linearize import oil_column_modes
+from ..machine import Machine
+from ..plant import make_plant
+from ..sensors import Sensors, load_sensors
+from .bench import Bench
+from .numbers import Numbers, validation_numbers
+from .phases import PHASES, Phase, run_phase
+from .prepare import prepare
+
+__all__ = ["Validation", "validate"]
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What a validation found: each phase of each test."""
+
+    campaign: str
+    machine: Machine
+    sensors: Sensors
+    numbers: Numbers
+    skews: Mapping[str, Delay]  # between channel groups, taken out of all records
+    phases: tuple[Phase, ...]  # test by test
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """Names of the tests, in the campaign's order."""
+        return tuple(dict.fromkeys(p.test for p in self.phases))
+
+    def phase(self, test: str, number: int) -> Phase | None:
+        """A phase of a test; None if it was not asked for."""
+        return next((p for p in self.phases if (p.test, p.number) == (test, number)), None)
+
+
+def validate(
+    machine: Machine,
+    campaign: Campaign,
+    *,
+    sensors: Sensors | None = None,
+    settings: ControllerSettings | None = None,
+    phases: Sequence[int] = tuple(PHASES),
+    jobs: int = -1,
+    progress: Progress | None = None,
+) -> Validation:
+    """Compare a campaign with its machine in the phases asked for, tests over `jobs` threads.
+
+    settings replace what records say of their controller. Skews between channel groups that stand out of their errors
+    are taken out first. A phase that cannot be says why; RecordError if no phase of any test can be.
+    """
+    sensors, numbers = sensors or load_sensors(), validation_numbers()
+    plant = make_plant(machine)
+    skews = {
+        group: found
+        for group, found in group_delays(plant, campaign.records).items()
+        if abs(found.delay) > numbers.significant_skew * found.standard_error
+    }
+    bench = Bench(sensors, numbers, oil_column_modes(machine), settings)
+    done, lock = [0], threading.Lock()
+
+    def count() -> None:
+        with lock:
+            done[0] += 1
+            if progress is not None:
+                progress(done[0] / (len(campaign.records) * len(phases)))
+
+    def one(record: xr.Dataset) -> list[Phase]:
+        return _phases_of(machine, align_record(record, skews), bench, phases, count)
+
+    found = Parallel(n_jobs=jobs, prefer="threads")(delayed(one)(record) for record in campaign.records)
+    every = tuple(phase for test in found for phase in test)
+    if all(phase.reason for phase in every):
+        why = "; ".join(dict.fromkeys(f"{p.test}, {PHASES[p.number]}: {p.reason}" for p in every))
+        raise RecordError(f"{campaign.name}: nothing can be compared: {why}")
+    return Validation(campaign.name, machine, sensors, numbers, skews, every)
+
+
+def _phases_of(
+    machine: Machine, record: xr.Dataset, bench: Bench, phases: Sequence[int], count: Callable[[], None]
+) -> list[Phase]:
+    found = []
+    try:
+        test = prepare(machine, record, bench.sensors)
+    except LhpostError as error:
+        name, time = str(record.attrs.get("test", "test")), record["time"].values
+        test, why = None, str(error)
+    for number in phases:
+        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test, bench))
+        count()
+    return found

@@ -1,0 +1,60 @@
+"""The forces behind a test by inverse dynamics: what `lhpost6 decompose` does, with the Python interface.
+
+    python scripts/decompose_forces.py [RECORD] [--out DIR]
+
+Without a record it makes one: a triangular wave in x, as test TX5 in kind, simulated and passed through noisy sensors.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+import xarray as xr
+
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.decompose import decompose_record, find_agreement, find_work, save_ledger
+from lhpost6_pin.decompose.table import print_agreement
+from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.records import load_record
+from lhpost6_pin.rehearse import rehearse
+from lhpost6_pin.report import write_decompose_report
+from lhpost6_pin.sensors import add_noise, load_sensors
+
+
+def triangular_test(machine: Machine) -> xr.Dataset:
+    """A triangular wave in x, as sensors show it."""
+    wave = find_motion("triangle", amplitude=0.2, velocity=0.25, axis="x")
+    facts = {"test": "TX", "title": "Triangular wave in x, simulated"}
+    test = rehearse(machine, make_target(wave), load_controller("lhpost6"), attrs=facts, record_every=4, engine="fused")
+    return add_noise(test.record, load_sensors(), np.random.default_rng(0))
+
+
+def main(
+    record: Annotated[Path | None, typer.Argument(help="Record of a test; else one is simulated.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for ledger.nc and report.html.")] = Path("out/forces"),
+) -> None:
+    """Take RECORD apart, say how well the model explains it, and draw the six rows of Section 6.1."""
+    machine = load_machine("lhpost6")
+    test = load_record(record) if record else triangular_test(machine)
+
+    # 1. Motion from all sensors, forces from the motion, in the band that is compared
+    found = decompose_record(machine, test)
+
+    # 2. Errors axis by axis, and what is left against noise, calibration errors and uncertain parameters
+    agreement = find_agreement(found)
+    print_agreement(found, agreement)
+
+    # 3. Straight from the arrays: how much of the actuators' work dry friction takes
+    work = find_work(found)
+    for effect, energy in zip(work.effects, work.energy[-1], strict=True):
+        print(f"{effect}: {energy / 1e3:+.2f} kJ into the platen")
+
+    # 4. The ledger as netCDF, and the report with the plots
+    save_ledger(found, out / "ledger.nc", work)
+    print(write_decompose_report(found, agreement, work, out / "report.html"))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,185 @@
+"""What a calibration's page, table and command say; the calibration itself is made by hand, no fit is run."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lhpost6_pin.calibration import Calibration, Subset, calibration_numbers, machine_knobs
+from lhpost6_pin.calibration.errors import SensorUnknown
+from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, verdict_on
+from lhpost6_pin.calibration_table import print_calibration
+from lhpost6_pin.campaign import Campaign
+from lhpost6_pin.cli import app
+from lhpost6_pin.errors import RecordError, UnknownNameError
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.report import write_calibrate_report
+
+MACHINE = load_machine()
+NAMES = ("platen.mass[x]", "horizontal.leakage", "horizontal.viscous", "vertical.seal_shape", "hold_down.base_height")
+UNKNOWNS = (
+    SensorUnknown("gain actuator_force[H1]", "gain", "actuator_force", 0, 0.003, "1", ("gain actuator_force 0", -1)),
+    SensorUnknown("delay spool_position", "delay", "spool_position", -1, 1e-4, "s", ("delay spool_position", -1)),
+)
+
+
+@pytest.fixture
+def found() -> Calibration:
+    """Mass 3 % up in 20 deviations, leakage and viscous friction within 3, a shape nobody tells of, a height moved."""
+    knobs = tuple(k for k in machine_knobs(MACHINE) if k.name in NAMES)
+    prior = np.array([*(k.sd for k in knobs), *(u.sd for u in UNKNOWNS)])
+    sd = prior * np.array([0.1, 0.2, 0.2, 0.9, 0.1, 0.1, 0.1])
+    estimate = sd * np.array([20.0, 1.0, -2.0, 0.5, -4.0, 8.0, 0.0])
+    correlation = np.eye(7)
+    correlation[1, 2] = correlation[2, 1] = -0.97
+    gas = Subset(
+        "gas law", np.where(np.arange(7) == 4, estimate + 10 * sd, np.nan), np.where(np.arange(7) == 4, 2 * sd, np.nan)
+    )
+    wrench = Subset(
+        "wrench, x", np.where(np.arange(7) < 1, estimate + sd, np.nan), np.where(np.arange(7) < 1, 2 * sd, np.nan)
+    )
+    return Calibration(
+        machine=MACHINE,
+        campaign="march",
+        tests=("TX", "WN"),
+        knobs=knobs,
+        unknowns=UNKNOWNS,
+        prior=prior,
+        estimate=estimate,
+        covariance=correlation * np.outer(sd, sd),
+        alone=np.vstack([1.5 * sd, np.minimum(7 * sd, prior)]),
+        subsets=(gas, wrench),
+        misfit_before=np.array([[181.0, 3480.0, 16900.0, np.nan], [180.0, 258.0, 16800.0, np.nan]]),
+        misfit_after=np.array([[0.95, 0.97, 1.02, np.nan], [1.03, 0.9, 1.07, np.nan]]),
+        rounds=3,
+        converged=True,
+        numbers=calibration_numbers(),
+    )
+
+
+def page_of(calibration: Calibration, folder: Path) -> str:
+    """The text of a report without its markup, its library and the data of its figures."""
+    path = write_calibrate_report(calibration, folder / "page.html", command="lhpost6 calibrate march")
+    bare = re.sub(r"<(script|style).*?</\1>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return " ".join(re.sub(r"<[^>]+>", " ", bare).replace("\N{NO-BREAK SPACE}", " ").split())
+
+
+# ---------------------------------------------------------------------------------------- verdicts
+def test_a_parameter_is_changed_beyond_three_deviations_and_not_informed_near_its_prior(found) -> None:
+    assert dict(zip(found.names, (verdict_on(found, i) for i in range(5)), strict=False)) == {
+        "platen.mass[x]": "changed",
+        "horizontal.leakage": "unchanged",
+        "horizontal.viscous": "unchanged",
+        "vertical.seal_shape": "not informed",
+        "hold_down.base_height": "changed",
+    }
+    assert changed_knobs(found) == [0, 4]
+
+
+def test_what_went_as_far_as_it_may_is_said_to_be_at_its_bound(found) -> None:
+    reach = found.numbers.number("fit.reach")
+    far = replace(found, estimate=np.where(np.arange(7) == 1, -reach * found.prior, found.estimate))
+    assert verdict_on(far, 1) == "at its bound"
+
+
+def test_a_group_contradicts_by_the_deviation_of_the_difference(found) -> None:
+    (one,) = contradictions(found)
+    assert (one.subset, found.names[one.unknown]) == ("gas law", "hold_down.base_height")
+    assert one.deviations == pytest.approx(10.0 / np.sqrt(2.0**2 - 1.0))  # variance of the group less that of all
+
+
+# ---------------------------------------------------------------------------------------- page
+def test_the_page_says_first_what_was_found(found, tmp_path) -> None:
+    page = page_of(found, tmp_path)
+    summary = page[: page.index("Parameters beside their priors")]
+    assert "converged after 3 rounds" in summary
+    assert "told something of 4 of 5 parameters" in summary
+    assert "2 differ from nominal by more than 3 predicted deviations: platen.mass[x] (+3.0" in summary
+    assert "hold_down.base_height (−0.0200 m)" in summary
+    assert "from 16,900 to 1.07: sensor noise is all that is left" in summary
+    assert "Sensor errors that differ from zero 1 of 2" in summary
+    assert "lhpost6 calibrate march" in page
+
+
+def test_the_page_has_estimates_intervals_and_what_tells_of_them(found, tmp_path) -> None:
+    page = page_of(found, tmp_path)
+    low, high = found.interval(0)
+    (mass,) = re.findall(r"platen\.mass\[x\] ◆ changed .*? to [\d,]+", page)
+    for value in (168100.0, 168100.0 * np.exp(found.estimate[0]), low, high):
+        assert f"{float(f'{value:.5g}'):,.10g}" in mass
+    assert "vertical.seal_shape not informed" in page
+    assert "gain actuator_force[H1] 0.240" in page  # 8 deviations of 0.03 %
+    assert "TX 181 → 0.950 3,480 → 0.970 16,900 → 1.02" in page
+    assert "platen.mass[x] 0.10 0.15 0.70" in page  # of the prior: all tests, TX, WN
+    assert "horizontal.leakage horizontal.viscous −0.9700" in page
+    assert "hold_down.base_height gas law" in page
+
+
+def test_the_page_draws_parameters_and_groups_beside_the_priors(found, tmp_path) -> None:
+    text = write_calibrate_report(found, tmp_path / "page.html").read_text(encoding="utf-8")
+    assert set(re.findall(r'data-for="([\w-]+)"', text)) == {"forest", "subsets"}
+    forest = re.search(r'data-for="forest">(.*?)</script>', text, re.DOTALL)
+    assert forest
+    for kind in ("differs from nominal", "does not differ", "not informed"):
+        assert kind in forest.group(1)
+    assert "contradicts all together" in text
+
+
+def test_a_misfit_above_noise_a_bound_and_a_failed_search_are_not_passed_over(found, tmp_path) -> None:
+    left = replace(found, misfit_after=2.0 * found.misfit_after)
+    assert "an effect is missing" in page_of(left, tmp_path) and "1.94 !" in page_of(left, tmp_path)
+    far = replace(found, estimate=np.where(np.arange(7) == 1, 4.0 * found.prior, found.estimate))
+    assert "something else is wrong: horizontal.leakage" in page_of(far, tmp_path)
+    assert "did not converge in 3 rounds" in page_of(replace(found, converged=False), tmp_path)
+
+
+def test_a_campaign_that_tells_nothing_has_a_page_too(found, tmp_path) -> None:
+    blank = replace(
+        found, estimate=np.zeros(7), covariance=np.diag(found.prior**2), subsets=(), alone=np.vstack(2 * [found.prior])
+    )
+    page = page_of(blank, tmp_path)
+    assert "told something of 0 of 5 parameters" in page and "None differs from nominal" in page
+    assert "No two unknowns are correlated" in page and "No group tells of a parameter by itself" in page
+
+
+# ---------------------------------------------------------------------------------------- terminal
+def test_the_table_shows_what_changed(found, capsys) -> None:
+    print_calibration(found)
+    said = capsys.readouterr().out
+    assert re.search(r"platen\.mass\[x\].*1\.681e\+05.*changed", said)
+    assert "gain actuator_force[H1]" in said and "delay spool_position" not in said  # which is not off
+    assert "converged after 3 rounds" in said
+
+
+@pytest.mark.parametrize(("converged", "code"), [(True, 0), (False, 1)])
+def test_the_command_leaves_override_and_report_and_says_if_it_converged(
+    found, tmp_path, monkeypatch, converged, code
+) -> None:
+    asked = {}
+
+    def pretend(machine, records, sensors, **options):
+        asked.update(options, machine=machine.name, sensors=sensors.name)
+        return replace(found, converged=converged)
+
+    monkeypatch.setattr("lhpost6_pin.campaign.load_campaign", lambda folder, machine: Campaign("march", ()))
+    monkeypatch.setattr("lhpost6_pin.calibration.calibrate", pretend)
+    ended = CliRunner().invoke(app, ["calibrate", "march", "--out", str(tmp_path), "--seed", "3", "--jobs", "1"])
+    assert ended.exit_code == code, ended.output
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["override.toml", "report.html"]
+    assert (asked["seed"], asked["jobs"], asked["campaign"]) == (3, 1, "march")
+    mass = load_machine("lhpost6", tmp_path / "override.toml").parameters["platen.mass"]
+    assert mass.evidence == "calibrated" and "march" in mass.source
+    np.testing.assert_allclose(mass.value[0], 168100.0 * np.exp(found.estimate[0]))
+    assert "not converged" in ended.output or converged
+
+
+def test_a_campaign_that_is_not_there_is_named(tmp_path) -> None:
+    for folder, words in ((tmp_path / "gone", "is no folder"), (tmp_path, "holds no record")):
+        ended = CliRunner().invoke(app, ["calibrate", str(folder)])
+        assert isinstance(ended.exception, RecordError)
+        assert words in str(ended.exception) and str(folder) in str(ended.exception)
+    ended = CliRunner().invoke(app, ["calibrate", str(tmp_path), "--sensors", "nobody"])
+    assert isinstance(ended.exception, UnknownNameError)

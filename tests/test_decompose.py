@@ -1,0 +1,242 @@
+"""Records taken apart: exact without noise, left at the noise's level with it, and honest about what is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from inverse_cases import RATE, shaken
+from machine_cases import DATA, machine_named
+from sensor_cases import measured
+from typer.testing import CliRunner
+
+from lhpost6_pin.cli import app
+from lhpost6_pin.decompose import (
+    Agreement,
+    Decomposed,
+    decompose_record,
+    find_agreement,
+    find_work,
+    save_ledger,
+)
+from lhpost6_pin.decompose.work import delivered_by
+from lhpost6_pin.errors import RecordError, SimulationError
+from lhpost6_pin.inverse_dynamics import leg_wrenches
+from lhpost6_pin.outputs import record_of_run
+from lhpost6_pin.records import load_record, open_record
+from lhpost6_pin.report import write_decompose_report
+from lhpost6_pin.sensors import add_noise, load_sensors
+
+PRACTICE = {name: DATA / "records" / f"practice_a_{name}.nc" for name in ("TX", "EQ_ridgecrest2019_ccc")}
+MACHINE = machine_named("lhpost6")
+SENSORS = load_sensors()
+
+
+@pytest.fixture(scope="module")
+def clean() -> xr.Dataset:
+    """A record of every model step, without noise."""
+    return record_of_run(shaken(MACHINE, 1.6, size=0.04), {"test": "shaken", "title": "Shaken"})
+
+
+@pytest.fixture(scope="module")
+def exact(clean: xr.Dataset) -> Decomposed:
+    """The same, taken apart."""
+    return decompose_record(MACHINE, clean)
+
+
+@pytest.fixture(scope="module", params=sorted(PRACTICE))
+def practice(request: pytest.FixtureRequest) -> tuple[Decomposed, Agreement]:
+    """A test of an independent simulator with noisy sensors, nothing hidden in it."""
+    found = decompose_record(MACHINE, load_record(PRACTICE[request.param]))
+    return found, find_agreement(found)
+
+
+@pytest.fixture(scope="module")
+def triangle() -> xr.Dataset:
+    """Its triangular wave."""
+    return load_record(PRACTICE["TX"])
+
+
+# ---------------------------------------------------------------------------------------- how well it comes apart
+def test_a_simulated_record_at_the_model_step_comes_apart_exactly(exact: Decomposed) -> None:
+    assert exact.sensors is None
+    assert np.abs(exact.forces.residual).max() < 1e-8 * np.abs(exact.forces.measured).max()  # stated bound; 1e-14 found
+    agreement = find_agreement(exact)
+    assert (agreement.actuators.rrmse < 1e-8).all()
+    assert not agreement.noise.any()
+    assert set(agreement.varying_explained) == {"none needed"}
+
+
+def test_sampled_more_slowly_what_is_left_is_the_staggered_schemes(clean: xr.Dataset) -> None:
+    slow = clean.isel(time=slice(None, None, 4)).assign_attrs(sample_rate_hz=RATE / 4)
+    found = decompose_record(MACHINE, slow)
+    left = np.abs(found.forces.residual).max() / np.abs(found.forces.measured).max()
+    assert 1e-8 < left < 1e-3  # friction marched with steps four times as long
+
+
+def test_with_noise_the_residual_is_at_the_noises_level_in_every_axis(practice: tuple[Decomposed, Agreement]) -> None:
+    _, agreement = practice
+    assert (agreement.noise_ratio > 0.9).all()  # 40 s x 33 Hz know a standard deviation to 3 %
+    assert (agreement.noise_ratio < 1.0 + SENSORS.noise_range).all()
+    assert set(agreement.varying_explained) == {"noise"}
+    assert set(agreement.offset_explained) <= {"noise", "sensors"}
+
+
+def test_where_axes_move_modelled_forces_follow_measured_ones(practice: tuple[Decomposed, Agreement]) -> None:
+    _, agreement = practice
+    assert agreement.actuators.rrmse[0] < 0.03
+    assert agreement.actuators.rrmse_varying[0] < 0.01
+    assert agreement.dissipative.rrmse_varying[0] < 0.03
+    assert agreement.struts is not None and agreement.struts.rrmse[2] < 0.005  # pressure gains to 0.5 %
+    assert agreement.actuators.peak_ratio[0] == pytest.approx(1.0, abs=0.05)
+    assert abs(agreement.actuators.delay[0]) < 6e-4  # two skews of 0.3 ms
+
+
+def test_a_parameter_that_is_wrong_shows_above_noise_and_sensors(triangle: xr.Dataset) -> None:
+    wrong = MACHINE.with_params({"horizontal.seal_friction": 2 * 9250.0})
+    agreement = find_agreement(decompose_record(wrong, triangle))
+    assert agreement.noise_ratio[0] > 5
+    assert agreement.varying_explained[0] in ("parameters", "nothing")
+    assert agreement.varying_explained[2:4] == ("noise", "noise")  # z and roll have no part in it
+
+
+# ---------------------------------------------------------------------------------------- what is to be expected
+def test_noise_of_the_forces_alone_is_what_the_legs_make_of_it(triangle: xr.Dataset) -> None:
+    only = replace(SENSORS, noise={"actuator_force": SENSORS.noise["actuator_force"]})
+    found = decompose_record(MACHINE, triangle, only, align=False)
+    unit = leg_wrenches(found.plant, found.plant.zero_state().q[None], np.ones((1, 10)))[0]
+    f = np.linspace(0, 256, 4097)
+    kept = np.trapezoid(only.noise_spectrum("actuator_force", f)[:, 0] * found.comparison.band.gain(f) ** 2, f)
+    expected = np.sqrt(kept * np.sum(unit**2, axis=0))
+    # 2 x 33 Hz x 10 s independent values: 3 %; legs turn by 0.2 m of 5
+    np.testing.assert_allclose(find_agreement(found).noise, expected, rtol=0.12)
+
+
+def test_offsets_and_gains_of_vertical_forces_add_in_squares(practice: tuple[Decomposed, Agreement]) -> None:
+    found, agreement = practice
+    vertical = found.whole.component_force[:, 4:10].mean(axis=0)
+    spread = np.sqrt(
+        6 * SENSORS.offset_sd("actuator_force") ** 2 + SENSORS.gain_sd("actuator_force") ** 2 * vertical @ vertical
+    )
+    assert agreement.sensors.offset[2] == pytest.approx(spread, rel=0.02)  # and a little from the horizontal ones
+
+
+# ---------------------------------------------------------------------------------------- where things come from
+def test_skews_are_taken_out_unless_asked_not_to(triangle: xr.Dataset) -> None:
+    plain, aligned = decompose_record(MACHINE, triangle, align=False), decompose_record(MACHINE, triangle)
+    assert not plain.delays and plain.record is triangle
+    assert "actuator_displacement" in aligned.delays and "Skews taken out" in " ".join(aligned.notes)
+    assert "aligned" in aligned.record.attrs
+
+
+def test_pressures_stand_in_for_forces(triangle: xr.Dataset) -> None:
+    found = decompose_record(MACHINE, triangle.drop_vars("actuator_force"))
+    assert "P_A A_1" in found.notes[0]
+    agreement = find_agreement(found)
+    assert agreement.actuators.rrmse_varying[0] < 0.02
+    assert set(agreement.offset_explained) <= {"noise", "sensors"}
+
+
+def test_without_strut_pressures_the_models_struts_stand_in(triangle: xr.Dataset) -> None:
+    found = decompose_record(MACHINE, triangle.drop_vars("strut_pressure"))
+    assert find_agreement(found).struts is None
+    left = found.forces.dissipative_measured - found.forces.dissipative
+    np.testing.assert_allclose(left, found.forces.residual, atol=1e-6)  # rounding of meganewtons
+
+
+def test_one_axis_comes_apart_too(tmp_path) -> None:
+    machine = machine_named("uniaxial")
+    clean = record_of_run(shaken(machine, 1.6, size=0.04), {"test": "one"})
+    clean = clean.isel(time=slice(None, None, 4)).assign_attrs(sample_rate_hz=RATE / 4)
+    found = decompose_record(machine, add_noise(clean, SENSORS, np.random.default_rng(0)))
+    agreement = find_agreement(found)
+    assert agreement.noise_ratio[0] == pytest.approx(1.0, abs=0.3)  # 2 x 33 Hz x 1.1 s: 8 % each
+    page = write_decompose_report(found, agreement, find_work(found), tmp_path / "page.html")
+    assert "Axis" in page.read_text()
+
+
+# ---------------------------------------------------------------------------------------- work
+def test_all_effects_and_the_rest_add_up_to_the_inertia(practice: tuple[Decomposed, Agreement]) -> None:
+    found, _ = practice
+    effects, wrench = delivered_by(found)
+    assert effects[-1] == "unexplained"
+    np.testing.assert_allclose(wrench.sum(axis=1), found.forces.ledger.inertia, atol=1e-7)  # of meganewtons
+
+
+def test_energy_is_balanced_and_friction_takes_it(practice: tuple[Decomposed, Agreement]) -> None:
+    found, _ = practice
+    work = find_work(found)
+    spent = dict(zip(work.effects, work.energy[-1], strict=True))
+    assert spent["actuators_4_way"] > 1e5
+    assert all(spent[name] < 0 for name in ("seal_friction", "pad_friction", "viscous"))
+    assert abs(spent["unexplained"]) < 0.005 * spent["actuators_4_way"]  # gains of forces
+    # trapezoids at 512 Hz of what moves at 10 Hz, (2 pi 10 / 512)^2 / 12 = 1e-3
+    assert np.abs(work.unbalanced).max() < 2e-3 * np.abs(work.kinetic).max()
+
+
+# ---------------------------------------------------------------------------------------- on disk
+def test_the_ledger_is_written_with_names_and_units(practice: tuple[Decomposed, Agreement], tmp_path) -> None:
+    found, _ = practice
+    save_ledger(found, tmp_path / "ledger.nc", source="here.nc")
+    data = open_record(tmp_path / "ledger.nc")
+    assert {"time", "effect", "component", "axis"} <= set(data.dims)
+    np.testing.assert_allclose(data.wrench.sum("effect"), data.inertia, atol=1e-7)
+    np.testing.assert_array_equal(data.required - data.measured, data.residual)
+    assert all(v.attrs["units"] and v.attrs["long_name"] for v in data.data_vars.values())
+    assert data.attrs["record"] == "here.nc" and data.attrs["cutoff_hz"] == 33.0
+    assert data.attrs["machine"] == "LHPOST6" and "fused" in data.attrs["made_from"]
+    assert [p.name for p in tmp_path.iterdir()] == ["ledger.nc"]
+
+
+def test_the_command_leaves_ledger_and_report_and_says_what_is_left(tmp_path) -> None:
+    arguments = ["decompose", str(PRACTICE["TX"]), "--out", str(tmp_path), "--cutoff", "20", "--no-align"]
+    ended = CliRunner().invoke(app, arguments)
+    assert ended.exit_code == 0, ended.output
+    assert "up to 20 Hz" in ended.output and "sd/noise" in ended.output
+    page = (tmp_path / "report.html").read_text()
+    assert "at the noise&#x27;s level" in page and "Dissipative force" in page
+    assert open_record(tmp_path / "ledger.nc").attrs["cutoff_hz"] == 20.0
+
+
+def test_a_page_of_forty_seconds_stays_small(plant, tmp_path) -> None:
+    record, _ = measured(plant, duration=40.0)
+    noisy = add_noise(record, SENSORS, np.random.default_rng(0)).assign_attrs(kind="measured")
+    found = decompose_record(plant.machine, noisy)
+    agreement = find_agreement(found)
+    assert "nothing" in agreement.varying_explained  # its pressures follow no dynamics
+    page = write_decompose_report(found, agreement, find_work(found), tmp_path / "page.html")
+    assert page.stat().st_size < 6e6
+    assert "an effect is missing, or a sensor is wrong" in page.read_text()
+
+
+# ---------------------------------------------------------------------------------------- what cannot be
+def test_what_a_record_lacks_is_named(triangle: xr.Dataset, clean: xr.Dataset) -> None:
+    with pytest.raises(RecordError, match="neither actuator_force nor chamber_pressure_a"):
+        decompose_record(MACHINE, triangle.drop_vars(["actuator_force", "chamber_pressure_a"]))
+    with pytest.raises(RecordError, match="no chamber_pressure_b"):
+        decompose_record(MACHINE, triangle.drop_vars(["actuator_force", "chamber_pressure_b"]))
+    with pytest.raises(RecordError, match="neither actuator_displacement nor platen_displacement"):
+        decompose_record(MACHINE, triangle.drop_vars(["actuator_displacement", "platen_displacement"]))
+    with pytest.raises(RecordError, match="no platen_velocity"):
+        decompose_record(MACHINE, clean.drop_vars("platen_velocity"))
+
+
+@pytest.mark.parametrize("channel", ["actuator_force", "platen_acceleration", "strut_pressure"])
+def test_a_sample_that_is_no_number_is_named(triangle: xr.Dataset, channel: str) -> None:
+    holed = triangle.copy(deep=True)
+    holed[channel][1234, 1] = np.nan
+    with pytest.raises(RecordError, match=rf"{channel}\[\w+\] at sample 1234 is not finite"):
+        decompose_record(MACHINE, holed)
+
+
+def test_records_of_other_machines_specimens_and_too_short_ones_are_refused(triangle: xr.Dataset) -> None:
+    with pytest.raises(RecordError, match="name its machine with --machine"):
+        decompose_record(machine_named("uniaxial"), triangle)
+    with pytest.raises(RecordError, match="mount it with --specimen"):
+        decompose_record(MACHINE, triangle.assign_attrs(specimen="tower"))
+    with pytest.raises(RecordError, match="too short"):
+        decompose_record(MACHINE, triangle.isel(time=slice(0, 600)))
+    with pytest.raises(RecordError, match="cutoff of 0 Hz"):
+        decompose_record(MACHINE, triangle, cutoff=0.0)
+    with pytest.raises(SimulationError, match="--locked"):
+        decompose_record(MACHINE.with_specimen(DATA / "pendulum.urdf"), triangle)

@@ -1,0 +1,332 @@
+"""Three-phase validation: what agrees is found to agree, what was put in is found, what is missing is named."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machine_cases import DATA
+from typer.testing import CliRunner
+
+from lhpost6_pin.campaign import Campaign, load_campaign, save_campaign
+from lhpost6_pin.cli import app
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.errors import RecordError
+from lhpost6_pin.identify import noise_target
+from lhpost6_pin.linearize import oil_column_modes
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.records import load_record
+from lhpost6_pin.rehearse import rehearse
+from lhpost6_pin.report.validate_report import write_validate_report
+from lhpost6_pin.sensors import add_noise, load_sensors
+from lhpost6_pin.signals import align
+from lhpost6_pin.validation import PHASES, Pair, metrics, validate
+from lhpost6_pin.validation.agreement import MOTIONS, agree
+from lhpost6_pin.validation.numbers import validation_numbers
+from lhpost6_pin.validation.resonance import find_peak
+
+
+def triangle(axis="x"):
+    """Slow triangle along one axis."""
+    motion = find_motion("triangle", axis=axis, amplitude=0.1, velocity=0.2, corner_acceleration=3.0, cycles=1)
+    return make_target(motion)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return load_machine()
+
+
+@pytest.fixture(scope="module")
+def campaign(machine):
+    """A triangle along X and white noise on all axes, in closed loop, free of sensor noise."""
+    settings = load_controller("lhpost6")
+    noise = noise_target(("x", "y", "z", "roll", "pitch", "yaw"), duration=8.0)
+    records = [
+        rehearse(machine, target, settings, attrs={"test": name}, engine="fused").record
+        for name, target in (("TX", triangle()), ("WN", noise))
+    ]
+    return Campaign("made", tuple(records))
+
+
+@pytest.fixture(scope="module")
+def noisy(campaign):
+    rng = np.random.default_rng(0)
+    return campaign._replace(records=tuple(add_noise(r, load_sensors(), rng) for r in campaign.records))
+
+
+@pytest.fixture(scope="module")
+def found(machine, campaign):
+    return validate(machine, campaign)
+
+
+@pytest.fixture(scope="module")
+def found_noisy(machine, noisy):
+    return validate(machine, noisy)
+
+
+# Nothing differs ------------------------------------------------------------------------------------------------------
+
+
+def test_the_closed_loop_repeats_a_run_of_the_same_machine(found):
+    for test in found.tests:
+        rows = [a for q in (*MOTIONS, "wrench") for a in found.phase(test, 3).of(q) if a.moves]
+        assert {a.column for a in rows} >= {"x"}
+        # same controller, reference and state: the run is repeated step by step; the alignment by no delay rounds
+        assert max(a.rrmse for a in rows) < 1e-12
+        assert max(a.rrmse_aligned for a in rows) < 1e-12
+
+
+def test_the_open_loop_repeats_a_run_whose_spools_keep_still_within_a_sample(machine):
+    """With a delay of ten samples, not 10.24, a record's positions are all that the ports saw."""
+    whole = machine.with_params({f"{kind}.valve_delay": 10 / 2048 for kind in ("horizontal", "vertical")})
+    record = rehearse(whole, triangle(), load_controller("lhpost6"), attrs={"test": "TX"}, engine="fused").record
+    phase = validate(whole, Campaign("whole", (record,)), phases=[2]).phase("TX", 2)
+    assert max(a.rrmse for a in phase.agreement if a.moves) < 1e-12  # the same steps: rounding
+    assert max(abs(a.drift) for a in phase.of("displacement")) < 1e-15
+
+
+def test_the_open_loop_of_a_run_differs_by_what_its_spools_do_within_a_sample(found):
+    """A record has their mean over each sample: the same oil, up to 0.24 of a sample, 0.1 ms, off."""
+    for test, most in (("TX", 1e-3), ("WN", 1e-2)):  # of accelerations and forces; several times what it is
+        rows = [a for q in (*MOTIONS, "wrench") for a in found.phase(test, 2).of(q) if a.moves]
+        assert {(a.quantity, a.column) for a in rows} >= {("displacement", "x"), ("wrench", "x"), ("wrench", "pitch")}
+        assert max(a.rrmse for a in rows) < most
+        assert max(a.rrmse for a in rows if a.quantity == "displacement") < 0.1 * most
+
+
+def test_the_closed_loop_gives_the_commands_of_the_run_itself(found):
+    for test in found.tests:
+        rows = found.phase(test, 3).of("spool_command")
+        assert len(rows) == 10
+        assert max(a.error for a in rows) < 1e-9  # of full stroke: rounding
+
+
+def test_inverse_dynamics_of_a_run_without_noise_gives_back_its_forces(found):
+    for test in found.tests:
+        rows = [a for a in found.phase(test, 1).of("wrench") if a.moves]
+        assert {a.column for a in rows} >= {"x", "pitch"}
+        # the record has a quarter of the model's steps: friction is marched with four times the step, whose lag
+        # of 0.2 ms shows where friction turns over
+        assert max(a.rrmse for a in rows) < 0.02
+
+
+def test_inverse_dynamics_is_at_the_noise_of_the_sensors(found_noisy):
+    for test in found_noisy.tests:
+        for one in found_noisy.phase(test, 1).of("wrench"):
+            # two draws differ in size by 1 / sqrt(2 x 30 Hz x 9 s) = 4 %. Friction is not linear in noise: at rest the
+            # first draw moves it from where it is, the second, on top of it, by less
+            assert 0.8 < one.error_to_noise < 2.5, f"{test} {one.column}"
+    for one in found_noisy.phase("WN", 1).of("wrench"):
+        assert 0.8 < one.error_to_noise < 1.3, one.column  # nothing rests
+
+
+def test_the_open_loop_of_noisy_spools_is_as_far_off_as_noise_takes_it(found_noisy):
+    for one in found_noisy.phase("WN", 2).of("acceleration"):
+        assert one.moves
+        # noise of spools excites oil columns, whose level wanders in 9 s: one draw tells another to a factor of two
+        assert 0.5 < one.error_to_noise < 2.0, one.column
+
+
+def test_oil_columns_of_model_and_run_are_the_same_and_near_those_of_the_linear_model(found, machine):
+    expected = {m.axis: m.frequency for m in oil_column_modes(machine)}
+    rows = [r for r in found.phase("WN", 2).resonances if np.isfinite(r.measured.frequency)]
+    assert len(rows) >= 3
+    for one in rows:
+        assert one.model.frequency == pytest.approx(one.measured.frequency, rel=1e-4)  # but for what spools do within
+        assert one.model.sharpness == pytest.approx(one.measured.sharpness, rel=1e-2)  # a sample
+        assert one.expected == expected[one.column]
+        assert one.measured.frequency == pytest.approx(one.expected, rel=validation_numbers().resonance.search)
+
+
+# What was put in ------------------------------------------------------------------------------------------------------
+
+
+def test_a_delay_that_was_put_in_is_found_and_removed(machine, campaign):
+    late = 0.004
+    record = campaign.records[0]
+    dt = 1 / 2048
+    motions = {
+        f"platen_{q}": record[f"platen_{q}"].copy(data=align(record[f"platen_{q}"].values, -late, dt)) for q in MOTIONS
+    }
+    found = validate(machine, Campaign("late", (record.assign(motions),)), phases=[3])
+    rows = {a.quantity: a for a in found.phase("TX", 3).agreement if a.column == "x"}
+    # the measurement is late, so the model is early; shifts are exact for what is band-limited to 30 of 1024 Hz
+    assert rows["velocity"].delay == pytest.approx(-late, abs=1e-6)
+    assert rows["acceleration"].rrmse > 0.05
+    assert rows["acceleration"].rrmse_aligned < 1e-3
+
+
+def test_a_drift_that_was_put_in_is_found(machine, campaign):
+    record = campaign.records[0]
+    rate = np.array([1e-4, 0, 0, 0, 0, 2e-5])
+    moved = record["platen_displacement"] - np.outer(record["time"].values, rate)
+    found = validate(
+        machine,
+        Campaign("drifting", (record.assign(platen_displacement=moved.assign_attrs(units="m, rad")),)),
+        phases=[2],
+    )
+    drift = [a.drift for a in found.phase("TX", 2).of("displacement")]
+    # a line passes a low-pass of unit gain unchanged; spools within a sample leave some 1e-9 m/s
+    np.testing.assert_allclose(drift, rate, atol=1e-8)
+
+
+def test_an_effect_that_the_model_lacks_shows_in_its_phase(machine, campaign):
+    heavier = machine.with_params({"platen.mass": [1.1 * m for m in machine.platen.mass]})
+    found = validate(heavier, campaign)
+    force = {a.column: a for a in found.phase("WN", 1).of("wrench")}
+    assert force["x"].rrmse > 0.05  # a tenth of the inertia force, which is most of it
+    # the weight of a tenth of the vertical mass, in the mean, upwards
+    assert force["z"].offset == pytest.approx(0.1 * machine.platen.mass[2] * 9.80665, rel=0.01)
+
+
+@pytest.mark.parametrize(("scale", "moves"), [(1.0, True), (0.01, False)])
+def test_a_column_moves_if_it_stands_out_of_the_noise_and_of_the_others(scale, moves):
+    t = np.arange(4096) / 512
+    x = np.sin(2 * np.pi * t)
+    measured = np.stack([x, scale * x], axis=1)
+    numbers = validation_numbers()
+    pair = Pair("displacement", ("x", "y"), measured, 1.1 * measured, np.full(2, 1e-4), np.full(2, 1e-4))
+    rows = agree([pair], 1 / 512, numbers)
+    assert rows[0].rrmse == pytest.approx(0.1)
+    assert rows[1].moves is moves
+    assert np.isfinite(rows[1].rrmse) == moves
+    assert rows[1].error_to_noise == pytest.approx(0.1 * scale * np.sqrt(0.5) / 1e-4, rel=1e-2)
+    loud = agree([replace(pair, heard=np.full(2, 0.1))], 1 / 512, numbers)  # rms 0.71 is less than ten times that
+    assert not loud[0].moves
+
+
+def test_a_preload_makes_no_error_look_small_and_an_offset_none_large():
+    t = np.arange(4096) / 512
+    x = np.sin(2 * np.pi * t)
+    measured, model = 1e6 + 1e4 * x, 1.01e6 + 1.2e4 * x
+    pair = Pair("actuator_force", ("V1",), measured[:, None], model[:, None], np.ones(1), np.ones(1))
+    (one,) = agree([pair], 1 / 512, validation_numbers())
+    assert one.rrmse == pytest.approx(0.2)
+    assert one.offset == pytest.approx(1e4, rel=1e-3)  # the ends are left out, and with them a whole number of periods
+
+
+def test_the_peak_of_an_oscillator_has_its_frequency_and_damping():
+    f = np.linspace(0.0, 60.0, 2401)
+    f0, zeta = 11.0, 0.03
+    power = 1 / ((1 - (f / f0) ** 2) ** 2 + (2 * zeta * f / f0) ** 2)
+    peak = find_peak(f, power, np.ones_like(f), 11.7, validation_numbers())
+    assert peak.frequency == pytest.approx(f0 * np.sqrt(1 - 2 * zeta**2), rel=1e-3)
+    assert peak.sharpness == pytest.approx(zeta, rel=0.01)  # half-power width 2 zeta f0, to second order in zeta
+    assert np.isnan(find_peak(f, power, np.zeros_like(f), 11.7, validation_numbers()).frequency)  # not coherent
+    assert np.isnan(find_peak(f, np.ones_like(f), np.ones_like(f), 11.7, validation_numbers()).frequency)  # no peak
+
+
+# What is missing ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("lost", "number", "named"),
+    [
+        (["spool_position"], 2, "spool_position"),
+        (["reference_displacement"], 3, "reference_displacement"),
+        (["actuator_force", "chamber_pressure_a"], 1, "actuator_force"),
+    ],
+)
+def test_a_phase_without_its_channels_says_which_and_the_others_go_on(machine, campaign, lost, number, named):
+    record = campaign.records[0].drop_vars(lost)
+    found = validate(machine, Campaign("poor", (record,)))
+    assert named in found.phase("TX", number).reason
+    others = [p for p in found.phases if p.number != number and "chamber_pressure_a" not in lost]
+    assert all(p.reason is None for p in others)
+
+
+def test_without_known_settings_there_is_no_closed_loop_unless_they_are_given(machine, campaign):
+    record = campaign.records[0]
+    for said, words in ((None, "names no controller"), ("somebody's", "not shipped")):
+        attrs = {k: v for k, v in record.attrs.items() if k != "controller"} | ({"controller": said} if said else {})
+        unsaid = record.copy(deep=False)
+        unsaid.attrs = attrs
+        with pytest.raises(RecordError, match=words):
+            validate(machine, Campaign("unsaid", (unsaid,)), phases=[3])
+    given = validate(machine, Campaign("given", (unsaid,)), phases=[3], settings=load_controller("lhpost6"))
+    assert given.phase("TX", 3).of("velocity")[0].rrmse < 1e-9
+
+
+def test_nothing_to_compare_is_an_error_that_names_what_is_missing(machine, campaign):
+    poor = campaign.records[0][["spool_command"]]
+    with pytest.raises(RecordError, match=r"nothing can be compared.*actuator_displacement"):
+        validate(machine, Campaign("poor", (poor,)))
+
+
+def test_strut_pressures_may_be_missing(machine, campaign):
+    found = validate(machine, Campaign("poor", (campaign.records[0].drop_vars("strut_pressure"),)), phases=[1])
+    phase = found.phase("TX", 1)
+    assert phase.pair("struts") is None
+    assert phase.of("wrench")[0].moves
+
+
+def test_a_specimen_that_is_not_mounted_is_named(machine, campaign):
+    with pytest.raises(RecordError, match=r"'tower'.*--specimen"):
+        validate(machine, Campaign("carrying", (campaign.records[0].assign_attrs(specimen="tower"),)))
+
+
+def test_a_measured_record_goes_through(machine):
+    record = load_record(DATA / "records" / "practice_a_TX.nc")
+    found = validate(machine, Campaign("measured", (record,)), phases=[1, 2])
+    rows = {(p.number, a.quantity, a.column): a for p in found.phases for a in p.agreement}
+    assert rows[1, "wrench", "x"].rrmse_aligned < 0.03  # 0.5 % of gain, friction of noisy motion
+    assert rows[2, "velocity", "x"].rrmse_aligned < 0.01
+    assert abs(rows[2, "displacement", "x"].drift) < 1e-3  # m/s: noise and offsets of spools and pressures
+
+
+# What is written ------------------------------------------------------------------------------------------------------
+
+
+def test_the_number_of_threads_changes_nothing(machine, noisy):
+    one, many = (validate(machine, noisy, phases=[1], jobs=n) for n in (1, 2))
+    assert json.dumps(metrics(one)) == json.dumps(metrics(many))
+
+
+def test_progress_ends_at_one(machine, campaign):
+    shares = []
+    validate(machine, campaign, phases=[1], progress=shares.append)
+    assert shares == [0.5, 1.0]
+
+
+def test_the_report_has_the_figures_of_every_phase(found_noisy, tmp_path):
+    page = write_validate_report(found_noisy, tmp_path / "report.html", command="lhpost6 validate made").read_text()
+    figures = set(re.findall(r'class="plot" id="([^"]+)"', page))
+    wanted = {"forces-TX", "loops-TX", "motion2-TX-x", "motion3-TX-x", "spool_command3-TX-H1", "actuator_force2-WN-V1"}
+    wanted |= {f"motion{n}-WN-{axis}" for n in (2, 3) for axis in ("x", "y", "z", "roll", "pitch", "yaw")}
+    wanted |= {"chamber_pressure_a2-TX-H1", "chamber_pressure_b2-TX-H1", "spectrum1-WN-x", "spectrum2-WN-x"}
+    assert wanted <= figures
+    assert len(figures) == len(re.findall(r'class="plot" id=', page))  # no name twice
+    assert page.count("▲") >= 1 + len(PHASES)  # the key and the worst of each phase
+    assert len(page) < 6e6
+
+
+def test_the_command_leaves_report_and_metrics(campaign, tmp_path):
+    save_campaign(campaign._replace(records=campaign.records[:1]), tmp_path / "in")
+    done = CliRunner().invoke(app, ["validate", str(tmp_path / "in"), "--out", str(tmp_path / "out"), "--jobs", "1"])
+    assert done.exit_code == 0, done.output
+    found = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    x = found["tests"]["TX"]["closed loop"]["agreement"]["velocity"]["x"]
+    assert x["rrmse"] < 1e-9
+    assert x["unit"] == "m/s"
+    assert found["tests"]["TX"]["open loop"]["agreement"]["velocity"]["yaw"]["rrmse"] is None
+    assert (tmp_path / "out" / "report.html").stat().st_size > 1e6
+
+
+@pytest.mark.parametrize("phases", ["", "4", "1;2"])
+def test_phases_that_do_not_exist_are_refused(phases, tmp_path):
+    done = CliRunner().invoke(app, ["validate", str(tmp_path), "--phases", phases])
+    assert done.exit_code == 1
+    assert "1,2,3" in str(done.exception)
+
+
+def test_an_empty_folder_and_tests_of_different_states_are_refused(machine, campaign, tmp_path):
+    with pytest.raises(RecordError, match="holds no record"):
+        load_campaign(tmp_path, machine)
+    one, two = campaign.records
+    mixed = campaign._replace(records=(one, two.assign_attrs(valves_per_horizontal_actuator=2)))
+    save_campaign(mixed, tmp_path)
+    with pytest.raises(RecordError, match="differ in valves_per_horizontal_actuator"):
+        load_campaign(tmp_path, machine)

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import RecordError
 
-__all__ = ["fill_gaps", "integrate", "resolution", "without_offset"]
+__all__ = ["WIDTHS", "fill_gaps", "integrate", "quieted", "resolution", "without_offset"]
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,35 @@ def fill_gaps(x: ArrayLike, dt: float, most: float, name: str = "signal") -> Arr
         at = np.flatnonzero(good)
         columns[~good, k] = Akima1DInterpolator(at, columns[at, k])(np.flatnonzero(~good))
     return x
+
+
+WIDTHS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64)
+"""Standard deviations [s] of the smoothing windows of `quieted`: from the noise's own pace to long rests."""
+
+_NOISE = 4.0
+"""Standard deviations of noise that smoothing may take away: rarely exceeded by chance, small beside what moves."""
+
+
+def quieted(x: ArrayLike, noise: ArrayLike, dt: float) -> Array:
+    """Signals (n, k) smoothed wherever only noise is lost: at rest they hardly move, elsewhere they are as given.
+
+    Every sample has the widest of the Gaussian-like windows `WIDTHS` up to which each, all around the sample, changes
+    what the one before it left by no more than noise (as in Lepski's choice of a bandwidth, Theory Probab. Appl. 35,
+    1991). noise (1 + len(WIDTHS), k) is its standard deviation in the signals as given and after each window.
+    """
+    from scipy.ndimage import minimum_filter1d, uniform_filter1d
+
+    last = np.asarray(x, dtype=float)
+    out, quiet = last.copy(), np.ones(last.shape, dtype=bool)
+    for width, most in zip(WIDTHS, _NOISE * np.asarray(noise, dtype=float), strict=False):
+        box = 2 * round(width / dt) + 1  # three of them have the standard deviation `width`, nearly
+        smooth = np.asarray(x, dtype=float)
+        for _ in range(3):
+            smooth = uniform_filter1d(smooth, box, axis=0, mode="nearest")
+        quiet &= minimum_filter1d(np.abs(smooth - last) <= most, 2 * box - 1, axis=0)
+        out = np.where(quiet, smooth, out)
+        last = smooth
+    return out
 
 
 def integrate(x: ArrayLike, dt: float) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .conditioning import integrate
+from .conditioning import WIDTHS, integrate, quieted
 from .errors import RecordError
 from .plant import Plant
 from .pose import PlatenMotion, forward_kinematics, leg_displacements
@@ -43,6 +43,7 @@ class FusedMotion(NamedTuple):
 
     motion: PlatenMotion  # displacement, velocity, acceleration (n, 6)
     noise: PlatenMotion  # (6,) each
+    path: Array  # (n, 6) displacement, still where it rests: for friction, whose memory noise would shake out of it
     used: tuple[str, ...]
 
 
@@ -88,7 +89,11 @@ def fuse_motion(
     weights = _weights(f, displacement, velocity, acceleration, crossover)
     raw = _composite(f, displacement, velocity, acceleration, weights, dt)
     motion = PlatenMotion(*(band.apply(x, dt) for x in raw))
-    return FusedMotion(motion, _noise(f, (displacement, velocity, acceleration), weights, band), tuple(used))
+    power = _noise(f, (displacement, velocity, acceleration), weights, band)
+    omega = 2 * np.pi * f[:, None]
+    noise = PlatenMotion(*(_deviation(f, power * omega ** (2 * k)) for k in range(3)))
+    after = [_deviation(f, power * np.exp(-((omega * width) ** 2))) for width in (0.0, *WIDTHS)]
+    return FusedMotion(motion, noise, quieted(motion.displacement, after, dt), tuple(used))
 
 
 def kinematic_jacobian(plant: Plant) -> Array:
@@ -189,15 +194,17 @@ def _weighted(differences: list[tuple[Array, Array]], f: Array, dt: float) -> Pl
     return PlatenMotion(x + basis @ slow, v + speed, a + 2 * slow[2] / t[-1] ** 2)
 
 
-def _noise(
-    f: Array, kinds: tuple[_Sensor | None, ...], weights: tuple[Array, Array, Array], band: Band
-) -> PlatenMotion:
-    """Standard deviation (6,) of the fused noise in displacement, velocity and acceleration."""
+def _noise(f: Array, kinds: tuple[_Sensor | None, ...], weights: tuple[Array, Array, Array], band: Band) -> Array:
+    """Spectrum (f, 6) of the fused displacement's noise."""
     omega = 2 * np.pi * f[:, None]
     power = np.zeros((len(f), 6))
     for order, (kind, weight) in enumerate(zip(kinds, weights, strict=True)):
         if kind is not None:
             over = np.divide(weight, omega**order, out=np.zeros_like(weight), where=omega > 0) if order else weight
             power += over**2 * kind.spectrum
-    power *= band.gain(f)[:, None] ** 2
-    return PlatenMotion(*(np.sqrt(np.trapezoid(power * omega ** (2 * k), f, axis=0)) for k in range(3)))
+    return power * band.gain(f)[:, None] ** 2
+
+
+def _deviation(f: Array, power: Array) -> Array:
+    """Standard deviation (6,) of noise with a spectrum (f, 6)."""
+    return np.asarray(np.sqrt(np.trapezoid(power, f, axis=0)))

@@ -93,12 +93,14 @@ def inverse_dynamics(
     actuator_force: ArrayLike,
     strut_pressure: ArrayLike | None = None,
     *,
+    path: Array | None = None,
     model_step: bool = False,
 ) -> Decomposition:
     """Take a motion of C and Euler angles apart, friction states starting at rest.
 
-    time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. model_step
-    says that the samples are the model steps of a semi-implicit run; forces then see the velocity that they saw there.
+    time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
+    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). model_step says that
+    the samples are the model steps of a semi-implicit run; forces then see the velocity that they saw there.
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
     if plant.model.nv != plant.axes.size:
@@ -109,7 +111,7 @@ def inverse_dynamics(
     t = np.asarray(time, float)
     dt = float(t[-1] - t[0]) / (len(t) - 1)
     moved = plant_motion(plant, motion)
-    z = march_states(plant, moved, dt)
+    z = march_states(plant, moved if path is None else plant_motion(plant, motion._replace(displacement=path)), dt)
     v = seen_velocity(moved, dt) if model_step else moved.v
     states = States(plant, t, moved.q, v, moved.a, z)
     measured = [np.asarray(actuator_force, float)]

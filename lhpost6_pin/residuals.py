@@ -53,6 +53,7 @@ class Measured:
     pressure_rate: Array | None  # [Pa/s]
     strut_pressure: Array | None  # (n, n_struts) [Pa]
     spool: Array | None  # (n, n_actuators) at the samples' instants [1]
+    path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
 
     @property
@@ -74,8 +75,12 @@ class Residuals(NamedTuple):
         return np.hstack(self)
 
 
-def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float) -> Measured:
+def make_measured(
+    record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None
+) -> Measured:
     """Make a record ready, with the platen motion found from it; pressures are differentiated up to `cutoff` [Hz].
+
+    path (n, 6) is the displacement that friction follows, where it is not the motion's.
 
     Raises RecordError if neither forces nor pressures were measured.
     """
@@ -98,6 +103,7 @@ def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float) -> Me
         pressure_rate=None if pressure is None else differentiate(pressure, dt, cutoff),
         strut_pressure=values("strut_pressure"),
         spool=values("spool_position"),
+        path=path,
     )
 
 
@@ -111,7 +117,8 @@ class Path(NamedTuple):
 def follow(plant: Plant, test: Measured) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke."""
     moved = plant_motion(plant, test.motion)
-    return Path(PlantMotion(*(np.ascontiguousarray(x) for x in moved)), march_states(plant, moved, test.dt))
+    slid = moved if test.path is None else plant_motion(plant, test.motion._replace(displacement=test.path))
+    return Path(PlantMotion(*(np.ascontiguousarray(x) for x in moved)), march_states(plant, slid, test.dt))
 
 
 def path_key(plant: Plant) -> bytes:

@@ -133,13 +133,16 @@ def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array
             for field in _DELAYED[unknown.channel]:
                 arrays[field] = align(arrays.get(field, _field(test, field)), value, test.dt)
     platen = [(u, v) for u, v in off if u.channel in test.share]
-    motion = test.motion
+    motion, path = test.motion, test.path
     if platen:
         motion = PlatenMotion(*(x.copy() for x in motion))
+        path = None if path is None else path.copy()
         for unknown, value in platen:
             for moved, share in zip(motion, test.share[unknown.channel], strict=True):
-                moved[:, unknown.column] -= value * share[:, unknown.column]
-    return replace(test, motion=motion, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
+                moved[:, unknown.column] -= value / (1.0 + value) * share[:, unknown.column]
+            if path is not None:
+                path[:, unknown.column] -= value / (1.0 + value) * test.share[unknown.channel].displacement[:, unknown.column]
+    return replace(test, motion=motion, path=path, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
 
 
 def _field(test: Measured, field: str) -> Array:

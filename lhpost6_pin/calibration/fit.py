@@ -6,7 +6,9 @@ r are the residuals in the frequency domain (real and imaginary parts, hence the
 that sensors leave in them. Noise is in the derivatives J of r, too, since every term of an equation is measured; then
 the sum of squares is least for an equation that is scaled down. The expectations of what noise adds to J^T r and J^T J
 are known from draws of simulated noise, and taken off (corrected normal equations, Fuller: Measurement Error Models,
-Wiley 1987, chapter 3). The inverse of the normal matrix is the predicted covariance.
+Wiley 1987, chapter 3). Where more than noise is left at the end (in a column of a test's residuals, in a band),
+the rest counts as noise, too: it is weighed less, and predicted deviations grow. The inverse of the normal matrix is
+the predicted covariance.
 """
 
 from collections.abc import Callable, Sequence
@@ -141,10 +143,8 @@ def calibrate(
     ]
     more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
     comparison = Comparison(
-        low=numbers.number("comparison.low"),
-        high=numbers.number("comparison.high"),
+        bands=numbers.vector("comparison.bands"),
         edge=numbers.number("comparison.edge"),
-        bands=int(numbers.number("comparison.bands")),
         step=numbers.number("fit.step"),
     )
     problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs)
@@ -208,12 +208,12 @@ def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Paramete
     them into a pose is to be calibrated.
     """
     channels = [n for n in ("platen_displacement", "platen_velocity", "platen_acceleration") if n in record]
-    motion = fuse_motion(plant, record, sensors).motion
-    ready = make_measured(record, motion, numbers.number("comparison.pressure_cutoff"))
+    fused = fuse_motion(plant, record, sensors)
+    ready = make_measured(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
     share = {}
     for name in channels if shares else ():
         more = fuse_motion(plant, record.assign({name: 2.0 * record[name]}), sensors).motion
-        share[name] = PlatenMotion(*(a - b for a, b in zip(more, motion, strict=True)))
+        share[name] = PlatenMotion(*(a - b for a, b in zip(more, fused.motion, strict=True)))
     return replace(ready, share=share)
 
 
@@ -228,21 +228,24 @@ class _Normal:
         self.problem = problem
         self.rest = problem.whitened(x)
         self.slope = problem.slopes(x, np.ones(len(x), bool), report)
+        self.power = [np.ones(r.shape) for r in self.rest]
         self.bias: _Bias | None = None
 
     def less(self, bias: "_Bias") -> "_Normal":
-        """The same with what noise adds taken off."""
+        """The same with what noise adds taken off, and weighed by what is left."""
         self.bias = bias
+        self.power = self.problem.excess(self.rest)
         return self
 
     def of(self, tests: Sequence[int], columns: slice | Mask = slice(None)) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of some tests and columns."""
         matrix, right = np.zeros(2 * (self.slope[0].shape[-1],)), np.zeros(self.slope[0].shape[-1])
         for t in tests:
-            more, side = _squares(self.slope[t][:, columns], self.rest[t][:, columns])
+            power = self.power[t][:, columns]
+            more, side = _squares(self.slope[t][:, columns], self.rest[t][:, columns], power)
             matrix, right = matrix + more, right + side
             if self.bias is not None:
-                more, side = self.bias.of(t, columns)
+                more, side = self.bias.of(t, columns, power)
                 matrix, right = matrix - more, right - side
         return matrix, right
 
@@ -275,16 +278,16 @@ class _Bias:
             clean = zip(normal.rest, normal.slope, strict=True)
             self.changes.append([(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)])
 
-    def of(self, test: int, columns: slice | Mask) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of one test and some columns."""
-        added = [_squares(c[test][1][:, columns], c[test][0][:, columns]) for c in self.changes]
+    def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
+        added = [_squares(c[test][1][:, columns], c[test][0][:, columns], power) for c in self.changes]
         matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
         return matrix, right
 
 
-def _squares(slope: Complex, rest: Complex) -> tuple[Array, Array]:
-    j = slope.reshape(-1, slope.shape[-1])
-    return 2.0 * (j.conj().T @ j).real, 2.0 * (j.conj().T @ rest.ravel()).real
+def _squares(slope: Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
+    j = (slope / np.sqrt(power)[..., None]).reshape(-1, slope.shape[-1])
+    return 2.0 * (j.conj().T @ j).real, 2.0 * (j.conj().T @ (rest / np.sqrt(power)).ravel()).real
 
 
 def _positive(matrix: Array, prior: Array) -> Array:

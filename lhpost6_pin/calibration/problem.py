@@ -5,6 +5,7 @@ Unknowns are the machine's knobs and the sensors' errors, in this order: x (p,),
 
 from collections.abc import Callable, Sequence
 from copy import copy
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,10 +29,8 @@ Complex = NDArray[np.complex128]
 class Comparison(NamedTuple):
     """How residuals are compared."""
 
-    low: float  # [Hz]
-    high: float
+    bands: tuple[float, ...]  # edges [Hz] of bands of frequency, each with its own noise
     edge: float  # cut off at both ends of a test [s]
-    bands: int  # of frequency, each with its own noise
     step: float  # of an unknown, for its derivative, in prior standard deviations
 
 
@@ -79,11 +78,19 @@ class Problem:
         plant = make_plant(machine)
         clean = [evaluate_residuals(plant, t) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
-        noise = []
+        noise: list[list[Complex]] = [[] for _ in tests]
+        self.frequency = [self._bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
         for i, test in enumerate(noisy):
-            drawn = evaluate_residuals(plant, test)
-            noise.append(self._bins(_less(drawn, clean[i % len(tests)]), test.dt))
-        self.whitener = make_whitener(noise, np.linspace(comparison.low, comparison.high, comparison.bands + 1))
+            at = i % len(tests)
+            noise[at].append(self._bins(_less(evaluate_residuals(plant, test), clean[at]), test.dt)[0])
+        for found, test, base in zip(noise, tests, clean, strict=True):
+            # what friction remembers is not known better than by its memory along the path as measured, and quieted;
+            # that counts as much as all draws together
+            other = evaluate_residuals(plant, replace(test, path=None))
+            draws = len(found)
+            found.append(self._bins(_less(other, base), test.dt)[0] * np.sqrt(draws))
+            found[:] = [bins * np.sqrt((draws + 1) / draws) for bins in found]
+        self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
     def with_tests(self, tests: Sequence[Measured]) -> "Problem":
         """The same problem with other tests."""
@@ -103,16 +110,27 @@ class Problem:
         """Whitened bins (m, c) of every test with the unknowns at x."""
         plant, tests = self._plant(x), self._corrected(x)
         found = []
-        for test in tests:
+        for i, test in enumerate(tests):
             bins, f = self._bins(evaluate_residuals(plant, test), test.dt)
-            found.append(self.whitener.apply(bins[..., None], f)[..., 0])
+            found.append(self.whitener.apply(i, bins[..., None], f)[..., 0])
+        return found
+
+    def excess(self, whitened: Sequence[Complex]) -> list[Array]:
+        """Power (m, c) of whitened bins above that of noise, by test, column and band; one where there is none."""
+        found = []
+        for f, bins in zip(self.frequency, whitened, strict=True):
+            power = np.ones(bins.shape)
+            band = self.whitener.band(f)
+            for b in np.unique(band):
+                power[band == b] = np.maximum(1.0, np.mean(np.abs(bins[band == b]) ** 2, axis=0))
+            found.append(power)
         return found
 
     def slopes(self, x: Array, free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Complex]:
         """Derivatives (m, c, p) of the whitened bins of every test, by differences; zero where not free."""
         base = _Base(self, x)
         terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
-        out = [np.zeros((len(f), sum(self.widths), len(x)), np.complex128) for f in base.frequency]
+        out = [np.zeros((len(f), sum(self.widths), len(x)), np.complex128) for f in self.frequency]
         with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
             for done, found in enumerate(parallel(delayed(self._difference)(x, base, term) for term in terms)):
                 for i, bins in found:
@@ -121,7 +139,7 @@ class Problem:
                 progress((done + 1) / len(terms))
         for slope in out:
             slope[:, :, ~free] = 0.0
-        return [self.whitener.apply(slope, f) for slope, f in zip(out, base.frequency, strict=True)]
+        return [self.whitener.apply(i, slope, f) for i, (slope, f) in enumerate(zip(out, self.frequency, strict=True))]
 
     def _difference(self, x: Array, base: "_Base", term: Term) -> list[tuple[int, list[Complex]]]:
         knobs = len(self.knobs)
@@ -155,7 +173,7 @@ class Problem:
     def _bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
         """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
         c = self.comparison
-        bins, f = spectrum_of(residuals.stacked(), dt, c.low, c.high, c.edge)
+        bins, f = spectrum_of(residuals.stacked(), dt, c.bands[0], c.bands[-1], c.edge)
         if bins.shape[1] == sum(getattr(self, "widths", ())) or not hasattr(self, "widths"):
             return bins, f
         out = np.zeros((len(f), sum(self.widths)), np.complex128)
@@ -193,7 +211,6 @@ class _Base:
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, path=p) for t, p in pairs]
-        self.frequency = [problem._bins(r, t.dt)[1] for r, t in zip(self.residuals, self.tests, strict=True)]
 
 
 def _less(after: Residuals, before: Residuals) -> Residuals:

@@ -35,35 +35,51 @@ def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tu
 
 
 class Whitener(NamedTuple):
-    """Inverse Cholesky factors (b, k, k) of the noise's cross-spectral matrices in bands between `edges` (b + 1,)."""
+    """Inverse Cholesky factors (t, b, k, k) of the noise's cross-spectral matrices: by test, in bands between `edges`.
+
+    edges is (b + 1,) [Hz].
+    """
 
     edges: Array
     factor: Complex
 
-    def apply(self, bins: Complex, f: Array) -> Complex:
-        """Whitened bins, shape (m, k, p) of `bins` at f (m,): noise in them has unit power, uncorrelated."""
+    def band(self, f: Array) -> NDArray[np.intp]:
+        """Band (m,) that each frequency f (m,) is in."""
+        return np.clip(np.searchsorted(self.edges, f, side="right") - 1, 0, self.factor.shape[1] - 1)
+
+    def apply(self, test: int, bins: Complex, f: Array) -> Complex:
+        """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
         out = np.empty_like(bins)
-        band = np.clip(np.searchsorted(self.edges, f, side="right") - 1, 0, len(self.factor) - 1)
+        band = self.band(f)
         for b in np.unique(band):
             part = bins[band == b]
-            mixed = self.factor[b] @ part.swapaxes(0, 1).reshape(part.shape[1], -1)
+            mixed = self.factor[test, b] @ part.swapaxes(0, 1).reshape(part.shape[1], -1)
             out[band == b] = mixed.reshape(part.shape[1], part.shape[0], -1).swapaxes(0, 1)
         return out
 
 
-def make_whitener(noise: Sequence[tuple[Complex, Array]], edges: Array) -> Whitener:
-    """Whitener from realisations of the noise: bins (m, k) and their frequencies (m,)."""
-    k = noise[0][0].shape[1]
-    factors = np.zeros((len(edges) - 1, k, k), np.complex128)
-    for b in range(len(edges) - 1):
-        top = np.inf if b == len(edges) - 2 else edges[b + 1]
-        inside = [bins[(f >= edges[b]) & (f < top) & (f > 0.0)] for bins, f in noise]
-        rows = np.vstack(inside)
-        matrix = rows.conj().T @ rows / len(rows)
-        matrix = matrix.T  # E[x x^H]
-        scale = np.sqrt(np.real(np.diag(matrix)))
-        scale = np.where(scale > 0.0, scale, 1.0)
-        normed = matrix / np.outer(scale, scale) + 1e-9 * np.eye(k)
+def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:
+    """Whitener from realisations of every test's noise, bins (m, k) at its frequencies (m,).
+
+    Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. How they are
+    correlated is taken as the same in all tests, and for means as in the first band above: one test has too few bins
+    in a band to tell.
+    """
+    count, k = len(edges) - 1, noise[0][0].shape[1]
+    factors = np.zeros((len(noise), count, k, k), np.complex128)
+    scaled: list[list[Complex]] = [[] for _ in range(count)]
+    for t, (realisations, f) in enumerate(zip(noise, frequency, strict=True)):
+        whole = np.where(f > 0.0, 1.0, np.sqrt(2.0))[:, None]  # a mean is real, with half the power of other bins
+        band = np.clip(np.searchsorted(edges, f, side="right") - 1, 0, count - 1)
+        for b in range(count):
+            rows = np.vstack([(bins * whole)[band == b] for bins in realisations])
+            power = np.mean(np.abs(rows) ** 2, axis=0) / (1.0 - 2.0 / len(rows))  # its inverse is unbiased
+            scale = np.sqrt(np.where(power > 0.0, power, 1.0))
+            scaled[b].append(rows / scale)
+            factors[t, b] = np.diag(1.0 / scale)
+    for b in range(count):
+        rows = np.vstack(scaled[b] + (scaled[1] if b == 0 else []))
+        correlation = rows.T @ rows.conj() / len(rows) + 1e-9 * np.eye(k)  # E[x x^H]
         # the inverse of a matrix that was estimated from n samples is too large by n / (n - k)
-        factors[b] = np.linalg.inv(np.linalg.cholesky(normed)) / scale * np.sqrt(1.0 - k / len(rows))
+        factors[:, b] = np.linalg.inv(np.linalg.cholesky(correlation)) * np.sqrt(1.0 - k / len(rows)) @ factors[:, b]
     return Whitener(edges, factors)

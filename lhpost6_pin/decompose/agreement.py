@@ -152,7 +152,7 @@ def _summed(found: Decomposed, changes: Iterator[Array]) -> Level:
 
 
 def _noise(found: Decomposed, sensors: Sensors, rng: np.random.Generator) -> Array:
-    noisier, _, _ = take_apart(found.plant, add_noise(found.record, sensors, rng), sensors, found.comparison.band)
+    noisier, *_ = take_apart(found.plant, add_noise(found.record, sensors, rng), sensors, found.comparison.band)
     change = noisier.residual - found.whole.residual
     return np.asarray(found.comparison.band.apply(change, found.dt)[found.inside].std(axis=0))
 
@@ -209,4 +209,4 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
 
 
 def _measured(found: Decomposed) -> Measured:
-    return make_measured(found.record, found.whole_motion, found.comparison.band.high)
+    return make_measured(found.record, found.whole_motion, found.comparison.band.high, path=found.whole_path)

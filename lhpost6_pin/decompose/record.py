@@ -49,6 +49,7 @@ class Decomposed:
     comparison: Comparison
     whole: Decomposition
     whole_motion: PlatenMotion
+    whole_path: Array | None  # (n, 6) displacement that friction followed, where it is not the motion's
     forces: Decomposition  # filtered, edges cut; its states are those of `whole`, cut
     motion: PlatenMotion  # the same
     delays: Mapping[str, Delay]  # taken out, by group
@@ -110,7 +111,7 @@ def decompose_record(
         require(record, *MOTION)
         _check_finite(record)
         sensors = None
-    whole, motion, notes = take_apart(plant, record, sensors, comparison.band)
+    whole, motion, path, notes = take_apart(plant, record, sensors, comparison.band)
     if delays:
         said = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
         notes = (*notes, f"Skews taken out: {said}.")
@@ -123,13 +124,14 @@ def decompose_record(
         )
     inside = slice(cut, n - cut)
     forces, seen = filtered(whole, motion, comparison.band, dt, inside)
-    return Decomposed(record, sensors, comparison, whole, motion, forces, seen, delays, notes)
+    return Decomposed(record, sensors, comparison, whole, motion, path, forces, seen, delays, notes)
 
 
 def take_apart(
     plant: Plant, record: xr.Dataset, sensors: Sensors | None, band: Band
-) -> tuple[Decomposition, PlatenMotion, tuple[str, ...]]:
-    """Inverse dynamics of a record as it stands, the motion that it started from, and where that came from in words.
+) -> tuple[Decomposition, PlatenMotion, Array | None, tuple[str, ...]]:
+    """Inverse dynamics of a record as it stands, the motion that it started from, the displacement that friction
+    followed (None: the motion's), and where they came from in words.
 
     With sensors the motion is fused, in their band; without accelerometers in `band`, as noise grows with frequency.
     """
@@ -140,7 +142,7 @@ def take_apart(
         struts = record["strut_pressure"].values
     elif plant.machine.struts:
         words.append("Strut pressures were not measured: the model's struts stand in for them.")
-    model_step = False
+    model_step, path = False, None
     if sensors is None:
         motion = PlatenMotion(*(record[name].values.astype(float) for name in MOTION))
         model_step = _at_model_step(record)
@@ -150,10 +152,10 @@ def take_apart(
         )
     else:
         fused = fuse_motion(plant, record, sensors, band=None if "platen_acceleration" in record else band)
-        motion = fused.motion
+        motion, path = fused.motion, fused.path
         words.append(f"Platen motion fused from {', '.join(fused.used)}.")
-    found = inverse_dynamics(plant, record["time"].values, motion, force, struts, model_step=model_step)
-    return found, motion, tuple(words)
+    found = inverse_dynamics(plant, record["time"].values, motion, force, struts, path=path, model_step=model_step)
+    return found, motion, path, tuple(words)
 
 
 def filtered(

@@ -7,18 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..names import AXES
-from ..validation import Pair, Phase
+from ..validation import Pair, Phase, Valves
 from ..validation.agreement import MOTIONS
 from .charts import Curve, Panel, XAxis, chart_figure
 from .control_blocks import axis_title
 from .decompose_plots import force_scale
 from .layout import axis_suffix
-from .page import Figure, Markup, figure, grid
-from .plots import BLUE, GREY, SCALES, Row, Scale, Trace, envelope, packed, time_figure
+from .page import Figure, Markup, figure, grid, number
+from .plots import BLUE, GREY, SCALES, Row, Scale, Trace, envelope, packed, palette, time_figure
 from .run_components import kinds
 from .run_motion import axis_scale, percent
 
-__all__ = ["actuator_blocks", "force_blocks", "motion_blocks", "scale_of", "spectrum_block"]
+__all__ = ["actuator_blocks", "force_blocks", "motion_blocks", "scale_of", "spectrum_block", "valve_block"]
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ MEASURED: dict[str, Any] = {"color": GREY, "width": 3.2}
 MODEL: dict[str, Any] = {"color": BLUE, "width": 1.2}
 BUCKETS = 320  # stretches of a channel over time, each drawn by its least and greatest sample
 FEW = 160  # the same where many actuators share a figure
-LOOP = 900  # points of a loop, evenly spaced
+LOOP = 1600  # points of a loop, evenly spaced: above 60 Hz in a test of half a minute
 ROW, SMALL_ROW = 130, 84  # [CSS px]
 CELL, BETWEEN = 170, 66  # [CSS px] height of a loop, and between rows of them
 SHOWN = (0.2, 80.0)  # [Hz] of spectra
@@ -130,12 +130,35 @@ def spectrum_block(phase: Phase, axes: Sequence[str], edges: Sequence[float]) ->
             if np.isfinite(ratio)
         )
         words = f"Model over measured: {ratios}." if ratios else "No band rises out of the noise."
+        words += " The noise of recorded spools shakes the model's oil columns." * (phase.number == 2)
         panel = Panel(f"Spectral density [{scale.unit}/√Hz]", curves, log=True)
         over = XAxis("Frequency [Hz]", log=True, span=SHOWN, ticks=TICKS)
         marks = [expected[axis]] if axis in expected else []
         name = f"spectrum{phase.number}-{phase.test}-{axis}"
         drawings.append(figure(chart_figure(name, axis_title(axis), words, [panel], over, row_height=200, marks=marks)))
     return [grid(*drawings, pairs=True)] if drawings else []
+
+
+def valve_block(valves: Valves) -> Markup:
+    """Return gain and phase of spools over their commands, actuators of a kind in one figure, and the model's."""
+    inside = (valves.frequency > 0.0) & (valves.frequency <= SHOWN[1])
+    f, ends = valves.frequency[inside], np.array([0.0, SHOWN[1]])
+    over = XAxis("Frequency [Hz]", span=(0.0, SHOWN[1]))
+    drawings = []
+    for own in kinds(valves.columns):
+        gains, phases, late = [], [], float(valves.model[own[0]])
+        for k, line in zip(own, palette(len(own)), strict=True):
+            response, name = valves.response[inside, k], valves.columns[k]
+            off = np.degrees(np.angle(response * np.exp(2j * np.pi * f * late)))
+            gains.append(Curve(name, f, np.abs(response), line))
+            phases.append(Curve(name, f, off - 360.0 * f * late, line))
+        phases.append(Curve("model", ends, -360.0 * ends * late, {"color": "#000000", "width": 1.6, "dash": "dash"}))
+        first, last = valves.columns[own[0]], valves.columns[own[-1]]
+        title = f"Spool over command, {first} to {last}" if len(own) > 1 else f"Spool over command, {first}"
+        words = f"In test {valves.test}, where coherent. The model's phase is that of {number(1e3 * late)} ms."
+        panels = [Panel("Gain [1]", gains, span=(0.0, 1.5)), Panel("Phase [deg]", phases)]
+        drawings.append(figure(chart_figure(f"valves-{first}", title, words, panels, over)))
+    return grid(*drawings, pairs=True)
 
 
 def _over_time(

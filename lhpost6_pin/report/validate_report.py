@@ -8,16 +8,8 @@ from ..validation import PHASES, Validation
 from .control_blocks import load_of
 from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page, table, versions
 from .run_motion import percent
-from .validate_sections import (
-    ROMAN,
-    drift_blocks,
-    named,
-    resonance_blocks,
-    summary_blocks,
-    test_blocks,
-    why_not,
-    worst_of,
-)
+from .validate_machine import drift_blocks, lag_blocks, resonance_blocks, valve_blocks
+from .validate_sections import ROMAN, named, summary_blocks, test_blocks, why_not, worst_of
 
 __all__ = ["write_validate_report"]
 
@@ -40,8 +32,7 @@ def write_validate_report(found: Validation, path: Path | str, *, command: str =
         headlines=[_headline(found, n) for n in _done(found)],
         sections=[
             Section("summary", "Agreement by phase, test and axis", summary_blocks(found)),
-            Section("drift", "Drift of the open loop", drift_blocks(found)),
-            Section("resonance", "Oil columns", resonance_blocks(found)),
+            *_machine_sections(found),
             *(
                 Section(f"test-{k}", f"Test {test}", test_blocks(found, test))
                 for k, test in enumerate(found.tests, start=1)
@@ -53,6 +44,20 @@ def write_validate_report(found: Validation, path: Path | str, *, command: str =
         versions=versions(),
     )
     return save_page(page, path)
+
+
+def _machine_sections(found: Validation) -> list[Section]:
+    """Sections on all tests together, as far as their phases were asked for."""
+    done = _done(found)
+    sections = []
+    if 2 in done:
+        sections.append(Section("drift", "Drift of the open loop", drift_blocks(found)))
+    if 3 in done:
+        sections.append(Section("lag", "Closed loop behind its reference", lag_blocks(found)))
+    if 2 in done or 3 in done:
+        sections.append(Section("resonance", "Oil columns", resonance_blocks(found)))
+        sections.append(Section("valves", "Servovalves", valve_blocks(found)))
+    return sections
 
 
 def _done(found: Validation) -> list[int]:
@@ -70,8 +75,13 @@ def _judge(found: Validation) -> tuple[str, Level]:
             continue
         phase, one = worst
         where = f"{phase.test}, {one.column}, {named(one.quantity)}"
-        sentences.append(f"{PHASES[n].capitalize()}: RRMSE at worst {percent(one.rrmse_aligned)} ({where}).")
+        words = f"{PHASES[n].capitalize()}: RRMSE at worst {percent(one.rrmse_aligned)} ({where})"
+        spread = found.residual_over_noise if n == 1 else None
+        residual = f"; residual {number(spread[0], 2)} to {number(spread[1], 2)} times the noise" if spread else ""
+        sentences.append(f"{words}{residual}.")
         level = level if one.rrmse_aligned <= FOLLOWED else "attention"
+    if any("settings may differ" in words for p in found.phases for words in p.notes):
+        sentences.append("The controller's settings are not known to be those of the tests.")
     stopped = [p.test for p in found.phases if any("stopped at" in words for words in (*p.notes, p.reason or ""))]
     if stopped:
         sentences.append(f"A simulation stopped on the way in {', '.join(dict.fromkeys(stopped))}; see the notes.")
@@ -85,7 +95,8 @@ def _headline(found: Validation, n: int) -> Headline:
     if worst is None:
         return Headline("–", label, "nothing to judge")
     phase, one = worst
-    note = f"{phase.test}, axis {one.column}, {named(one.quantity)}; {percent(one.rrmse)} with its delay"
+    note = f"{phase.test}, axis {one.column}, {named(one.quantity)}; {percent(one.rrmse)} with its delay; "
+    note += f"{number(one.error_to_noise, 2)} × noise"
     return Headline(percent(one.rrmse_aligned), label, note, "good" if one.rrmse_aligned <= FOLLOWED else "attention")
 
 

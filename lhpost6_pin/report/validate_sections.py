@@ -1,15 +1,23 @@
-"""Sections of a validation report: the summary as a heat map, drift, oil columns, and every test phase by phase."""
+"""Sections of a validation report: the summary as a heat map, and every test phase by phase."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..names import AXES
 from ..validation import PHASES, Agreement, Phase, Validation
 from .page import Markup, details, number, paragraph, table, text
-from .plots import SCALES
 from .run_motion import percent, shown_as
 from .validate_plots import actuator_blocks, force_blocks, motion_blocks, scale_of, spectrum_block
 
-__all__ = ["ROMAN", "drift_blocks", "named", "resonance_blocks", "summary_blocks", "test_blocks", "why_not", "worst_of"]
+__all__ = [
+    "ROMAN",
+    "named",
+    "summary_blocks",
+    "test_blocks",
+    "why_not",
+    "worst_of",
+]
 
 ROMAN = {1: "I", 2: "II", 3: "III"}
 SUMMED = {1: ("wrench",), 2: ("displacement", "acceleration", "wrench"), 3: ("displacement", "acceleration")}
@@ -68,7 +76,8 @@ def summary_blocks(found: Validation) -> list[Markup]:
     how = (
         "RRMSE = √(Σ error² ∕ Σ measured²), delay removed; forces less their means, which are compared below. ▲ marks "
         "the worst of each phase. An axis that hardly moves has no percentage: its error stands as a multiple of what "
-        f"the sensors' noise alone would leave, marked ! above {NOISE:g}; gains and offsets of sensors are not in that."
+        f"the sensors' noise alone would leave, marked ! above {NOISE:g}, without gains and offsets of sensors. Errors "
+        "of a displacement come from gains and drift, not from noise: they stand by themselves."
     )
     axes = [axis for axis in AXES if any(a.column == axis for p in found.phases for a in p.agreement)]
     rows = []
@@ -83,7 +92,8 @@ def summary_blocks(found: Validation) -> list[Markup]:
         if all(p.reason for p in found.phases if p.number == n) and any(p.number == n for p in found.phases)
     ]
     heat = table("RRMSE, delay removed", ("Phase and quantity", "Test", *axes), rows)
-    return [paragraph(how), paragraph(Markup(key)), heat, *skipped, *_spool_blocks(found), *_mean_blocks(found)]
+    after = [*_spool_blocks(found), *_noise_blocks(found), *_mean_blocks(found)]
+    return [paragraph(how), paragraph(Markup(key)), heat, *skipped, *after]
 
 
 def _spool_blocks(found: Validation) -> list[Markup]:
@@ -96,6 +106,33 @@ def _spool_blocks(found: Validation) -> list[Markup]:
         f"Spool commands of the closed loop: RRMSE at worst {percent(worst.rrmse_aligned)} ({test}, {worst.column})."
     )
     return [paragraph(words)]
+
+
+def _noise_blocks(found: Validation) -> list[Markup]:
+    """Return the residual of inverse dynamics over the noise predicted for it, axis by axis."""
+    phases = [p for p in found.phases if p.number == 1 and not p.reason]
+    if not phases:
+        return []
+    rows: list[tuple[str, ...]] = []
+    for p in phases:
+        ratios = [a.error_to_noise for a in p.of("wrench")]
+        rows.append((p.test, *(f"{'! ' * (not 1 / NOISE < r < NOISE)}{number(r, 3)}" for r in ratios)))
+    rows.append(("noise predicted", *(_span(same) for same in zip(*(p.of("wrench") for p in phases), strict=True))))
+    how = (
+        "Residual of inverse dynamics, required less measured actuator force less its mean, delay removed, over what "
+        f"the sensors' noise is predicted to leave in it. One is noise and nothing else; ! marks more than {NOISE:g} "
+        f"(the model lacks something) and less than {1 / NOISE:g} (the record has less noise than is stated). The last "
+        "row is that noise itself, one standard deviation. Gains of sensors add to the residual in axes that move."
+    )
+    header = ("Test", *(a.column for a in phases[0].of("wrench")))
+    return [paragraph(how), table("Residual of inverse dynamics over the noise predicted", header, rows)]
+
+
+def _span(tests: Sequence[Agreement]) -> str:
+    """Least and greatest noise of one column over all tests, in words."""
+    scale = scale_of(tests[0].quantity, tests[0].column)
+    low, high = (number(end(a.noise for a in tests) * scale.factor, 2) for end in (min, max))
+    return f"{low if low == high else f'{low} to {high}'} {scale.unit}"
 
 
 def _mean_blocks(found: Validation) -> list[Markup]:
@@ -123,6 +160,8 @@ def _mean_cell(one: Agreement) -> str:
 def _cell(one: Agreement, worst: bool) -> Markup:
     if one.moves:
         return _shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", one.rrmse_aligned)
+    if one.quantity == "displacement":
+        return text(f"{number(1e6 * one.error, 2)}\N{NO-BREAK SPACE}{'µrad' if one.column in AXES[3:] else 'µm'}")
     if not np.isfinite(one.error_to_noise):
         return text("hardly moves")
     return text(f"{'! ' * (one.error_to_noise > NOISE)}{number(one.error_to_noise, 2)} × noise")
@@ -135,50 +174,6 @@ def _shaded(words: str, ratio: float) -> Markup:
     return Markup(
         f'<span style="{style};print-color-adjust:exact;-webkit-print-color-adjust:exact">{text(words)}</span>'
     )
-
-
-def drift_blocks(found: Validation) -> list[Markup]:
-    """Return the drift rate of every test's open loop."""
-    phases = [p for p in found.phases if p.number == 2 and not p.reason]
-    if not phases:
-        return [paragraph(f"Not known: {why_not(found, 2)}.")]
-    axes = [a.column for a in phases[0].of("displacement")]
-    rows = [
-        (p.test, *(number(1e6 * a.drift) for a in p.of("displacement")), f"{number(float(p.time[-1]))} s")
-        for p in phases
-    ]
-    how = (
-        "Least-squares slope of the displacement's error, model less measured. Nothing holds an open loop in place: "
-        "errors of pressures, spools and leakage add up."
-    )
-    header = ("Test", *(f"{axis} [{'µrad/s' if axis in AXES[3:] else 'µm/s'}]" for axis in axes), "Over")
-    return [paragraph(how), table("Drift rate", header, rows)]
-
-
-def resonance_blocks(found: Validation) -> list[Markup]:
-    """Return the oil columns as tests and model show them."""
-    rows = [
-        (
-            f"{p.test}, {PHASES[p.number]}",
-            r.column,
-            number(r.expected),
-            *(number(x.frequency, 4) for x in (r.measured, r.model)),
-            *(percent(x.sharpness) for x in (r.measured, r.model)),
-        )
-        for p in found.phases
-        for r in p.resonances
-        if np.isfinite(r.measured.frequency) and np.isfinite(r.model.frequency)
-    ]
-    how = (
-        "Where the acceleration of an axis answers its spools most, near the oil column of the linear model (undamped, "
-        "friction sliding), if it is coherent with them and above the noise. Sharpness is half the relative width at "
-        "half the power: a damping ratio, if the length of the test does not limit it. Axes that hardly moved are left "
-        "out, and peaks that only one side shows."
-    )
-    if not rows:
-        return [paragraph(how), paragraph("No test shows an oil column.")]
-    header = ("Test", "Axis", "Linear model [Hz]", "Measured [Hz]", "Model [Hz]", "Sharpness, measured", "and model")
-    return [paragraph(how), table("Oil columns", header, rows)]
 
 
 # ---------------------------------------------------------------------------------------------- test by test
@@ -217,15 +212,20 @@ def _short(phase: Phase) -> str:
 
 
 def _metrics(phase: Phase) -> Markup:
-    header = ("Quantity", "Column", "RRMSE", "Delay removed", "Delay", "Peak ratio", "Correlation", "RMS error")
+    header = ("Quantity", "RRMSE", "Delay removed", "Delay", "Peak ratio", "Correlation", "RMS error")
     rows = []
     for a in phase.agreement:
         scale = scale_of(a.quantity, a.column)
-        late = shown_as(a.delay, SCALES["time"]) if np.isfinite(a.delay) else "–"
-        alike = f"{a.correlation:.5f}" if np.isfinite(a.correlation) else "–"
-        column = a.column if a.moves else f"{a.column} (hardly moves)"
+        late = f"{1e3 * a.delay:.3f} ms".replace("-", "−") if np.isfinite(a.delay) else "–"
+        alike = f"{a.correlation_aligned:.5f}" if np.isfinite(a.correlation_aligned) else "–"
         ratios = percent(a.rrmse), percent(a.rrmse_aligned), late, number(a.peak_ratio, 4), alike
-        errors = shown_as(a.error, scale), shown_as(a.offset, scale), number(a.error_to_noise, 2)
-        rows.append((named(a.quantity), column, *ratios, *errors))
-    heads = (*header, "Mean error", "RMS error over noise")
-    return details("All numbers", table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows))
+        error, mean = (shown_as(x, scale).removesuffix("\N{NO-BREAK SPACE}1") for x in (a.error_aligned, a.offset))
+        errors = error, number(a.error_to_noise, 2), mean
+        rows.append((f"{named(a.quantity)}, {a.column}", *ratios, *errors))
+    heads = (*header, "÷ noise", "Mean error")
+    how = (
+        "Delay: of the model behind the measurement. Correlation and RMS error: delay removed. A dash: hardly moves. "
+        "With and without the delay: metrics.json."
+    )
+    numbers = table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows)
+    return details("All numbers", paragraph(how), numbers)

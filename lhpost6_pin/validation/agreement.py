@@ -61,19 +61,21 @@ class Agreement(NamedTuple):
     variation: float  # rms of the measurement about its mean
     error: float  # rms of model less measurement; of forces and pressures less its mean
     noise: float  # standard deviation that sensor noise alone leaves in the error
+    error_aligned: float  # rms after taking the delay out; the same as before where there is none to take out
     rrmse: float  # [1]
     rrmse_aligned: float  # [1] after taking the delay out
     delay: float  # of the model behind the measurement [s]
-    peak_ratio: float  # model over measurement
+    peak_ratio: float  # model over measurement; a delay does not change it
     correlation: float
+    correlation_aligned: float  # after taking the delay out
     offset: float  # mean of model less measurement
     offset_expected: float  # standard deviation that calibration of sensors leaves in it; nan where not known
     drift: float  # least-squares slope of the error [unit / s]
 
     @property
     def error_to_noise(self) -> float:
-        """Error in standard deviations of the sensor noise [1]."""
-        return self.error / self.noise if self.noise > 0.0 else float("nan")
+        """Error, delay removed, in standard deviations of the sensor noise [1]."""
+        return self.error_aligned / self.noise if self.noise > 0.0 else float("nan")
 
 
 def unit_of(quantity: str, column: str) -> str:
@@ -123,12 +125,12 @@ def _agree_one(pair: Pair, k: int, moves: bool, late: float, part: slice, dt: fl
     if pair.quantity in _PRELOADED:
         whole, measured = whole - whole[part].mean(), measured - measured.mean()
     model = whole[part]
+    shifted = align(whole, late, dt)[part] if np.isfinite(late) else model
     error = model - measured
-    ratio = aligned = peak = alike = float("nan")
+    ratio = ratio_aligned = peak = alike = alike_aligned = float("nan")
     if moves:
         ratio, peak, alike = (float(f(measured, model)) for f in (rrmse, peak_ratio, correlation))
-        shifted = align(whole, late, dt) if np.isfinite(late) else whole
-        aligned = float(rrmse(measured, shifted[part]))
+        ratio_aligned, alike_aligned = (float(f(measured, shifted)) for f in (rrmse, correlation))
     return Agreement(
         pair.quantity,
         pair.columns[k],
@@ -137,11 +139,13 @@ def _agree_one(pair: Pair, k: int, moves: bool, late: float, part: slice, dt: fl
         float(measured.std()),
         float(np.sqrt(np.mean(error**2))),
         float(pair.noise[k]),
+        float(np.sqrt(np.mean((shifted - measured) ** 2))),
         ratio,
-        aligned,
+        ratio_aligned,
         late,
         peak,
         alike,
+        alike_aligned,
         offset,
         float("nan") if pair.calibration is None else float(pair.calibration[k]),
         float(drift_rate(error, dt)),

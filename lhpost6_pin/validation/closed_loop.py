@@ -1,6 +1,7 @@
 """What a record says of the closed loop it was made in: controller settings, reference or drive."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -16,9 +17,17 @@ from ..records import require
 from ..schemes import SAMPLE_RATE
 from ..signals import differentiate, resample_band_limited
 
-__all__ = ["drive_of", "settings_of"]
+__all__ = ["Lag", "drive_of", "settings_of", "whose_settings"]
 
 Array = NDArray[np.float64]
+
+
+class Lag(NamedTuple):
+    """Delay of one axis behind what was asked for, of measurement and model [s]."""
+
+    column: str
+    measured: float
+    model: float
 
 
 def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> ControllerSettings:
@@ -35,6 +44,15 @@ def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> Control
             return settings
     said = "no controller" if said is None else f"the controller {said!r}, which is not shipped"
     raise RecordError(f"the record names {said}; give its settings as a TOML file with --controller")
+
+
+def whose_settings(record: xr.Dataset, settings: ControllerSettings, given: ControllerSettings | None) -> str:
+    """Where the settings of the closed loop come from, in words: others than the test's explain any difference."""
+    named = record.attrs.get("controller")
+    if given is None or named == settings.name:
+        return f"closed loop with the controller that the record names, “{settings.name}”"
+    said = "no controller" if named is None else f"“{named}”"
+    return f"closed loop with the controller given, “{settings.name}”; the record names {said}: settings may differ"
 
 
 def drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:

@@ -34,6 +34,13 @@ class Resonances(NamedTuple):
     coherence: float  # of acceleration with spools, from which a peak counts
 
 
+class Transfer(NamedTuple):
+    """How transfer functions of servovalves are estimated."""
+
+    segment: float  # [s]
+    coherence: float  # of a spool with its command, below which nothing is shown
+
+
 @dataclass(frozen=True)
 class Numbers:
     """Numbers of `models/procedures/validate.toml`."""
@@ -45,8 +52,14 @@ class Numbers:
     hardly: HardlyMoving
     spectra: Spectra
     resonance: Resonances
+    valves: Transfer
     reference_high: float  # [Hz]
     stated: Parameters
+
+    @property
+    def shortest(self) -> float:
+        """Length of a test that is long enough to be compared [s]: for the longest delay sought, and its edges."""
+        return 8 * self.longest_delay + 4 * self.edge
 
 
 def validation_numbers() -> Numbers:
@@ -61,6 +74,7 @@ def validation_numbers() -> Numbers:
         hardly=HardlyMoving(*(n(f"hardly_moving.{name}") for name in HardlyMoving._fields)),
         spectra=Spectra(stated.vector("spectra.edges"), n("spectra.segment"), n("spectra.noise")),
         resonance=Resonances(*(n(f"resonance.{name}") for name in Resonances._fields)),
+        valves=Transfer(n("valves.segment"), n("valves.coherence")),
         reference_high=n("reference.high"),
         stated=stated,
     )

@@ -8,7 +8,7 @@ Each phase engages more of the model: platen, struts and friction; then the oil;
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from ..rehearse import rehearse, replay
 from ..simulate import fastest_engine
 from .agreement import Agreement, Pair, agree
 from .bench import Bench
-from .closed_loop import drive_of, settings_of
+from .closed_loop import Lag, drive_of, settings_of, whose_settings
 from .prepare import Prepared, wrench_calibration
 from .resonance import Resonance
 from .runs import RunOverTest
@@ -45,6 +45,7 @@ class Phase:
     agreement: tuple[Agreement, ...] = ()
     spectrum: Spectrum | None = None
     resonances: tuple[Resonance, ...] = ()
+    lags: tuple[Lag, ...] = ()  # of a closed loop behind its reference
     notes: tuple[str, ...] = ()
     reason: str | None = None
 
@@ -105,7 +106,13 @@ def _closed_loop(test: Prepared, bench: Bench) -> Phase:
     target, drive = drive_of(test.test.record, settings, bench.numbers.reference_high)
     engine = fastest_engine(test.plant)
     ran = rehearse(test.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
-    return _of_run(3, test, RunOverTest(test, ran, None, bench), ("spool_command",), bench)
+    both = RunOverTest(test, ran, None, bench)
+    both.notes.append(whose_settings(test.test.record, settings, bench.settings))
+    phase = _of_run(3, test, both, ("spool_command",), bench)
+    velocity = phase.pair("velocity")
+    assert velocity is not None
+    moving = [a.column for a in phase.of("velocity") if a.moves]
+    return replace(phase, lags=both.lags(target.velocity, velocity, moving))
 
 
 def _of_run(number: int, test: Prepared, both: RunOverTest, channels: Sequence[str], bench: Bench) -> Phase:
@@ -113,4 +120,4 @@ def _of_run(number: int, test: Prepared, both: RunOverTest, channels: Sequence[s
     found = agree(pairs, test.dt, bench.numbers)
     moving = {a.column for a in found if a.quantity == "acceleration" and a.moves}
     shown = tuple(r for r in both.resonances() if r.column in moving)
-    return Phase(number, test.name, both.time, tuple(pairs), found, both.spectrum(), shown, tuple(both.notes))
+    return Phase(number, test.name, both.time, tuple(pairs), found, both.spectrum(), shown, notes=tuple(both.notes))

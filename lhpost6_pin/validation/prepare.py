@@ -20,8 +20,9 @@ from ..pose import PlatenMotion, plant_motion
 from ..records import require
 from ..rehearse import with_valves
 from ..sensors import Sensors, add_noise
+from .numbers import Numbers
 
-__all__ = ["Measured", "Prepared", "prepare", "total_wrench", "wrench_calibration"]
+__all__ = ["Measured", "Prepared", "prepare", "too_short", "total_wrench", "wrench_calibration"]
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,11 @@ class Prepared:
     def machine(self) -> Machine:
         """The machine with the servovalves that were open."""
         return self.plant.machine
+
+
+def too_short(seconds: float, numbers: Numbers) -> str:
+    """What to say of a test that is too short to be compared."""
+    return f"{seconds:.3g} s are too short to compare; {numbers.shortest:.3g} s are needed"
 
 
 def prepare(machine: Machine, record: xr.Dataset, sensors: Sensors) -> Prepared:

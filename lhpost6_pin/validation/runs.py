@@ -9,10 +9,11 @@ from ..errors import SimulationError
 from ..names import AXES
 from ..pose import PlatenMotion
 from ..rehearse import SimulatedTest
-from ..signals import Band, resample_band_limited
+from ..signals import Band, delay, resample_band_limited
 from .agreement import MOTIONS, Pair
 from .bench import Bench
-from .prepare import Prepared, total_wrench, wrench_calibration
+from .closed_loop import Lag
+from .prepare import Prepared, too_short, total_wrench, wrench_calibration
 from .resonance import Resonance, estimate_response, find_resonances
 from .spectra import Spectrum, estimate_spectrum
 
@@ -35,10 +36,8 @@ class RunOverTest:
         self.ran, self.again = ran.record, again.record if again is not None and same else ran.record
         self.clock = ran.record["time"].values
         self.n = int(np.searchsorted(test.time, self.clock[-1] + 1e-9, side="right"))
-        least = 8 * bench.numbers.longest_delay + 4 * bench.numbers.edge
-        if self.n * test.dt < least:
-            short = f"{self.n * test.dt:.3g} s are too short to compare; {least:.3g} s are needed"
-            raise SimulationError(ran.run.trouble or short)
+        if self.n * test.dt < bench.numbers.shortest:
+            raise SimulationError(ran.run.trouble or too_short(self.n * test.dt, bench.numbers))
         self.notes = [ran.run.trouble] if ran.run.trouble else []
         if ran.run.clipped:
             self.notes.append(f"{ran.run.clipped} spool values beyond full stroke were clipped")
@@ -56,6 +55,18 @@ class RunOverTest:
         if self.test.test.force is not None:
             found.append(self._wrench())
         return found + [self._channel(name) for name in channels if self._has(name)]
+
+    def lags(self, asked: Array, pair: Pair, moving: Sequence[str]) -> tuple[Lag, ...]:
+        """Delays behind the velocity (m, 6) that was asked for at the run's samples, of the columns that move."""
+        wanted = self._brought(asked[: len(self.clock)], self.bench.numbers.band)
+        longest = self.bench.numbers.longest_delay
+        found = []
+        for k, column in enumerate(pair.columns):
+            if column in moving:
+                reference = wanted[:, AXES.index(column)]
+                sides = (delay(reference, side[:, k], self.test.dt, longest) for side in (pair.measured, pair.model))
+                found.append(Lag(column, *map(float, sides)))
+        return tuple(found)
 
     def spectrum(self) -> Spectrum:
         """Spectra of the platen's acceleration."""
@@ -132,8 +143,13 @@ class RunOverTest:
         return Pair(quantity, tuple(columns), *kept, heard.std(axis=0), noise.std(axis=0), calibration)
 
     def _brought(self, values: Array, band: Band) -> Array:
-        """A run's values, filtered, at the test's samples."""
-        return resample_band_limited(band.apply(values, self.clock[1] - self.clock[0]), self.clock, self.time)
+        """A run's values, filtered, at the test's samples: picked where these are samples of the run, else between."""
+        step = self.clock[1] - self.clock[0]
+        kept, every = band.apply(values, step), max(round(self.test.dt / step), 1)
+        picked = self.clock[::every][: self.n]
+        if len(picked) == self.n and np.allclose(picked, self.time, rtol=0.0, atol=1e-6 * step):
+            return np.asarray(kept[::every][: self.n])
+        return resample_band_limited(kept, self.clock, self.time)
 
     def _accelerations(self) -> tuple[Array, Array]:
         """Measured acceleration (n, 6), and what noise adds to it."""

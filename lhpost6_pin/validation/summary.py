@@ -11,8 +11,17 @@ from .phases import PHASES, Phase
 from .resonance import Peak, Resonance
 from .spectra import Spectrum
 from .validate import Validation
+from .valves import Valves
 
 __all__ = ["metrics", "save_metrics"]
+
+_UNITS = {
+    "seconds, delay, standard_error, behind_reference": "s",
+    "frequency, linear_model, low_pass": "Hz",
+    "variation, error, error_aligned, noise, offset, offset_expected": "the row's unit",
+    "drift": "the row's unit per second",
+    "all others": "1",
+}
 
 
 def metrics(found: Validation) -> dict[str, Any]:
@@ -22,8 +31,10 @@ def metrics(found: Validation) -> dict[str, Any]:
         "campaign": found.campaign,
         "machine": machine.name,
         "specimen": machine.specimen.name if machine.specimen else "none",
+        "units": _UNITS,
         "low_pass": found.numbers.band.high,
         "skews": {group: {"delay": d.delay, "standard_error": d.standard_error} for group, d in found.skews.items()},
+        "valves": _valves(found.valves),
         "tests": {
             test: {PHASES[p.number]: _phase(p, found) for p in found.phases if p.test == test} for test in found.tests
         },
@@ -46,7 +57,16 @@ def _phase(phase: Phase, found: Validation) -> dict[str, Any]:
     if phase.spectrum is not None:
         out["amplitude_ratio"] = _ratios(phase.spectrum, found.numbers.spectra.edges)
     out["resonance"] = {r.column: _resonance(r) for r in phase.resonances}
+    if phase.lags:
+        out["behind_reference"] = {lag.column: {"measured": lag.measured, "model": lag.model} for lag in phase.lags}
     return out
+
+
+def _valves(valves: Valves | None) -> dict[str, Any] | None:
+    if valves is None:
+        return None
+    columns = zip(valves.columns, valves.delay, valves.standard_error, valves.model, strict=True)
+    return {c: {"delay": float(d), "standard_error": float(e), "model": float(m)} for c, d, e, m in columns}
 
 
 def _ratios(spectrum: Spectrum, edges: tuple[float, ...]) -> dict[str, Any]:

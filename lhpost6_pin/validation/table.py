@@ -25,6 +25,21 @@ def print_validation(found: Validation) -> None:
             cells = (_worst(phase, quantity) for quantity in quantities)
             table.add_row(escape(phase.test), PHASES[phase.number], *cells)
     console.print(table)
+    spread = found.residual_over_noise
+    if spread is not None:
+        console.print(
+            f"Residual of inverse dynamics: {spread[0]:.2g} to {spread[1]:.2g} times the noise of the sensors"
+        )
+    slides = [
+        (abs(a.drift), p.test, a.column)
+        for p in found.phases
+        if p.number == 2
+        for a in p.of("displacement")
+        if a.unit == "m"
+    ]
+    if slides:
+        rate, test, column = max(slides)
+        console.print(f"Drift of the open loop: at most {1e3 * rate:.3g} mm/s ({test}, {column})", markup=False)
     for words, tests in skipped.items():
         console.print(f"{', '.join(tests)}: {words}", markup=False, highlight=False, soft_wrap=True)
 

@@ -4,6 +4,7 @@ found = validate(machine, campaign)
 found.phase("TX", 1).of("wrench")       # agreement of required and measured actuator wrench, per axis
 """
 
+import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +23,8 @@ from ..sensors import Sensors, load_sensors
 from .bench import Bench
 from .numbers import Numbers, validation_numbers
 from .phases import PHASES, Phase, run_phase
-from .prepare import prepare
+from .prepare import prepare, too_short
+from .valves import Valves, find_valves
 
 __all__ = ["Validation", "validate"]
 
@@ -38,12 +40,20 @@ class Validation:
     sensors: Sensors
     numbers: Numbers
     skews: Mapping[str, Delay]  # between channel groups, taken out of all records
+    valves: Valves | None  # spools behind their commands; None where either was not recorded
     phases: tuple[Phase, ...]  # test by test
 
     @property
     def tests(self) -> tuple[str, ...]:
         """Names of the tests, in the campaign's order."""
         return tuple(dict.fromkeys(p.test for p in self.phases))
+
+    @property
+    def residual_over_noise(self) -> tuple[float, float] | None:
+        """Least and greatest residual of inverse dynamics over the noise predicted for it; None if there is none."""
+        every = [a.error_to_noise for p in self.phases if p.number == 1 for a in p.of("wrench")]
+        known = [ratio for ratio in every if math.isfinite(ratio)]
+        return (min(known), max(known)) if known else None
 
     def phase(self, test: str, number: int) -> Phase | None:
         """A phase of a test; None if it was not asked for."""
@@ -63,13 +73,16 @@ def validate(
     """Compare a campaign with its machine in the phases asked for, tests over `jobs` threads.
 
     settings replace what records say of their controller. Skews between channel groups that stand out of their errors
-    are taken out first. A phase that cannot be says why; RecordError if no phase of any test can be.
+    are taken out first. A phase that cannot be says why; RecordError if no phase of any test can be, or if two tests
+    have one name.
     """
+    _check_names(campaign)
     sensors, numbers = sensors or load_sensors(), validation_numbers()
     plant = make_plant(machine)
+    enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
     skews = {
         group: found
-        for group, found in group_delays(plant, campaign.records).items()
+        for group, found in group_delays(plant, enough).items()
         if abs(found.delay) > numbers.significant_skew * found.standard_error
     }
     bench = Bench(sensors, numbers, oil_column_modes(machine), settings)
@@ -89,7 +102,26 @@ def validate(
     if all(phase.reason for phase in every):
         why = "; ".join(dict.fromkeys(f"{p.test}, {PHASES[p.number]}: {p.reason}" for p in every))
         raise RecordError(f"{campaign.name}: nothing can be compared: {why}")
-    return Validation(campaign.name, machine, sensors, numbers, skews, every)
+    valves = find_valves(machine, enough, numbers)
+    return Validation(campaign.name, machine, sensors, numbers, skews, valves, every)
+
+
+def _seconds(record: xr.Dataset) -> float:
+    """Length of a record [s]."""
+    return float(record["time"][-1] - record["time"][0])
+
+
+def _check_names(campaign: Campaign) -> None:
+    """Raise RecordError if two tests have one name."""
+    files: dict[str, list[str]] = {}
+    for k, record in enumerate(campaign.records, start=1):
+        file = record.encoding.get("source", f"record {k}")
+        files.setdefault(str(record.attrs.get("test", "test")), []).append(str(file))
+    for name, twice in files.items():
+        if len(twice) > 1:
+            raise RecordError(
+                f"{campaign.name}: test {name!r} is twice there: {', '.join(twice)}; rename one (attribute test)"
+            )
 
 
 def _phases_of(
@@ -97,6 +129,8 @@ def _phases_of(
 ) -> list[Phase]:
     found = []
     try:
+        if (length := _seconds(record)) < bench.numbers.shortest:
+            raise RecordError(too_short(length, bench.numbers))
         test = prepare(machine, record, bench.sensors)
     except LhpostError as error:
         name, time = str(record.attrs.get("test", "test")), record["time"].values

@@ -6,7 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from .calibration import Calibration
-from .calibration.verdicts import DEVIATIONS, contradictions, far, verdict_on
+from .calibration.verdicts import contradictions, far, verdict_on
 from .residuals import RESIDUALS
 
 __all__ = ["print_calibration"]
@@ -37,9 +37,9 @@ def _parameters(calibration: Calibration) -> Table:
 def _sensors(calibration: Calibration) -> Table:
     first, distance = len(calibration.knobs), far(calibration)
     order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
-    title = f"Errors of the sensors beyond {DEVIATIONS:g} predicted deviations, of {len(order)}"
+    title = f"Errors of the sensors beyond {calibration.limit:g} predicted deviations, of {len(order)}"
     table = _table(title, "error", "estimate", "unit", "deviations", "sd/prior")
-    for i in (i for i in order if abs(distance[i]) > DEVIATIONS):
+    for i in (i for i in order if abs(distance[i]) > calibration.limit):
         unknown = calibration.unknowns[i - first]
         numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{distance[i]:+.1f}", _share(calibration, i)
         table.add_row(escape(unknown.name), *numbers)

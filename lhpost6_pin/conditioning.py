@@ -53,7 +53,7 @@ def fill_gaps(x: ArrayLike, dt: float, most: float, name: str = "signal") -> Arr
 WIDTHS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64)
 """Standard deviations [s] of the smoothing windows of `quieted`: from the noise's own pace to long rests."""
 
-_NOISE = 4.0
+_NOISE = 5.0
 """Standard deviations of noise that smoothing may take away: rarely exceeded by chance, small beside what moves."""
 
 
@@ -62,13 +62,13 @@ def quieted(x: ArrayLike, noise: ArrayLike, dt: float) -> Array:
 
     Every sample has the widest of the Gaussian-like windows `WIDTHS` up to which each, all around the sample, changes
     what the one before it left by no more than noise (as in Lepski's choice of a bandwidth, Theory Probab. Appl. 35,
-    1991). noise (1 + len(WIDTHS), k) is its standard deviation in the signals as given and after each window.
+    1991). noise (len(WIDTHS), k) is the standard deviation of what each window takes of it beyond the one before.
     """
     from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
     last = np.asarray(x, dtype=float)
     out, quiet = last.copy(), np.ones(last.shape, dtype=bool)
-    for width, most in zip(WIDTHS, _NOISE * np.asarray(noise, dtype=float), strict=False):
+    for width, most in zip(WIDTHS, _NOISE * np.asarray(noise, dtype=float), strict=True):
         box = 2 * round(width / dt) + 1  # three of them have the standard deviation `width`, nearly
         smooth = np.asarray(x, dtype=float)
         for _ in range(3):

@@ -16,6 +16,7 @@ in motion. Sensors are taken as calibrated and aligned: their gains and skews ar
 """
 
 import logging
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -92,8 +93,9 @@ def fuse_motion(
     power = _noise(f, (displacement, velocity, acceleration), weights, band)
     omega = 2 * np.pi * f[:, None]
     noise = PlatenMotion(*(_deviation(f, power * omega ** (2 * k)) for k in range(3)))
-    after = [_deviation(f, power * np.exp(-((omega * width) ** 2))) for width in (0.0, *WIDTHS)]
-    return FusedMotion(motion, noise, quieted(motion.displacement, after, dt), tuple(used))
+    gains = [np.exp(-((omega * width) ** 2) / 2) for width in (0.0, *WIDTHS)]
+    lost = [_deviation(f, power * (wider - narrower) ** 2) for narrower, wider in pairwise(gains)]
+    return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), tuple(used))
 
 
 def kinematic_jacobian(plant: Plant) -> Array:

@@ -84,6 +84,12 @@ class Machine:
             raise ParameterError(f"an effect named {effect.name!r} is in this machine already; give it another name")
         return replace(self, added_effects=(*self.added_effects, effect))
 
+    def with_valves(self, count: int) -> "Machine":
+        """Return a copy with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""
+        if count == 0:
+            return self
+        return self.with_params({f"{a.kind}.valves": count for a in self.actuators if a.area_b is not None})
+
     def with_specimen(
         self,
         urdf: str | Path,

@@ -25,7 +25,7 @@ from .records import require
 from .signals import resample_band_limited
 from .simulate import SAMPLE_RATE, ClosedLoop, Drive, OpenLoop, PluggedLoop, Progress, Run, simulate
 
-__all__ = ["SimulatedTest", "rehearse", "replay", "target_within_limits", "with_valves"]
+__all__ = ["SimulatedTest", "rehearse", "replay", "target_within_limits"]
 
 Array = NDArray[np.float64]
 
@@ -124,7 +124,7 @@ def replay(
     carried = str(record.attrs.get("specimen", "none"))
     if carried != "none" and machine.specimen is None:
         raise RecordError(f"the record was made with specimen {carried!r} on the table; mount it with --specimen")
-    machine = with_valves(machine, int(record.attrs.get("valves_per_horizontal_actuator", 0)))
+    machine = machine.with_valves(int(record.attrs.get("valves_per_horizontal_actuator", 0)))
     if machine.double_acting:
         require(record, "chamber_pressure_b")
     plant = make_plant(machine)
@@ -160,13 +160,6 @@ def _usable(run: Run) -> Run:
     command = None if run.command is None else run.command[:n]
     rows = {name: getattr(run, name)[:n] for name in ("time", "q", "v", "a", "z", "spool")}
     return replace(run, **rows, command=command)
-
-
-def with_valves(machine: Machine, valves: int) -> Machine:
-    """Copy of a machine with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""
-    if valves == 0:
-        return machine
-    return machine.with_params({f"{a.kind}.valves": valves for a in machine.actuators if a.area_b is not None})
 
 
 def _start(plant: Plant, record: xr.Dataset) -> State:

@@ -75,9 +75,7 @@ class Residuals(NamedTuple):
         return np.hstack(self)
 
 
-def make_measured(
-    record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None
-) -> Measured:
+def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None) -> Measured:
     """Make a record ready, with the platen motion found from it; pressures are differentiated up to `cutoff` [Hz].
 
     path (n, 6) is the displacement that friction follows, where it is not the motion's.

@@ -7,7 +7,9 @@ from sensor_cases import RATE, measured
 
 from lhpost6_pin.errors import RecordError
 from lhpost6_pin.fusion import fuse_motion, kinematic_jacobian
+from lhpost6_pin.inverse_dynamics import march_states
 from lhpost6_pin.kinematics import pose_jacobian
+from lhpost6_pin.pose import PlatenMotion, plant_motion
 from lhpost6_pin.records import make_record
 from lhpost6_pin.sensors import add_noise, load_sensors
 from lhpost6_pin.signals import Band
@@ -109,6 +111,31 @@ def test_a_guided_platen_has_its_motion_from_one_length() -> None:
 
 def test_the_jacobian_is_that_of_the_report(plant) -> None:
     np.testing.assert_allclose(kinematic_jacobian(plant), pose_jacobian(plant.machine, np.zeros(6)), atol=1e-12)
+
+
+def test_friction_keeps_its_memory_of_a_motion_through_a_rest(plant) -> None:
+    """The platen goes 1 mm along x and rests for half a minute; seals stay as they were left."""
+    t = np.arange(round(32 * RATE)) / RATE
+    angle = np.pi * np.minimum(t, 1.0)
+    moving = np.where(t < 1.0, 1.0, 0.0)
+    x = 5e-4 * np.array([1 - np.cos(angle), np.pi * np.sin(angle) * moving, np.pi**2 * np.cos(angle) * moving])
+    motion = PlatenMotion(*(np.outer(row, np.eye(6)[0]) for row in x))
+    channels = dict(zip((f"platen_{name}" for name in PlatenMotion._fields), motion, strict=True))
+    record = add_noise(make_record(t, channels, {}, {"kind": "simulated"}), SENSORS, np.random.default_rng(5))
+    fused = fuse_motion(plant, record, SENSORS)
+    seals = [k for k, name in enumerate(plant.states) if name.startswith("seal_friction.H")]
+
+    def memory(displacement) -> np.ndarray:
+        path = plant_motion(plant, motion._replace(displacement=displacement))
+        return march_states(plant, path, 1 / RATE)[-1, seals]
+
+    left = memory(motion.displacement)
+    assert np.abs(left).min() > 0.9  # 1 mm is five times the seals' yield displacement
+    kept, shaken = memory(fused.path), memory(fused.motion.displacement)
+    assert np.abs(kept - left).max() < 0.25  # some ten um in all of ways to and fro, over a yield of 200 um
+    assert np.abs(shaken - left).min() > 0.5  # which is why there is a path
+    away = (t > 0.2) & (t < 0.8)  # where the platen moves the path loses nothing but noise
+    assert np.abs(fused.path - motion.displacement)[away, 0].max() < 4 * fused.noise.displacement[0]
 
 
 def test_what_cannot_be_fused_is_refused_by_name(plant) -> None:

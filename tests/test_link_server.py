@@ -30,7 +30,6 @@ from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.records import load_record, save_record
-from lhpost6_pin.rehearse import with_valves
 from lhpost6_pin.simulate import ClosedLoop, PluggedLoop, simulate
 
 MODES = list(Mode)
@@ -150,7 +149,7 @@ def test_a_users_own_controller_runs_over_the_link_as_in_one_process(plant, rest
 
 
 def test_two_valves_on_each_horizontal_actuator_take_fourteen_commands_and_move_the_same_plant():
-    twin = make_plant(with_valves(load_machine(), 2))
+    twin = make_plant(load_machine().with_valves(2))
     rest = find_equilibrium(twin)
     loop = closed_loop(twin, rest, 20 * 2048, 200)
     with served(twin, rest) as (_, address), LinkClient(*address) as client:
@@ -301,7 +300,7 @@ def test_a_server_interrupted_by_the_keyboard_ends_and_keeps_its_counts(plant, r
 # ---------------------------------------------------------------------------------------- controller and plant alike
 def test_a_controller_for_another_machine_is_refused(plant, rest):
     loop = PluggedLoop(Proportional(), *wanted(10), rest)
-    twin = make_plant(with_valves(load_machine(), 2))
+    twin = make_plant(load_machine().with_valves(2))
     with served(plant, rest) as (_, address), LinkClient(*address) as client:
         with pytest.raises(LinkError, match="10 servovalves open, the controller's 14"):
             run_over_link(client, twin, loop)
@@ -318,7 +317,7 @@ def test_a_run_begins_with_a_plant_at_rest(plant, rest):
 
 
 def test_commands_may_be_given_per_actuator_or_per_valve_and_in_no_other_number(plant):
-    twin = make_plant(with_valves(load_machine(), 2))
+    twin = make_plant(load_machine().with_valves(2))
     rest = find_equilibrium(twin)
     with served(twin, rest) as (table, address), LinkClient(*address) as client:
         client.exchange(np.full(10, 0.1))

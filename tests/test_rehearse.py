@@ -14,7 +14,7 @@ from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.records import load_record, make_record
-from lhpost6_pin.rehearse import rehearse, replay, target_within_limits, with_valves
+from lhpost6_pin.rehearse import rehearse, replay, target_within_limits
 from lhpost6_pin.schemes import spool_windows
 from lhpost6_pin.signals import rrmse
 from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
@@ -84,7 +84,7 @@ def test_two_valves_carry_what_one_cannot():
     target = sine_target(amplitude=0.7, period=2.0)  # 2.2 m/s
     with pytest.raises(OutOfRangeError, match="H1 leg velocity"):
         target_within_limits(make_plant(load_machine()), target)
-    target_within_limits(make_plant(with_valves(load_machine(), 2)), target)
+    target_within_limits(make_plant(load_machine().with_valves(2)), target)
 
 
 def test_rehearsing_beyond_limits_is_refused_before_anything_runs_unless_asked_for():
@@ -296,10 +296,10 @@ def test_a_record_of_two_samples_can_be_replayed():
 
 def test_valves_are_opened_on_double_acting_actuators_only():
     machine = load_machine()
-    assert with_valves(machine, 0) is machine
+    assert machine.with_valves(0) is machine
     for count in (1, 2):
-        changed = with_valves(machine, count)
+        changed = machine.with_valves(count)
         assert [a.valves for a in changed.actuators] == [count] * 4 + [a.valves for a in machine.actuators[4:]]
     assert [a.valves for a in machine.actuators][:4] == [1] * 4  # a copy was changed
     with pytest.raises(ParameterError, match="valves"):
-        with_valves(machine, -1)
+        machine.with_valves(-1)

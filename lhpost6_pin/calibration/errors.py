@@ -141,7 +141,9 @@ def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array
             for moved, share in zip(motion, test.share[unknown.channel], strict=True):
                 moved[:, unknown.column] -= value / (1.0 + value) * share[:, unknown.column]
             if path is not None:
-                path[:, unknown.column] -= value / (1.0 + value) * test.share[unknown.channel].displacement[:, unknown.column]
+                path[:, unknown.column] -= (
+                    value / (1.0 + value) * test.share[unknown.channel].displacement[:, unknown.column]
+                )
     return replace(test, motion=motion, path=path, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
 
 

@@ -8,7 +8,7 @@ the sum of squares is least for an equation that is scaled down. The expectation
 are known from draws of simulated noise, and taken off (corrected normal equations, Fuller: Measurement Error Models,
 Wiley 1987, chapter 3). Where more than noise is left at the end (in a column of a test's residuals, in a band),
 the rest counts as noise, too: it is weighed less, and predicted deviations grow. The inverse of the normal matrix is
-the predicted covariance.
+the predicted covariance, with a floor under its deviations.
 """
 
 from collections.abc import Callable, Sequence
@@ -81,6 +81,16 @@ class Calibration:
         return (*(k.name for k in self.knobs), *(u.name for u in self.unknowns))
 
     @property
+    def limit(self) -> float:
+        """Predicted deviations beyond which an estimate differs from what it is compared with."""
+        return self.numbers.number("report.deviations")
+
+    @property
+    def noise_alone(self) -> float:
+        """Misfit up to which noise is all that is left."""
+        return self.numbers.number("report.misfit")
+
+    @property
     def informed(self) -> Mask:
         """Unknowns (p,) of which the campaign has told something: predicted deviation well below the prior."""
         return np.asarray(self.sd < self.numbers.number("report.informed") * self.prior)
@@ -125,13 +135,15 @@ def calibrate(
 ) -> Calibration:
     """Calibrate a machine by the tests of a campaign, all at once.
 
-    Deterministic for a seed (of the simulated noise), whatever the number of jobs. Raises RecordError for a record that
+    Servovalves are open as in the records. Deterministic for a seed (of the simulated noise), whatever the number of
+    jobs. Raises RecordError for a record that
     lacks motion, forces and pressures, or was made with a specimen that the machine has not.
     """
     numbers = calibration_numbers()
     report = progress or (lambda share: None)
-    plant = make_plant(machine)
     _refuse(machine, records)
+    machine = machine.with_valves(int(records[0].attrs.get("valves_per_horizontal_actuator", 0)))
+    plant = make_plant(machine)
     records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
     skews = group_delays(plant, records)
     records = [align_record(r, skews) for r in records]
@@ -150,7 +162,7 @@ def calibrate(
     problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs)
     report(0.1)
     replicas = [problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again)]
-    rounds = int(numbers.number("fit.rounds"))
+    rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     x = np.zeros(len(problem.prior))
     before = _misfit(problem, problem.whitened(x))
     bias: _Bias | None = None
@@ -172,7 +184,7 @@ def calibrate(
             converged = True
             break
     report(1.0)
-    covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)), np.float64)
+    covariance = np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2)
     return Calibration(
         machine=machine,
         campaign=campaign,
@@ -181,8 +193,8 @@ def calibrate(
         unknowns=problem.unknowns,
         prior=problem.prior,
         estimate=x,
-        covariance=covariance,
-        alone=normal.alone(problem.prior),
+        covariance=np.asarray(covariance, np.float64),
+        alone=np.hypot(normal.alone(problem.prior), floor),
         subsets=_subsets(problem, normal, x - step),
         misfit_before=before,
         misfit_after=_misfit(problem, problem.whitened(x)),

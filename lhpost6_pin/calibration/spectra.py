@@ -72,7 +72,7 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
         whole = np.where(f > 0.0, 1.0, np.sqrt(2.0))[:, None]  # a mean is real, with half the power of other bins
         band = np.clip(np.searchsorted(edges, f, side="right") - 1, 0, count - 1)
         for b in range(count):
-            rows = np.vstack([(bins * whole)[band == b] for bins in realisations])
+            rows = np.concatenate([(bins * whole)[band == b] for bins in realisations], dtype=np.complex128)
             power = np.mean(np.abs(rows) ** 2, axis=0) / (1.0 - 2.0 / len(rows))  # its inverse is unbiased
             scale = np.sqrt(np.where(power > 0.0, power, 1.0))
             scaled[b].append(rows / scale)

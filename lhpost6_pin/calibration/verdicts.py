@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 
 from .fit import Calibration
 
-__all__ = ["DEVIATIONS", "Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "far", "verdict_on"]
+__all__ = ["Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "far", "verdict_on"]
 
 Array = NDArray[np.float64]
 Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
-
-DEVIATIONS = 3.0  # judgement: predicted deviations beyond which an estimate differs from what it is compared with
 
 
 def far(calibration: Calibration) -> Array:
@@ -21,15 +19,17 @@ def far(calibration: Calibration) -> Array:
 
 
 def beyond(calibration: Calibration) -> NDArray[np.bool_]:
-    """Unknowns (p,) that differ from nominal, or from zero, by more than `DEVIATIONS`."""
-    return np.asarray(np.abs(far(calibration)) > DEVIATIONS)
+    """Sensor errors that differ from zero by more than the limit; parameters that do so and by a material amount."""
+    material = calibration.numbers.number("report.material") * calibration.prior
+    material[len(calibration.knobs) :] = 0.0
+    return np.asarray((np.abs(far(calibration)) > calibration.limit) & (np.abs(calibration.estimate) > material))
 
 
 def verdict_on(calibration: Calibration, i: int) -> Verdict:
     """The verdict on unknown i; the first that holds.
 
-    At its bound: as far from nominal as the fit lets it go. Changed: farther than `DEVIATIONS`. Unchanged: the campaign
-    has told something of it, and it is nearer than that.
+    At its bound: as far from nominal as the fit lets it go. Changed: `beyond`. Unchanged: the campaign has told
+    something of it, and it is nearer than that.
     """
     reach = calibration.numbers.number("fit.reach") * calibration.prior[i]
     if abs(calibration.estimate[i]) >= reach * (1.0 - 1e-6):
@@ -40,9 +40,9 @@ def verdict_on(calibration: Calibration, i: int) -> Verdict:
 
 
 def changed_knobs(calibration: Calibration) -> list[int]:
-    """Knobs that differ from nominal by more than `DEVIATIONS`, farthest first."""
-    distance = np.abs(far(calibration))[: len(calibration.knobs)]
-    return [int(i) for i in np.argsort(-distance, kind="stable") if distance[i] > DEVIATIONS]
+    """Knobs that differ from nominal (`beyond`), the clearest first."""
+    distance, changed = np.abs(far(calibration))[: len(calibration.knobs)], beyond(calibration)
+    return [int(i) for i in np.argsort(-distance, kind="stable") if changed[i]]
 
 
 class Contradiction(NamedTuple):
@@ -54,7 +54,7 @@ class Contradiction(NamedTuple):
 
 
 def contradictions(calibration: Calibration) -> list[Contradiction]:
-    """Estimates of single groups that differ from those of all by more than `DEVIATIONS`, farthest first.
+    """Estimates of single groups that differ from those of all by more than the limit, farthest first.
 
     The variance of the difference is that of the group less that of all (Hausman, Econometrica 46, 1978), since the
     group is part of all; no less than what the search leaves open.
@@ -64,6 +64,6 @@ def contradictions(calibration: Calibration) -> list[Contradiction]:
     for subset in calibration.subsets:
         variance = np.maximum(subset.sd**2 - calibration.sd**2, left_open**2)  # NaN where the group tells nothing
         distance = (subset.estimate - calibration.estimate) / np.sqrt(variance)
-        for i in np.flatnonzero(np.abs(distance) > DEVIATIONS):
+        for i in np.flatnonzero(np.abs(distance) > calibration.limit):
             found.append(Contradiction(subset.name, int(i), float(distance[i])))
     return sorted(found, key=lambda one: -abs(one.deviations))

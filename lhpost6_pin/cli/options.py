@@ -60,9 +60,7 @@ def find_table(
     machine: str, override: Path | None, valves: int, specimen: str | None, at: str | None, locked: bool
 ) -> "Machine":
     """Machine with its open valves, and the specimen that the options name, if any."""
-    from ..rehearse import with_valves
-
-    table = with_valves(find_machine(machine, override), valves)
+    table = find_machine(machine, override).with_valves(valves)
     if specimen is None:
         if locked or at:
             raise ParameterError("--locked and --specimen-at are about a specimen; name it with --specimen")

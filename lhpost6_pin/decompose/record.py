@@ -130,10 +130,10 @@ def decompose_record(
 def take_apart(
     plant: Plant, record: xr.Dataset, sensors: Sensors | None, band: Band
 ) -> tuple[Decomposition, PlatenMotion, Array | None, tuple[str, ...]]:
-    """Inverse dynamics of a record as it stands, the motion that it started from, the displacement that friction
-    followed (None: the motion's), and where they came from in words.
+    """Inverse dynamics of a record as it stands: forces, motion, path of friction, and where they came from in words.
 
-    With sensors the motion is fused, in their band; without accelerometers in `band`, as noise grows with frequency.
+    The path is the displacement (n, 6) that friction followed; None: the motion's. With sensors the motion is fused,
+    in their band; without accelerometers in `band`, as noise grows with frequency.
     """
     force, source = _actuator_force(plant.machine, record)
     struts = None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration import Calibration
-from ..calibration.verdicts import DEVIATIONS, changed_knobs, contradictions
+from ..calibration.verdicts import changed_knobs, contradictions
 from .layout import stacked_layout, time_band
 from .page import Figure, Markup, figure, number, paragraph, table, text
 from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION
@@ -101,7 +101,8 @@ def subset_block(calibration: Calibration) -> Markup:
         series.append(Dots("contradicts all together", places, where, half, labels, VERMILLION, "circle-open", 17))
     words = (
         "Each group of residuals alone, with the same priors; a group is left out where its predicted deviation is "
-        f"above {limit:g} of the prior's. {INTERVAL}s. Ringed: more than {DEVIATIONS:g} deviations from all together. "
+        f"above {limit:g} of the prior's. {INTERVAL}s. Ringed: more than {calibration.limit:g} "
+        "deviations from all together. "
         "Drag to zoom; a double click shows all."
     )
     shown = [names[i] for i in told]

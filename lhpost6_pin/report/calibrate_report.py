@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ..calibration import Calibration
-from ..calibration.verdicts import DEVIATIONS, beyond, changed_knobs, contradictions, verdict_on
+from ..calibration.verdicts import beyond, changed_knobs, contradictions, verdict_on
 from .calibrate_sections import (
-    MISFIT,
     alike_blocks,
     change_of,
     group_blocks,
@@ -65,13 +64,13 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
         most = ", ".join(f"{calibration.names[i]} ({change_of(calibration, i)})" for i in changed[:NAMED])
         more = f"{'most clearly ' * (len(changed) > NAMED)}{most}"
         differ = "differs" if len(changed) == 1 else "differ"
-        said.append(f"{len(changed)} {differ} from nominal by more than {DEVIATIONS:g} predicted deviations: {more}.")
+        said.append(f"{len(changed)} {differ} from nominal: {more}.")
     else:
-        said.append(f"None differs from nominal by more than {DEVIATIONS:g} predicted deviations.")
+        said.append("None differs from nominal.")
     before, after = (float(np.nanmax(m)) for m in (calibration.misfit_before, calibration.misfit_after))
     level: Level = "good"
     bounded = _bounded(calibration)
-    if after > MISFIT:
+    if after > calibration.noise_alone:
         level = "attention"
         said.append(
             f"The worst misfit went from {number(before)} to {number(after)}: more than sensor noise is left, so an "
@@ -94,9 +93,9 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     before = float(np.nanmax(calibration.misfit_before))
     limit = calibration.numbers.number("report.informed")
     note = f"predicted deviation below {limit:g} of the prior's"
-    differ = f"by more than {DEVIATIONS:g} predicted deviations"
+    differ = f"by more than {calibration.limit:g} predicted deviations"
     good: Level = "good" if calibration.converged else "bad"
-    fits: Level = "good" if after <= MISFIT else "attention"
+    fits: Level = "good" if after <= calibration.noise_alone else "attention"
     apart = len(contradictions(calibration))
     return [
         Headline("yes" if calibration.converged else "no", "Converged", f"rounds: {calibration.rounds}", good),

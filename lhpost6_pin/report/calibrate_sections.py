@@ -5,14 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..calibration import Calibration
-from ..calibration.verdicts import DEVIATIONS, beyond, contradictions, far, verdict_on
+from ..calibration.verdicts import beyond, contradictions, far, verdict_on
 from ..residuals import RESIDUALS
 from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
 from .page import Markup, details, number, paragraph, table
 from .run_motion import percent
 
 __all__ = [
-    "MISFIT",
     "alike_blocks",
     "change_of",
     "group_blocks",
@@ -22,7 +21,6 @@ __all__ = [
     "test_blocks",
 ]
 
-MISFIT = 1.3  # judgement: mean square up to which residuals are noise: the whitener comes from a few draws of it
 LISTED = 15  # rows of a table before the rest is folded away
 KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force": "force against pressure"}
 
@@ -30,7 +28,8 @@ KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force":
 # ---------------------------------------------------------------------------------------- parameters and sensors
 def knob_blocks(calibration: Calibration) -> list[Markup]:
     """Return every parameter beside its prior, drawn and in numbers."""
-    outside, informed = far(calibration), calibration.numbers.number("report.informed")
+    outside = far(calibration)
+    informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
     rows = []
     for i, knob in enumerate(calibration.knobs):
         low, high = calibration.interval(i, PROBABILITY)
@@ -48,7 +47,8 @@ def knob_blocks(calibration: Calibration) -> list[Markup]:
             )
         )
     how = (
-        f"Changed: farther from nominal than {DEVIATIONS:g} predicted deviations. Unchanged: nearer, and the campaign "
+        f"Changed: farther from nominal than {calibration.limit:g} predicted deviations, and than {material:g} of the "
+        "prior's. Unchanged: nearer, and the campaign "
         f"has told something of it, which is a predicted deviation below {informed:g} of the prior's. Not informed: "
         "what stands here is mostly the prior. A height is the mean over its kind's components, which move "
         "together."
@@ -69,12 +69,12 @@ def sensor_blocks(calibration: Calibration) -> list[Markup]:
         "parameters are free of these errors; the override file does not hold them."
     )
     header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "In deviations", "Predicted over prior")
-    caption = f"Errors beyond {DEVIATIONS:g} predicted deviations from zero, the clearest first"
+    caption = f"Errors beyond {calibration.limit:g} predicted deviations from zero, the clearest first"
     blocks = [how]
     if differ:
         blocks.append(table(caption, header, rows[:differ]))
     else:
-        blocks.append(paragraph(f"None is beyond {DEVIATIONS:g} predicted deviations from zero."))
+        blocks.append(paragraph(f"None is beyond {calibration.limit:g} predicted deviations from zero."))
     if differ < len(rows):
         blocks.append(details(f"The other {len(rows) - differ}", table("Other errors", header, rows[differ:])))
     return blocks
@@ -99,14 +99,14 @@ def misfit_blocks(calibration: Calibration) -> list[Markup]:
     before, after = calibration.misfit_before, calibration.misfit_after
     kinds = [k for k in range(len(RESIDUALS)) if np.isfinite(after[:, k]).any()]
     rows = [
-        (test, *(f"{number(float(before[t, k]))} → {_judged(float(after[t, k]))}" for k in kinds))
+        (test, *(f"{number(float(before[t, k]))} → {_judged(calibration, float(after[t, k]))}" for k in kinds))
         for t, test in enumerate(calibration.tests)
     ]
     how = (
         "Mean square of the residuals over what sensor noise alone would leave, with the machine and the sensors as "
         "given and as calibrated: 1 is noise. Wrench: inertia, weight and friction against what actuators and struts "
         "deliver. Oil flow: continuity in every chamber. Gas law: strut pressures against their lengths. Force: load "
-        f"cells against chamber pressures. ! marks what is above {MISFIT:g}."
+        f"cells against chamber pressures. ! marks what is above {calibration.noise_alone:g}."
     )
     header = ("Test", *(KINDS[RESIDUALS[k]] for k in kinds))
     return [paragraph(how), table("Misfit before → after", header, rows)]
@@ -138,7 +138,7 @@ def group_blocks(calibration: Calibration) -> list[Markup]:
     compared = sum(int(np.sum(np.isfinite(s.sd))) for s in calibration.subsets)
     how = paragraph(
         f"Of {compared} estimates by single groups, {len(found)} differ from that of all together by more than "
-        f"{DEVIATIONS:g} deviations of the difference. If the equations hold and noise is all, about "
+        f"{calibration.limit:g} deviations of the difference. If the equations hold and noise is all, about "
         f"{number(0.0027 * compared, 1)} would; more says that an equation lacks something. Noise that residuals share "
         "is taken off in the order wrench, flow, gas law, force: a later group holds a little of the earlier ones."
     )
@@ -182,8 +182,8 @@ def _folded(caption: str, header: Sequence[str], rows: Sequence[Sequence[object]
 
 
 # --------------------------------------------------------------------------------------------------------- words
-def _judged(misfit: float) -> str:
-    return f"{number(misfit)}{' !' * (misfit > MISFIT)}"
+def _judged(calibration: Calibration, misfit: float) -> str:
+    return f"{number(misfit)}{' !' * (misfit > calibration.noise_alone)}"
 
 
 def _marked(calibration: Calibration, i: int) -> str:

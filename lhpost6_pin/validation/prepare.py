@@ -18,7 +18,6 @@ from ..machine import Machine
 from ..plant import Plant, make_plant
 from ..pose import PlatenMotion, plant_motion
 from ..records import require
-from ..rehearse import with_valves
 from ..sensors import Sensors, add_noise
 from .numbers import Numbers
 
@@ -70,7 +69,7 @@ def prepare(machine: Machine, record: xr.Dataset, sensors: Sensors) -> Prepared:
     carried = str(record.attrs.get("specimen", "none"))
     if carried != "none" and machine.specimen is None:
         raise RecordError(f"the test was made with specimen {carried!r} on the table; mount it with --specimen")
-    table = with_valves(machine, int(record.attrs.get("valves_per_horizontal_actuator", 0)))
+    table = machine.with_valves(int(record.attrs.get("valves_per_horizontal_actuator", 0)))
     plant = make_plant(table)
     noisy = add_noise(record, sensors, np.random.default_rng(SEED))
     both = (Measured(r, _motion(plant, r, sensors), _force(table, r)) for r in (record, noisy))

@@ -4,7 +4,29 @@ Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the in
 read or written, 130 interrupted.
 """
 
-from . import calibration, connect, controllers, data, forces, look, runs, validation  # each adds its commands
+from . import (  # each adds its commands
+    calibration,
+    campaigns,
+    connect,
+    controllers,
+    data,
+    forces,
+    look,
+    runs,
+    validation,
+)
 from .app import app, main
 
-__all__ = ["app", "calibration", "connect", "controllers", "data", "forces", "look", "main", "runs", "validation"]
+__all__ = [
+    "app",
+    "calibration",
+    "campaigns",
+    "connect",
+    "controllers",
+    "data",
+    "forces",
+    "look",
+    "main",
+    "runs",
+    "validation",
+]

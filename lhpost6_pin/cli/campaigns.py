@@ -1,0 +1,58 @@
+"""Commands that make campaigns: campaign."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import ParameterError
+from .app import app, progress_bar
+from .options import (
+    Locked,
+    MachineName,
+    Out,
+    Override,
+    SettingsName,
+    SpecimenAt,
+    SpecimenName,
+    find_settings,
+    find_table,
+    folder_for,
+)
+
+__all__ = ["campaign"]
+
+
+@app.command()
+def campaign(
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    override: Override = None,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
+    controller: SettingsName = None,
+    sensors: Annotated[str, typer.Option(help="Sensors' noise and ranges: shipped name, or a TOML file.")] = "lhpost6",
+    tests: Annotated[str | None, typer.Option(help="Tests of the campaign, with commas; by default all.")] = None,
+    errors: Annotated[bool, typer.Option(help="Draw gains, offsets and skews of the sensors.")] = True,
+    seed: Annotated[int, typer.Option(min=0, help="Of noise and errors of the sensors.")] = 0,
+) -> None:
+    """Rehearse a campaign of tests and record it as sensors would: to plan one, and to try what follows."""
+    from ..campaign import save_campaign, simulate_campaign
+    from ..sensors import load_sensors
+
+    table = find_table(machine, override, 0, specimen, specimen_at, locked)
+    settings, known = find_settings(controller, table), load_sensors(sensors)
+    wanted = tuple(word.strip() for word in tests.split(",")) if tests is not None else None
+    if wanted is not None and len(set(wanted)) < len(wanted):
+        raise ParameterError(f"--tests {tests}: names a test twice")
+    folder = folder_for(out, "campaign")
+    if any(folder.glob("*.nc")):
+        raise ParameterError(f"--out {folder}: holds records already, which would count as tests; name another folder")
+    with progress_bar(f"a campaign on {table.name}") as progress:
+        made = simulate_campaign(
+            table, settings, known, seed=seed, errors=errors, tests=wanted, name=folder.name, progress=progress
+        )
+    save_campaign(made, folder)
+    for record in made.records:
+        typer.echo(f"wrote {Path(folder) / record.attrs['test']}.nc")

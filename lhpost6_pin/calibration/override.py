@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from ..files import write_whole
-from .fit import Calibration
 from .knobs import knob_changes
+from .result import Calibration
 
 __all__ = ["save_override"]
 

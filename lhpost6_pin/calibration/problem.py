@@ -108,22 +108,11 @@ class Problem:
 
     def whitened(self, x: Array) -> list[Complex]:
         """Whitened bins (m, c) of every test with the unknowns at x."""
-        plant, tests = self._plant(x), self._corrected(x)
+        plant, tests = self.plant_at(x), self._corrected(x)
         found = []
         for i, test in enumerate(tests):
             bins, f = self._bins(evaluate_residuals(plant, test), test.dt)
             found.append(self.whitener.apply(i, bins[..., None], f)[..., 0])
-        return found
-
-    def excess(self, whitened: Sequence[Complex]) -> list[Array]:
-        """Power (m, c) of whitened bins above that of noise, by test, column and band; one where there is none."""
-        found = []
-        for f, bins in zip(self.frequency, whitened, strict=True):
-            power = np.ones(bins.shape)
-            band = self.whitener.band(f)
-            for b in np.unique(band):
-                power[band == b] = np.maximum(1.0, np.mean(np.abs(bins[band == b]) ** 2, axis=0))
-            found.append(power)
         return found
 
     def slopes(self, x: Array, free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Complex]:
@@ -147,7 +136,7 @@ class Problem:
         for i, _ in term.members:
             more[i] = self.comparison.step * self.prior[i]
         if term.members[0][0] < knobs:
-            plant, tests = self._plant(x + more), base.tests
+            plant, tests = self.plant_at(x + more), base.tests
         else:  # what is left of an error after correction is as good as the error itself
             plant, tests = base.plant, [corrected(t, self.unknowns, more[knobs:]) for t in base.tests]
         known = path_key(plant) == base.key
@@ -164,7 +153,8 @@ class Problem:
             out.append((i, [np.where(rows, c, 0.0) / (self.comparison.step * self.prior[i]) for c in changes]))
         return out
 
-    def _plant(self, x: Array) -> Plant:
+    def plant_at(self, x: Array) -> Plant:
+        """Plant with its knobs turned to x (p,)."""
         return make_plant(with_knobs(self.machine, self.knobs, x[: len(self.knobs)]))
 
     def _corrected(self, x: Array) -> list[Measured]:
@@ -206,7 +196,7 @@ class _Base:
     """What differences are taken from: everything evaluated once at x."""
 
     def __init__(self, problem: Problem, x: Array) -> None:
-        self.plant, self.tests = problem._plant(x), problem._corrected(x)
+        self.plant, self.tests = problem.plant_at(x), problem._corrected(x)
         self.key = path_key(self.plant)
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)

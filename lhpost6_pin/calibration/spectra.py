@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Whitener", "make_whitener", "spectrum_of"]
+__all__ = ["Whitener", "excess", "make_whitener", "spectrum_of"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,6 +56,17 @@ class Whitener(NamedTuple):
             mixed = self.factor[test, b] @ part.swapaxes(0, 1).reshape(part.shape[1], -1)
             out[band == b] = mixed.reshape(part.shape[1], part.shape[0], -1).swapaxes(0, 1)
         return out
+
+
+def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[Array]) -> list[Array]:
+    """Power (m, k) of every test's whitened bins above that of noise, by column and band; one where there is none."""
+    found = []
+    for bins, f in zip(whitened, frequency, strict=True):
+        power, band = np.ones(bins.shape), whitener.band(f)
+        for b in np.unique(band):
+            power[band == b] = np.maximum(1.0, np.mean(np.abs(bins[band == b]) ** 2, axis=0))
+        found.append(power)
+    return found
 
 
 def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:

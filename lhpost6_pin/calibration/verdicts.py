@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .fit import Calibration
+from .result import Calibration
 
 __all__ = ["Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "far", "verdict_on"]
 

@@ -100,7 +100,8 @@ def subset_block(calibration: Calibration) -> Markup:
         labels, half = [f"{names[i]}, {name}" for name, i in marked], [0.0] * len(marked)
         series.append(Dots("contradicts all together", places, where, half, labels, VERMILLION, "circle-open", 17))
     words = (
-        "Each group of residuals alone, with the same priors; a group is left out where its predicted deviation is "
+        "Each group of residuals alone, and open-loop simulation from the recorded spools, with the same priors; a "
+        "group is left out where its predicted deviation is "
         f"above {limit:g} of the prior's. {INTERVAL}s. Ringed: more than {calibration.limit:g} "
         "deviations from all together. "
         "Drag to zoom; a double click shows all."

@@ -140,7 +140,9 @@ def group_blocks(calibration: Calibration) -> list[Markup]:
         f"Of {compared} estimates by single groups, {len(found)} differ from that of all together by more than "
         f"{calibration.limit:g} deviations of the difference. If the equations hold and noise is all, about "
         f"{number(0.0027 * compared, 1)} would; more says that an equation lacks something. Noise that residuals share "
-        "is taken off in the order wrench, flow, gas law, force: a later group holds a little of the earlier ones."
+        "is taken off in the order wrench, flow, gas law, force: a later group holds a little of the earlier ones. "
+        "Simulation drives the plant by the recorded spools, in open loop, and compares platen velocity and chamber "
+        "pressures, with the errors of the sensors held at what all together say of them."
     )
     header = ("Unknown", "Group", "Group alone", "All together", "Unit", "In deviations")
     blocks = [how]

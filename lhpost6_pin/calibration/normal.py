@@ -1,0 +1,112 @@
+"""Normal equations of a calibration: summed by test and column as wanted, corrected for noise, solved within bounds."""
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parameters import Parameters
+from .problem import Problem
+from .spectra import excess
+
+__all__ = ["Bias", "Normal", "bounded_step", "positive", "squares"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+Progress = Callable[[float], None]
+
+
+class Normal:
+    """Normal equations at x, H dx = -g: by test and column of the residuals, so that they can be summed as wanted."""
+
+    def __init__(self, problem: Problem, x: Array, report: Progress) -> None:
+        """Evaluate residuals and their derivatives at x (p,)."""
+        self.problem = problem
+        self.rest = problem.whitened(x)
+        self.slope = problem.slopes(x, np.ones(len(x), bool), report)
+        self.power = [np.ones(r.shape) for r in self.rest]
+        self.bias: Bias | None = None
+
+    def less(self, bias: "Bias") -> "Normal":
+        """The same with what noise adds taken off, and weighed by what is left."""
+        self.bias = bias
+        self.power = excess(self.problem.whitener, self.rest, self.problem.frequency)
+        return self
+
+    def of(self, tests: Sequence[int], columns: slice | Mask = slice(None)) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of some tests and columns."""
+        matrix, right = np.zeros(2 * (self.slope[0].shape[-1],)), np.zeros(self.slope[0].shape[-1])
+        for t in tests:
+            power = self.power[t][:, columns]
+            more, side = squares(self.slope[t][:, columns], self.rest[t][:, columns], power)
+            matrix, right = matrix + more, right + side
+            if self.bias is not None:
+                more, side = self.bias.of(t, columns, power)
+                matrix, right = matrix - more, right - side
+        return matrix, right
+
+    @cached_property
+    def whole(self) -> tuple[Array, Array]:
+        """Of all tests."""
+        return self.of(range(len(self.rest)))
+
+    def posterior(self, prior: Array) -> Array:
+        """Matrix with the priors in it."""
+        return positive(self.whole[0], prior) + np.diag(prior**-2.0)
+
+    def alone(self, prior: Array) -> Array:
+        """Predicted deviations (n_tests, p) from each test by itself."""
+        found = []
+        for t in range(len(self.rest)):
+            matrix = positive(self.of([t])[0], prior) + np.diag(prior**-2.0)
+            found.append(np.sqrt(np.diag(np.linalg.inv(matrix))))
+        return np.array(found)
+
+
+class Bias:
+    """What noise adds to the normal equations: the mean product of its changes in slopes and residuals."""
+
+    def __init__(self, normal: Normal, replicas: Sequence[Problem], x: Array, reports: Sequence[Progress]) -> None:
+        """Evaluate the same at x with more noise in the tests, as often as there are replicas."""
+        free = np.ones(len(x), bool)
+        self.changes = []
+        for replica, report in zip(replicas, reports, strict=True):
+            noisy = zip(replica.whitened(x), replica.slopes(x, free, report), strict=True)
+            clean = zip(normal.rest, normal.slope, strict=True)
+            self.changes.append([(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)])
+
+    def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
+        added = [squares(c[test][1][:, columns], c[test][0][:, columns], power) for c in self.changes]
+        matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
+        return matrix, right
+
+
+def squares(slope: Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
+    """Normal matrix (p, p) and right side (p,) of bins (m, c) and their derivatives (m, c, p) over a power (m, c)."""
+    j = (slope / np.sqrt(power)[..., None]).reshape(-1, slope.shape[-1])
+    return 2.0 * (j.conj().T @ j).real, 2.0 * (j.conj().T @ (rest / np.sqrt(power)).ravel()).real
+
+
+def positive(matrix: Array, prior: Array) -> Array:
+    """A normal matrix without negative directions, which are left where noise is all that a derivative has."""
+    value, vector = np.linalg.eigh(matrix * np.outer(prior, prior))
+    return (vector * np.maximum(value, 0.0)) @ vector.T / np.outer(prior, prior)
+
+
+def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters) -> Array:
+    """Gauss-Newton step within the trust region and the reach of every unknown."""
+    from scipy.optimize import lsq_linear
+
+    prior = problem.prior
+    trust, reach = numbers.number("fit.trust"), numbers.number("fit.reach")
+    right = normal.whole[1]
+    factor = np.linalg.cholesky(normal.posterior(prior) * np.outer(prior, prior))
+    wanted = np.linalg.solve(factor, -(right + x / prior**2) * prior)
+    place = x / prior
+    least = np.maximum(-reach, problem.lowest / prior)
+    low, high = np.maximum(-trust, np.minimum(least - place, 0.0)), np.minimum(trust, np.maximum(reach - place, 0.0))
+    low, high = low - 1e-9, high + 1e-9  # no empty interval
+    return np.asarray(lsq_linear(factor.T, wanted, bounds=(low, high)).x * prior)

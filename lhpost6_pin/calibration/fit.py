@@ -120,7 +120,7 @@ def calibrate(
         estimate=x,
         covariance=covariance,
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*_subsets(problem, normal, x - step), *([] if simulated is None else [simulated])),
+        subsets=(*_subsets(problem, normal, x - step, floor), *([] if simulated is None else [simulated])),
         misfit_before=before,
         misfit_after=_misfit(problem, problem.whitened(x)),
         rounds=done,
@@ -168,7 +168,7 @@ def _misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
     return out
 
 
-def _subsets(problem: Problem, normal: Normal, x: Array) -> tuple[Subset, ...]:
+def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array) -> tuple[Subset, ...]:
     """What gas law, flows of each kind of actuator and wrench along each axis say by themselves, about x.
 
     Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
@@ -192,5 +192,5 @@ def _subsets(problem: Problem, normal: Normal, x: Array) -> tuple[Subset, ...]:
         sd = np.sqrt(np.diag(covariance))
         estimate = x - covariance @ (g + x / problem.prior**2)
         told = sd < 0.9 * problem.prior
-        found.append(Subset(name, np.where(told, estimate, np.nan), np.where(told, sd, np.nan)))
+        found.append(Subset(name, np.where(told, estimate, np.nan), np.where(told, np.hypot(sd, floor), np.nan)))
     return tuple(found)

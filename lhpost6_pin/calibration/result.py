@@ -19,11 +19,12 @@ Mask = NDArray[np.bool_]
 
 
 class Subset(NamedTuple):
-    """What one group of residuals says by itself: estimates (p,) and predicted deviations (p,), NaN where nothing."""
+    """What one group of residuals, or simulation, says by itself; NaN where nothing."""
 
     name: str  # such as "gas law", "flow, horizontal", "wrench, x"
-    estimate: Array
-    sd: Array
+    estimate: Array  # (p,)
+    sd: Array  # (p,) predicted deviations
+    part: bool = True  # of all together; simulation is not
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def by_simulation(
     told, silent = sd < 0.9 * prior, np.full(len(x) - knobs, np.nan)
     estimate = np.where(told, x[:knobs] - covariance @ side, np.nan)
     sd = np.where(told, np.hypot(sd, floor * prior), np.nan)
-    return Subset("simulation", np.append(estimate, silent), np.append(sd, silent))
+    return Subset("simulation", np.append(estimate, silent), np.append(sd, silent), part=False)
 
 
 def _bins(drive: _Drive, values: Array, problem: Problem, band: tuple[float, ...]) -> tuple[Complex, Array]:

@@ -57,12 +57,13 @@ def contradictions(calibration: Calibration) -> list[Contradiction]:
     """Estimates of single groups that differ from those of all by more than the limit, farthest first.
 
     The variance of the difference is that of the group less that of all (Hausman, Econometrica 46, 1978), since the
-    group is part of all; no less than what the search leaves open.
+    group is part of all; no less than what the search leaves open. Of simulation, which is no part, they add up.
     """
     left_open = calibration.numbers.number("fit.converged") * calibration.sd
     found = []
     for subset in calibration.subsets:
-        variance = np.maximum(subset.sd**2 - calibration.sd**2, left_open**2)  # NaN where the group tells nothing
+        sign = -1.0 if subset.part else 1.0
+        variance = np.maximum(subset.sd**2 + sign * calibration.sd**2, left_open**2)  # NaN where it tells nothing
         distance = (subset.estimate - calibration.estimate) / np.sqrt(variance)
         for i in np.flatnonzero(np.abs(distance) > calibration.limit):
             found.append(Contradiction(subset.name, int(i), float(distance[i])))

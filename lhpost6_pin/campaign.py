@@ -59,10 +59,10 @@ class SensorErrors(NamedTuple):
 
 
 def load_campaign(folder: Path | str, machine: Machine) -> Campaign:
-    """Read all records of a folder, in the order of their names; those of another machine are refused.
+    """Read all records (.nc) of a folder, in the order of their names; a record without a name is called by its file.
 
-    Raises RecordError naming the file, or the folder if there is none in it, or tests that differ in their open
-    servovalves or specimen.
+    Raises RecordError naming the folder if it is none or holds no record, the file of a record that breaks the layout
+    or is of another machine, and tests that differ in their open servovalves or specimen.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -70,23 +70,27 @@ def load_campaign(folder: Path | str, machine: Machine) -> Campaign:
     files = sorted(folder.glob("*.nc"))
     if not files:
         raise RecordError(f"{folder}: holds no record (.nc); import measured data with `lhpost6 import`")
+    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
     records = []
     for path in files:
-        record = load_record(path, {"actuator": machine.actuator_names, "strut": machine.strut_names})
+        record = load_record(path, labels)
         record.attrs.setdefault("test", path.stem)
         records.append(record)
     for fact in ("valves_per_horizontal_actuator", "specimen"):
         found = {str(r.attrs.get(fact, "not said")): p.name for r, p in zip(records, files, strict=True)}
         if len(found) > 1:
             said = "; ".join(f"{name}: {value}" for value, name in found.items())
-            raise RecordError(f"{folder}: tests differ in {fact} ({said}); a campaign is of one machine in one state")
+            why = "a campaign is of one machine in one state: give each state a folder, or mend the attribute"
+            raise RecordError(f"{folder}: tests differ in {fact} ({said}); {why}")
     return Campaign(folder.resolve().name, tuple(records))
 
 
-def save_campaign(campaign: Campaign, folder: Path) -> None:
-    """Write each record as TEST.nc."""
-    for record in campaign.records:
-        save_record(record, folder / f"{record.attrs['test']}.nc")
+def save_campaign(campaign: Campaign, folder: Path) -> list[Path]:
+    """Write each record as TEST.nc, and say where; raises RecordError for one that breaks the layout."""
+    paths = [folder / f"{record.attrs['test']}.nc" for record in campaign.records]
+    for record, path in zip(campaign.records, paths, strict=True):
+        save_record(record, path)
+    return paths
 
 
 def simulate_campaign(
@@ -103,6 +107,8 @@ def simulate_campaign(
     """Rehearse the tests of `campaign.toml` (or some of them) and record them as the sensors would.
 
     errors draws calibration errors within the sensors' ranges, the same for all tests. Deterministic for a seed.
+    progress is called with the share done.
+
     Raises SimulationError if a test does not last, UnknownNameError for a test that the file does not have.
     """
     numbers = load_parameters(models_folder() / "procedures" / "campaign.toml")
@@ -155,7 +161,7 @@ def _target(numbers: Parameters, test: str, machine: Machine) -> Target:
 
 
 def draw_errors(record: xr.Dataset, sensors: Sensors, rng: np.random.Generator) -> SensorErrors:
-    """Calibration errors of a record's channels, uniform within the sensors' ranges."""
+    """Calibration errors of a record's channels and delays of all groups, uniform within the sensors' ranges."""
     gain: dict[str, Array] = {}
     offset: dict[str, Array] = {}
     for ranges, out in ((sensors.gain_range, gain), (sensors.offset_range, offset)):
@@ -172,7 +178,8 @@ def as_sensed(
 ) -> xr.Dataset:
     """A run's record as sensors show it: skewed, low-passed, sampled at `rate` [Hz], scaled, shifted, noisy.
 
-    The spool, in a run the mean over the sample that follows, is first taken to the sample's instant.
+    The spool, in a run the mean over the sample that follows, is first taken to the sample's instant. Hidden states and
+    specimen joints are left out; the errors are added to the attributes (`true_gain_...`).
     """
     dt = float(record["time"][1] - record["time"][0])
     every = round(1.0 / (rate * dt))

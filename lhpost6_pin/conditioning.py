@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def without_offset(x: ArrayLike, rest: slice) -> Array:
-    """Signal less its mean over the samples `rest`, per column."""
+    """Signal less its mean over the samples `rest`, per column; raises ValueError if there are none."""
     x = np.asarray(x, dtype=float)
     if not len(x[rest]):
         raise ValueError(f"no samples at rest in {rest} of {len(x)}")

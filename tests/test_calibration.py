@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from lhpost6_pin.calibration import calibrate, calibration_numbers, machine_knobs, with_knobs
+from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, machine_knobs, with_knobs
 from lhpost6_pin.calibration.errors import corrected, sensor_unknowns
 from lhpost6_pin.calibration.fit import _ready
 from lhpost6_pin.calibration.knobs import Knob
@@ -14,12 +15,13 @@ from lhpost6_pin.calibration.problem import Comparison, Problem
 from lhpost6_pin.calibration.simulation import by_simulation
 from lhpost6_pin.calibration.spectra import make_whitener, spectrum_of
 from lhpost6_pin.campaign import Campaign, load_campaign, save_campaign, simulate_campaign
+from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.errors import RecordError
 from lhpost6_pin.fusion import fuse_motion
 from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.plant import make_plant
-from lhpost6_pin.residuals import evaluate_residuals, make_measured
+from lhpost6_pin.residuals import RESIDUALS, Measured, evaluate_residuals, make_measured
 from lhpost6_pin.sensors import Sensors, add_noise, load_sensors
 from lhpost6_pin.signals import align
 
@@ -132,9 +134,14 @@ def test_whitened_noise_has_unit_power_and_no_correlation(test):
     matrix = others.conj().T @ others / len(others)
     assert np.allclose(matrix, np.eye(3), atol=0.06)  # 9 600 bins: entries scatter by 1 %, their estimate as much
     means = np.mean([np.abs(x[f == 0]) ** 2 for x in white])
-    assert (
-        0.2 < means < 0.8
-    )  # a mean is real: half the power; sixty of them scatter by a fifth, their scales by a third
+    # a mean is real: half the power; sixty of them scatter by a fifth, their scales by a third
+    assert 0.2 < means < 0.8
+
+
+def test_noise_of_fewer_samples_than_columns_is_refused():
+    noise = [[np.ones((2, 7), complex)] * 3]  # the first band counts with the second
+    with pytest.raises(RecordError, match=r"6 samples of the noise between 1 and 2 Hz for 7 columns"):
+        make_whitener(noise, [np.array([1.0, 2.5])], np.array([1.0, 2.0, 3.0]))
 
 
 # ------------------------------------------------------------------------------------------------------- errors
@@ -175,17 +182,34 @@ def test_gains_of_platen_channels_take_their_share_of_the_motion(machine, sensor
         assert np.abs(moved - wanted).max() < 5e-3 * np.abs(wrong - wanted).max()
 
 
+def test_errors_of_chambers_b_are_taken_out_where_spools_were_not_measured(problem, machine, sensors):
+    blind = replace(problem.tests[0], spool=None)
+    unknowns = sensor_unknowns(machine, sensors, blind)
+    values = np.array([1e4 * (u.name == "offset chamber_pressure_b[H3]") for u in unknowns])
+    change = corrected(blind, unknowns, values).pressure - blind.pressure
+    assert np.allclose(change[:, 12], -1e4, rtol=1e-9)  # ten chambers A, then H1 and H2; pressures are rounded at 1e-9
+    assert not np.delete(change, 12, axis=1).any()
+
+
 # --------------------------------------------------------------------------------------------------------- fit
+COMPARISON = Comparison((0.0, 0.01, 5.0, 10.0, 20.0, 30.0), 0.3, 0.1)
+
+
 @pytest.fixture(scope="module")
-def problem(machine, sensors, campaign) -> Problem:
+def seen(machine, sensors, campaign) -> list[Measured]:
+    """One test, and four times with more noise."""
     plant = make_plant(machine)
     record = campaign.records[1].drop_vars("actuator_displacement")
     rng = np.random.default_rng(5)
-    tests = [
+    return [
         make_measured(r, fuse_motion(plant, r, sensors).motion, 60.0)
         for r in (record, *(add_noise(record, sensors, rng) for _ in range(4)))
     ]
-    return Problem(machine, tests[:1], tests[1:], sensors, Comparison((0.0, 0.01, 5.0, 10.0, 20.0, 30.0), 0.3, 0.1))
+
+
+@pytest.fixture(scope="module")
+def problem(machine, sensors, seen) -> Problem:
+    return Problem(machine, seen[:1], seen[1:], sensors, COMPARISON)
 
 
 def test_unknowns_evaluated_together_have_the_derivatives_of_each_alone(problem):
@@ -206,10 +230,76 @@ def test_unknowns_evaluated_together_have_the_derivatives_of_each_alone(problem)
         assert np.allclose(slope[..., i], alone, rtol=1e-6, atol=1e-7 * np.abs(alone).max())
 
 
+def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, sensors):
+    tests = [replace(t, actuator_force=None) for t in seen]
+    without = Problem(machine, tests[:1], tests[1:], sensors, COMPARISON)
+    x = np.zeros(len(without.prior))
+    chosen = [without.names.index(n) for n in ("gain chamber_pressure_a[H2]", "offset chamber_pressure_b[H3]")]
+    (slope,) = without.slopes(x, np.isin(np.arange(len(x)), chosen), lambda share: None)
+    for i in chosen:
+        step = 0.1 * without.prior[i] * (np.arange(len(x)) == i)
+        alone = (without.whitened(x + step)[0] - without.whitened(x)[0]) / step[i]
+        assert np.abs(alone[:, without.rows("wrench")]).max() > 0.0
+        assert np.allclose(slope[..., i], alone, rtol=1e-6, atol=1e-7 * np.abs(alone).max())  # rounding, as above
+
+
 def test_whitened_residuals_hold_as_many_columns_as_their_kinds(problem):
     r = evaluate_residuals(make_plant(problem.machine), problem.tests[0])
     assert problem.widths == tuple(x.shape[1] for x in r) == (6, 14, 3, 10)
     assert sum(problem.rows(k).sum() for k in ("wrench", "flow", "gas", "force")) == 33
+
+
+def _zero(record, name, sample=7, column=1, value=0.0):
+    values = record[name].values.copy()
+    values[sample, column] = value
+    return record.assign({name: record[name].copy(data=values)})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda r: _zero(r, "spool_position", value=np.nan), r"WN: spool_position\[H2\], sample 7: is not finite"),
+        (lambda r: _zero(r, "strut_pressure"), r"WN: strut_pressure\[S2\] is not above zero at sample 7"),
+        (lambda r: r.drop_vars("spool_position"), "WN has no spool_position, which other tests have"),
+        (lambda r: r.drop_vars("chamber_pressure_b"), "WN: has pressures of one side only"),
+        (lambda r: r.drop_vars("platen_displacement"), "WN: has no platen_displacement; lengths do not replace it"),
+        (
+            lambda r: r.drop_vars(["actuator_force", "chamber_pressure_a", "chamber_pressure_b"]),
+            "WN: has neither actuator_force nor chamber_pressure_a",
+        ),
+        (lambda r: r.isel(actuator=slice(9)), "WN: actuator: has labels"),
+        (lambda r: r.isel(horizontal=slice(2)), "WN: horizontal: has labels"),
+        (lambda r: r.assign_attrs(specimen="house"), "WN was made with specimen 'house'"),
+        (lambda r: r.isel(time=slice(1500)), "WN: 2.93 s at 512 Hz leave nothing to compare between 0.01 and 0.3 Hz"),
+        (lambda r: r.isel(time=slice(300)), "WN: 0.584 s at 512 Hz leave nothing to compare between 0 and 0.01 Hz"),
+        (
+            lambda r: r.isel(time=slice(None, None, 10)).assign_attrs(sample_rate_hz=51.2),
+            "WN: .* at 51.2 Hz leave nothing to compare between 27 and 30 Hz",
+        ),
+    ],
+)
+def test_a_test_that_cannot_be_calibrated_by_is_refused_by_name(machine, sensors, campaign, spoil, message):
+    first, second = campaign.records
+    with pytest.raises(RecordError, match=message):
+        calibrate(machine, [first, spoil(second)], sensors)
+
+
+def test_what_the_first_test_lacks_is_named_too(machine, sensors, campaign):
+    first, second = campaign.records
+    with pytest.raises(RecordError, match="TX has no strut_pressure, which other tests have"):
+        calibrate(machine, [first.drop_vars("strut_pressure"), second], sensors)
+
+
+def test_no_test_at_all_is_refused(machine, sensors):
+    with pytest.raises(RecordError, match="no record to calibrate by"):
+        calibrate(machine, [], sensors)
+
+
+@pytest.mark.parametrize("command", ["calibrate", "validate"])
+def test_no_jobs_at_all_are_refused(command, tmp_path):
+    done = CliRunner().invoke(app, [command, str(tmp_path), "--jobs", "0"])
+    assert done.exit_code == 1
+    assert "--jobs 0" in str(done.exception)
 
 
 @pytest.fixture(scope="module")
@@ -257,6 +347,31 @@ def test_override_file_makes_the_calibrated_machine(found, machine, tmp_path):
         assert again.parameters[name].value == pytest.approx(quantity.value, rel=1e-12), name
     assert again.parameters["horizontal.flow"].source.startswith("calibrated from campaign two tests")
     assert again.parameters["horizontal.flow"].evidence == "calibrated"
+
+
+def test_names_with_quotes_do_not_spoil_the_override_file(machine, tmp_path):
+    knobs = machine_knobs(machine)
+    sd = np.array([k.sd for k in knobs])
+    none = np.zeros((1, len(RESIDUALS)))
+    named = Calibration(
+        machine=machine,
+        campaign='the "north" C:\\tests',
+        tests=("line\nbreak",),
+        knobs=knobs,
+        unknowns=(),
+        prior=sd,
+        estimate=np.zeros(len(knobs)),
+        covariance=np.diag(sd**2),
+        alone=sd[None],
+        subsets=(),
+        misfit_before=none,
+        misfit_after=none,
+        rounds=1,
+        converged=True,
+        numbers=calibration_numbers(),
+    )
+    again = load_machine("lhpost6", save_override(named, tmp_path / "override.toml"))
+    assert again.parameters["horizontal.flow"].source == f"calibrated from campaign {named.campaign}: {named.tests[0]}"
 
 
 # ---------------------------------------------------------------------------------------------------- campaigns

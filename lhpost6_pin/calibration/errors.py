@@ -19,7 +19,7 @@ from ..residuals import Measured
 from ..sensors import Sensors
 from ..signals import align
 
-__all__ = ["SensorUnknown", "corrected", "sensor_unknowns"]
+__all__ = ["CHANNELS", "SensorUnknown", "corrected", "sensor_unknowns"]
 
 Array = NDArray[np.float64]
 
@@ -30,14 +30,14 @@ class SensorUnknown:
 
     name: str  # such as "gain actuator_force[H1]", "delay spool_position"
     kind: str
-    channel: str
-    column: int  # -1 for all columns of a delay's group
+    channel: str  # a group of channels for a delay
+    column: int  # in the fields of a test that the channel is in; -1 for all of a delay's group
     sd: float  # of the prior, about zero
     unit: str
     alone: tuple[str, int]  # evaluated together: unknowns of one `alone[0]` act on different rows, marked by alone[1]
 
 
-_CHANNELS = {
+CHANNELS = {
     "platen_displacement": "m | rad",
     "platen_velocity": "m/s | rad/s",
     "platen_acceleration": "m/s2 | rad/s2",
@@ -47,14 +47,16 @@ _CHANNELS = {
     "strut_pressure": "Pa",
     "spool_position": "1",
 }
-_FIELDS: Mapping[str, tuple[tuple[str, int, bool], ...]] = {
-    "actuator_force": (("actuator_force", 0, True),),
-    "chamber_pressure_a": (("pressure", 0, True), ("pressure_rate", 0, False)),
-    "chamber_pressure_b": (("pressure", -1, True), ("pressure_rate", -1, False)),
-    "strut_pressure": (("strut_pressure", 0, True),),
-    "spool_position": (("spool", 0, True),),
+"""Channels that a machine is calibrated by, with their units."""
+
+_FIELDS: Mapping[str, tuple[tuple[str, bool], ...]] = {
+    "actuator_force": (("actuator_force", True),),
+    "chamber_pressure_a": (("pressure", True), ("pressure_rate", False)),
+    "chamber_pressure_b": (("pressure", True), ("pressure_rate", False)),
+    "strut_pressure": (("strut_pressure", True),),
+    "spool_position": (("spool", True),),
 }
-"""Fields of a test that a channel's error is in: name, its first column (-1: after chambers A), if offsets count."""
+"""Fields of a test that a channel's error is in, and whether an offset is in them."""
 
 _DELAYED: Mapping[str, tuple[str, ...]] = {
     "actuator_force": ("actuator_force",),
@@ -62,7 +64,7 @@ _DELAYED: Mapping[str, tuple[str, ...]] = {
     "strut_pressure": ("strut_pressure",),
     "spool_position": ("spool",),
 }
-_DELAYS = ("actuator_force", "chamber_pressure", "strut_pressure", "spool_position")
+"""Fields of a test that the delay of a group of channels is in."""
 
 
 def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple[SensorUnknown, ...]:
@@ -77,7 +79,8 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
         "spool_position": machine.actuator_names if test.spool is not None else (),
     }
     found = []
-    for channel, unit in _CHANNELS.items():
+    for channel, unit in CHANNELS.items():
+        first = len(machine.actuator_names) if channel == "chamber_pressure_b" else 0  # after chambers A
         for kind, sd in (("gain", sensors.gain_sd(channel)), ("offset", sensors.offset_sd(channel))):
             if channel.startswith("platen") and kind == "offset":
                 continue  # the control zero-position is where they are zero
@@ -89,45 +92,50 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
                         f"{kind} {channel}[{label}]",
                         kind,
                         channel,
-                        i,
+                        first + i,
                         sd,
                         "1" if kind == "gain" else unit,
-                        _alone(machine, kind, channel, i),
+                        _alone(machine, kind, channel, i, forces=test.actuator_force is not None),
                     )
                 )
-    for group in _DELAYS:
+    for group in _DELAYED:
         sd = sensors.delay_sd(group)
         if sd > 0.0 and columns[{"chamber_pressure": "chamber_pressure_a"}.get(group, group)]:
             found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
     return tuple(found)
 
 
-def _alone(machine: Machine, kind: str, channel: str, column: int) -> tuple[str, int]:
-    """Spools and pressures act on one actuator's residuals, a strut's pressure on its own: one evaluation for all."""
-    if channel in ("chamber_pressure_a", "spool_position", "strut_pressure"):
-        return f"{kind} {channel}", column
-    if channel == "chamber_pressure_b":
-        return f"{kind} {channel}", machine.actuator_names.index(machine.double_acting[column])
-    return f"{kind} {channel} {column}", -1
+def _alone(machine: Machine, kind: str, channel: str, i: int, *, forces: bool) -> tuple[str, int]:
+    """Spools and pressures act on one actuator's residuals, a strut's pressure on its own: one evaluation for all.
+
+    Not so pressures that stand in for forces which were not measured: each is in the whole wrench.
+    """
+    if channel in ("spool_position", "strut_pressure") or (channel == "chamber_pressure_a" and forces):
+        return f"{kind} {channel}", i
+    if channel == "chamber_pressure_b" and forces:
+        return f"{kind} {channel}", machine.actuator_names.index(machine.double_acting[i])
+    return f"{kind} {channel} {i}", -1
 
 
 def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array) -> Measured:
-    """The test as perfect sensors would have shown it, if their errors were `values`; what has none is not copied."""
+    """The test as perfect sensors would have shown it, if their errors were `values`, one an unknown.
+
+    What has no error is not copied.
+    """
     off = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
     arrays: dict[str, Array] = {}
     for kind in ("offset", "gain"):
         for unknown, value in off:
             if unknown.kind != kind or unknown.channel in test.share:
                 continue
-            for field, first, itself in _FIELDS[unknown.channel]:
-                if kind == "offset" and not itself:
+            for field, shifted in _FIELDS[unknown.channel]:
+                if kind == "offset" and not shifted:
                     continue
                 array = arrays.setdefault(field, _field(test, field).copy())
-                column = unknown.column + (first if first >= 0 else array.shape[1] - _doubles(test))
                 if kind == "gain":
-                    array[:, column] /= 1.0 + value
+                    array[:, unknown.column] /= 1.0 + value
                 else:
-                    array[:, column] -= value
+                    array[:, unknown.column] -= value
     for unknown, value in off:
         if unknown.kind == "delay":
             for field in _DELAYED[unknown.channel]:
@@ -138,20 +146,13 @@ def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array
         motion = PlatenMotion(*(x.copy() for x in motion))
         path = None if path is None else path.copy()
         for unknown, value in platen:
-            for moved, share in zip(motion, test.share[unknown.channel], strict=True):
-                moved[:, unknown.column] -= value / (1.0 + value) * share[:, unknown.column]
+            k, part, shares = unknown.column, value / (1.0 + value), test.share[unknown.channel]
+            for moved, share in zip(motion, shares, strict=True):
+                moved[:, k] -= part * share[:, k]
             if path is not None:
-                path[:, unknown.column] -= (
-                    value / (1.0 + value) * test.share[unknown.channel].displacement[:, unknown.column]
-                )
+                path[:, k] -= part * shares.displacement[:, k]
     return replace(test, motion=motion, path=path, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
 
 
 def _field(test: Measured, field: str) -> Array:
     return np.asarray(getattr(test, field))
-
-
-def _doubles(test: Measured) -> int:
-    """Chambers B in a test."""
-    assert test.pressure is not None and test.spool is not None
-    return test.pressure.shape[1] - test.spool.shape[1]

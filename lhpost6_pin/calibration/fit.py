@@ -13,25 +13,29 @@ the predicted covariance, with a floor under its deviations.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from ..alignment import align_record, group_delays
-from ..errors import RecordError
+from ..errors import RecordError, SimulationError
 from ..fusion import fuse_motion
 from ..machine import Machine
 from ..names import AXES
 from ..parameters import Parameters
 from ..plant import Plant, make_plant
 from ..pose import PlatenMotion
+from ..records import channel_name, layout_faults
 from ..residuals import RESIDUALS, Measured, make_measured
 from ..sensors import Sensors, add_noise
+from .errors import CHANNELS
 from .normal import Bias, Normal, bounded_step, positive
 from .problem import Comparison, Problem
 from .result import Calibration, Subset, calibration_numbers
 from .simulation import by_simulation
+from .spectra import spectrum_of
 
 __all__ = ["calibrate"]
 
@@ -52,13 +56,22 @@ def calibrate(
 ) -> Calibration:
     """Calibrate a machine by the tests of a campaign, all at once.
 
-    Servovalves are open as in the records. Deterministic for a seed (of the simulated noise), whatever the number of
-    jobs. Raises RecordError for a record that lacks motion, forces and pressures, or was made with a specimen that the
-    machine has not.
+    Records are of one machine in one state, with the same channels; each may have its own sample rate. Servovalves are
+    open as in the first. Deterministic for a seed (of the simulated noise), whatever the number of `jobs` (threads; -1:
+    one a core). `progress` is called with the share done.
+
+    Raises RecordError for a record that breaks the layout, is of another machine, or was made with a specimen that the
+    machine has not; that lacks platen_displacement, or both forces and pressures; that differs from the others in its
+    channels; that is too short or too slowly sampled. SimulationError for a specimen with joints.
     """
     numbers = calibration_numbers()
+    comparison = Comparison(
+        bands=numbers.vector("comparison.bands"),
+        edge=numbers.number("comparison.edge"),
+        step=numbers.number("fit.step"),
+    )
     report = progress or (lambda share: None)
-    _refuse(machine, records)
+    _refuse(machine, records, comparison)
     machine = machine.with_valves(int(records[0].attrs.get("valves_per_horizontal_actuator", 0)))
     plant = make_plant(machine)
     records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
@@ -66,16 +79,11 @@ def calibrate(
     records = [align_record(r, skews) for r in records]
     rng = np.random.default_rng(seed)
     tests = [_ready(plant, r, sensors, numbers) for r in records]
-    count, draws, again = len(tests), *(int(numbers.number(f"fit.{n}")) for n in ("draws", "corrections"))
+    count, draws, again = len(tests), int(numbers.number("fit.draws")), int(numbers.number("fit.corrections"))
     noisy = [
         _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
     ]
     more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
-    comparison = Comparison(
-        bands=numbers.vector("comparison.bands"),
-        edge=numbers.number("comparison.edge"),
-        step=numbers.number("fit.step"),
-    )
     problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs)
     report(0.1)
     replicas = [problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again)]
@@ -129,13 +137,53 @@ def calibrate(
     )
 
 
-def _refuse(machine: Machine, records: Sequence[xr.Dataset]) -> None:
+def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Comparison) -> None:
+    """Raise what `calibrate` says, naming the test."""
     if not records:
         raise RecordError("no record to calibrate by")
-    for record in records:
-        test, carried = record.attrs.get("test", "a record"), str(record.attrs.get("specimen", "none"))
+    if make_plant(machine).articulated:
+        raise SimulationError("calibration takes a platen with a rigid specimen at most; lock its joints (--locked)")
+    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
+    names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
+    for test, record in zip(names, records, strict=True):
+        if faults := layout_faults(record, labels):
+            raise RecordError(f"{test}: {faults[0]}")
+        carried = str(record.attrs.get("specimen", "none"))
         if carried != "none" and machine.specimen is None:
             raise RecordError(f"{test} was made with specimen {carried!r} on the table; mount it with --specimen")
+        _refuse_channels(test, record, double_acting=bool(machine.double_acting))
+        _refuse_short(test, record, comparison)
+        if lacking := [c for c in CHANNELS if c not in record and any(c in other for other in records)]:
+            what = f"{test} has no {', '.join(lacking)}, which other tests have"
+            raise RecordError(f"{what}; take that test out of the campaign, or the channel out of all")
+
+
+def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> None:
+    if "platen_displacement" not in record:
+        why = "lengths do not replace it, as the geometry behind them is to be calibrated"
+        raise RecordError(f"{test}: has no platen_displacement; {why}")
+    if "actuator_force" not in record and "chamber_pressure_a" not in record:
+        raise RecordError(f"{test}: has neither actuator_force nor chamber_pressure_a; give one of them or both")
+    if double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):
+        raise RecordError(f"{test}: has pressures of one side only; give chamber_pressure_a and chamber_pressure_b")
+    if "strut_pressure" in record:
+        below = np.argwhere(record["strut_pressure"].values <= 0.0)
+        for sample, column in below[:1]:
+            what = f"{channel_name(record['strut_pressure'], int(column))} is not above zero at sample {sample}"
+            raise RecordError(f"{test}: {what}; give absolute pressures, or take the channel out of all tests")
+
+
+def _refuse_short(test: str, record: xr.Dataset, comparison: Comparison) -> None:
+    n, bands = record.sizes["time"], comparison.bands
+    length = float(record["time"][-1] - record["time"][0])
+    dt = length / (n - 1)
+    f = np.zeros(0)
+    if n > 2 * round(comparison.edge / dt):
+        f = spectrum_of(np.zeros((n, 1)), dt, bands[0], bands[-1], comparison.edge)[1]
+    for low, high in pairwise(bands):
+        if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
+            what = f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
+            raise RecordError(f"{test}: {what}; take it out of the campaign")
 
 
 def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Parameters, *, shares: bool = True) -> Measured:
@@ -169,7 +217,7 @@ def _misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
 
 
 def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array) -> tuple[Subset, ...]:
-    """What gas law, flows of each kind of actuator and wrench along each axis say by themselves, about x.
+    """What wrench along each axis, flows of each kind of actuator and gas law say by themselves, about normal's x (p,).
 
     Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
     """

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..machine import Machine
 from ..parameters import Quantity
+from ..residuals import RESIDUALS
 
 __all__ = ["Knob", "machine_knobs", "with_knobs"]
 
@@ -91,7 +92,7 @@ def _felt(knob: Knob, free: str) -> bool:
 def _knobs_of(path: str, name: str, quantity: Quantity) -> list[Knob]:
     shows_in: tuple[str, ...] = ("flow",) if name in _OIL else ("wrench", "gas") if name in _GAS else ("wrench",)
     if name not in _OIL + _GAS + _MECHANICAL:
-        shows_in = ("wrench", "flow", "gas")
+        shows_in = RESIDUALS
     values = quantity.value if isinstance(quantity.value, tuple) else (quantity.value,)
     assert quantity.sd is not None
     sds = quantity.sd if isinstance(quantity.sd, tuple) else (quantity.sd,) * len(values)
@@ -134,7 +135,7 @@ def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> M
 
 
 def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> dict[str, float | list[float]]:
-    """New values by path, as `Machine.with_params` takes them."""
+    """New values by path for coordinates (k,), as `Machine.with_params` takes them."""
     values: dict[str, float | list[float]] = {}
     for knob, x in zip(knobs, coordinates, strict=True):
         for path, i in knob.paths:

@@ -30,7 +30,7 @@ class Normal:
         self.bias: Bias | None = None
 
     def less(self, bias: "Bias") -> "Normal":
-        """The same with what noise adds taken off, and weighed by what is left."""
+        """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
         self.bias = bias
         self.power = excess(self.problem.whitener, self.rest, self.problem.frequency)
         return self
@@ -49,11 +49,11 @@ class Normal:
 
     @cached_property
     def whole(self) -> tuple[Array, Array]:
-        """Of all tests."""
+        """Matrix (p, p) and right side (p,) of all tests."""
         return self.of(range(len(self.rest)))
 
     def posterior(self, prior: Array) -> Array:
-        """Matrix with the priors in it."""
+        """Matrix (p, p) of all tests with the priors (p,) in it."""
         return positive(self.whole[0], prior) + np.diag(prior**-2.0)
 
     def alone(self, prior: Array) -> Array:
@@ -97,7 +97,7 @@ def positive(matrix: Array, prior: Array) -> Array:
 
 
 def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters) -> Array:
-    """Gauss-Newton step within the trust region and the reach of every unknown."""
+    """Gauss-Newton step (p,) from x (p,), within the trust region and the reach of every unknown."""
     from scipy.optimize import lsq_linear
 
     prior = problem.prior

@@ -1,5 +1,6 @@
 """The override file that a calibration leaves: the numbers found, with where they come from."""
 
+import json
 from pathlib import Path
 
 from ..files import write_whole
@@ -32,15 +33,20 @@ def save_override(calibration: Calibration, path: Path) -> Path:
         section, _, key = name.partition(".")
         group = f"kind.{section}" if section in kinds else f"component.{section}" if section in names else section
         unit, deviation = machine.parameters[name].unit, deviations[name]
-        entry = f'value = {_toml(value)}, unit = "{unit}", evidence = "calibrated", source = "{source}"'
+        entry = f'value = {_toml(value)}, unit = "{unit}", evidence = "calibrated", source = {_text(source)}'
         spread = _toml(deviation if isinstance(value, list) else deviation[0])
         groups.setdefault(group, []).append(f"{key} = {{ {entry}, sd = {spread} }}")
-    lines = [f"# Numbers of {machine.name}, {source}.", "# sd is the predicted standard deviation."]
+    title = " ".join(f"# Numbers of {machine.name}, {source}.".split())  # on one line
+    lines = [title, "# sd is the predicted standard deviation."]
     for group, entries in groups.items():
         lines += ["", f"[{group}]", *entries]
     with write_whole(path) as beside:
         beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)  # TOML's basic strings are JSON's
 
 
 def _toml(value: float | list[float]) -> str:

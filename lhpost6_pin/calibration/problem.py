@@ -35,10 +35,10 @@ class Comparison(NamedTuple):
 
 
 class Term(NamedTuple):
-    """What is evaluated at once: unknowns that act on different rows, each with its actuator or strut, or -1."""
+    """What is evaluated at once: unknowns that act on different rows."""
 
-    members: tuple[tuple[int, int], ...]
-    residuals: tuple[str, ...]
+    members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut whose rows it acts on; -1: all rows
+    residuals: tuple[str, ...]  # kinds that it shows in
 
 
 _SHOWS_IN = {
@@ -67,7 +67,10 @@ class Problem:
         *,
         jobs: int = -1,
     ) -> None:
-        """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added."""
+        """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added.
+
+        All tests have the same channels. Raises RecordError where they are too short together.
+        """
         self.machine, self.tests, self.comparison, self.jobs = machine, tuple(tests), comparison, jobs
         self.knobs = machine_knobs(machine)
         self.unknowns = sensor_unknowns(machine, sensors, tests[0])
@@ -93,7 +96,7 @@ class Problem:
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
     def with_tests(self, tests: Sequence[Measured]) -> "Problem":
-        """The same problem with other tests."""
+        """The same problem, weighed by the same noise, with the same tests seen another time."""
         other = copy(self)
         other.tests = tuple(tests)
         return other
@@ -164,7 +167,7 @@ class Problem:
         """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
         c = self.comparison
         bins, f = spectrum_of(residuals.stacked(), dt, c.bands[0], c.bands[-1], c.edge)
-        if bins.shape[1] == sum(getattr(self, "widths", ())) or not hasattr(self, "widths"):
+        if bins.shape[1] == sum(self.widths):
             return bins, f
         out = np.zeros((len(f), sum(self.widths)), np.complex128)
         at = 0
@@ -187,8 +190,11 @@ class Problem:
         for i, unknown in enumerate(self.unknowns):
             together.setdefault(unknown.alone[0], []).append((len(self.knobs) + i, unknown.alone[1]))
         for members in together.values():
-            unknown = self.unknowns[members[0][0] - len(self.knobs)]
-            terms.append(Term(tuple(members), _SHOWS_IN[unknown.channel]))
+            channel = self.unknowns[members[0][0] - len(self.knobs)].channel
+            shows_in = _SHOWS_IN[channel]
+            if self.tests[0].actuator_force is None and channel.startswith("chamber_pressure"):
+                shows_in = ("wrench", *shows_in)  # pressures stand in for forces
+            terms.append(Term(tuple(members), shows_in))
         return tuple(terms)
 
 

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RecordError
+
 __all__ = ["Whitener", "excess", "make_whitener", "spectrum_of"]
 
 Array = NDArray[np.float64]
@@ -19,8 +21,9 @@ Complex = NDArray[np.complex128]
 
 
 def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tuple[Complex, Array]:
-    """Bins (m, k) of columns (n, k) from `low` to `high` [Hz], `edge` [s] cut off at both ends, and their frequencies.
+    """Bins (m, k) of columns (n, k) from `low` to `high` [Hz], and their frequencies (m,) [Hz].
 
+    What is transformed is without `edge` [s] at both ends, and shorter by a few samples for a fast transform.
     Scaled so that noise of one-sided spectrum S has E|X|^2 = S; the mean, which is real, so that E X^2 = S / 2.
     """
     from scipy import fft
@@ -45,7 +48,7 @@ class Whitener(NamedTuple):
 
     def band(self, f: Array) -> NDArray[np.intp]:
         """Band (m,) that each frequency f (m,) is in."""
-        return np.clip(np.searchsorted(self.edges, f, side="right") - 1, 0, self.factor.shape[1] - 1)
+        return _band(self.edges, f)
 
     def apply(self, test: int, bins: Complex, f: Array) -> Complex:
         """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
@@ -56,6 +59,10 @@ class Whitener(NamedTuple):
             mixed = self.factor[test, b] @ part.swapaxes(0, 1).reshape(part.shape[1], -1)
             out[band == b] = mixed.reshape(part.shape[1], part.shape[0], -1).swapaxes(0, 1)
         return out
+
+
+def _band(edges: Array, f: Array) -> NDArray[np.intp]:
+    return np.clip(np.searchsorted(edges, f, side="right") - 1, 0, len(edges) - 2)
 
 
 def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[Array]) -> list[Array]:
@@ -75,13 +82,15 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
     Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. How they are
     correlated is taken as the same in all tests, and for means as in the first band above: one test has too few bins
     in a band to tell.
+
+    Raises RecordError if all together still have too few.
     """
     count, k = len(edges) - 1, noise[0][0].shape[1]
     factors = np.zeros((len(noise), count, k, k), np.complex128)
     scaled: list[list[Complex]] = [[] for _ in range(count)]
     for t, (realisations, f) in enumerate(zip(noise, frequency, strict=True)):
         whole = np.where(f > 0.0, 1.0, np.sqrt(2.0))[:, None]  # a mean is real, with half the power of other bins
-        band = np.clip(np.searchsorted(edges, f, side="right") - 1, 0, count - 1)
+        band = _band(edges, f)
         for b in range(count):
             rows = np.concatenate([(bins * whole)[band == b] for bins in realisations], dtype=np.complex128)
             power = np.mean(np.abs(rows) ** 2, axis=0) / (1.0 - 2.0 / len(rows))  # its inverse is unbiased
@@ -90,6 +99,10 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
             factors[t, b] = np.diag(1.0 / scale)
     for b in range(count):
         rows = np.vstack(scaled[b] + (scaled[1] if b == 0 else []))
+        if len(rows) <= k:
+            where = f"between {edges[b]:g} and {edges[b + 1]:g} Hz"
+            what = f"{len(rows)} samples of the noise {where} for {k} columns of residuals"
+            raise RecordError(f"the tests are too short together: they give {what}; add tests, or longer ones")
         correlation = rows.T @ rows.conj() / len(rows) + 1e-9 * np.eye(k)  # E[x x^H]
         # the inverse of a matrix that was estimated from n samples is too large by n / (n - k)
         factors[:, b] = np.linalg.inv(np.linalg.cholesky(correlation)) * np.sqrt(1.0 - k / len(rows)) @ factors[:, b]

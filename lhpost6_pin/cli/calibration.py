@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import ParameterError
 from .app import app, progress_bar
 from .options import Locked, MachineName, Out, Override, SpecimenAt, SpecimenName, find_table, folder_for
 from .runs import repeating_command
@@ -22,8 +23,8 @@ def calibrate(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulated sensor noise that sets weights.")] = 0,
-    jobs: Annotated[int, typer.Option(help="Processes at a time; -1: as many as there are cores.")] = -1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated sensor noise that sets weights.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
 ) -> None:
     """Calibrate the machine and its sensors on measured tests; leaves override.toml and report.html."""
     from ..calibration import calibrate as calibrate_machine
@@ -33,6 +34,8 @@ def calibrate(
     from ..report import write_calibrate_report
     from ..sensors import load_sensors
 
+    if jobs == 0:
+        raise ParameterError("--jobs 0: give a number of threads, or -1 for as many as there are cores")
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     known = load_sensors(sensors)
     tests = load_campaign(campaign, table)

@@ -1,6 +1,5 @@
 """Commands that make campaigns: campaign."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -33,9 +32,9 @@ def campaign(
     locked: Locked = False,
     controller: SettingsName = None,
     sensors: Annotated[str, typer.Option(help="Sensors' noise and ranges: shipped name, or a TOML file.")] = "lhpost6",
-    tests: Annotated[str | None, typer.Option(help="Tests of the campaign, with commas; by default all.")] = None,
+    tests: Annotated[str | None, typer.Option(help="Some of its tests, such as TX,WN; else all.")] = None,
     errors: Annotated[bool, typer.Option(help="Draw gains, offsets and skews of the sensors.")] = True,
-    seed: Annotated[int, typer.Option(min=0, help="Of noise and errors of the sensors.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of noise and errors of the sensors.")] = 0,
 ) -> None:
     """Rehearse a campaign of tests and record it as sensors would: to plan one, and to try what follows."""
     from ..campaign import save_campaign, simulate_campaign
@@ -49,10 +48,10 @@ def campaign(
     folder = folder_for(out, "campaign")
     if any(folder.glob("*.nc")):
         raise ParameterError(f"--out {folder}: holds records already, which would count as tests; name another folder")
+    name = folder.resolve().name
     with progress_bar(f"a campaign on {table.name}") as progress:
         made = simulate_campaign(
-            table, settings, known, seed=seed, errors=errors, tests=wanted, name=folder.name, progress=progress
+            table, settings, known, seed=seed, errors=errors, tests=wanted, name=name, progress=progress
         )
-    save_campaign(made, folder)
-    for record in made.records:
-        typer.echo(f"wrote {Path(folder) / record.attrs['test']}.nc")
+    for path in save_campaign(made, folder):
+        typer.echo(f"wrote {path}")

@@ -68,8 +68,11 @@ def export(
     from ..importing import FORMATS, export_record
     from ..records import load_record
 
+    dataset = load_record(record)
     path = out or record.with_suffix(FORMATS.get(to, ""))
-    export_record(load_record(record), path, to)
+    if path.exists() and path.samefile(record):
+        raise RecordError(f"{path}: is the record to export; name another file with --out")
+    export_record(dataset, path, to)
     typer.echo(f"wrote {path}")
 
 

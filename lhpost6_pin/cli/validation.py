@@ -12,7 +12,6 @@ from .options import (
     MachineName,
     Out,
     Override,
-    SettingsName,
     SpecimenAt,
     SpecimenName,
     find_settings,
@@ -33,9 +32,12 @@ def validate(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
-    controller: SettingsName = None,
-    phases: Annotated[str, typer.Option(help="Phases: 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
-    jobs: Annotated[int, typer.Option(help="Tests at a time; -1: as many as there are cores.")] = -1,
+    controller: Annotated[
+        str | None,
+        typer.Option(help="Controller settings for phase 3: name or TOML file; else those that records name."),
+    ] = None,
+    phases: Annotated[str, typer.Option(help="Some of 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
+    jobs: Annotated[int, typer.Option(help="Tests at a time, in threads; -1: as many as there are cores.")] = -1,
 ) -> None:
     """Validate the model on measured tests in three phases; leaves report.html and metrics.json."""
     from ..campaign import load_campaign
@@ -44,6 +46,8 @@ def validate(
     from ..validation import validate as validate_campaign
     from ..validation.table import print_validation
 
+    if jobs == 0:
+        raise ParameterError("--jobs 0: give a number of tests at a time, or -1 for as many as there are cores")
     wanted = _phases(phases)
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     settings = find_settings(controller, table) if controller else None

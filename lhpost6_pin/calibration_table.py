@@ -21,7 +21,11 @@ def print_calibration(calibration: Calibration) -> None:
     pairs, apart = len(calibration.alike()), len(contradictions(calibration))
     console.print(f"{pairs} pairs cannot be told apart; {apart} estimates by single groups contradict all together")
     rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
-    console.print(f"converged after {rounds}" if calibration.converged else f"[bold red]not converged[/] in {rounds}")
+    console.print(
+        f"converged after {rounds}"
+        if calibration.converged
+        else f"[bold red]not converged[/] in {rounds}: try again from the override file just written"
+    )
 
 
 def _parameters(calibration: Calibration) -> Table:

@@ -100,14 +100,15 @@ def simulate_campaign(
     *,
     seed: int,
     errors: bool = True,
+    scale: float = 1.0,
     tests: tuple[str, ...] | None = None,
     name: str = "simulated",
     progress: Progress | None = None,
 ) -> Campaign:
     """Rehearse the tests of `campaign.toml` (or some of them) and record them as the sensors would.
 
-    errors draws calibration errors within the sensors' ranges, the same for all tests. Deterministic for a seed.
-    progress is called with the share done.
+    scale is a factor on all motions; errors draws calibration errors within the sensors' ranges, the same for all
+    tests. Deterministic for a seed. progress is called with the share done.
 
     Raises SimulationError if a test does not last, UnknownNameError for a test that the file does not have.
     """
@@ -124,7 +125,7 @@ def simulate_campaign(
     drawn: SensorErrors | None = None
     records = []
     for i, test in enumerate(wanted):
-        target = _target(numbers, test, machine)
+        target = _target(numbers, test, machine, scale)
         samples = min(len(target.time), round(numbers.number(f"{test}.seconds") * SAMPLE_RATE))
         motion = PlatenMotion(*(x[:samples] for x in (target.displacement, target.velocity, target.acceleration)))
         loop = ClosedLoop(controller, controller.drive_for(*motion), rest)
@@ -146,7 +147,7 @@ def simulate_campaign(
     return Campaign(name, tuple(records))
 
 
-def _target(numbers: Parameters, test: str, machine: Machine) -> Target:
+def _target(numbers: Parameters, test: str, machine: Machine, factor: float) -> Target:
     """Target of a test; what the file says beside motion, scale and seconds are options of the motion."""
     options: dict[str, Any] = {}
     for path in (*numbers, *numbers.words):
@@ -155,7 +156,7 @@ def _target(numbers: Parameters, test: str, machine: Machine) -> Target:
             word = numbers.words.get(path)
             options[key] = numbers.number(path) if word is None else bool(word) if isinstance(word, int) else word
     motion = find_motion(str(numbers.words[f"{test}.motion"]), **options)
-    scale = numbers.number(f"{test}.scale") if f"{test}.scale" in numbers else 1.0
+    scale = factor * (numbers.number(f"{test}.scale") if f"{test}.scale" in numbers else 1.0)
     own = None if machine.motion == "free" else machine.motion
     return make_target(motion, scale=scale, axes=own, rate=float(SAMPLE_RATE))
 

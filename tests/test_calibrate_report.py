@@ -12,9 +12,9 @@ from lhpost6_pin.calibration import Calibration, Subset, calibration_numbers, ma
 from lhpost6_pin.calibration.errors import SensorUnknown
 from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, verdict_on
 from lhpost6_pin.calibration_table import print_calibration
-from lhpost6_pin.campaign import Campaign
+from lhpost6_pin.campaign import Campaign, load_campaign
 from lhpost6_pin.cli import app
-from lhpost6_pin.errors import RecordError, UnknownNameError
+from lhpost6_pin.errors import LhpostError, ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.report import write_calibrate_report
 
@@ -183,3 +183,22 @@ def test_a_campaign_that_is_not_there_is_named(tmp_path) -> None:
         assert words in str(ended.exception) and str(folder) in str(ended.exception)
     ended = CliRunner().invoke(app, ["calibrate", str(tmp_path), "--sensors", "nobody"])
     assert isinstance(ended.exception, UnknownNameError)
+
+
+# ---------------------------------------------------------------------------------------- campaigns
+def test_a_simulated_campaign_can_be_loaded_and_is_not_added_to(tmp_path) -> None:
+    asked = ["campaign", "--machine", "uniaxial", "--scale", "0.3", "--out", str(tmp_path), "--seed", "2"]
+    ended = CliRunner().invoke(app, [*asked, "--tests", "TX"])
+    assert ended.exit_code == 0, ended.output
+    (record,) = load_campaign(tmp_path, load_machine("uniaxial")).records
+    assert record.attrs["test"] == "TX" and "noise" in record.attrs
+    swing = float(np.ptp(record["platen_displacement"].values[:, 0]))
+    assert swing == pytest.approx(2 * 0.3 * 0.2, rel=0.1)  # a triangle of 0.2 m scaled; it is tracked to some per cent
+    again = CliRunner().invoke(app, asked)
+    assert isinstance(again.exception, ParameterError) and "holds records already" in str(again.exception)
+
+
+@pytest.mark.parametrize(("tests", "words"), [("TX,TX", "twice"), ("TX,QQ", "QQ")])
+def test_tests_that_a_campaign_has_not_are_named(tmp_path, tests, words) -> None:
+    ended = CliRunner().invoke(app, ["campaign", "--machine", "uniaxial", "--tests", tests, "--out", str(tmp_path)])
+    assert isinstance(ended.exception, LhpostError) and words in str(ended.exception)

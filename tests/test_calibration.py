@@ -332,7 +332,9 @@ def test_simulation_is_a_second_opinion_that_agrees(found, truth):
 def test_without_spools_there_is_no_second_opinion(problem):
     blind = problem.with_tests([replace(t, spool=None) for t in problem.tests])
     x = np.zeros(len(problem.prior))
-    assert by_simulation(blind, [], x, band=(0.3, 30.0), floor=0.05, progress=lambda share: None) is None
+    assert (
+        by_simulation(blind, [], x, band=(0.3, 30.0), floor=0.05, told_below=0.9, progress=lambda share: None) is None
+    )
 
 
 def test_misfit_falls_to_the_noise(found):
@@ -347,6 +349,14 @@ def test_override_file_makes_the_calibrated_machine(found, machine, tmp_path):
         assert again.parameters[name].value == pytest.approx(quantity.value, rel=1e-12), name
     assert again.parameters["horizontal.flow"].source.startswith("calibrated from campaign two tests")
     assert again.parameters["horizontal.flow"].evidence == "calibrated"
+
+
+def test_numbers_of_an_earlier_override_stay_in_the_new_one(found, machine, tmp_path):
+    earlier = machine.with_params({"limits.valve_reserve": 0.2, "horizontal.valves": 2})
+    path = save_override(replace(found, machine=earlier), tmp_path / "override.toml")
+    again = load_machine("lhpost6", path)
+    assert again.parameters["limits.valve_reserve"].value == 0.2
+    assert "horizontal.valves" not in again.parameters  # how many were open is in the records
 
 
 def test_names_with_quotes_do_not_spoil_the_override_file(machine, tmp_path):

@@ -109,12 +109,14 @@ def calibrate(
             converged = True
             break
     covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64)
+    told_below = numbers.number("report.told")
     simulated = by_simulation(
         problem,
         noisy[: int(numbers.number("simulation.draws")) * count],
         x,
         band=numbers.vector("simulation.bands"),
         floor=numbers.number("simulation.floor"),
+        told_below=told_below,
         progress=_between(report, 0.8, 1.0),
     )
     report(1.0)
@@ -128,7 +130,7 @@ def calibrate(
         estimate=x,
         covariance=covariance,
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*_subsets(problem, normal, x - step, floor), *([] if simulated is None else [simulated])),
+        subsets=(*_subsets(problem, normal, x - step, floor, told_below), *([] if simulated is None else [simulated])),
         misfit_before=before,
         misfit_after=_misfit(problem, problem.whitened(x)),
         rounds=done,
@@ -216,7 +218,7 @@ def _misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
     return out
 
 
-def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array) -> tuple[Subset, ...]:
+def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array, told_below: float) -> tuple[Subset, ...]:
     """What wrench along each axis, flows of each kind of actuator and gas law say by themselves, about normal's x (p,).
 
     Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
@@ -239,6 +241,6 @@ def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array) -> tuple[
         covariance = np.linalg.inv(h + np.diag(problem.prior**-2.0))
         sd = np.sqrt(np.diag(covariance))
         estimate = x - covariance @ (g + x / problem.prior**2)
-        told = sd < 0.9 * problem.prior
+        told = sd < told_below * problem.prior
         found.append(Subset(name, np.where(told, estimate, np.nan), np.where(told, np.hypot(sd, floor), np.nan)))
     return tuple(found)

@@ -49,13 +49,15 @@ def by_simulation(
     *,
     band: tuple[float, ...],
     floor: float,
+    told_below: float,
     progress: Callable[[float], None],
 ) -> Subset | None:
     """Estimates of the knobs by open-loop simulation about x (p,), with the problem's priors; NaN for sensor errors.
 
     noisy are the tests again, in order, any number of times, each with more noise. band are the edges [Hz] of bands of
-    frequency; floor goes under the deviations, as a share of the priors'. None where there is no such opinion: without
-    spools and pressures, with a specimen that has joints, or if a run does not last.
+    frequency; floor goes under the deviations, as a share of the priors'; what is not told below told_below of theirs
+    is NaN. None where there is no such opinion: without spools and pressures, with a specimen that has joints, or if a
+    run does not last.
     """
     knobs, tests = len(problem.knobs), len(problem.tests)
     if any(t.spool is None or t.pressure is None for t in problem.tests) or problem.plant_at(x).articulated:
@@ -93,7 +95,7 @@ def by_simulation(
         matrix, side = matrix + more, side + change
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))
-    told, silent = sd < 0.9 * prior, np.full(len(x) - knobs, np.nan)
+    told, silent = sd < told_below * prior, np.full(len(x) - knobs, np.nan)
     estimate = np.where(told, x[:knobs] - covariance @ side, np.nan)
     sd = np.where(told, np.hypot(sd, floor * prior), np.nan)
     return Subset("simulation", np.append(estimate, silent), np.append(sd, silent), part=False)

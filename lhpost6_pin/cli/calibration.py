@@ -7,7 +7,7 @@ import typer
 
 from ..errors import ParameterError
 from .app import app, progress_bar
-from .options import Locked, MachineName, Out, Override, SpecimenAt, SpecimenName, find_table, folder_for
+from .options import Locked, MachineName, Out, Override, SensorsName, SpecimenAt, SpecimenName, find_table, folder_for
 from .runs import repeating_command
 
 __all__ = ["calibrate"]
@@ -19,7 +19,7 @@ def calibrate(
     out: Out = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
-    sensors: Annotated[str, typer.Option(help="Sensors' noise and ranges: shipped name, or a TOML file.")] = "lhpost6",
+    sensors: SensorsName = "lhpost6",
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,

@@ -11,6 +11,7 @@ from .options import (
     MachineName,
     Out,
     Override,
+    SensorsName,
     SettingsName,
     SpecimenAt,
     SpecimenName,
@@ -31,8 +32,9 @@ def campaign(
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
     controller: SettingsName = None,
-    sensors: Annotated[str, typer.Option(help="Sensors' noise and ranges: shipped name, or a TOML file.")] = "lhpost6",
+    sensors: SensorsName = "lhpost6",
     tests: Annotated[str | None, typer.Option(help="Some of its tests, such as TX,WN; else all.")] = None,
+    scale: Annotated[float, typer.Option(help="Factor on all motions, as for a smaller table.")] = 1.0,
     errors: Annotated[bool, typer.Option(help="Draw gains, offsets and skews of the sensors.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of noise and errors of the sensors.")] = 0,
 ) -> None:
@@ -51,7 +53,7 @@ def campaign(
     name = folder.resolve().name
     with progress_bar(f"a campaign on {table.name}") as progress:
         made = simulate_campaign(
-            table, settings, known, seed=seed, errors=errors, tests=wanted, name=name, progress=progress
+            table, settings, known, seed=seed, errors=errors, tests=wanted, scale=scale, name=name, progress=progress
         )
     for path in save_campaign(made, folder):
         typer.echo(f"wrote {path}")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .app import app
-from .options import Locked, MachineName, Out, Override, SpecimenAt, SpecimenName, find_table, folder_for
+from .options import Locked, MachineName, Out, Override, SensorsName, SpecimenAt, SpecimenName, find_table, folder_for
 from .runs import repeating_command
 
 __all__ = ["decompose"]
@@ -21,6 +21,7 @@ def decompose(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    sensors: SensorsName = "lhpost6",
     cutoff: Annotated[float | None, typer.Option(help="Forces are compared up to here [Hz]; else 33.")] = None,
     no_align: Annotated[bool, typer.Option("--no-align", help="Leave skews between channels alone.")] = False,
 ) -> None:
@@ -29,12 +30,13 @@ def decompose(
     from ..decompose.table import print_agreement
     from ..records import load_record
     from ..report import write_decompose_report
+    from ..sensors import load_sensors
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     measured = load_record(record)
     name = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record")).replace("/", "_")
     folder = folder_for(out, f"{name}_forces")
-    found = decompose_record(table, measured, cutoff=cutoff, align=not no_align)
+    found = decompose_record(table, measured, load_sensors(sensors), cutoff=cutoff, align=not no_align)
     agreement, work = find_agreement(found), find_work(found)
     save_ledger(found, folder / "ledger.nc", work, str(record))
     report = write_decompose_report(found, agreement, work, folder / "report.html", command=repeating_command())

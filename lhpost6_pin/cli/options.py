@@ -30,6 +30,9 @@ SpecimenAt = Annotated[
     typer.Option("--specimen-at", help=r"Its root on the platen's top: x,y,z \[m], or with r,p,y \[rad]."),
 ]
 Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
+SensorsName = Annotated[
+    str, typer.Option("--sensors", help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.")
+]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
 Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")

@@ -12,6 +12,7 @@ from .options import (
     MachineName,
     Out,
     Override,
+    SensorsName,
     SpecimenAt,
     SpecimenName,
     find_settings,
@@ -32,6 +33,7 @@ def validate(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    sensors: SensorsName = "lhpost6",
     controller: Annotated[
         str | None,
         typer.Option(help="Controller settings for phase 3: name or TOML file; else those that records name."),
@@ -42,6 +44,7 @@ def validate(
     """Validate the model on measured tests in three phases; leaves report.html and metrics.json."""
     from ..campaign import load_campaign
     from ..report.validate_report import write_validate_report
+    from ..sensors import load_sensors
     from ..validation import save_metrics
     from ..validation import validate as validate_campaign
     from ..validation.table import print_validation
@@ -51,10 +54,12 @@ def validate(
     wanted = _phases(phases)
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     settings = find_settings(controller, table) if controller else None
-    tests = load_campaign(campaign, table)
+    known, tests = load_sensors(sensors), load_campaign(campaign, table)
     folder = folder_for(out, f"{tests.name}_validation")
     with progress_bar(f"validating {table.name} on {tests.name}") as progress:
-        found = validate_campaign(table, tests, settings=settings, phases=wanted, jobs=jobs, progress=progress)
+        found = validate_campaign(
+            table, tests, sensors=known, settings=settings, phases=wanted, jobs=jobs, progress=progress
+        )
     save_metrics(found, folder / "metrics.json")
     report = write_validate_report(found, folder / "report.html", command=repeating_command())
     print_validation(found)

@@ -104,7 +104,7 @@ def calibrate(
             normal = normal.less(bias)
         step = bounded_step(normal, x, problem, numbers)
         x = x + step
-        sd = np.sqrt(np.diag(np.linalg.inv(normal.posterior(problem.prior))))
+        sd = np.sqrt(np.diag(np.linalg.inv(normal.posterior(problem.prior))) + floor**2)
         if done > 1 and np.max(np.abs(step) / sd) < numbers.number("fit.converged"):
             converged = True
             break

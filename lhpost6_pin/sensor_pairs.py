@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .alignment import gas_pressure
+from .conditioning import resolution
 from .fusion import kinematic_jacobian
 from .names import AXES
 from .plant import Plant
@@ -90,10 +91,13 @@ class _View:
         return np.asarray(np.trapezoid(power, self.f, axis=0))
 
     def sd(self, name: str) -> tuple[float, float, float]:
-        """Calibration of a channel, one standard deviation: gain [1], offset [unit], delay [s]."""
+        """Calibration of a channel, one standard deviation: gain [1], offset [unit], delay [s].
+
+        What holds still within a digital step is off by a part of it, which is an offset, too.
+        """
         group = "chamber_pressure" if name.startswith("chamber_pressure") else name
-        s = self.sensors
-        return s.gain_sd(name), s.offset_sd(name), s.delay_sd(group)
+        s, step = self.sensors, resolution(self.values(name)) if self.has(name) else 0.0
+        return s.gain_sd(name), float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0))), s.delay_sd(group)
 
 
 def comparisons(plant: Plant, record: xr.Dataset, sensors: Sensors) -> Iterator[Comparison]:

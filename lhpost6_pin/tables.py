@@ -14,6 +14,7 @@ from .machine import Machine
 if TYPE_CHECKING:
     import xarray as xr
 
+    from .consistency import SensorFinding
     from .plant import Plant
     from .records import Finding
     from .report.run_report import RunSummary
@@ -28,6 +29,7 @@ __all__ = [
     "print_modes",
     "print_motions",
     "print_saved",
+    "print_sensor_findings",
     "report_limits",
 ]
 
@@ -176,6 +178,24 @@ def print_findings(file: str, findings: "Sequence[Finding]") -> None:
     console.print(table)
     counts = {s: sum(f.severity == s for f in findings) for s in ("error", "warning")}
     console.print(f"{counts['error']} errors, {counts['warning']} warnings")
+
+
+def print_sensor_findings(findings: "Sequence[SensorFinding]") -> None:
+    """Print comparisons between sensors that stand out, and how many there were."""
+    suspicious = [f for f in findings if f.verdict == "suspicious"]
+    untested = sum(f.verdict == "untested" for f in findings)
+    console = _console()
+    if suspicious:
+        names = ("comparison", "channel", "quantity", "unit", "estimate", "expected", "within", "deviations")
+        table = Table(*names, title="Sensors that disagree")
+        for f in sorted(suspicious, key=lambda one: -abs(one.significance)):
+            numbers = f"{f.estimate:.5g}", f"{f.expected:.5g}", f"{f.tolerance:.2g}", f"{f.significance:+.1f}"
+            table.add_row(f.check, escape(f.channel), f.quantity, f.unit, *numbers)
+        console.print(table)
+        console.print("A sensor is off, or the law or geometry that it is held against lacks something.")
+    console.print(
+        f"sensors against each other: {len(findings)} numbers, {len(suspicious)} suspicious, {untested} untested"
+    )
 
 
 _COMPARED = (

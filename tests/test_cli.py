@@ -200,6 +200,16 @@ def test_check_names_channel_and_sample_of_a_broken_record_and_exits_1(lhpost6, 
     assert "actuator_force[H3]" in ended.words and "1234" in ended.words and "1 errors" in ended.words
 
 
+def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6, tmp_path):
+    assert "190 numbers, 0 suspicious" in lhpost6("check", PRACTICE).words
+    record = load_record(PRACTICE)
+    record["actuator_displacement"][:, 0] *= 1.05  # ten times the calibration range
+    save_record(record, tmp_path / "campaign" / "long.nc")
+    ended = lhpost6("check", tmp_path / "campaign")
+    assert "Sensors that disagree" in ended.out and "actuator_displacement[H1]" in ended.out
+    assert ended.code == 0  # it can be used, with care
+
+
 @pytest.mark.parametrize("name", ["absent.nc", "[red]absent.nc", "[/red].nc", "a folder"])
 def test_check_of_what_is_no_record_exits_1_and_names_it(lhpost6, tmp_path, name):
     (tmp_path / "a folder").mkdir()

@@ -1,12 +1,15 @@
 """Commands to look at things: doctor, info, capacity, motions, check."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .app import app
-from .options import MachineName, Override, find_machine
+from .options import MachineName, Override, SensorsName, find_machine
+
+if TYPE_CHECKING:
+    from ..machine import Machine
 
 __all__ = ["capacity", "check", "doctor", "info", "motions"]
 
@@ -48,16 +51,43 @@ def motions(name: Annotated[str | None, typer.Argument(help="One of them, to see
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(help="Record to look into.")],
+    file: Annotated[Path, typer.Argument(help="Record to look into, or a campaign: a folder of records.")],
     machine: MachineName = "lhpost6",
     override: Override = None,
+    sensors: SensorsName = "lhpost6",
 ) -> None:
-    """Say what is in a record and what is wrong with it; forces are held against pressures times areas."""
+    """Say what is in records and what is wrong with them, and whether the sensors of measured ones agree."""
     from ..check import check_record
     from ..tables import print_findings
 
-    areas = {a.name: (a.area_a, a.area_b or 0.0) for a in find_machine(machine, override).actuators}
-    findings = check_record(file, areas)
-    print_findings(str(file), findings)
-    if any(f.severity == "error" for f in findings):
+    table = find_machine(machine, override)
+    areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
+    files = sorted(file.glob("*.nc")) or [file]
+    wrong = False
+    for path in files:
+        findings = check_record(path, areas)
+        print_findings(str(path), findings)
+        wrong = wrong or any(f.severity == "error" for f in findings)
+    if wrong:
         raise typer.Exit(1)
+    _check_sensors(table, files, sensors)
+
+
+def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> None:
+    """Compare the sensors of measured records of this machine; what was simulated without noise has none."""
+    from ..consistency import check_sensors
+    from ..plant import make_plant
+    from ..records import load_record
+    from ..sensors import load_sensors
+    from ..tables import print_sensor_findings
+
+    records = [load_record(path) for path in files]
+    labels = {"actuator": table.actuator_names, "strut": table.strut_names}
+    measured = [
+        r
+        for r in records
+        if (r.attrs.get("kind") != "simulated" or "noise" in r.attrs)
+        and all([str(x) for x in r[dim].values] == list(names) for dim, names in labels.items() if dim in r.coords)
+    ]
+    if measured:
+        print_sensor_findings(check_sensors(make_plant(table), measured, load_sensors(sensors)))

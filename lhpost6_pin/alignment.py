@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from .machine import Machine
 from .plant import Plant
 from .pose import leg_displacements
+from .records import sample_interval
 from .sensors import GROUPS
 from .signals import Band, align, differentiate
 
@@ -30,6 +31,7 @@ __all__ = [
     "gas_pressure",
     "group_delays",
     "hydraulic_force",
+    "oil_force",
     "phase_delay",
     "slow_delay",
 ]
@@ -140,8 +142,7 @@ def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay
     """
     found: dict[str, tuple[str, list[Array], list[Array]]] = {}
     for record in records:
-        time = record["time"].values
-        dt = float(time[-1] - time[0]) / (len(time) - 1)
+        dt = sample_interval(record)
         for group, reference, ours, theirs in _pairs(plant, record, dt):
             _, delays, errors = found.setdefault(group, (reference, [], []))
             measure = slow_delay if group == "strut_pressure" else phase_delay  # a gas spring moves with displacement
@@ -157,8 +158,7 @@ def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay
 def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.Dataset:
     """Record whose groups are advanced by their delays [s]; what was done is written in its attribute `aligned`."""
     channels, done = {}, []
-    time = record["time"].values
-    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    dt = sample_interval(record)
     for group, given in delays.items():
         delay = given.delay if isinstance(given, Delay) else float(given)
         behind = f" behind {given.reference}" if isinstance(given, Delay) else ""
@@ -173,14 +173,20 @@ def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.
 # ------------------------------------------------------------------------------------------------ twins
 def hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
     """P_A A_1 - P_B A_2 (n, actuators) of the measured chamber pressures [N]; NaN where one is missing."""
-    names = list(machine.actuator_names)
-    force = record["chamber_pressure_a"].sel(actuator=names).values * [a.area_a for a in machine.actuators]
-    for name in machine.double_acting:
-        k = names.index(name)
-        area = machine.actuators[k].area_b
-        known = "chamber_pressure_b" in record and area is not None
-        force[:, k] -= record["chamber_pressure_b"].sel(horizontal=name).values * area if known else np.nan
-    return force
+    a = record["chamber_pressure_a"].sel(actuator=list(machine.actuator_names)).values
+    if "chamber_pressure_b" in record:
+        b = record["chamber_pressure_b"].sel(horizontal=list(machine.double_acting)).values
+    else:
+        b = np.full((len(a), len(machine.double_acting)), np.nan)
+    return oil_force(machine, a, b)
+
+
+def oil_force(machine: Machine, pressure_a: Array, pressure_b: Array) -> Array:
+    """P_A A_1 - P_B A_2 (n, actuators) [N] of pressures in all chambers A and those B there are [Pa] (Eq. 4-6)."""
+    force = pressure_a * np.array([a.area_a for a in machine.actuators])
+    double = [a.area_b is not None for a in machine.actuators]
+    force[:, double] -= pressure_b * np.array([a.area_b for a in machine.actuators if a.area_b is not None])
+    return np.asarray(force, np.float64)
 
 
 def gas_pressure(machine: Machine, elongation: Array) -> Array:

@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .errors import RecordError
-from .records import LAYOUT, Finding, channel_name, layout_faults, open_record
+from .records import LAYOUT, Finding, channel_name, layout_faults, open_record, sample_interval
 from .signals import differentiate, lowpass_zero_phase
 
 __all__ = ["check_dataset", "check_record"]
@@ -115,10 +115,6 @@ def _columns(dataset: xr.Dataset, *names: str) -> Iterator[tuple[str, Array, flo
                 yield channel_name(dataset[name], k), x, float(max(alike.max(), 1e-6 * spans.max()))
 
 
-def _interval(dataset: xr.Dataset) -> float:
-    return float(dataset["time"][-1] - dataset["time"][0]) / (dataset.sizes["time"] - 1)
-
-
 def _resolution(x: Array) -> float:
     """Smallest step of a channel: its digital resolution, or nearly nothing for a computed one."""
     steps = np.abs(np.diff(x))
@@ -214,7 +210,7 @@ def _spikes(dataset: xr.Dataset) -> Iterator[_Warning]:
 def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
     from scipy.signal import welch
 
-    count, rate = dataset.sizes["time"], 1 / _interval(dataset)
+    count, rate = dataset.sizes["time"], 1 / sample_interval(dataset)
     if not 200 <= rate <= 1e5:
         yield (
             "time",
@@ -239,7 +235,7 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
 # -------------------------------------------------------------------------------------------- consistency
 def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
     """Compare each of displacement, velocity and acceleration with the derivative of those before it."""
-    dt = _interval(dataset)
+    dt = sample_interval(dataset)
     if dataset.sizes["time"] < 256 or dataset.sizes["time"] * dt < 2:
         return
     cutoff = min(40.0, 0.2 / dt)

@@ -27,7 +27,7 @@ from .conditioning import WIDTHS, integrate, quieted
 from .errors import RecordError
 from .plant import Plant
 from .pose import PlatenMotion, forward_kinematics, leg_displacements
-from .records import channel_name
+from .records import channel_name, sample_interval
 from .sensors import Sensors, spectrum
 from .signals import Band, differentiate
 
@@ -78,7 +78,7 @@ def fuse_motion(
     Raises RecordError if there is neither displacement nor length, or a channel that is used is not finite.
     """
     time = record["time"].values
-    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    dt = sample_interval(record)
     f = np.asarray(np.fft.rfftfreq(2 * (len(time) - 1), dt), np.float64)
     displacement, used = _displacement(plant, record, sensors, f)
     velocity, acceleration = (_sensor(record, sensors, f, n) for n in ("platen_velocity", "platen_acceleration"))

@@ -11,7 +11,7 @@ from typing import Any
 
 from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
 from .effects import Effect, standard_effects
-from .errors import ParameterError
+from .errors import ParameterError, RecordError
 from .parameters import Parameters, load_parameters, override_parameters
 from .schema import build_section
 from .specimen import Specimen, find_specimen
@@ -89,6 +89,20 @@ class Machine:
         if count == 0:
             return self
         return self.with_params({f"{a.kind}.valves": count for a in self.actuators if a.area_b is not None})
+
+    def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
+        """Return a copy with the servovalves open that a record's attributes state, none stated: as it is.
+
+        Raises what `refuse_unmounted` does.
+        """
+        self.refuse_unmounted(attrs, said)
+        return self.with_valves(int(attrs.get("valves_per_horizontal_actuator", 0)))
+
+    def refuse_unmounted(self, attrs: Mapping[str, Any], said: str) -> None:
+        """Raise RecordError if a record, `said` in words, was made with a specimen and this table is bare."""
+        carried = str(attrs.get("specimen", "none"))
+        if carried != "none" and self.specimen is None:
+            raise RecordError(f"{said} was made with specimen {carried!r} on the table; mount it with --specimen")
 
     def with_specimen(
         self,

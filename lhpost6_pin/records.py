@@ -28,12 +28,14 @@ __all__ = [
     "Channel",
     "Finding",
     "channel_name",
+    "is_measured",
     "layout_faults",
     "load_record",
     "make_record",
     "open_record",
     "require",
     "same_unit",
+    "sample_interval",
     "save_record",
 ]
 
@@ -174,6 +176,17 @@ def make_record(
     record.attrs |= dict(attrs) | {"layout_version": LAYOUT_VERSION}
     _refuse(layout_faults(record), "record")
     return record
+
+
+def sample_interval(dataset: xr.Dataset) -> float:
+    """Time from one sample to the next [s]."""
+    time = dataset["time"].values
+    return float(time[-1] - time[0]) / (len(time) - 1)
+
+
+def is_measured(dataset: xr.Dataset) -> bool:
+    """Whether sensors stand between a record and its motion: real ones, or the noise of simulated ones."""
+    return dataset.attrs.get("kind") != "simulated" or "noise" in dataset.attrs
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:

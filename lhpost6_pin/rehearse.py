@@ -13,7 +13,7 @@ from .capacity import make_leg_check
 from .control import ControllerSettings, make_controller
 from .control.plug import UserController
 from .equilibrium import find_equilibrium, hydraulic_rows
-from .errors import OutOfRangeError, RecordError, SimulationError
+from .errors import OutOfRangeError, SimulationError
 from .inverse import InverseFilter, apply_inverse
 from .machine import Machine
 from .motions import LimitsSummary, MotionLimits, Target, check_limits
@@ -121,10 +121,7 @@ def replay(
     that the record was made with and the machine has not.
     """
     require(record, "spool_position", "chamber_pressure_a")
-    carried = str(record.attrs.get("specimen", "none"))
-    if carried != "none" and machine.specimen is None:
-        raise RecordError(f"the record was made with specimen {carried!r} on the table; mount it with --specimen")
-    machine = machine.with_valves(int(record.attrs.get("valves_per_horizontal_actuator", 0)))
+    machine = machine.as_tested(record.attrs, "the record")
     if machine.double_acting:
         require(record, "chamber_pressure_b")
     plant = make_plant(machine)

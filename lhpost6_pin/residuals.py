@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from .alignment import gas_pressure, oil_force
 from .compiled import compiled
 from .effects import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE
 from .engine_fused import inertia_table, platen_acceleration
@@ -27,7 +28,7 @@ from .laws.orifice import opening
 from .ledger import add_at_c
 from .plant import Plant
 from .pose import PlantMotion, PlatenMotion, plant_motion
-from .records import require
+from .records import require, sample_interval
 from .rigid_body import platen_inertia
 from .schemes import SD, TAU, V_SEEN, S, forces_stage, pose_stage
 from .signals import differentiate
@@ -82,7 +83,7 @@ def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, pa
 
     Raises RecordError if neither forces nor pressures were measured.
     """
-    dt = float(record["time"][-1] - record["time"][0]) / (record.sizes["time"] - 1)
+    dt = sample_interval(record)
 
     def values(name: str) -> Array | None:
         return np.ascontiguousarray(record[name].values, float) if name in record else None
@@ -138,9 +139,7 @@ def evaluate_residuals(
     double = np.array([name in machine.double_acting for name in machine.actuator_names])
     force = test.actuator_force
     if test.pressure is not None:
-        area = np.array([[a.area_a, a.area_b or 0.0] for a in machine.actuators])
-        oil = test.pressure[:, : plant.spools] * area[:, 0]
-        oil[:, double] -= test.pressure[:, plant.spools :] * area[double, 1]
+        oil = oil_force(machine, test.pressure[:, : plant.spools], test.pressure[:, plant.spools :])
         force = oil if force is None else force
     wants_flow = "flow" in only and test.pressure is not None and test.spool is not None
     wants_wrench = "wrench" in only and force is not None
@@ -166,11 +165,11 @@ def evaluate_residuals(
     )
     gas = np.zeros((n, 0))
     if "gas" in only and test.strut_pressure is not None:
-        s = machine.struts
-        p0, n_gas, l0 = (np.array([getattr(x, k) for x in s]) for k in ("pressure", "polytropic_index", "gas_length"))
-        gas = np.log(test.strut_pressure / p0) + n_gas * np.log1p(length[:, plant.spools :] / l0)
-    both = "force" in only and test.pressure is not None and test.actuator_force is not None
-    return Residuals(wrench, flow, gas, test.actuator_force - oil if both else np.zeros((n, 0)))
+        gas = np.log(test.strut_pressure / gas_pressure(machine, length[:, plant.spools :]))
+    told = np.zeros((n, 0))
+    if "force" in only and test.pressure is not None and test.actuator_force is not None:
+        told = test.actuator_force - oil
+    return Residuals(wrench, flow, gas, told)
 
 
 @compiled

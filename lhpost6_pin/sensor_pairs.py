@@ -17,6 +17,7 @@ from .fusion import kinematic_jacobian
 from .names import AXES
 from .plant import Plant
 from .pose import forward_kinematics, leg_displacements
+from .records import sample_interval
 from .sensors import Sensors, spectrum
 from .signals import Band, align, differentiate
 
@@ -58,7 +59,7 @@ class _View:
     def __init__(self, plant: Plant, record: xr.Dataset, sensors: Sensors) -> None:
         self.plant, self.record, self.sensors = plant, record, sensors
         time = record["time"].values
-        self.dt = float(time[-1] - time[0]) / (len(time) - 1)
+        self.dt = sample_interval(record)
         self.step = max(1, int(1 / (8 * BAND.high * self.dt)))
         self.trim = round(TRIM / (self.step * self.dt))
         self.independent = 2 * BAND.high * (len(time) * self.dt - 2 * TRIM)

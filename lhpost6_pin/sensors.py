@@ -19,7 +19,7 @@ from .conditioning import resolution
 from .errors import ParameterError, UnknownNameError
 from .files import models_folder
 from .parameters import Parameters, load_parameters
-from .records import LAYOUT, channel_name, same_unit
+from .records import LAYOUT, channel_name, same_unit, sample_interval
 from .signals import Band
 
 __all__ = ["GROUPS", "NoiseEstimate", "Sensors", "add_noise", "estimate_noise", "find_rest", "load_sensors", "spectrum"]
@@ -144,7 +144,7 @@ def spectrum(sensors: Sensors, record: xr.Dataset, channel: str, f: ArrayLike) -
     """Noise spectrum (n, columns) of a channel in this record: its sensor's, and that of its digital resolution."""
     values = _columns(record, channel)
     step = resolution(values)
-    stated = sensors.noise_spectrum(channel, f) + step**2 / 6 * _interval(record)
+    stated = sensors.noise_spectrum(channel, f) + step**2 / 6 * sample_interval(record)
     return np.broadcast_to(stated, (len(stated), values.shape[1]))
 
 
@@ -159,7 +159,7 @@ def add_noise(record: xr.Dataset, sensors: Sensors, rng: np.random.Generator) ->
     for name in sensors.noise:
         if name in record:
             values = _columns(record, name)
-            noisy = values + _draw(sensors, name, values.shape, 1 / _interval(record), rng)
+            noisy = values + _draw(sensors, name, values.shape, 1 / sample_interval(record), rng)
             step = np.ptp(noisy) / (2**sensors.bits - 1)
             noisy = step * np.round(noisy / step) if step > 0 else noisy
             channels[name] = record[name].copy(data=noisy.reshape(record[name].shape))
@@ -201,7 +201,7 @@ def find_rest(record: xr.Dataset, sensors: Sensors, k: float = 6.0) -> slice:
     they bear its edge. Channels without stated noise do not count. An empty slice means that the record does not
     begin at rest (or is noisier than `k` allows).
     """
-    n, dt = record.sizes["time"], _interval(record)
+    n, dt = record.sizes["time"], sample_interval(record)
     edge = int(np.ceil(2 / (sensors.band.high * dt)))
     least = max(2, round(1 / 16 / dt))
     if n < edge + least:
@@ -223,7 +223,7 @@ def estimate_noise(record: xr.Dataset, sensors: Sensors, rest: slice | None = No
     """
     rest = find_rest(record, sensors) if rest is None else rest
     start, stop, _ = rest.indices(record.sizes["time"])
-    duration = (stop - start) * _interval(record)
+    duration = (stop - start) * sample_interval(record)
     if duration < 0.25:
         log.info("no rest of 1/4 s to estimate noise from: %g s", duration)
         return ()
@@ -252,8 +252,3 @@ def _recorded_sd(sensors: Sensors, record: xr.Dataset, channel: str) -> Array:
 
 def _columns(record: xr.Dataset, channel: str) -> Array:
     return record[channel].values.astype(float).reshape(record.sizes["time"], -1)
-
-
-def _interval(record: xr.Dataset) -> float:
-    time = record["time"].values
-    return float(time[-1] - time[0]) / (len(time) - 1)

@@ -72,7 +72,7 @@ def calibrate(
     )
     report = progress or (lambda share: None)
     _refuse(machine, records, comparison)
-    machine = machine.with_valves(int(records[0].attrs.get("valves_per_horizontal_actuator", 0)))
+    machine = machine.as_tested(records[0].attrs, "the first test")
     plant = make_plant(machine)
     records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
     skews = group_delays(plant, records)
@@ -89,13 +89,14 @@ def calibrate(
     replicas = [problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again)]
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     x = np.zeros(len(problem.prior))
-    before = _misfit(problem, problem.whitened(x))
     bias: Bias | None = None
     converged, done = False, 0
     shares = np.linspace(0.1, 0.8, rounds + len(replicas) + 1)
     for done in range(1, rounds + 1):
         at = done - 1 if done == 1 else done - 1 + len(replicas)
         normal = Normal(problem, x, _between(report, shares[at], shares[at + 1]))
+        if done == 1:
+            before = _misfit(problem, normal.rest)
         if done == 2:  # near enough to the end, and the same from there on
             bias = Bias(
                 normal, replicas, x, [_between(report, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
@@ -150,9 +151,7 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Compari
     for test, record in zip(names, records, strict=True):
         if faults := layout_faults(record, labels):
             raise RecordError(f"{test}: {faults[0]}")
-        carried = str(record.attrs.get("specimen", "none"))
-        if carried != "none" and machine.specimen is None:
-            raise RecordError(f"{test} was made with specimen {carried!r} on the table; mount it with --specimen")
+        machine.refuse_unmounted(record.attrs, test)
         _refuse_channels(test, record, double_acting=bool(machine.double_acting))
         _refuse_short(test, record, comparison)
         if lacking := [c for c in CHANNELS if c not in record and any(c in other for other in records)]:

@@ -56,21 +56,23 @@ def by_simulation(
 
     noisy are the tests again, in order, any number of times, each with more noise. band are the edges [Hz] of bands of
     frequency; floor goes under the deviations, as a share of the priors'; what is not told below told_below of theirs
-    is NaN. None where there is no such opinion: without spools and pressures, with a specimen that has joints, or if a
-    run does not last.
+    is NaN. None where there is no such opinion: without spools and pressures, or if a run does not last.
     """
     knobs, tests = len(problem.knobs), len(problem.tests)
-    if any(t.spool is None or t.pressure is None for t in problem.tests) or problem.plant_at(x).articulated:
+    if any(t.spool is None or t.pressure is None for t in problem.tests):
         return None
     prior, step = problem.prior[:knobs], problem.comparison.step * problem.prior[:knobs]
     drives = [_drive(corrected(t, problem.unknowns, x[knobs:])) for t in problem.tests]
-    jobs = [(x, [drive]) for drive in drives]
-    jobs += [(x, [_noisier(drives[i % tests], problem.tests[i % tests], t)]) for i, t in enumerate(noisy)]
-    jobs += [(x + h * np.eye(len(x))[i], drives) for i, h in enumerate(step)]
+    plant = problem.plant_at(x)
+    jobs = [(plant, [drive]) for drive in drives]
+    jobs += [(plant, [_noisier(drives[i % tests], problem.tests[i % tests], t)]) for i, t in enumerate(noisy)]
+    for i, h in enumerate(step):
+        turned = x.copy()
+        turned[i] += h
+        jobs.append((problem.plant_at(turned), drives))
 
-    def errors(place: Array, some: Sequence[_Drive]) -> list[Complex] | None:
+    def errors(plant: Plant, some: Sequence[_Drive]) -> list[Complex] | None:
         """Bins of measured less simulated outputs of each drive; None if a run did not last."""
-        plant = problem.plant_at(place)
         found = [_outputs(plant, drive) for drive in some]
         pairs = [(d, f) for d, f in zip(some, found, strict=True) if f is not None]
         return [_bins(d, d.measured - f, problem, band)[0] for d, f in pairs] if len(pairs) == len(some) else None

@@ -77,7 +77,7 @@ def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> None:
     """Compare the sensors of measured records of this machine; what was simulated without noise has none."""
     from ..consistency import check_sensors
     from ..plant import make_plant
-    from ..records import load_record
+    from ..records import is_measured, load_record
     from ..sensors import load_sensors
     from ..tables import print_sensor_findings
 
@@ -86,7 +86,7 @@ def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> None:
     measured = [
         r
         for r in records
-        if (r.attrs.get("kind") != "simulated" or "noise" in r.attrs)
+        if is_measured(r)
         and all([str(x) for x in r[dim].values] == list(names) for dim, names in labels.items() if dim in r.coords)
     ]
     if measured:

@@ -25,7 +25,7 @@ from ..inverse_dynamics import leg_wrenches
 from ..machine import Machine
 from ..plant import make_plant
 from ..pose import PlatenMotion
-from ..residuals import Measured, evaluate_residuals, make_measured
+from ..residuals import Measured, evaluate_residuals, follow, make_measured, path_key
 from ..sensors import Sensors, add_noise
 from ..signals import Band, correlation, differentiate, peak_ratio, rrmse
 from .record import Decomposed, decompose_numbers, take_apart
@@ -194,6 +194,7 @@ def _pressures(machine: Machine, found: Decomposed) -> Iterator[tuple[str, int, 
 def _by_parameters(found: Decomposed) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each number of the platen and the kinds."""
     machine, measured = found.plant.machine, _measured(found)
+    key, path_as_it_is = path_key(found.plant), follow(found.plant, measured)
     sections = {"platen", *(c.kind for c in machine.components)}
     for path, quantity in machine.parameters.items():
         section, _, name = path.partition(".")
@@ -205,7 +206,8 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
             moved[k] += sd
             value = moved.tolist() if isinstance(quantity.value, tuple) else float(moved[0])
             plant = make_plant(machine.with_params({path: value}))
-            yield evaluate_residuals(plant, measured, ("wrench",)).wrench - found.whole.residual
+            known = path_as_it_is if path_key(plant) == key else None
+            yield evaluate_residuals(plant, measured, ("wrench",), path=known).wrench - found.whole.residual
 
 
 def _measured(found: Decomposed) -> Measured:

@@ -22,7 +22,7 @@ from ..machine import Machine
 from ..parameters import Parameters, load_parameters
 from ..plant import Plant, make_plant
 from ..pose import PlatenMotion
-from ..records import channel_name, require
+from ..records import channel_name, is_measured, require, sample_interval
 from ..sensors import Sensors, load_sensors
 from ..signals import Band
 
@@ -100,8 +100,7 @@ def decompose_record(
     comparison = _comparison(cutoff)
     plant = make_plant(machine)
     delays: Mapping[str, Delay] = {}
-    measured = record.attrs.get("kind") != "simulated" or "noise" in record.attrs
-    if measured:
+    if is_measured(record):
         sensors = load_sensors() if sensors is None else sensors
         _check_finite(record)
         if align:
@@ -116,7 +115,7 @@ def decompose_record(
         said = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
         notes = (*notes, f"Skews taken out: {said}.")
     n = len(whole.states.time)
-    dt = float(whole.states.time[-1] - whole.states.time[0]) / (n - 1)
+    dt = sample_interval(record)
     cut = round(comparison.edge / dt)
     if n - 2 * cut < 4 * cut:
         raise RecordError(
@@ -198,9 +197,7 @@ def _comparison(cutoff: float | None) -> Comparison:
 def _check_machine(machine: Machine, record: xr.Dataset) -> None:
     """Refuse a record of another machine, or with a specimen that this one does not carry."""
     require(record, "time")
-    carried = str(record.attrs.get("specimen", "none"))
-    if carried != "none" and machine.specimen is None:
-        raise RecordError(f"the record was made with specimen {carried!r} on the table; mount it with --specimen")
+    machine.refuse_unmounted(record.attrs, "the record")
     for dim, names in (("actuator", machine.actuator_names), ("strut", machine.strut_names)):
         if dim in record.coords and [str(x) for x in record[dim].values] != list(names):
             raise RecordError(
@@ -234,8 +231,7 @@ def _actuator_force(machine: Machine, record: xr.Dataset) -> tuple[Array, str]:
 
 def _at_model_step(record: xr.Dataset) -> bool:
     """Whether the samples of a simulated record are the steps of a semi-implicit run."""
-    time = record["time"].values
-    rate = (len(time) - 1) / float(time[-1] - time[0])
+    rate = 1.0 / sample_interval(record)
     steps = float(record.attrs.get("steps_per_second", np.nan))
     return record.attrs.get("scheme") == "semi_implicit" and abs(rate - steps) < 1e-6 * steps
 

@@ -52,6 +52,8 @@ def delivered_by(found: Decomposed, *, whole: bool = False) -> tuple[tuple[str, 
 
 def find_work(found: Decomposed) -> Work:
     """Power of every effect, its energy by the trapezoidal rule, and the balance of kinetic energy."""
+    from scipy.integrate import cumulative_trapezoid
+
     effects, wrench = delivered_by(found, whole=True)
     part = found.inside
     motion, states = found.whole_motion, found.whole.states
@@ -64,11 +66,5 @@ def find_work(found: Decomposed) -> Work:
     power = np.einsum("nmj,nj->nm", wrench, twist)
     _, mass = platen_inertia(found.plant.model, found.plant.machine)
     kinetic = 0.5 * np.einsum("ni,ij,nj->n", v, mass, v)
-    energy = _integral(power, found.dt)
+    energy = cumulative_trapezoid(power, dx=found.dt, axis=0, initial=0.0)
     return Work(found.time, effects, power, energy, energy.sum(axis=1), kinetic - kinetic[0])
-
-
-def _integral(rate: Array, dt: float) -> Array:
-    out = np.zeros_like(rate)
-    np.cumsum(0.5 * dt * (rate[1:] + rate[:-1]), axis=0, out=out[1:])
-    return out

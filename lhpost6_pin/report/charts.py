@@ -15,12 +15,13 @@ from .layout import ROW, axis_suffix, level_label, level_line, on_row, stacked_l
 from .page import Figure
 from .plots import packed
 
-__all__ = ["FREQUENCY_TICKS", "Curve", "Panel", "XAxis", "chart_figure", "matrix_figure"]
+__all__ = ["FREQUENCY_TICKS", "Curve", "Panel", "Plot", "XAxis", "chart_figure", "grid_figure", "matrix_figure"]
 
 FREQUENCY_TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40)  # [Hz]
 BAND_COLOR = "#009e73"
 LABEL_COLOR = "rgba(255,255,255,0.8)"  # behind words on a line: curves may cross them
 CELL = 92  # [CSS px] height of one plot of a matrix
+BETWEEN = 66  # [CSS px] between the rows of a grid
 MATRIX_WIDTH = 720  # [CSS px] below which a matrix scrolls sideways
 
 
@@ -45,6 +46,15 @@ class Panel:
     span: tuple[float, float] | None = None
     band: tuple[float, float] | None = None  # shaded values
     lines: Mapping[str, float] = field(default_factory=dict)  # label: level of a horizontal line
+
+
+@dataclass(frozen=True)
+class Plot:
+    """One plot of a grid of plots, each with its own axes."""
+
+    title: str  # with its unit
+    x_title: str
+    curves: Sequence[Curve]
 
 
 @dataclass(frozen=True)
@@ -127,6 +137,40 @@ def matrix_figure(
     heads = [_heading(f"from {label}", x=(c + 0.5) / n, y=1.0) for c, label in enumerate(labels)]
     layout["annotations"] += [*heads, _heading("Frequency [Hz]", x=0.5, y=0.0, below=True)]
     return Figure(name, title, description, traces, layout, layout["height"], MATRIX_WIDTH)
+
+
+def grid_figure(
+    name: str, title: str, description: str, rows: Sequence[Sequence[Plot]], *, cell: int, gap: float
+) -> Figure:
+    """Return rows of equally many plots, `cell` [CSS px] high; curves are named once, by the first.
+
+    `gap` is what is left free at the left of a column, as a share of it.
+    """
+    columns, above, below = len(rows[0]), 44, 50
+    height = above + len(rows) * cell + (len(rows) - 1) * BETWEEN + below
+    inner = height - above - below
+    layout: dict[str, Any] = {
+        "height": height,
+        "margin": {"l": 62, "r": 12, "t": above, "b": below},
+        "meta": {"linked": False, "row": cell},
+        "annotations": [],
+        "hovermode": "closest",
+        "legend": {"orientation": "h", "x": 1, "xanchor": "right", "y": 1 + 20 / inner, "yanchor": "bottom"},
+    }
+    traces = []
+    for r, row in enumerate(rows):
+        top = 1.0 - r * (cell + BETWEEN) / inner
+        for c, plot in enumerate(row):
+            suffix = axis_suffix(r * columns + c)
+            across = [(c + (gap if c else 0.0)) / columns, (c + 0.97) / columns]
+            words = {"text": plot.x_title, "standoff": 4, "font": {"size": 11}}
+            layout[f"xaxis{suffix}"] = {"domain": across, "anchor": f"y{suffix}", "nticks": 6, "title": words}
+            up = [max(top - cell / inner, 0.0), top]
+            layout[f"yaxis{suffix}"] = {"domain": up, "anchor": f"x{suffix}", "nticks": 6}
+            layout["annotations"].append(_heading(plot.title, x=across[0], y=top) | {"xanchor": "left"})
+            own = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "showlegend": r == c == 0}
+            traces += [_trace(curve) | own for curve in plot.curves]
+    return Figure(name, title, description, traces, layout, height, 300 * columns)
 
 
 def _trace(curve: Curve) -> dict[str, Any]:

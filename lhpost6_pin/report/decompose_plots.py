@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from ..decompose import Agreement, Decomposed, Work
 from ..decompose.work import delivered_by
 from ..names import AXES
-from .layout import axis_suffix
+from .charts import Curve, Plot, grid_figure
 from .page import Figure, Markup, details, figure
-from .plots import BLUE, GREY, SCALES, VERMILLION, Row, Scale, Trace, envelope, packed, palette, time_figure
+from .plots import BLUE, GREY, SCALES, VERMILLION, Row, Scale, Trace, envelope, palette, time_figure
 from .run_motion import axis_scale
 
 __all__ = ["component_blocks", "effect_blocks", "force_scale", "moved_axes", "six_row_blocks", "work_blocks"]
@@ -26,7 +26,7 @@ LEFT: dict[str, Any] = {"color": VERMILLION, "width": 1.0}
 POINTS = 2500  # of a loop that is drawn: 60 a second of a record of 40 s
 BUCKETS = 500  # stretches of a channel over time, each drawn by its least and greatest sample
 STILL = 0.01  # share of an axis's travel below which it counts as not moved
-CELL, BETWEEN = 190, 66  # [CSS px] height of a plot, and between rows
+CELL = 190  # [CSS px] height of a plot
 ROWS = (
     ("Total actuator force", "time"),
     ("Total actuator force", "displacement"),
@@ -75,55 +75,19 @@ def _six_rows(name: str, title: str, words: str, found: Decomposed, axes: Sequen
         "Strut force": (struts, forces.struts),
         "Dissipative force": (forces.dissipative_measured, forces.dissipative),
     }
-    columns, rows = len(axes), len(ROWS)
-    above, below = 44, 50
-    height = above + rows * CELL + (rows - 1) * BETWEEN + below
-    inner = height - above - below
-    layout: dict[str, Any] = {
-        "height": height,
-        "margin": {"l": 62, "r": 12, "t": above, "b": below},
-        "meta": {"linked": False, "row": CELL},
-        "annotations": [],
-        "hovermode": "closest",
-        "legend": {"orientation": "h", "x": 1, "xanchor": "right", "y": 1, "yanchor": "bottom", "yref": "paper"},
-    }
-    layout["legend"] |= {"yanchor": "bottom", "y": 1 + 20 / inner}
-    traces = []
-    for r, (what, against) in enumerate(ROWS):
-        top = 1.0 - r * (CELL + BETWEEN) / inner
-        for c, axis in enumerate(axes):
-            k = AXES.index(axis)
-            suffix = axis_suffix(r * columns + c)
-            across = [(c + (0.14 if c else 0.0)) / columns, (c + 0.97) / columns]
-            over = _over(found, against, k)
-            layout[f"xaxis{suffix}"] = {"domain": across, "anchor": f"y{suffix}", "nticks": 6}
-            layout[f"xaxis{suffix}"]["title"] = {"text": _against(axis, against), "standoff": 4, "font": {"size": 11}}
-            layout[f"yaxis{suffix}"] = {
-                "domain": [max(top - CELL / inner, 0.0), top],
-                "anchor": f"x{suffix}",
-                "nticks": 6,
-            }
-            word = what if axis in "xyz" else what.replace("force", "moment")
-            layout["annotations"].append(_heading(f"{word}, {axis} [{force_scale(axis).unit}]", across[0], top))
-            for label, values, line in zip(("measured", "modelled"), pairs[what], (MEASURED, MODELLED), strict=True):
-                if values is None:
-                    continue
+
+    def plot(what: str, against: str, axis: str) -> Plot:
+        k, scale = AXES.index(axis), force_scale(axis)
+        over, word = _over(found, against, k), what if axis in "xyz" else what.replace("force", "moment")
+        curves = []
+        for label, values, line in zip(("measured", "modelled"), pairs[what], (MEASURED, MODELLED), strict=True):
+            if values is not None:
                 kept = _kept(values[:, k], against)
-                traces.append(
-                    {
-                        "type": "scatter",
-                        "mode": "lines",
-                        "name": label,
-                        "legendgroup": label,
-                        "showlegend": r == 0 and c == 0,
-                        "x": packed(over[kept]),
-                        "y": packed(values[kept, k] * force_scale(axis).factor),
-                        "line": dict(line),
-                        "xaxis": f"x{suffix}",
-                        "yaxis": f"y{suffix}",
-                    }
-                )
-    return Figure(name, title, words, traces, layout, height, 300 * columns)
+                curves.append(Curve(label, over[kept], values[kept, k] * scale.factor, line))
+        return Plot(f"{word}, {axis} [{scale.unit}]", _against(axis, against), curves)
+
+    rows = [[plot(what, against, axis) for axis in axes] for what, against in ROWS]
+    return grid_figure(name, title, words, rows, cell=CELL, gap=0.14)
 
 
 def _kept(values: Array, against: str) -> NDArray[np.int64]:
@@ -141,11 +105,6 @@ def _over(found: Decomposed, against: str, k: int) -> Array:
 
 def _against(axis: str, against: str) -> str:
     return "Time [s]" if against == "time" else f"{against.capitalize()}, {axis} [{axis_scale(axis, against).unit}]"
-
-
-def _heading(words: str, x: float, y: float) -> dict[str, Any]:
-    place = {"x": x, "y": y, "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "bottom", "yshift": 3}
-    return place | {"text": f"<b>{words}</b>", "showarrow": False, "font": {"size": 12}}
 
 
 def effect_blocks(found: Decomposed, agreement: Agreement) -> list[Markup]:

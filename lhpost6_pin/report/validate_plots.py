@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 from ..names import AXES
 from ..validation import Pair, Phase, Valves
 from ..validation.agreement import MOTIONS
-from .charts import Curve, Panel, XAxis, chart_figure
+from .charts import Curve, Panel, Plot, XAxis, chart_figure, grid_figure
 from .control_blocks import axis_title
 from .decompose_plots import force_scale
-from .layout import axis_suffix
 from .page import Figure, Markup, figure, grid, number
-from .plots import BLUE, GREY, SCALES, Row, Scale, Trace, envelope, packed, palette, time_figure
+from .plots import BLUE, GREY, SCALES, Row, Scale, Trace, envelope, palette, time_figure
 from .run_components import kinds
 from .run_motion import axis_scale, percent
 
@@ -28,7 +27,7 @@ BUCKETS = 320  # stretches of a channel over time, each drawn by its least and g
 FEW = 160  # the same where many actuators share a figure
 LOOP = 1600  # points of a loop, evenly spaced: above 60 Hz in a test of half a minute
 ROW, SMALL_ROW = 130, 84  # [CSS px]
-CELL, BETWEEN = 170, 66  # [CSS px] height of a loop, and between rows of them
+CELL = 170  # [CSS px] height of a loop
 SHOWN = (0.2, 80.0)  # [Hz] of spectra
 TICKS = (0.2, 0.5, 1, 2, 5, 10, 20, 50)
 _SCALES = {"actuator_force": "force", "chamber_pressure_a": "pressure", "chamber_pressure_b": "pressure"}
@@ -186,44 +185,24 @@ def _grid(
     pairs = {what: phase.pair(what) for what, _ in rows}
     against = {q: motion.pair(q) if motion else None for q in ("displacement", "velocity")}
     rows = [(what, over) for what, over in rows if pairs[what] and (over == "time" or against[over])]
-    columns, above, below = len(axes), 44, 50
-    height = above + len(rows) * CELL + (len(rows) - 1) * BETWEEN + below
-    inner = height - above - below
-    legend = {"orientation": "h", "x": 1, "xanchor": "right", "y": 1 + 20 / inner, "yanchor": "bottom"}
-    layout: dict[str, Any] = {
-        "height": height,
-        "margin": {"l": 62, "r": 12, "t": above, "b": below},
-        "meta": {"linked": False, "row": CELL},
-        "annotations": [],
-        "hovermode": "closest",
-        "legend": legend,
-    }
-    traces = []
-    for r, (what, over) in enumerate(rows):
-        top = 1.0 - r * (CELL + BETWEEN) / inner
-        for c, axis in enumerate(axes):
-            suffix = axis_suffix(r * columns + c)
-            across = [(c + (0.10 if c else 0.0)) / columns, (c + 0.97) / columns]
-            unit = "s" if over == "time" else scale_of(over, axis).unit
-            heading = f"{over.capitalize()} [{unit}]"
-            layout[f"xaxis{suffix}"] = {"domain": across, "anchor": f"y{suffix}", "nticks": 6}
-            layout[f"xaxis{suffix}"]["title"] = {"text": heading, "standoff": 4, "font": {"size": 11}}
-            low = max(top - CELL / inner, 0.0)
-            layout[f"yaxis{suffix}"] = {"domain": [low, top], "anchor": f"x{suffix}", "nticks": 6}
-            word = _FORCES[what] if axis not in AXES[3:] else _FORCES[what].replace("force", "moment")
-            layout["annotations"].append(_heading(f"{word}, {axis} [{scale_of(what, axis).unit}]", across[0], top))
-            place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
-            for side, line in (("measured", MEASURED), ("model", MODEL)):
-                trace = _loop(phase, pairs[what], against.get(over), side, axis, over, own=motion is phase)
-                shown = {"name": side, "legendgroup": side, "showlegend": r == 0 and c == 0}
-                traces.append(trace | place | shown | {"line": dict(line)})
-    return Figure(name, title, words, traces, layout, height, 300 * columns)
+
+    def plot(what: str, over: str, axis: str) -> Plot:
+        word = _FORCES[what] if axis not in AXES[3:] else _FORCES[what].replace("force", "moment")
+        unit = "s" if over == "time" else scale_of(over, axis).unit
+        curves = []
+        for side, line in (("measured", MEASURED), ("model", MODEL)):
+            x, y = _loop(phase, pairs[what], against.get(over), side, axis, over, own=motion is phase)
+            curves.append(Curve(side, x, y, line))
+        return Plot(f"{word}, {axis} [{scale_of(what, axis).unit}]", f"{over.capitalize()} [{unit}]", curves)
+
+    plots = [[plot(what, over, axis) for axis in axes] for what, over in rows]
+    return grid_figure(name, title, words, plots, cell=CELL, gap=0.10)
 
 
 def _loop(
     phase: Phase, force: Pair | None, motion: Pair | None, side: str, axis: str, over: str, *, own: bool
-) -> dict[str, Any]:
-    """Return one side's force over time, or over its own motion, or that which was measured."""
+) -> tuple[Array, Array]:
+    """Return time, that side's own motion or that which was measured, and that side's force over it."""
     assert force is not None
     k = force.columns.index(axis)
     y = getattr(force, side)[:, k]
@@ -234,10 +213,4 @@ def _loop(
         n = min(len(x), len(y))
         x, y, factor = x[:n], y[:n], scale_of(over, axis).factor
         kept = np.arange(0, n, -(-n // LOOP))
-    values = {"x": packed(x[kept] * factor), "y": packed(y[kept] * scale_of(force.quantity, axis).factor)}
-    return {"type": "scatter", "mode": "lines"} | values
-
-
-def _heading(words: str, x: float, y: float) -> dict[str, Any]:
-    place = {"x": x, "y": y, "xref": "paper", "yref": "paper", "xanchor": "left", "yanchor": "bottom", "yshift": 3}
-    return place | {"text": f"<b>{words}</b>", "showarrow": False, "font": {"size": 12}}
+    return x[kept] * factor, y[kept] * scale_of(force.quantity, axis).factor

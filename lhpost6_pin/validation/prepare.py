@@ -11,13 +11,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..alignment import hydraulic_force
-from ..errors import RecordError
 from ..fusion import fuse_motion
 from ..inverse_dynamics import leg_wrenches
 from ..machine import Machine
 from ..plant import Plant, make_plant
 from ..pose import PlatenMotion, plant_motion
-from ..records import require
+from ..records import is_measured, require
 from ..sensors import Sensors, add_noise
 from .numbers import Numbers
 
@@ -66,10 +65,7 @@ def too_short(seconds: float, numbers: Numbers) -> str:
 def prepare(machine: Machine, record: xr.Dataset, sensors: Sensors) -> Prepared:
     """Make a record ready. Raises RecordError naming the channels without which there is no platen motion."""
     require(record, "time")
-    carried = str(record.attrs.get("specimen", "none"))
-    if carried != "none" and machine.specimen is None:
-        raise RecordError(f"the test was made with specimen {carried!r} on the table; mount it with --specimen")
-    table = machine.with_valves(int(record.attrs.get("valves_per_horizontal_actuator", 0)))
+    table = machine.as_tested(record.attrs, "the test")
     plant = make_plant(table)
     noisy = add_noise(record, sensors, np.random.default_rng(SEED))
     both = (Measured(r, _motion(plant, r, sensors), _force(table, r)) for r in (record, noisy))
@@ -81,7 +77,7 @@ def prepare(machine: Machine, record: xr.Dataset, sensors: Sensors) -> Prepared:
 def _motion(plant: Plant, record: xr.Dataset, sensors: Sensors) -> PlatenMotion:
     """Platen motion: a simulated record's own if it is free of noise, else fused from all its sensors."""
     names = [f"platen_{quantity}" for quantity in PlatenMotion._fields]
-    if record.attrs.get("kind") == "simulated" and "noise" not in record.attrs and set(names) <= set(record.data_vars):
+    if not is_measured(record) and set(names) <= set(record.data_vars):
         return PlatenMotion(*(record[name].values for name in names))
     return fuse_motion(plant, record, sensors).motion
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..alignment import combine_delays, phase_delay
 from ..machine import Machine
+from ..records import sample_interval
 from .numbers import Numbers
 
 __all__ = ["Valves", "find_valves"]
@@ -41,7 +42,7 @@ def find_valves(machine: Machine, records: Sequence[xr.Dataset], numbers: Number
         if {"spool_command", "spool_position"} <= set(record.data_vars):
             sides = (record[n].sel(actuator=names).values for n in ("spool_command", "spool_position"))
             command, spool = (np.asarray(x, float) for x in sides)
-            dt = float(record["time"][-1] - record["time"][0]) / (len(command) - 1)
+            dt = sample_interval(record)
             found.append((record, command, spool, dt, *phase_delay(command, spool, dt)))
     if not found:
         return None

@@ -1,97 +1,31 @@
 """Effects: what law acts on which ports with which numbers; and the tables that compiled code reads.
 
-An `Effect` is one entry of the force ledger. `LAWS` says of each law how many ports it joins, its parameters with
-units, its hidden states and what it can say of energy. `effect_table` turns a list of effects into rows, one a port
-(a pad has two): adding an effect adds rows, nothing is compiled anew.
+An `Effect` with rows is one entry of the force ledger; one without alters rows of others (`law_table`).
+`effect_table` turns a list of effects into rows, one a port (a pad has two): adding an effect adds rows or changes
+numbers in them, nothing is compiled anew.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .alterations import alter_rows
 from .components import Actuator, Hydraulics, Strut
 from .errors import ParameterError, UnknownNameError
+from .law_table import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT, ROW, Law
 from .laws.orifice import width_ratios
 
-__all__ = [
-    "BOUC_WEN_1D",
-    "BOUC_WEN_2D",
-    "HYDRAULIC_DOUBLE",
-    "HYDRAULIC_SINGLE",
-    "LAWS",
-    "NITROGEN_STRUT",
-    "ROW",
-]
-__all__ += ["VISCOUS", "Effect", "Law", "effect_table", "standard_effects"]
-
-MAX_PARAMS = 12
-
-ROW = np.dtype(
-    [
-        ("law", np.int64),  # code of the law
-        ("effect", np.int64),  # number of the effect in the ledger
-        ("port", np.int64),  # port it acts on
-        ("port_2", np.int64),  # second port, -1 without
-        ("state", np.int64),  # number of its first hidden state, -1 without
-        ("input", np.int64),  # number of the spool that feeds it, -1 without
-        ("p", np.float64, MAX_PARAMS),  # the law's numbers, in the law's order
-    ]
-)
-"""Table row: one law on one port (or pair of ports)."""
-
-# Codes of the laws, as the compiled stage reads them.
-HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS = range(6)
-
-
-class Law(NamedTuple):
-    """What a law needs; the law itself is a kernel in ``laws/``."""
-
-    code: int
-    ports: int
-    params: tuple[tuple[str, str], ...]  # (name, unit)
-    states: tuple[str, ...] = ()
-    stores_energy: bool = False
-    takes_spool: bool = False
-
-
-_FLOW = tuple((name, "m3/s/Pa^0.5") for name in ("flow_pa", "flow_bt", "flow_at", "flow_pb"))
-_HYDRAULIC = (
-    ("area_a", "m2"),
-    ("area_b", "m2"),
-    *_FLOW,
-    ("flow_curve", "1"),
-    ("leakage", "m3/s/Pa"),
-    ("chamber_a", "m"),
-    ("chamber_b", "m"),
-    ("bulk_modulus", "Pa"),
-    ("root_regularisation", "Pa"),
-)
-_FRICTION = (("friction", "N"), ("yield_slip", "m"), ("shape", "1"))
-
-LAWS: Mapping[str, Law] = {
-    "hydraulic_double": Law(HYDRAULIC_DOUBLE, 1, _HYDRAULIC, ("pressure_a", "pressure_b"), True, True),
-    "hydraulic_single": Law(HYDRAULIC_SINGLE, 1, _HYDRAULIC, ("pressure_a",), True, True),
-    "nitrogen_strut": Law(
-        NITROGEN_STRUT,
-        1,
-        (("pressure", "Pa"), ("area", "m2"), ("gas_length", "m"), ("polytropic_index", "1")),
-        stores_energy=True,
-    ),
-    "bouc_wen_1d": Law(BOUC_WEN_1D, 1, _FRICTION, ("z",)),
-    "bouc_wen_2d": Law(BOUC_WEN_2D, 2, _FRICTION, ("z_x", "z_y")),
-    "viscous": Law(VISCOUS, 1, (("coefficient", "N s/m"),)),
-}
-"""All laws by name."""
+__all__ = ["Effect", "effect_table", "standard_effects", "state_names"]
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A named force effect: where it acts, what law it obeys, its numbers, and where they come from.
+    """A named effect: where it acts, what law it obeys, its numbers, and where they come from.
 
-    ports: one name per row (``H1``, ``S2``, ``platen.z``); a two-port law takes the stem of a pad (``V1``).
+    ports: one name per row (``H1``, ``S2``, ``platen.z``); a two-port law takes the stem of a pad (``V1``), or
+    two names with a space between. One that alters takes the names of what it alters.
     params: one tuple per row, in the law's order. spools: for a hydraulic law, the number of its spool per row.
     """
 
@@ -101,6 +35,7 @@ class Effect:
     params: tuple[tuple[float, ...], ...]
     source: str
     spools: tuple[int, ...] = ()
+    family: str = ""  # of the library; empty for the report's and what is made by hand
 
     def __post_init__(self) -> None:
         """Check the shape; raises UnknownNameError or ParameterError."""
@@ -179,12 +114,16 @@ def _hydraulic_numbers(actuator: Actuator, oil: Hydraulics) -> tuple[float, ...]
 def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.void]:
     """Rows of all effects for compiled code; raises UnknownNameError for a port that does not exist."""
     number = {name: i for i, name in enumerate(ports)}
-    rows = np.zeros(sum(len(e.ports) for e in effects), ROW)
+    acting = [e for e in effects if not LAWS[e.law].alters]
+    rows = np.zeros(sum(len(e.ports) for e in acting), ROW)
+    for column in ("link", "more", "shared"):
+        rows[column] = -1
+    base: dict[int, int] = {}  # row of the actuator or strut on a port
     i = state = 0
-    for ledger, effect in enumerate(effects):
+    for ledger, effect in enumerate(acting):
         law = LAWS[effect.law]
         for k, port in enumerate(effect.ports):
-            names = (port,) if law.ports == 1 else (f"{port}.x", f"{port}.y")
+            names = _port_names(port, law)
             for name in names:
                 if name not in number:
                     raise UnknownNameError("port", name, list(ports))
@@ -195,15 +134,26 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
             row["state"] = state if law.states else -1
             row["input"] = effect.spools[k] if effect.spools else -1
             row["p"][: len(law.params)] = effect.params[k]
+            if law.code in (HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT):
+                base[number[names[0]]] = i
+            row["link"] = base.get(number[names[0]], -1)
             i, state = i + 1, state + len(law.states)
+    alter_rows(rows, effects, {port: base[number[port]] for port in ports if number[port] in base}, state)
     return rows
 
 
+def _port_names(port: str, law: Law) -> tuple[str, ...]:
+    if law.ports == 1:
+        return (port,)
+    return tuple(port.split()) if " " in port else (f"{port}.x", f"{port}.y")
+
+
 def state_names(effects: Sequence[Effect]) -> tuple[str, ...]:
-    """Names of all hidden states in table order, such as ``actuators_4_way.H1.pressure_a``."""
+    """Names of all hidden states in table order, such as ``actuators_4_way.H1.pressure_a``; alterations' come last."""
+    in_order = sorted(effects, key=lambda effect: bool(LAWS[effect.law].alters))
     return tuple(
         f"{effect.name}.{port}.{state}"
-        for effect in effects
+        for effect in in_order
         for port in effect.ports
         for state in LAWS[effect.law].states
     )

@@ -27,7 +27,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .effects import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT
+from .law_table import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT
 from .laws.chamber import chamber_energy, flow_enthalpy, flows_double, flows_single
 from .laws.orifice import opening
 from .laws.strut import strut_energy

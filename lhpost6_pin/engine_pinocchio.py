@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from .compiled import compiled
-from .effects import ROW
+from .law_table import ROW
 from .plant import Plant
 from .ports import BODY, LEG
 from .schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from .effects import HYDRAULIC_DOUBLE
 from .errors import SimulationError
+from .law_table import HYDRAULIC_DOUBLE
 from .laws.orifice import spool_for_opening
 from .plant import Plant, State
 from .schemes import TAU, forces_stage, pose_stage

@@ -4,14 +4,17 @@ A `Machine` is built from a `Parameters` mapping, so that another table is anoth
 plain floats; where each comes from stays in `Machine.parameters` under the same path.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
 from .effects import Effect, standard_effects
 from .errors import ParameterError, RecordError
+from .law_table import LAWS
+from .library import effect_entry, make_named_effect
 from .parameters import Parameters, load_parameters, override_parameters
 from .schema import build_section
 from .specimen import Specimen, find_specimen
@@ -37,13 +40,25 @@ class Machine:
     struts: tuple[Strut, ...]
     limits: Limits
     parameters: Parameters
-    added_effects: tuple[Effect, ...] = ()
+    own_effects: tuple[Effect, ...] = ()
     specimen: Specimen | None = None
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """All force effects in ledger order: the report's, then those added."""
-        return (*standard_effects(self.actuators, self.struts, self.hydraulics), *self.added_effects)
+        """All effects that make forces, in ledger order: the report's, then those added."""
+        added = (e for e in self.added_effects if not LAWS[e.law].alters)
+        return (*standard_effects(self.actuators, self.struts, self.hydraulics), *added)
+
+    @property
+    def alterations(self) -> tuple[Effect, ...]:
+        """Effects added that make no force of their own but alter what is there."""
+        return tuple(e for e in self.added_effects if LAWS[e.law].alters)
+
+    @cached_property
+    def added_effects(self) -> tuple[Effect, ...]:
+        """Effects beyond the report's: the library's that the parameters name, then those given as such."""
+        named = (make_named_effect(self, name, entry) for name, entry in self.parameters.effects.items())
+        return (*named, *self.own_effects)
 
     @property
     def components(self) -> "tuple[Actuator | Strut, ...]":
@@ -76,13 +91,25 @@ class Machine:
             parameters = override_parameters(parameters, changes)
         if keywords:
             parameters = override_parameters(parameters, {k.replace("__", "."): v for k, v in keywords.items()})
-        return build_machine(parameters, added_effects=self.added_effects, specimen=self.specimen)
+        return build_machine(parameters, self.own_effects, self.specimen)
 
-    def with_effect(self, effect: Effect) -> "Machine":
-        """Return a copy with one more force effect; its name must be new. Raises ParameterError."""
-        if effect.name in {e.name for e in self.effects}:
-            raise ParameterError(f"an effect named {effect.name!r} is in this machine already; give it another name")
-        return replace(self, added_effects=(*self.added_effects, effect))
+    def with_effect(
+        self, effect: Effect | str, components: Sequence[str] = (), *, name: str = "", **values: float
+    ) -> "Machine":
+        """Return a copy with one more effect: of the library by its family's name, or one made by hand.
+
+        Of a family: components (none: all that it can act on), values in SI (typical ones where none are given), and a
+        name of its own, the family's if empty. The name must be new.
+        Raises ParameterError; UnknownNameError for a family that the library has not.
+        """
+        label = name or (effect if isinstance(effect, str) else effect.name)
+        if label in {e.name for e in (*self.effects, *self.alterations)}:
+            raise ParameterError(f"an effect named {label!r} is in this machine already; give it another name")
+        if isinstance(effect, Effect):
+            return replace(self, own_effects=(*self.own_effects, effect))
+        entry = effect_entry(effect, components, values)
+        parameters = replace(self.parameters, effects={**self.parameters.effects, label: entry})
+        return build_machine(parameters, self.own_effects, self.specimen)
 
     def with_valves(self, count: int) -> "Machine":
         """Return a copy with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""
@@ -176,11 +203,12 @@ def build_machine(
         struts=tuple(struts),
         limits=build_section(Limits, parameters, ("limits",)),
         parameters=parameters,
-        added_effects=added_effects,
+        own_effects=added_effects,
         specimen=specimen,
     )
     _check_names(parameters, components, kinds)
     _check_machine(machine)
+    _ = machine.added_effects  # raises for an effect that cannot be
     return machine
 
 

@@ -8,14 +8,23 @@ one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or `
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from .errors import ParameterError, UnknownNameError
 from .files import models_folder
 
-__all__ = ["EVIDENCE", "Parameters", "Quantity", "Value", "load_parameters", "override_parameters", "to_unit"]
+__all__ = [
+    "EVIDENCE",
+    "EffectEntry",
+    "Parameters",
+    "Quantity",
+    "Value",
+    "load_parameters",
+    "override_parameters",
+    "to_unit",
+]
 
 Value: TypeAlias = float | tuple[float, ...]
 
@@ -48,12 +57,22 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
+class EffectEntry:
+    """An effect of the library as a machine file states it in a section ``[effect.NAME]``."""
+
+    family: str
+    components: tuple[str, ...]  # empty: all that the family can act on
+    values: Mapping[str, Quantity]
+
+
+@dataclass(frozen=True, slots=True)
 class Parameters(Mapping[str, Quantity]):
     """All quantities of a machine by path, and the plain words (kinds, mounts, options) beside them."""
 
     quantities: Mapping[str, Quantity]
     words: Mapping[str, str | int]
     origin: str
+    effects: Mapping[str, EffectEntry] = field(default_factory=dict)  # by name
 
     def __getitem__(self, path: str) -> Quantity:
         """Return the quantity at `path`; raises UnknownNameError that lists the section's paths."""
@@ -114,8 +133,11 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
     """
     if isinstance(changes, str | Path):
         path = Path(changes)
-        entries, origin = _entries(_read_toml(path), path.name), path.name
+        tree = _read_toml(path)
+        entries, origin = _entries(tree, path.name), path.name
+        added = _effects(tree, path.name)
     else:
+        added = {}
         entries, origin = dict(changes), "given by hand"
     quantities, words = dict(parameters.quantities), dict(parameters.words)
     for key, entry in entries.items():
@@ -130,7 +152,7 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
             near = [p for p in (*quantities, *words) if p.split(".")[0] == key.split(".")[0]]
             raise UnknownNameError("parameter", key, near or list(quantities))
         quantities[key] = _changed(base, entry, key, origin)
-    return Parameters(quantities, words, f"{parameters.origin} + {origin}")
+    return Parameters(quantities, words, f"{parameters.origin} + {origin}", {**parameters.effects, **added})
 
 
 def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
@@ -186,7 +208,26 @@ def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:
                 f"{file}: {path} = {entry!r} has no unit; write {path.split('.')[-1]} = "
                 '{ value = ..., unit = "...", evidence = "...", source = "..." }'
             )
-    return Parameters(quantities, words, file)
+    return Parameters(quantities, words, file, _effects(tree, file))
+
+
+def _effects(tree: Mapping[str, Any], file: str) -> dict[str, EffectEntry]:
+    """Effects of the library that a file names, ``[effect.NAME]``."""
+    found = {}
+    for name, table in dict(tree.get("effect", {})).items():
+        key = f"{file}: effect.{name}"
+        if not isinstance(table, dict) or not isinstance(table.get("family"), str):
+            raise ParameterError(f"{key} must be a section with family = a name of the library")
+        components = table.get("components", [])
+        if not isinstance(components, list) or not all(isinstance(c, str) for c in components):
+            raise ParameterError(f'{key}: components = {components!r} should be a list of names, such as ["H1"]')
+        entries = {k: v for k, v in table.items() if k not in ("family", "components")}
+        for k, v in entries.items():
+            if not isinstance(v, dict):
+                raise ParameterError(f"{key}: {k} = {v!r} has no unit; write {k} = {{ value = ..., unit = ... }}")
+        values = {k: _quantity({"evidence": "override", "source": file, **v}, f"{key}.{k}") for k, v in entries.items()}
+        found[name] = EffectEntry(table["family"], tuple(components), values)
+    return found
 
 
 def _entries(tree: Mapping[str, Any], file: str) -> dict[str, Any]:
@@ -205,6 +246,8 @@ def _entries(tree: Mapping[str, Any], file: str) -> dict[str, Any]:
 
 def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for name, table in tree.items():
+        if name == "effect":
+            continue  # `_effects` reads these
         if not isinstance(table, dict):
             raise ParameterError(f"{file}: {name} stands outside any section; put it under [machine] or [platen]")
         if name not in _GROUPS:

@@ -67,7 +67,7 @@ class Plant:
 def make_plant(machine: "Machine") -> Plant:
     """Build tables and model of a machine; raises ParameterError or UnknownNameError."""
     ports = port_names(machine)
-    effects = machine.effects
+    effects = (*machine.effects, *machine.alterations)
     rows = effect_table(effects, ports)
     if len(rows) and rows["port"].max() < len(ports) - len(PLATEN_PORTS):
         ports = ports[: -len(PLATEN_PORTS)]  # no effect acts on the platen as such: nothing to evaluate there

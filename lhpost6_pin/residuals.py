@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from .alignment import gas_pressure, oil_force
 from .compiled import compiled
-from .effects import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE
 from .engine_fused import inertia_table, platen_acceleration
 from .equilibrium import hydraulic_rows
 from .inverse_dynamics import march_states
+from .law_table import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE
 from .laws.chamber import chamber_rate, flows_double, flows_single
 from .laws.orifice import opening
 from .ledger import add_at_c

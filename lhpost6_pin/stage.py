@@ -9,7 +9,14 @@ port [N or N m], port_force (n_ports,) their sum per port.
 """
 
 from .compiled import compiled, compiled_inline
-from .effects import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, VISCOUS
+from .law_table import (
+    BOUC_WEN_1D,
+    BOUC_WEN_2D,
+    HYDRAULIC_DOUBLE,
+    HYDRAULIC_SINGLE,
+    NITROGEN_STRUT,
+    VISCOUS,
+)
 from .laws.bouc_wen import advance as bouc_wen_advance
 from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
 from .laws.bouc_wen import friction_force
@@ -25,6 +32,7 @@ from .laws.chamber import (
 from .laws.orifice import opening
 from .laws.strut import strut_force
 from .laws.viscous import viscous_force
+from .stage_added import added_force, added_rates, advance_added
 
 __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
 
@@ -55,6 +63,8 @@ def state_rates(rows, s, sd, spool, supply, z, zd):
             opened = opening(spool[row.input], p[6])
             q_a, _ = flows_single(opened, z[k], p[2], p[4], p[7], supply[0], supply[1], p[11])
             zd[k] = chamber_rate(q_a, p[0], sd[a], p[8] + s[a], p[10])
+        else:
+            added_rates(rows, i, s, sd, z, zd)
 
 
 @compiled_inline
@@ -114,6 +124,8 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
                 supply[1],
                 p[11],
             )
+        else:
+            advance_added(rows, i, s, ds, dt, z)
 
 
 @compiled_inline
@@ -142,7 +154,9 @@ def apply_forces(rows, s, sd, z, force, port_force):
         elif law == VISCOUS:
             first = viscous_force(sd[a], p[0])
         else:
-            first = 0.0
+            first, second = added_force(rows, i, s, sd, z)
+            if row.port_2 >= 0:
+                port_force[row.port_2] += second
         force[i, 0] = first
         force[i, 1] = second
         port_force[a] += first

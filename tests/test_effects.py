@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from lhpost6_pin import stage
-from lhpost6_pin.effects import LAWS, Effect, effect_table
+from lhpost6_pin.effects import Effect, effect_table
 from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.errors import ParameterError, UnknownNameError
+from lhpost6_pin.law_table import LAWS
 from lhpost6_pin.ledger import force_ledger
 from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.plant import Plant, make_plant

@@ -18,9 +18,10 @@ from scipy.linalg import expm
 from scipy.special import ellipk
 
 from lhpost6_pin import kinematics as kin
-from lhpost6_pin.effects import LAWS, Effect
+from lhpost6_pin.effects import Effect
 from lhpost6_pin.engine_fused import inertia_table, platen_acceleration
 from lhpost6_pin.errors import ParameterError, SimulationError
+from lhpost6_pin.law_table import LAWS
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.platen_steps import integrate_platen, platen_difference
 from lhpost6_pin.ports import PLATEN_PORTS

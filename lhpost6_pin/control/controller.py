@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects import HYDRAULIC_DOUBLE
 from ..equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
 from ..errors import ControllerError
+from ..law_table import HYDRAULIC_DOUBLE
 from ..laws.orifice import opening
 from ..plant import Plant
 from ..pose import leg_jacobian

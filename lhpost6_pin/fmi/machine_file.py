@@ -11,7 +11,7 @@ from .. import __version__
 from ..effects import Effect
 from ..errors import ParameterError
 from ..machine import Machine, build_machine
-from ..parameters import Parameters, Quantity
+from ..parameters import EffectEntry, Parameters, Quantity
 from ..specimen import Specimen
 
 __all__ = ["MACHINE_FILE", "load_machine_file", "save_machine_file"]
@@ -29,7 +29,8 @@ def save_machine_file(machine: Machine, folder: Path) -> list[Path]:
         "origin": machine.parameters.origin,
         "words": dict(machine.parameters.words),
         "quantities": {path: asdict(quantity) for path, quantity in machine.parameters.items()},
-        "added_effects": [asdict(effect) for effect in machine.added_effects],
+        "effects": {name: asdict(entry) for name, entry in machine.parameters.effects.items()},
+        "own_effects": [asdict(effect) for effect in machine.own_effects],
     }
     files = [folder / MACHINE_FILE]
     if machine.specimen is not None:
@@ -46,13 +47,21 @@ def load_machine_file(folder: Path) -> tuple[Machine, str]:
     """Read what `save_machine_file` wrote: the machine, and the version of lhpost6_pin that wrote it."""
     known = json.loads((folder / MACHINE_FILE).read_text(encoding="utf-8"))
     quantities = {path: Quantity(**_tuples(entry)) for path, entry in known["quantities"].items()}
+    effects = {
+        name: EffectEntry(
+            entry["family"],
+            tuple(entry["components"]),
+            {key: Quantity(**_tuples(value)) for key, value in entry["values"].items()},
+        )
+        for name, entry in known["effects"].items()
+    }
     specimen = None
     if "specimen" in known:
         entry = _tuples(known["specimen"])
         specimen = Specimen(**{**entry, "urdf": folder / entry["urdf"]})
     machine = build_machine(
-        Parameters(quantities, known["words"], known["origin"]),
-        added_effects=tuple(Effect(**_tuples(entry)) for entry in known["added_effects"]),
+        Parameters(quantities, known["words"], known["origin"], effects),
+        added_effects=tuple(Effect(**_tuples(entry)) for entry in known["own_effects"]),
         specimen=specimen,
     )
     return machine, known["lhpost6_pin"]

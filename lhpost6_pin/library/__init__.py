@@ -1,0 +1,14 @@
+"""The library of named effects: what a shake table may have that the report's model lacks."""
+
+from .family import Family, Shape, families, find_family
+from .make import effect_entry, make_effect, make_named_effect
+
+__all__ = [
+    "Family",
+    "Shape",
+    "effect_entry",
+    "families",
+    "find_family",
+    "make_effect",
+    "make_named_effect",
+]

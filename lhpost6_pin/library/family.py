@@ -1,0 +1,115 @@
+"""Families: every effect of the library by its name, as `models/library.toml` states it."""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ParameterError, UnknownNameError
+from ..files import models_folder
+
+if TYPE_CHECKING:
+    from ..machine import Machine
+
+__all__ = ["Family", "Shape", "families", "find_family"]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A number of an effect: its unit, a typical size, bounds, and where a search for it starts."""
+
+    name: str
+    unit: str
+    typical: float
+    low: float
+    high: float
+    start: tuple[float, ...]  # values that a search tries; for the amplitude none are needed
+    source: str
+
+    @property
+    def amplitude(self) -> bool:
+        """Whether the effect vanishes, in proportion, with this number."""
+        return not self.start
+
+
+@dataclass(frozen=True)
+class Family:
+    """A mechanism by its canonical name, usable by hand and searched for in measured tests."""
+
+    name: str
+    title: str
+    equation: str
+    acts_on: tuple[str, ...]  # "actuator", "double-acting", "single-acting", "bearing", "strut", "platen", "supply"
+    shapes: tuple[Shape, ...]  # the amplitude first
+    shows_in: tuple[str, ...]  # kinds of residuals
+    confused_with: tuple[str, ...]
+    tell_apart: str
+    twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
+
+    def components(self, machine: "Machine") -> tuple[str, ...]:
+        """Names of all components of a machine that it can act on; ``platen`` or ``supply`` where it has none."""
+        found = []
+        for actuator in machine.actuators:
+            acting = {"actuator", "double-acting" if actuator.area_b is not None else "single-acting"}
+            acting |= {"bearing"} if actuator.mount == "bearing" else {"swivel"}
+            if acting & set(self.acts_on):
+                found.append(actuator.name)
+        if "strut" in self.acts_on:
+            found += machine.strut_names
+        return tuple(found) + tuple(word for word in ("platen", "supply") if word in self.acts_on)
+
+    def groups(self, machine: "Machine") -> tuple[tuple[str, ...], ...]:
+        """Sets of components that a search tries: all of them, all of each kind, and each alone."""
+        names = self.components(machine)
+        kinds: dict[str, list[str]] = {}
+        for component in machine.components:
+            if component.name in names:
+                kinds.setdefault(component.kind, []).append(component.name)
+        found = [names]
+        if self.twins == "kind":
+            found += [tuple(members) for members in kinds.values()]
+            found += [(name,) for name in names]
+        return tuple(dict.fromkeys(group for group in found if group))
+
+
+@cache
+def families() -> dict[str, Family]:
+    """All families by name, in the order of `models/library.toml`; raises ParameterError for what is incomplete."""
+    path = models_folder() / "library.toml"
+    with path.open("rb") as handle:
+        tree = tomllib.load(handle)
+    return {name: _family(name, table) for name, table in tree.items()}
+
+
+def find_family(name: str) -> Family:
+    """Family by name; raises UnknownNameError that lists all."""
+    known = families()
+    if name not in known:
+        raise UnknownNameError("effect of the library", name, list(known))
+    return known[name]
+
+
+def _family(name: str, table: dict[str, Any]) -> Family:
+    words = ("title", "equation", "acts_on", "shows_in", "confused_with", "tell_apart")
+    if missing := [w for w in words if w not in table]:
+        raise ParameterError(f"library.toml: {name} lacks {', '.join(missing)}")
+    shapes = []
+    for key, entry in table.items():
+        if isinstance(entry, dict):
+            if missing := [w for w in ("unit", "typical", "low", "high", "source") if w not in entry]:
+                raise ParameterError(f"library.toml: {name}.{key} lacks {', '.join(missing)}")
+            typical, low, high = (float(entry[w]) for w in ("typical", "low", "high"))
+            start = tuple(float(x) for x in entry.get("start", ()))
+            shapes.append(Shape(key, entry["unit"], typical, low, high, start, entry["source"]))
+    shapes.sort(key=lambda shape: not shape.amplitude)
+    return Family(
+        name=name,
+        title=table["title"],
+        equation=table["equation"],
+        acts_on=tuple(table["acts_on"]),
+        shapes=tuple(shapes),
+        shows_in=tuple(table["shows_in"]),
+        confused_with=tuple(table["confused_with"]),
+        tell_apart=table["tell_apart"],
+        twins=table.get("twins", "kind"),
+    )

@@ -1,0 +1,85 @@
+"""From a family's name, its components and its numbers to an effect of a machine."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from ..effects import Effect
+from ..errors import ParameterError
+from ..parameters import EffectEntry, Quantity, to_unit
+from . import friction, oil
+from .family import Family, find_family
+
+if TYPE_CHECKING:
+    from ..machine import Machine
+
+__all__ = ["effect_entry", "make_effect", "make_named_effect"]
+
+Made = tuple[str, Sequence[str], Sequence[tuple[float, ...]]]
+Build = Callable[["Machine", Sequence[str], Mapping[str, float]], Made]
+"""(machine, components, values) -> law, ports, params."""
+
+_BUILD: Mapping[str, Build] = {**friction.BUILD, **oil.BUILD}
+
+
+def make_effect(
+    machine: "Machine",
+    family: str,
+    components: Sequence[str] = (),
+    values: Mapping[str, float] | None = None,
+    *,
+    name: str = "",
+    source: str = "given by hand",
+) -> Effect:
+    """An effect of a family on some components (none: all that it can act on); values in SI, typical ones else.
+
+    Raises UnknownNameError for a family that the library has not; ParameterError for a component that it cannot act on
+    and for a number that it does not have or that is out of its bounds.
+    """
+    known = find_family(family)
+    possible = known.components(machine)
+    chosen = tuple(components) or possible
+    if wrong := [c for c in chosen if c not in possible]:
+        raise ParameterError(
+            f"{family}: cannot act on {', '.join(wrong)}; it can on {', '.join(possible) or 'nothing'}"
+        )
+    law, ports, params = _BUILD[family](machine, chosen, _numbers(known, values or {}))
+    return Effect(name or family, law, tuple(ports), tuple(params), source, family=family)
+
+
+def make_named_effect(machine: "Machine", name: str, entry: EffectEntry) -> Effect:
+    """The effect that a section ``[effect.NAME]`` states; raises what `make_effect` does, with its name."""
+    shapes = {shape.name: shape for shape in find_family(entry.family).shapes}
+    values, sources = {}, []
+    for key, quantity in entry.values.items():
+        unit = shapes[key].unit if key in shapes else quantity.unit
+        value = to_unit(quantity.value, quantity.unit, unit, f"effect.{name}.{key}")
+        if isinstance(value, tuple):
+            raise ParameterError(f"effect.{name}.{key}: {value!r} should be one number")
+        values[key] = value
+        sources.append(f"{quantity.evidence}: {quantity.source}")
+    source = "; ".join(dict.fromkeys(sources)) or "typical numbers of the library"
+    return make_effect(machine, entry.family, entry.components, values, name=name, source=source)
+
+
+def effect_entry(family: str, components: Sequence[str], values: Mapping[str, float]) -> EffectEntry:
+    """What a machine file would state for these values in SI; raises UnknownNameError or ParameterError."""
+    shapes = {shape.name: shape for shape in find_family(family).shapes}
+    if unknown := [key for key in values if key not in shapes]:
+        raise ParameterError(f"{family}: has no {', '.join(unknown)}; its numbers are {', '.join(shapes)}")
+    given = {key: Quantity(float(v), shapes[key].unit, "override", "given by hand") for key, v in values.items()}
+    return EffectEntry(family, tuple(components), given)
+
+
+def _numbers(family: Family, values: Mapping[str, float]) -> dict[str, float]:
+    shapes = {shape.name: shape for shape in family.shapes}
+    if unknown := [key for key in values if key not in shapes]:
+        raise ParameterError(f"{family.name}: has no {', '.join(unknown)}; its numbers are {', '.join(shapes)}")
+    found = {}
+    for key, shape in shapes.items():
+        value = float(values.get(key, shape.typical))
+        if not shape.low <= value <= shape.high:
+            raise ParameterError(
+                f"{family.name}: {key} = {value:g} {shape.unit} is not between {shape.low:g} and {shape.high:g}"
+            )
+        found[key] = value
+    return found

@@ -1,4 +1,4 @@
-"""Families: every effect of the library by its name, as `models/library.toml` states it."""
+"""Families: every effect of the library by its name, as `models/library/effects.toml` states it."""
 
 import tomllib
 from dataclasses import dataclass
@@ -74,8 +74,8 @@ class Family:
 
 @cache
 def families() -> dict[str, Family]:
-    """All families by name, in the order of `models/library.toml`; raises ParameterError for what is incomplete."""
-    path = models_folder() / "library.toml"
+    """All families by name, in the order of `models/library/effects.toml`; raises ParameterError for what is incomplete."""
+    path = models_folder() / "library" / "effects.toml"
     with path.open("rb") as handle:
         tree = tomllib.load(handle)
     return {name: _family(name, table) for name, table in tree.items()}
@@ -92,12 +92,12 @@ def find_family(name: str) -> Family:
 def _family(name: str, table: dict[str, Any]) -> Family:
     words = ("title", "equation", "acts_on", "shows_in", "confused_with", "tell_apart")
     if missing := [w for w in words if w not in table]:
-        raise ParameterError(f"library.toml: {name} lacks {', '.join(missing)}")
+        raise ParameterError(f"effects.toml: {name} lacks {', '.join(missing)}")
     shapes = []
     for key, entry in table.items():
         if isinstance(entry, dict):
             if missing := [w for w in ("unit", "typical", "low", "high", "source") if w not in entry]:
-                raise ParameterError(f"library.toml: {name}.{key} lacks {', '.join(missing)}")
+                raise ParameterError(f"effects.toml: {name}.{key} lacks {', '.join(missing)}")
             typical, low, high = (float(entry[w]) for w in ("typical", "low", "high"))
             start = tuple(float(x) for x in entry.get("start", ()))
             shapes.append(Shape(key, entry["unit"], typical, low, high, start, entry["source"]))

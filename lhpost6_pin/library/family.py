@@ -1,4 +1,4 @@
-"""Families: every effect of the library by its name, as `models/library/effects.toml` states it."""
+"""Families: every effect of the library by its name, as `models/library/*.toml` state it."""
 
 import tomllib
 from dataclasses import dataclass
@@ -74,11 +74,13 @@ class Family:
 
 @cache
 def families() -> dict[str, Family]:
-    """All families by name, in the order of `models/library/effects.toml`; raises ParameterError for what is incomplete."""
-    path = models_folder() / "library" / "effects.toml"
-    with path.open("rb") as handle:
-        tree = tomllib.load(handle)
-    return {name: _family(name, table) for name, table in tree.items()}
+    """All families by name, in the order of the files in `models/library`; raises ParameterError for what is missing."""
+    found: dict[str, Family] = {}
+    for path in sorted((models_folder() / "library").glob("*.toml")):
+        with path.open("rb") as handle:
+            for name, table in tomllib.load(handle).items():
+                found[name] = _family(name, table, path.name)
+    return found
 
 
 def find_family(name: str) -> Family:
@@ -89,15 +91,15 @@ def find_family(name: str) -> Family:
     return known[name]
 
 
-def _family(name: str, table: dict[str, Any]) -> Family:
+def _family(name: str, table: dict[str, Any], file: str) -> Family:
     words = ("title", "equation", "acts_on", "shows_in", "confused_with", "tell_apart")
     if missing := [w for w in words if w not in table]:
-        raise ParameterError(f"effects.toml: {name} lacks {', '.join(missing)}")
+        raise ParameterError(f"{file}: {name} lacks {', '.join(missing)}")
     shapes = []
     for key, entry in table.items():
         if isinstance(entry, dict):
             if missing := [w for w in ("unit", "typical", "low", "high", "source") if w not in entry]:
-                raise ParameterError(f"effects.toml: {name}.{key} lacks {', '.join(missing)}")
+                raise ParameterError(f"{file}: {name}.{key} lacks {', '.join(missing)}")
             typical, low, high = (float(entry[w]) for w in ("typical", "low", "high"))
             start = tuple(float(x) for x in entry.get("start", ()))
             shapes.append(Shape(key, entry["unit"], typical, low, high, start, entry["source"]))

@@ -74,7 +74,7 @@ class Family:
 
 @cache
 def families() -> dict[str, Family]:
-    """All families by name, in the order of the files in `models/library`; raises ParameterError for what is missing."""
+    """All families by name, file after file of `models/library`; raises ParameterError for what is missing."""
     found: dict[str, Family] = {}
     for path in sorted((models_folder() / "library").glob("*.toml")):
         with path.open("rb") as handle:

@@ -128,7 +128,8 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
 
     `changes` maps a path to a number or array in the file's unit, or to a table ``{value, unit, source, ...}`` of
     which only value is needed; or it is the path of a small TOML file of such tables. A component's path
-    (``H3.seal_friction``) may be new if its kind has that key; anything else must exist. Raises ParameterError naming
+    (``H3.seal_friction``) may be new if its kind has that key, and a number of an effect that is there
+    (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError naming
     the key, or UnknownNameError.
     """
     if isinstance(changes, str | Path):
@@ -140,7 +141,11 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
         added = {}
         entries, origin = dict(changes), "given by hand"
     quantities, words = dict(parameters.quantities), dict(parameters.words)
+    effects = {**parameters.effects, **added}
     for key, entry in entries.items():
+        if key.startswith("effect."):
+            _override_effect(effects, key, entry, origin)
+            continue
         inherited = _of_kind(parameters, key)
         if key in words or inherited in words:
             if isinstance(entry, bool) or not isinstance(entry, str | int):
@@ -152,7 +157,19 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
             near = [p for p in (*quantities, *words) if p.split(".")[0] == key.split(".")[0]]
             raise UnknownNameError("parameter", key, near or list(quantities))
         quantities[key] = _changed(base, entry, key, origin)
-    return Parameters(quantities, words, f"{parameters.origin} + {origin}", {**parameters.effects, **added})
+    return Parameters(quantities, words, f"{parameters.origin} + {origin}", effects)
+
+
+def _override_effect(effects: dict[str, EffectEntry], key: str, entry: Any, origin: str) -> None:
+    """Change a number of an effect in place, ``effect.NAME.KEY``; it must be stated."""
+    name, _, number = key.removeprefix("effect.").rpartition(".")
+    if name not in effects:
+        raise UnknownNameError("effect of the machine", name, list(effects))
+    known = effects[name]
+    if number not in known.values:
+        raise UnknownNameError(f"number of effect {name}", number, list(known.values))
+    changed = _changed(known.values[number], entry, key, origin)
+    effects[name] = replace(known, values={**known.values, number: changed})
 
 
 def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:

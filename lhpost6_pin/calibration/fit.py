@@ -12,32 +12,24 @@ the predicted covariance, with a floor under its deviations.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ..alignment import align_record, group_delays
-from ..errors import RecordError, SimulationError
-from ..fusion import fuse_motion
 from ..machine import Machine
 from ..names import AXES
 from ..parameters import Parameters
-from ..plant import Plant, make_plant
-from ..pose import PlatenMotion
-from ..records import channel_name, layout_faults
-from ..residuals import RESIDUALS, Measured, make_measured
-from ..sensors import Sensors, add_noise
-from .errors import CHANNELS
+from ..residuals import RESIDUALS
+from ..sensors import Sensors
 from .normal import Bias, Normal, bounded_step, positive
-from .problem import Comparison, Problem
+from .prepare import prepare_problem
+from .problem import Problem
 from .result import Calibration, Subset, calibration_numbers
 from .simulation import by_simulation
-from .spectra import spectrum_of
 
-__all__ = ["calibrate"]
+__all__ = ["Solution", "calibrate", "misfit", "solve"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -65,55 +57,18 @@ def calibrate(
     channels; that is too short or too slowly sampled. SimulationError for a specimen with joints.
     """
     numbers = calibration_numbers()
-    comparison = Comparison(
-        bands=numbers.vector("comparison.bands"),
-        edge=numbers.number("comparison.edge"),
-        step=numbers.number("fit.step"),
-    )
     report = progress or (lambda share: None)
-    _refuse(machine, records, comparison)
-    machine = machine.as_tested(records[0].attrs, "the first test")
-    plant = make_plant(machine)
-    records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
-    skews = group_delays(plant, records)
-    records = [align_record(r, skews) for r in records]
-    rng = np.random.default_rng(seed)
-    tests = [_ready(plant, r, sensors, numbers) for r in records]
-    count, draws, again = len(tests), int(numbers.number("fit.draws")), int(numbers.number("fit.corrections"))
-    noisy = [
-        _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
-    ]
-    more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
-    problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs)
+    ready = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
+    problem, noisy = ready.problem, ready.noisy
     report(0.1)
-    replicas = [problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again)]
-    rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
-    x = np.zeros(len(problem.prior))
-    bias: Bias | None = None
-    converged, done = False, 0
-    shares = np.linspace(0.1, 0.8, rounds + len(replicas) + 1)
-    for done in range(1, rounds + 1):
-        at = done - 1 if done == 1 else done - 1 + len(replicas)
-        normal = Normal(problem, x, _between(report, shares[at], shares[at + 1]))
-        if done == 1:
-            before = _misfit(problem, normal.rest)
-        if done == 2:  # near enough to the end, and the same from there on
-            bias = Bias(
-                normal, replicas, x, [_between(report, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
-            )
-        if bias is not None:
-            normal = normal.less(bias)
-        step = bounded_step(normal, x, problem, numbers)
-        x = x + step
-        sd = np.sqrt(np.diag(np.linalg.inv(normal.posterior(problem.prior))) + floor**2)
-        if done > 1 and np.max(np.abs(step) / sd) < numbers.number("fit.converged"):
-            converged = True
-            break
+    found = solve(problem, ready.replicas, numbers, np.zeros(len(problem.prior)), _between(report, 0.1, 0.8))
+    normal, x = found.normal, found.x
+    floor = numbers.number("fit.floor") * problem.prior
     covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64)
     told_below = numbers.number("report.told")
     simulated = by_simulation(
         problem,
-        noisy[: int(numbers.number("simulation.draws")) * count],
+        noisy[: int(numbers.number("simulation.draws")) * len(records)],
         x,
         band=numbers.vector("simulation.bands"),
         floor=numbers.number("simulation.floor"),
@@ -122,7 +77,7 @@ def calibrate(
     )
     report(1.0)
     return Calibration(
-        machine=machine,
+        machine=problem.machine,
         campaign=campaign,
         tests=tuple(str(r.attrs.get("test", i)) for i, r in enumerate(records)),
         knobs=problem.knobs,
@@ -131,83 +86,59 @@ def calibrate(
         estimate=x,
         covariance=covariance,
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*_subsets(problem, normal, x - step, floor, told_below), *([] if simulated is None else [simulated])),
-        misfit_before=before,
-        misfit_after=_misfit(problem, problem.whitened(x)),
-        rounds=done,
-        converged=converged,
+        subsets=(*_subsets(problem, normal, found.at, floor, told_below), *([] if simulated is None else [simulated])),
+        misfit_before=found.misfit_before,
+        misfit_after=misfit(problem, problem.whitened(x)),
+        rounds=found.rounds,
+        converged=found.converged,
         numbers=numbers,
     )
 
 
-def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Comparison) -> None:
-    """Raise what `calibrate` says, naming the test."""
-    if not records:
-        raise RecordError("no record to calibrate by")
-    if make_plant(machine).articulated:
-        raise SimulationError("calibration takes a platen with a rigid specimen at most; lock its joints (--locked)")
-    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
-    names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
-    for test, record in zip(names, records, strict=True):
-        if faults := layout_faults(record, labels):
-            raise RecordError(f"{test}: {faults[0]}")
-        machine.refuse_unmounted(record.attrs, test)
-        _refuse_channels(test, record, double_acting=bool(machine.double_acting))
-        _refuse_short(test, record, comparison)
-        if lacking := [c for c in CHANNELS if c not in record and any(c in other for other in records)]:
-            what = f"{test} has no {', '.join(lacking)}, which other tests have"
-            raise RecordError(f"{what}; take that test out of the campaign, or the channel out of all")
+class Solution(NamedTuple):
+    """Where a search has ended."""
+
+    x: Array  # (p,) the unknowns
+    at: Array  # (p,) where the normal equations are from
+    normal: Normal
+    misfit_before: Array  # (n_tests, n_kinds), at the start
+    rounds: int
+    converged: bool
 
 
-def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> None:
-    if "platen_displacement" not in record:
-        why = "lengths do not replace it, as the geometry behind them is to be calibrated"
-        raise RecordError(f"{test}: has no platen_displacement; {why}")
-    if "actuator_force" not in record and "chamber_pressure_a" not in record:
-        raise RecordError(f"{test}: has neither actuator_force nor chamber_pressure_a; give one of them or both")
-    if double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):
-        raise RecordError(f"{test}: has pressures of one side only; give chamber_pressure_a and chamber_pressure_b")
-    if "strut_pressure" in record:
-        below = np.argwhere(record["strut_pressure"].values <= 0.0)
-        for sample, column in below[:1]:
-            what = f"{channel_name(record['strut_pressure'], int(column))} is not above zero at sample {sample}"
-            raise RecordError(f"{test}: {what}; give absolute pressures, or take the channel out of all tests")
-
-
-def _refuse_short(test: str, record: xr.Dataset, comparison: Comparison) -> None:
-    n, bands = record.sizes["time"], comparison.bands
-    length = float(record["time"][-1] - record["time"][0])
-    dt = length / (n - 1)
-    f = np.zeros(0)
-    if n > 2 * round(comparison.edge / dt):
-        f = spectrum_of(np.zeros((n, 1)), dt, bands[0], bands[-1], comparison.edge)[1]
-    for low, high in pairwise(bands):
-        if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
-            what = f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
-            raise RecordError(f"{test}: {what}; take it out of the campaign")
-
-
-def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Parameters, *, shares: bool = True) -> Measured:
-    """A record with its motion fused, and each platen channel's share in it.
-
-    Fusion is linear in its channels: a share is what doubling a channel adds. Lengths stay out: the geometry that turns
-    them into a pose is to be calibrated.
-    """
-    channels = [n for n in ("platen_displacement", "platen_velocity", "platen_acceleration") if n in record]
-    fused = fuse_motion(plant, record, sensors)
-    ready = make_measured(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
-    share = {}
-    for name in channels if shares else ():
-        more = fuse_motion(plant, record.assign({name: 2.0 * record[name]}), sensors).motion
-        share[name] = PlatenMotion(*(a - b for a, b in zip(more, fused.motion, strict=True)))
-    return replace(ready, share=share)
+def solve(
+    problem: Problem, replicas: Sequence[Problem], numbers: Parameters, start: Array, progress: Progress
+) -> Solution:
+    """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on."""
+    x = start.copy()
+    rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
+    bias: Bias | None = None
+    converged = False
+    shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
+    for done in range(1, rounds + 1):
+        at = done - 1 if done == 1 else done - 1 + len(replicas)
+        normal = Normal(problem, x, _between(progress, shares[at], shares[at + 1]))
+        if done == 1:
+            before = misfit(problem, normal.rest)
+        if done == 2:  # near enough to the end, and the same from there on
+            parts = [_between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
+            bias = Bias(normal, replicas, x, parts)
+        if bias is not None:
+            normal = normal.less(bias)
+        step = bounded_step(normal, x, problem, numbers)
+        x = x + step
+        sd = np.sqrt(np.diag(np.linalg.inv(normal.posterior(problem.prior))) + floor**2)
+        if done > 1 and np.max(np.abs(step) / sd) < numbers.number("fit.converged"):
+            converged = True
+            break
+    return Solution(x, x - step, normal, before, done, converged)
 
 
 def _between(report: Progress, first: float, last: float) -> Progress:
     return lambda share: report(first + (last - first) * share)
 
 
-def _misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
+def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
     """Mean square (n_tests, n_kinds) of whitened residuals; NaN for kinds that have no columns."""
     out = np.full((len(whitened), len(RESIDUALS)), np.nan)
     for t, bins in enumerate(whitened):

@@ -41,6 +41,7 @@ class Knob:
     relative: bool  # coordinate ln(value / nominal), else value - nominal
     shows_in: tuple[str, ...]  # residuals that can tell of it
     lowest: float = -math.inf  # coordinate below which no machine can be built
+    highest: float = math.inf
 
     def at(self, coordinate: float) -> float:
         """Value in `unit` at a coordinate."""
@@ -139,10 +140,10 @@ def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) ->
     values: dict[str, float | list[float]] = {}
     for knob, x in zip(knobs, coordinates, strict=True):
         for path, i in knob.paths:
-            now = machine.parameters[path].value
             if i < 0:
                 values[path] = knob.at(float(x))
                 continue
+            now = machine.parameters[path].value
             vector = values.setdefault(path, list(now) if isinstance(now, tuple) else [now])
             assert isinstance(vector, list)
             # points of a kind may stand at different heights: each is shifted

@@ -106,7 +106,7 @@ def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters
     factor = np.linalg.cholesky(normal.posterior(prior) * np.outer(prior, prior))
     wanted = np.linalg.solve(factor, -(right + x / prior**2) * prior)
     place = x / prior
-    least = np.maximum(-reach, problem.lowest / prior)
-    low, high = np.maximum(-trust, np.minimum(least - place, 0.0)), np.minimum(trust, np.maximum(reach - place, 0.0))
+    least, most = np.maximum(-reach, problem.lowest / prior), np.minimum(reach, problem.highest / prior)
+    low, high = np.maximum(-trust, np.minimum(least - place, 0.0)), np.minimum(trust, np.maximum(most - place, 0.0))
     low, high = low - 1e-9, high + 1e-9  # no empty interval
     return np.asarray(lsq_linear(factor.T, wanted, bounds=(low, high)).x * prior)

@@ -17,7 +17,7 @@ from ..plant import Plant, make_plant
 from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow, path_key
 from ..sensors import Sensors
 from .errors import corrected, sensor_unknowns
-from .knobs import machine_knobs, with_knobs
+from .knobs import Knob, machine_knobs, with_knobs
 from .spectra import make_whitener, spectrum_of
 
 __all__ = ["Comparison", "Problem", "Term"]
@@ -71,13 +71,9 @@ class Problem:
 
         All tests have the same channels. Raises RecordError where they are too short together.
         """
-        self.machine, self.tests, self.comparison, self.jobs = machine, tuple(tests), comparison, jobs
-        self.knobs = machine_knobs(machine)
+        self.tests, self.comparison, self.jobs = tuple(tests), comparison, jobs
         self.unknowns = sensor_unknowns(machine, sensors, tests[0])
-        self.names = (*(k.name for k in self.knobs), *(u.name for u in self.unknowns))
-        self.prior = np.array([*(k.sd for k in self.knobs), *(u.sd for u in self.unknowns)])
-        self.lowest = np.array([*(k.lowest for k in self.knobs), *(-np.inf for _ in self.unknowns)])
-        self.terms = self._terms()
+        self._turn(machine, machine_knobs(machine))
         plant = make_plant(machine)
         clean = [evaluate_residuals(plant, t) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
@@ -94,6 +90,20 @@ class Problem:
             found.append(self._bins(_less(other, base), test.dt)[0] * np.sqrt(draws))
             found[:] = [bins * np.sqrt((draws + 1) / draws) for bins in found]
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
+
+    def _turn(self, machine: Machine, knobs: tuple[Knob, ...]) -> None:
+        self.machine, self.knobs = machine, knobs
+        self.names = (*(k.name for k in knobs), *(u.name for u in self.unknowns))
+        self.prior = np.array([*(k.sd for k in knobs), *(u.sd for u in self.unknowns)])
+        self.lowest = np.array([*(k.lowest for k in knobs), *(-np.inf for _ in self.unknowns)])
+        self.highest = np.array([*(k.highest for k in knobs), *(np.inf for _ in self.unknowns)])
+        self.terms = self._terms()
+
+    def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Problem":
+        """The same tests and noise with another machine, or other knobs."""
+        other = copy(self)
+        other._turn(machine, knobs)
+        return other
 
     def with_tests(self, tests: Sequence[Measured]) -> "Problem":
         """The same problem, weighed by the same noise, with the same tests seen another time."""

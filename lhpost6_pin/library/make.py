@@ -66,8 +66,13 @@ def effect_entry(family: str, components: Sequence[str], values: Mapping[str, fl
     shapes = {shape.name: shape for shape in find_family(family).shapes}
     if unknown := [key for key in values if key not in shapes]:
         raise ParameterError(f"{family}: has no {', '.join(unknown)}; its numbers are {', '.join(shapes)}")
-    given = {key: Quantity(float(v), shapes[key].unit, "override", "given by hand") for key, v in values.items()}
-    return EffectEntry(family, tuple(components), given)
+    stated = {
+        key: Quantity(float(values[key]), shape.unit, "override", "given by hand")
+        if key in values
+        else Quantity(shape.typical, shape.unit, "assumed", f"typical of the library: {shape.source}")
+        for key, shape in shapes.items()
+    }
+    return EffectEntry(family, tuple(components), stated)
 
 
 def _numbers(family: Family, values: Mapping[str, float]) -> dict[str, float]:

@@ -22,12 +22,13 @@ from .plant import Plant
 from .pose import leg_displacements
 from .records import sample_interval
 from .sensors import GROUPS
-from .signals import Band, align, differentiate
+from .signals import Band, align, differentiate, lag
 
 __all__ = [
     "Delay",
     "align_record",
     "combine_delays",
+    "due_spools",
     "gas_pressure",
     "group_delays",
     "hydraulic_force",
@@ -171,6 +172,12 @@ def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.
 
 
 # ------------------------------------------------------------------------------------------------ twins
+def due_spools(plant: Plant, command: Array, dt: float) -> Array:
+    """Spool positions (n, n_actuators) [1] that commands give: late by each valve's delay, and by its lag if any."""
+    late = align(command, -plant.delays, dt)
+    return lag(late, plant.lags, dt) if plant.lags.any() else late
+
+
 def hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
     """P_A A_1 - P_B A_2 (n, actuators) of the measured chamber pressures [N]; NaN where one is missing."""
     a = record["chamber_pressure_a"].sel(actuator=list(machine.actuator_names)).values

@@ -86,7 +86,7 @@ def _zero_jacobian(plant: Plant) -> Array:
 
 def _forces(plant: Plant) -> list[Capacity]:
     machine, par = plant.machine, plant.machine.parameters
-    high, low = plant.supply
+    high, low = plant.supply[:2]
     jacobian = _zero_jacobian(plant)
     rows = plant.rows[hydraulic_rows(plant)]
     push = high * rows["p"][:, 0] - low * rows["p"][:, 1]

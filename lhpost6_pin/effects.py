@@ -25,7 +25,8 @@ class Effect:
     """A named effect: where it acts, what law it obeys, its numbers, and where they come from.
 
     ports: one name per row (``H1``, ``S2``, ``platen.z``); a two-port law takes the stem of a pad (``V1``), or
-    two names with a space between. One that alters takes the names of what it alters.
+    two names with a space between, the second a dash where one port is enough. One that alters takes the names of
+    what it alters.
     params: one tuple per row, in the law's order. spools: for a hydraulic law, the number of its spool per row.
     """
 
@@ -116,7 +117,7 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
     number = {name: i for i, name in enumerate(ports)}
     acting = [e for e in effects if not LAWS[e.law].alters]
     rows = np.zeros(sum(len(e.ports) for e in acting), ROW)
-    for column in ("link", "more", "shared"):
+    for column in ("link", "more"):
         rows[column] = -1
     base: dict[int, int] = {}  # row of the actuator or strut on a port
     i = state = 0
@@ -127,16 +128,18 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
             for name in names:
                 if name not in number:
                     raise UnknownNameError("port", name, list(ports))
+            leg = number.get(names[0].split(".")[0], -1)
             row = rows[i]
             row["law"], row["effect"] = law.code, ledger
             row["port"] = number[names[0]]
-            row["port_2"] = number[names[-1]] if law.ports == 2 else -1
+            row["port_2"] = number[names[1]] if len(names) == 2 else -1
             row["state"] = state if law.states else -1
             row["input"] = effect.spools[k] if effect.spools else -1
             row["p"][: len(law.params)] = effect.params[k]
             if law.code in (HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT):
                 base[number[names[0]]] = i
-            row["link"] = base.get(number[names[0]], -1)
+            if leg in base and rows[base[leg]]["input"] >= 0:
+                row["link"] = rows[base[leg]]["state"]
             i, state = i + 1, state + len(law.states)
     alter_rows(rows, effects, {port: base[number[port]] for port in ports if number[port] in base}, state)
     return rows
@@ -145,14 +148,17 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
 def _port_names(port: str, law: Law) -> tuple[str, ...]:
     if law.ports == 1:
         return (port,)
-    return tuple(port.split()) if " " in port else (f"{port}.x", f"{port}.y")
+    return tuple(port.removesuffix(" -").split()) if " " in port else (f"{port}.x", f"{port}.y")
 
 
 def state_names(effects: Sequence[Effect]) -> tuple[str, ...]:
-    """Names of all hidden states in table order, such as ``actuators_4_way.H1.pressure_a``; alterations' come last."""
+    """Names of all hidden states in table order, such as ``actuators_4_way.H1.pressure_a``; alterations' come last.
+
+    Of two ports named, the first counts.
+    """
     in_order = sorted(effects, key=lambda effect: bool(LAWS[effect.law].alters))
     return tuple(
-        f"{effect.name}.{port}.{state}"
+        f"{effect.name}.{port.split()[0]}.{state}"
         for effect in in_order
         for port in effect.ports
         for state in LAWS[effect.law].states

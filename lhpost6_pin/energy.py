@@ -32,8 +32,11 @@ from .laws.chamber import chamber_energy, flow_enthalpy, flows_double, flows_sin
 from .laws.orifice import opening
 from .laws.strut import strut_energy
 from .ledger import number_of, stage_arguments
+from .oil import oil_power
 from .schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
 from .simulate import Run
+from .stage_added import added_power
+from .supply import supply_pressures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -130,7 +133,7 @@ def energy_audit(run: Run) -> Audit:
         if law.stores_energy:
             rate = inflow[:, i] - dissipated[:, i] - delivered[:, i]
             add(f"stored.{name}", rate, stored[:, i] - stored[0, i])
-        if law.takes_spool or not law.stores_energy:
+        if law.states or not law.stores_energy:
             add(f"dissipated.{name}", dissipated[:, i])
         add(f"delivered.{name}", delivered[:, i])
     for name, rate, energy in zip(("kinetic", "gravity"), *_rigid_energies(run), strict=True):
@@ -158,19 +161,23 @@ def row_power(row, s, z, work, spool, supply):
     k = row.state
     if row.law == NITROGEN_STRUT:
         return 0.0, 0.0, strut_energy(s[a], p[0], p[1], p[2], p[3])
+    high, low = supply_pressures(supply, z)
+    if row.altered != 0:
+        return oil_power(row, s[a], z, spool[row.input], high, low)
     if row.law == HYDRAULIC_DOUBLE:
         # without leakage these are the flows of the orifices alone
         q_a, q_b, _, _ = flows_double(
-            opening(spool[row.input], p[6]), z[k], z[k + 1], p[2], p[3], p[4], p[5], 0.0, supply[0], supply[1], p[11]
+            opening(spool[row.input], p[6]), z[k], z[k + 1], p[2], p[3], p[4], p[5], 0.0, high, low, p[11]
         )
         h_a, h_b = flow_enthalpy(z[k], p[10]), flow_enthalpy(z[k + 1], p[10])
         oil = chamber_energy(z[k], p[0], p[8] + s[a], p[10]) + chamber_energy(z[k + 1], p[1], p[9] - s[a], p[10])
         return h_a * q_a + h_b * q_b, (h_a - h_b) * p[7] * (z[k] - z[k + 1]), oil
     if row.law == HYDRAULIC_SINGLE:
-        q_a, _ = flows_single(opening(spool[row.input], p[6]), z[k], p[2], p[4], 0.0, supply[0], supply[1], p[11])
+        q_a, _ = flows_single(opening(spool[row.input], p[6]), z[k], p[2], p[4], 0.0, high, low, p[11])
         h_a = flow_enthalpy(z[k], p[10])
         return h_a * q_a, h_a * p[7] * z[k], chamber_energy(z[k], p[0], p[8] + s[a], p[10])
-    return 0.0, -work, 0.0
+    dissipated, held = added_power(row, s, z, work)
+    return 0.0, dissipated, held
 
 
 @compiled

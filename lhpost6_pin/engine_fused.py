@@ -241,12 +241,13 @@ def run_fused(
     """Run controller samples first..last (exclusive) of `steps` model steps each.
 
     scheme 0 semi_implicit, 1 euler, 2 rk4. closed: the controller (axis, actuator, balance, canceller, memory) fills
-    command (n, nu) from drive; otherwise spool (n * k, nu) drives, k rows a sample. fed (nu,) are the actuators' rows.
+    command (n, nu) from drive and spool (steps, nu) holds those of the last sample; otherwise spool (n * k, nu) drives,
+    k rows a sample. fed (nu,) are the actuators' rows.
     Every `every`-th sample is written to out_*. The other arrays are those of `Plant` and `Workspace`.
     Returns (status, samples done, commands clipped).
     """
     nu = command.shape[1]
-    window = np.zeros((steps, nu))
+    window = spool if closed else np.zeros((steps, nu))
     work = np.zeros((2, 6))
     a = np.zeros(motion.shape[1])
     per_sample = spool.shape[0] // max(1, command.shape[0])

@@ -8,15 +8,29 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from .errors import SimulationError
-from .law_table import HYDRAULIC_DOUBLE
+from .law_table import (
+    AREA_A,
+    AREA_B,
+    EXTERNAL,
+    HYDRAULIC_DOUBLE,
+    LEAKAGE,
+    NULL_BIAS,
+    NULL_LEAKAGE,
+    TURBULENT,
+)
 from .laws.orifice import spool_for_opening
+from .oil import leak_flows, start_line, valve_flows
 from .plant import Plant, State
 from .schemes import TAU, forces_stage, pose_stage
+from .supply import steady_supply, supply_pressures
 from .workspace import make_workspace
 
 __all__ = ["Equilibrium", "find_equilibrium", "hydraulic_rows", "rest_pressures", "unloaded_speeds"]
 
 Array = NDArray[np.float64]
+
+_SUPPLY_TURNS = 8
+"""Rounds of pressures at rest and flow drawn: leaks lower the supply by a thousandth of its pressure."""
 
 
 class Equilibrium(NamedTuple):
@@ -69,18 +83,68 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
             f"the actuators cannot hold the platen in the zero-position: {miss:.3g} N or N m is left over"
         )
     z, spool = ws.z.copy(), np.zeros(plant.spools)
-    for i, row in enumerate(plant.rows[hydraulic_rows(plant)]):
-        pressures, spool[i] = rest_pressures(row, float(force[i]), plant.supply)
+    _fill(plant, force, plant.supply[:2], z, spool)
+    for _ in range(_SUPPLY_TURNS if plant.supply.size > 2 else 0):  # what leaks at rest is drawn from the supply, too
+        steady_supply(plant.rows, spool, plant.supply, z)
+        _fill(plant, force, np.array(supply_pressures(plant.supply, z)), z, spool)
+    return Equilibrium(State(start.q, start.v, z), spool, force)
+
+
+def _fill(plant: Plant, force: Array, supply: Array, z: Array, spool: Array) -> None:
+    """Fill pressures, flows through lines and spools at which nothing flows into any chamber."""
+    high, low = supply
+    for i, at in enumerate(hydraulic_rows(plant)):
+        row = plant.rows[at]
+        solve = rest_pressures if row["altered"] == 0 else _rest_of_altered
+        pressures, spool[i] = solve(row, float(force[i]), supply)
         k = row["state"]
         z[k : k + len(pressures)] = pressures
-        low, high = plant.supply[1], plant.supply[0]
         if not all(low <= p <= high for p in pressures):
             name = plant.machine.actuators[i].name
             raise SimulationError(
                 f"{name} must give {force[i]:.4g} N at rest, beyond its supply: {pressures} Pa is not between "
                 f"{low:g} and {high:g} Pa; lighten the specimen or raise hydraulics.supply_pressure"
             )
-    return Equilibrium(State(start.q, start.v, z), spool, force)
+        start_line(plant.rows, at, spool[i], pressures[0], pressures[-1], high, low, z)
+
+
+def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[float, ...], float]:
+    """As `rest_pressures` with all that alterations add; a spool of full stroke where none is enough."""
+    from scipy.optimize import brentq
+
+    p, double = row["p"], bool(row["law"] == HYDRAULIC_DOUBLE)
+    high, low = (float(x) for x in supply)
+    if not p[[LEAKAGE, TURBULENT, EXTERNAL, NULL_LEAKAGE]].any():  # nothing leaks: the spool rests at its null
+        pressures, spool = rest_pressures(row, force, supply)
+        return pressures, spool - float(p[NULL_BIAS])
+
+    def flows(pressure_a: float, pressure_b: float, spool: float) -> tuple[float, float]:
+        flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
+        across, _, out_a, out_b, _ = leak_flows(p, double, pressure_a, pressure_b, low)
+        return flow_a - across - out_a, flow_b + across - out_b
+
+    def spool_for(pressure_a: float, pressure_b: float) -> float:
+        ends = [flows(pressure_a, pressure_b, x)[0] for x in (-1.0, 1.0)]
+        if ends[0] >= 0.0 or ends[1] <= 0.0:
+            return -1.0 if ends[0] >= 0.0 else 1.0
+        return float(brentq(lambda x: flows(pressure_a, pressure_b, x)[0], -1.0, 1.0, xtol=1e-18, rtol=1e-15))
+
+    area_a, area_b = float(p[AREA_A]), float(p[AREA_B])
+    if not double:
+        return (force / area_a,), spool_for(force / area_a, 0.0)
+
+    def other(pressure_a: float) -> float:
+        return (pressure_a * area_a - force) / area_b
+
+    def miss(pressure_a: float) -> float:
+        return flows(pressure_a, other(pressure_a), spool_for(pressure_a, other(pressure_a)))[1]
+
+    least, most = max(low, (low * area_b + force) / area_a), min(high, (high * area_b + force) / area_a)
+    if least < most and miss(least) > 0.0 > miss(most):
+        a = float(brentq(miss, least, most, xtol=1e-6, rtol=1e-15))
+    else:  # no pressures within the supply's: what the report's law has, which says so
+        a = float(rest_pressures(row, force, supply)[0][0])
+    return (a, other(a)), spool_for(a, other(a))
 
 
 def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[float, ...], float]:
@@ -89,7 +153,7 @@ def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[flo
     The spool feeds the leak across the piston; with no leak, its limit as the leak vanishes.
     """
     area_a, area_b, k_pa, k_bt, k_at, k_pb, curve, leakage = row["p"][:8]
-    high, low = supply
+    high, low = supply[:2]
     if row["law"] != HYDRAULIC_DOUBLE:
         pressure = force / area_a
         drop = max(high - pressure, np.finfo(float).tiny)
@@ -115,7 +179,7 @@ def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[flo
 def unloaded_speeds(row: np.void, force: float, supply: Array) -> tuple[float, float]:
     """Steady piston speeds [m/s] at full opening under the rest force: extending, retracting (Eqs. 4-2, 4-5)."""
     area_a, area_b, k_pa, k_bt, k_at, k_pb = (float(v) for v in row["p"][:6])
-    high, low = supply
+    high, low = supply[:2]
     if row["law"] != HYDRAULIC_DOUBLE:
         pressure = force / area_a
         return k_pa * math.sqrt(high - pressure) / area_a, k_at * math.sqrt(pressure - low) / area_a

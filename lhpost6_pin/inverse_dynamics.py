@@ -11,13 +11,15 @@ Hidden friction states are marched along the motion by the simulation's own step
 a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .compiled import compiled
+from .equilibrium import hydraulic_rows
 from .errors import RecordError, SimulationError
+from .law_table import LAWS, LOAD_FRICTION
 from .ledger import Ledger, States, add_at_c, force_ledger
 from .plant import Plant
 from .platen_steps import platen_difference
@@ -26,7 +28,7 @@ from .schemes import DS, FORCE, SD, S, port_rates, pose_stage, set_twist
 from .stage import advance_states
 from .workspace import make_workspace
 
-__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity"]
+__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity", "with_loads"]
 
 Array = NDArray[np.float64]
 
@@ -122,7 +124,30 @@ def inverse_dynamics(
         names += plant.machine.strut_names
     force = np.hstack(measured)
     wrench = leg_wrenches(plant, moved.q, force)
-    return Decomposition(states, force_ledger(states), tuple(names), force, wrench, plant.spools)
+    ledger = _without_oil(force_ledger(states._replace(z=with_loads(plant, z, measured[0]))), plant)
+    return Decomposition(states, ledger, tuple(names), force, wrench, plant.spools)
+
+
+def with_loads(plant: Plant, z: Array, actuator_force: Array) -> Array:
+    """Hidden states (n, n_states) that hold measured actuator forces (n, n_actuators) [N] for friction that feels them.
+
+    Each force stands as pressure in chamber A, with none in B. Where nothing feels them z comes back as it is.
+    """
+    if not np.any(plant.rows["law"] == LOAD_FRICTION):
+        return z
+    fed = plant.rows[hydraulic_rows(plant)]
+    out = z.copy()
+    out[:, fed["state"]] = actuator_force / fed["p"][:, 0]
+    return out
+
+
+def _without_oil(ledger: Ledger, plant: Plant) -> Ledger:
+    """The ledger with actuators' forces zero."""
+    oil = [e.name for e in plant.machine.effects if LAWS[e.law].takes_spool]
+    force, wrench = ledger.force.copy(), ledger.wrench.copy()
+    force[:, [row.split(".")[0] in oil for row in ledger.rows]] = 0.0
+    wrench[:, [effect in oil for effect in ledger.effects]] = 0.0
+    return replace(ledger, force=force, wrench=wrench)
 
 
 def seen_velocity(motion: PlantMotion, dt: float) -> Array:

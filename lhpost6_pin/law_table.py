@@ -10,17 +10,55 @@ from typing import NamedTuple
 import numpy as np
 
 __all__ = [
+    "AIR",
+    "AIR_INDEX",
+    "AREA_A",
+    "AREA_B",
+    "ASYMMETRIC",
+    "BACK",
+    "BACKLASH",
+    "BACK_TIME",
     "BOUC_WEN_1D",
     "BOUC_WEN_2D",
+    "CHAMBER_A",
+    "CHAMBER_B",
     "CONSTANT",
+    "CURVE_ERROR",
+    "CURVE_POWER",
+    "CURVE_SIDE",
+    "DEADBAND",
+    "DRAG",
+    "DRAWN",
+    "DROOP",
+    "DROOP_TIME",
+    "END_STOP",
+    "EXTERNAL",
+    "GAS_HEAT",
+    "GAS_LEAK",
     "HYDRAULIC_DOUBLE",
     "HYDRAULIC_SINGLE",
     "LAWS",
     "LEAKAGE",
+    "LINE_DAMPING",
+    "LINE_TIME",
+    "LOAD_FRICTION",
     "MAX_PARAMS",
     "NITROGEN_STRUT",
+    "NULL_BIAS",
+    "NULL_LEAKAGE",
+    "NULL_WIDTH",
+    "OSCILLATOR",
+    "RETURN",
+    "RETURNED",
     "ROW",
+    "SPRING",
+    "STRIBECK",
+    "SUPPLY",
+    "TURBULENT",
+    "VAPOUR",
     "VISCOUS",
+    "VOIDS",
+    "WARM_UP",
     "Law",
 ]
 
@@ -34,10 +72,9 @@ ROW = np.dtype(
         ("port_2", np.int64),  # second port, -1 without
         ("state", np.int64),  # number of its first hidden state, -1 without
         ("input", np.int64),  # number of the spool that feeds it, -1 without
-        ("link", np.int64),  # row of the actuator or strut on the same port, -1 without
+        ("link", np.int64),  # number of the first hidden state of the actuator on the same leg or pad, -1 without
         ("altered", np.int64),  # 1 where alterations have changed more than the report's numbers
         ("more", np.int64),  # number of the first hidden state that alterations have given it, -1 without
-        ("shared", np.int64),  # number of the first hidden state of the supply, -1 without
         ("p", np.float64, MAX_PARAMS),  # the law's numbers, in the law's order; behind them those of alterations
     ]
 )
@@ -45,9 +82,16 @@ ROW = np.dtype(
 
 # Codes of the laws that have rows, as the compiled stage reads them.
 HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS, CONSTANT = range(7)
+STRIBECK, ASYMMETRIC, WARM_UP, LOAD_FRICTION, BACKLASH, DRAG, SPRING, END_STOP = range(7, 15)
+OSCILLATOR, GAS_LEAK, GAS_HEAT = range(15, 18)
 
-# Places of numbers in the rows of actuators.
-LEAKAGE = 7
+# Places of numbers in the rows of actuators: some of the report's, then those of alterations.
+AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
+TURBULENT, EXTERNAL, NULL_LEAKAGE, NULL_WIDTH, NULL_BIAS, DEADBAND = range(12, 18)
+AIR, AIR_INDEX, VOIDS, VAPOUR, CURVE_ERROR, CURVE_SIDE, CURVE_POWER, LINE_TIME, LINE_DAMPING = range(18, 27)
+
+# Places in the supply's numbers; a machine without alterations of it has the first two.
+SUPPLY, RETURN, DROOP, DROOP_TIME, BACK, BACK_TIME, DRAWN, RETURNED, WEIGHT = range(9)
 
 
 class Law(NamedTuple):
@@ -59,7 +103,7 @@ class Law(NamedTuple):
     states: tuple[str, ...] = ()
     stores_energy: bool = False
     takes_spool: bool = False
-    alters: str = ""  # "oil": numbers of an actuator's row; empty: nothing, it has rows of its own
+    alters: str = ""  # "oil": an actuator's row; "supply", "valve", "leg", "inertia"; empty: nothing, it has own rows
 
 
 _FLOW = tuple((name, "m3/s/Pa^0.5") for name in ("flow_pa", "flow_bt", "flow_at", "flow_pb"))
@@ -75,6 +119,7 @@ _HYDRAULIC = (
     ("root_regularisation", "Pa"),
 )
 _FRICTION = (("friction", "N"), ("yield_slip", "m"), ("shape", "1"))
+_GAS = (("pressure", "Pa"), ("area", "m2"), ("gas_length", "m"), ("polytropic_index", "1"))
 
 LAWS: Mapping[str, Law] = {
     "hydraulic_double": Law(HYDRAULIC_DOUBLE, 1, _HYDRAULIC, ("pressure_a", "pressure_b"), True, True),
@@ -90,6 +135,58 @@ LAWS: Mapping[str, Law] = {
     "viscous": Law(VISCOUS, 1, (("coefficient", "N s/m"),)),
     # beyond the report
     "constant": Law(CONSTANT, 1, (("force", "N | N m"),)),
+    "stribeck": Law(STRIBECK, 1, (*_FRICTION, ("speed", "m/s")), ("z",)),
+    "asymmetric": Law(ASYMMETRIC, 1, _FRICTION, ("z",)),
+    "warm_up": Law(
+        WARM_UP, 1, (("growth", "N s/m"), ("yield_slip", "m"), ("shape", "1"), ("memory", "s")), ("z", "mean_speed")
+    ),
+    "load_friction": Law(
+        LOAD_FRICTION,
+        2,
+        (("coefficient", "1"), ("yield_slip", "m"), ("shape", "1"), ("area_a", "m2"), ("area_b", "m2")),
+        ("z_x", "z_y"),
+    ),
+    "backlash": Law(BACKLASH, 1, (("friction", "N"), ("yield_slip", "m"), ("gap", "m")), ("offset",), True),
+    "drag": Law(DRAG, 1, (("force", "N"), ("exponent", "1"))),
+    "spring": Law(SPRING, 1, (("stiffness", "N/m | N m/rad"),), stores_energy=True),
+    "end_stop": Law(END_STOP, 1, (("force", "N"), ("start", "m"), ("exponent", "1")), stores_energy=True),
+    "oscillator": Law(
+        OSCILLATOR,
+        2,
+        (("mass", "kg"), ("circular_frequency", "rad/s"), ("damping", "1"), ("lever", "m"), ("gravity", "m/s2")),
+        ("stretch", "velocity"),
+    ),
+    "gas_leak": Law(GAS_LEAK, 1, (("rate", "1/s"), *_GAS, ("lost", "1")), ("time",), True),
+    "gas_heat": Law(GAS_HEAT, 1, (("share", "1"), *_GAS, ("time_constant", "s")), ("exchanged",), True),
+    "thrust_direction": Law(-1, 1, (("share", "1"),), alters="leg"),
+    "more_inertia": Law(
+        -1,
+        1,
+        (
+            ("mass", "kg"),
+            *((f"first_{axis}", "kg m") for axis in "xyz"),
+            *((f"second_{pair}", "kg m2") for pair in ("xx", "yy", "zz", "xy", "xz", "yz")),
+        ),
+        alters="inertia",
+    ),
     "extra_leakage": Law(-1, 1, (("leakage", "m3/s/Pa"),), alters="oil"),
+    "turbulent_leakage": Law(-1, 1, (("coefficient", "m3/s/Pa^0.5"),), alters="oil"),
+    "external_leakage": Law(-1, 1, (("leakage", "m3/s/Pa"),), alters="oil"),
+    "null_leakage": Law(-1, 1, (("leakage", "m3/s/Pa^0.5"), ("width", "1")), alters="oil"),
+    "null_bias": Law(-1, 1, (("bias", "1"),), alters="oil"),
+    "deadband": Law(-1, 1, (("overlap", "1"),), alters="oil"),
+    "entrained_air": Law(-1, 1, (("air", "1"), ("polytropic_index", "1")), alters="oil"),
+    "cavitation": Law(-1, 1, (("share", "1"), ("vapour_pressure", "Pa")), alters="oil"),
+    "flow_curve": Law(-1, 1, (("error", "1"), ("side", "1"), ("power", "1")), alters="oil"),
+    "dead_volume": Law(-1, 1, (("volume", "m3"),), alters="oil"),
+    "line": Law(
+        -1, 1, (("time", "s"), ("damping", "1")), ("flow_a", "flow_rate_a", "flow_b", "flow_rate_b"), alters="oil"
+    ),
+    "supply_droop": Law(
+        -1, 1, (("droop", "Pa s/m3"), ("time", "s"), ("weight", "1")), ("drawn_flow",), alters="supply"
+    ),
+    "back_pressure": Law(-1, 1, (("rise", "Pa s2/m6"), ("time", "s")), ("returned_flow",), alters="supply"),
+    "valve_delay": Law(-1, 1, (("delay", "s"),), alters="valve"),
+    "valve_lag": Law(-1, 1, (("time", "s"),), alters="valve"),
 }
 """All laws by name."""

@@ -8,10 +8,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .equilibrium import hydraulic_rows
+from .gas import gas_ratio
 from .laws.strut import gas_pressure
 from .pose import PlatenMotion, leg_displacements, platen_motion
 from .records import make_record
 from .simulate import Run
+from .supply import supply_pressures
 
 __all__ = ["record_of_run"]
 
@@ -43,14 +45,14 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         "actuator_force": force,
         "chamber_pressure_a": pressure_a,
         "spool_position": run.spool,
-        "supply_pressure": np.full(len(run.time), plant.supply[0]),
+        "supply_pressure": _supply_pressure(run),
     }
     labels = {"actuator": machine.actuator_names}
     if double.any():
         channels["chamber_pressure_b"] = pressure_b
         labels["horizontal"] = machine.double_acting
     if machine.struts:
-        channels["strut_pressure"] = _strut_pressure(run, legs[:, plant.spools :])
+        channels["strut_pressure"] = _strut_pressure(run, legs[:, plant.spools :]) * gas_ratio(plant, run.z)
         labels["strut"] = machine.strut_names
     if run.command is not None:
         channels["spool_command"] = run.command
@@ -88,6 +90,11 @@ def _strut_pressure(run: Run, elongation: Array) -> Array:
     struts = run.plant.machine.struts
     columns = (law(x, s.pressure, s.gas_length, s.polytropic_index) for x, s in zip(elongation.T, struts, strict=True))
     return np.column_stack(list(columns))
+
+
+def _supply_pressure(run: Run) -> Array:
+    supply, law = run.plant.supply, supply_pressures.py_func  # type: ignore[attr-defined]
+    return np.broadcast_to(law(supply, run.z.T)[0], len(run.time)).copy()
 
 
 def _hidden_states(run: Run) -> dict[str, Any]:

@@ -129,8 +129,8 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
     `changes` maps a path to a number or array in the file's unit, or to a table ``{value, unit, source, ...}`` of
     which only value is needed; or it is the path of a small TOML file of such tables. A component's path
     (``H3.seal_friction``) may be new if its kind has that key, and a number of an effect that is there
-    (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError naming
-    the key, or UnknownNameError.
+    (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError
+    naming the key, or UnknownNameError.
     """
     if isinstance(changes, str | Path):
         path = Path(changes)

@@ -7,8 +7,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from .alterations import command_path, supply_numbers
 from .effects import effect_table, state_names
-from .ports import PLATEN_PORTS, body_table, leg_table, port_names
+from .ports import PLATEN_PORTS, SWIVEL_TURNS, body_table, leg_table, port_names
 from .rigid_body import free_axes, make_model
 
 if TYPE_CHECKING:
@@ -37,15 +38,21 @@ class Plant:
     legs: NDArray[np.void]  # ports.LEG, actuators then struts
     body: NDArray[np.void]  # ports.BODY, one row
     rows: NDArray[np.void]  # effects.ROW
-    ports: tuple[str, ...]  # those that its arrays hold; the platen's only where an effect acts on them
+    ports: tuple[str, ...]  # those that its arrays hold; platen's and swivels' only where an effect acts on them
     states: tuple[str, ...]
-    supply: Array  # (2,) supply and return pressure [Pa]
+    supply: Array  # supply and return pressure [Pa]; behind them what `supply` needs where flow changes them
     delays: Array  # (n_actuators,) valve delay [s]
+    lags: Array  # (n_actuators,) time constant [s] with which a spool follows its delayed command
 
     @property
     def spools(self) -> int:
         """Number of valve spools, one an actuator."""
         return len(self.machine.actuators)
+
+    @property
+    def command_path(self) -> Array:
+        """Delays of valves (n_actuators,) [s] as `schemes.spool_windows` takes them: with lags behind, if there are."""
+        return np.concatenate([self.delays, self.lags]) if self.lags.any() else self.delays
 
     @property
     def articulated(self) -> bool:
@@ -69,8 +76,14 @@ def make_plant(machine: "Machine") -> Plant:
     ports = port_names(machine)
     effects = (*machine.effects, *machine.alterations)
     rows = effect_table(effects, ports)
-    if len(rows) and rows["port"].max() < len(ports) - len(PLATEN_PORTS):
-        ports = ports[: -len(PLATEN_PORTS)]  # no effect acts on the platen as such: nothing to evaluate there
+    used = max(rows["port"].max(), rows["port_2"].max()) if len(rows) else len(ports)
+    swivels = sum(port.endswith(SWIVEL_TURNS) for port in ports)
+    for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)):
+        if used < end:
+            ports = ports[:end]  # no effect acts on the others: nothing to evaluate there
+    states = state_names(effects)
+    oil = machine.hydraulics
+    delays, lags = command_path(effects, {a.name: a.valve_delay for a in machine.actuators})
     return Plant(
         machine=machine,
         model=make_model(machine),
@@ -79,7 +92,8 @@ def make_plant(machine: "Machine") -> Plant:
         body=body_table(machine),
         rows=rows,
         ports=ports,
-        states=state_names(effects),
-        supply=np.array([machine.hydraulics.supply_pressure, machine.hydraulics.return_pressure]),
-        delays=np.array([a.valve_delay for a in machine.actuators]),
+        states=states,
+        supply=np.array([oil.supply_pressure, oil.return_pressure, *supply_numbers(effects, states)]),
+        delays=np.array(delays),
+        lags=np.array(lags),
     )

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled_inline
+from .compiled import compiled, compiled_inline
+from .errors import UnknownNameError
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -26,6 +27,7 @@ __all__ = [
     "BODY",
     "LEG",
     "PLATEN_PORTS",
+    "SWIVEL_TURNS",
     "body_table",
     "evaluate_ports",
     "leg_table",
@@ -48,6 +50,7 @@ LEG = np.dtype(
             "normal_thrust",
             np.float64,
         ),  # bearing: 0 thrust along the vertical (Eq. 4-23), 1 along the normal (3-27)
+        ("swivel", np.int64),  # number of the first of its four swivel ports, -1 without
     ]
 )
 """Table row of a leg: an actuator or a strut."""
@@ -66,28 +69,52 @@ PLATEN_PORTS = ("platen.x", "platen.y", "platen.z", "platen.roll", "platen.pitch
 """Platen ports: displacement of C along {s}, and rotation; their forces are the wrench at C in {c}."""
 
 
+SWIVEL_TURNS = ("base_1", "base_2", "tip_1", "tip_2")
+"""Swivel ports of an actuator: its rod's turn in the base, and the platen's in the rod, each about two axes."""
+
+
 def port_names(machine: "Machine") -> tuple[str, ...]:
-    """Names of all ports in table order: actuators, struts, pads (``V1.x``, ``V1.y``), the six platen ports."""
+    """Names of all ports: actuators, struts, pads (``V1.x``, ``V1.y``), platen, swivels of actuators (``H1.tip_1``)."""
     pads = [f"{a.name}.{d}" for a in machine.actuators if a.mount == "bearing" for d in "xy"]
-    return (*machine.actuator_names, *machine.strut_names, *pads, *PLATEN_PORTS)
+    turns = [f"{a.name}.{turn}" for a in machine.actuators if a.mount == "swivel" for turn in SWIVEL_TURNS]
+    return (*machine.actuator_names, *machine.strut_names, *pads, *PLATEN_PORTS, *turns)
 
 
 def leg_table(machine: "Machine") -> NDArray[np.void]:
-    """Table of actuators, then struts, as `evaluate_ports` reads it."""
+    """Table of actuators, then struts, as `evaluate_ports` reads it; raises UnknownNameError for an effect's leg."""
     centre = np.array(machine.platen.centre_of_gravity)
     legs = np.zeros(len(machine.actuators) + len(machine.struts), LEG)
     pad = len(legs)
+    bearings = sum(a.mount == "bearing" for a in machine.actuators)
+    turn = pad + 2 * bearings + len(PLATEN_PORTS)
     for row, component in zip(legs, machine.components, strict=True):
         row["rho"] = np.array(component.platen_point) - centre
         row["base_point"] = component.base_point
         row["zero_length"] = math.dist(component.platen_point, component.base_point)
         row["stroke"] = getattr(component, "stroke", math.inf)
-        row["pad"] = -1
-        if getattr(component, "mount", "swivel") == "bearing":
+        row["pad"] = row["swivel"] = -1
+        mount = getattr(component, "mount", "none")
+        if mount == "bearing":
             row["bearing"], row["pad"] = 1, pad
             row["normal_thrust"] = float(machine.thrust == "normal")
             pad += 2
+        elif mount == "swivel":
+            row["swivel"] = turn
+            turn += len(SWIVEL_TURNS)
+    _alter_legs(legs, machine)
     return legs
+
+
+def _alter_legs(legs: NDArray[np.void], machine: "Machine") -> None:
+    """Turn the thrust of bearings as effects say: by their share, from the machine's direction to the other one."""
+    names = [c.name for c in machine.components]
+    other = -1.0 if machine.thrust == "normal" else 1.0
+    for effect in machine.alterations:
+        if effect.law == "thrust_direction":
+            for name, (share,) in zip(effect.ports, effect.params, strict=True):
+                if name not in names:
+                    raise UnknownNameError("bearing", name, names)
+                legs[names.index(name)]["normal_thrust"] += other * share
 
 
 def body_table(machine: "Machine") -> NDArray[np.void]:
@@ -140,6 +167,56 @@ def _row(out, i, fx, fy, fz, rx, ry, rz):
     out[i, 5] = rx * fy - ry * fx
 
 
+@compiled
+def _swivel_ports(frame, legs, s, J, B):
+    """Fill the swivel ports of all legs that have them: J = B^T.
+
+    With u the leg's direction and v_P the platen point's velocity the rod turns at u x v_P / L in the base, and the
+    platen at omega - u x v_P / L in the rod. Their components along two axes across the leg: e_1 level, e_2 = u x e_1.
+    The force column is the moment on the platen and, as the rod has no mass, its lateral force at the platen point.
+    The axes turn with the leg, so that s of the base is its tilt and its turn about the vertical less a constant only
+    while that tilt is small; s of the tip, which no angle belongs to, is zero.
+    """
+    for i in range(legs.size):
+        leg = legs[i]
+        k = leg.swivel
+        if k < 0:
+            continue
+        px, py, pz = leg.rho[0], leg.rho[1], leg.rho[2]
+        dx = frame[3, 0] + frame[0, 0] * px + frame[0, 1] * py + frame[0, 2] * pz - leg.base_point[0]
+        dy = frame[3, 1] + frame[1, 0] * px + frame[1, 1] * py + frame[1, 2] * pz - leg.base_point[1]
+        dz = frame[3, 2] + frame[2, 0] * px + frame[2, 1] * py + frame[2, 2] * pz - leg.base_point[2]
+        level = math.sqrt(dx * dx + dy * dy)
+        length = math.sqrt(level * level + dz * dz)
+        s[k] = -math.atan2(dz, level)
+        s[k + 1] = math.atan2(dy, dx)
+        s[k + 2] = s[k + 3] = 0.0
+        e1x, e1y = (-dy / level, dx / level) if level > 1e-9 * length else (0.0, 1.0)
+        e2x, e2y, e2z = -dz / length * e1y, dz / length * e1x, (dx * e1y - dy * e1x) / length
+        for n in range(2):
+            # e . (u x v) / L = (e x u) . v / L, and e_1 x u = -e_2, e_2 x u = e_1
+            ex, ey, ez = (e1x, e1y, 0.0) if n == 0 else (e2x, e2y, e2z)
+            fx, fy, fz = (-e2x, -e2y, -e2z) if n == 0 else (e1x, e1y, 0.0)
+            fx, fy, fz = fx / length, fy / length, fz / length
+            _row(
+                J,
+                k + n,
+                frame[0, 0] * fx + frame[1, 0] * fy + frame[2, 0] * fz,
+                frame[0, 1] * fx + frame[1, 1] * fy + frame[2, 1] * fz,
+                frame[0, 2] * fx + frame[1, 2] * fy + frame[2, 2] * fz,
+                px,
+                py,
+                pz,
+            )
+            for j in range(6):
+                J[k + 2 + n, j] = -J[k + n, j]
+            for j in range(3):
+                J[k + 2 + n, 3 + j] += frame[0, j] * ex + frame[1, j] * ey + frame[2, j] * ez
+        for n in range(k, k + 4):
+            for j in range(6):
+                B[n, j] = J[n, j]
+
+
 @compiled_inline
 def evaluate_ports(frame, legs, body, s, J, B):
     """Fill s (n,), J (n, 6) and B (n, 6) of all ports at the pose in rows 0 to 3 of frame.
@@ -149,7 +226,7 @@ def evaluate_ports(frame, legs, body, s, J, B):
     of the platen over the plate in the axes of {n_i} (Eqs. 4-13 to 4-15); J is slip relative to the rising plate, B
     the force on the platen alone (Eq. 4-24); s is the displacement of the platen point of the zero-position.
     Platen ports, where the arrays have room for them: J = B^T, displacement of C, Euler angles (whose rates are not
-    omega), wrench at C in {c}.
+    omega), wrench at C in {c}. Swivel ports, where there is room for them too: see `_swivel_ports`.
     """
     r00, r01, r02 = frame[0, 0], frame[0, 1], frame[0, 2]
     r10, r11, r12 = frame[1, 0], frame[1, 1], frame[1, 2]
@@ -240,9 +317,11 @@ def evaluate_ports(frame, legs, body, s, J, B):
         B[first + 3 + k, 3] = fx
         B[first + 3 + k, 4] = fy
         B[first + 3 + k, 5] = fz
-    for k in range(first, s.size):
+    for k in range(first, first + 6):
         for j in range(6):
             J[k, j] = B[k, j]
     s[first + 3] = math.atan2(r21, r22)
     s[first + 4] = -math.asin(min(1.0, max(-1.0, r20)))
     s[first + 5] = math.atan2(r10, r00)
+    if s.size > first + 6:
+        _swivel_ports(frame, legs, s, J, B)

@@ -4,6 +4,8 @@
     flow     L A / beta dP/dt + A dL/dt - Q, per chamber [m3/s]                              (Eqs. 4-2 to 4-5)
     gas      ln P/P_0 + n ln(1 + dL/L_c0), per strut [1]                                     (Eq. 4-7)
     force    measured actuator force less P_A A_1 - P_B A_2 [N]                              (Eq. 4-6)
+    servo    measured spool position less what its command gives, late by the valve [1]      (Section 4.1.2)
+    supply   measured supply pressure less the model's, which flow may lower [Pa]
 
 All are zero where the model is right and sensors are perfect. The laws are those of the simulation, called by the same
 tables; accelerations come from the fused engine's forward dynamics, whose oracle is Pinocchio.
@@ -17,15 +19,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .alignment import gas_pressure, oil_force
+from .alignment import due_spools, gas_pressure, oil_force
 from .compiled import compiled
 from .engine_fused import inertia_table, platen_acceleration
 from .equilibrium import hydraulic_rows
-from .inverse_dynamics import march_states
-from .law_table import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE
-from .laws.chamber import chamber_rate, flows_double, flows_single
-from .laws.orifice import opening
+from .gas import gas_ratio
+from .inverse_dynamics import march_states, with_loads
+from .law_table import GAS_HEAT, OSCILLATOR
 from .ledger import add_at_c
+from .oil_residuals import flow_misses, follow_supply
 from .plant import Plant
 from .pose import PlantMotion, PlatenMotion, plant_motion
 from .records import require, sample_interval
@@ -38,7 +40,7 @@ __all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "
 
 Array = NDArray[np.float64]
 
-RESIDUALS = ("wrench", "flow", "gas", "force")
+RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
 """Kinds of residuals."""
 
 
@@ -54,6 +56,8 @@ class Measured:
     pressure_rate: Array | None  # [Pa/s]
     strut_pressure: Array | None  # (n, n_struts) [Pa]
     spool: Array | None  # (n, n_actuators) at the samples' instants [1]
+    spool_command: Array | None = None  # (n, n_actuators) [1]
+    supply_pressure: Array | None = None  # (n, 1) [Pa]
     path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
 
@@ -70,6 +74,8 @@ class Residuals(NamedTuple):
     flow: Array  # (n, n_chambers)
     gas: Array  # (n, n_struts)
     force: Array  # (n, n_actuators)
+    servo: Array  # (n, n_actuators)
+    supply: Array  # (n, 1)
 
     def stacked(self) -> Array:
         """All columns side by side (n, k)."""
@@ -90,7 +96,7 @@ def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, pa
 
     pressure_a, pressure_b = values("chamber_pressure_a"), values("chamber_pressure_b")
     pressure = pressure_a if pressure_a is None or pressure_b is None else np.hstack([pressure_a, pressure_b])
-    force = values("actuator_force")
+    force, supply = values("actuator_force"), values("supply_pressure")
     if force is None and pressure is None:
         require(record, "actuator_force")
     return Measured(
@@ -102,6 +108,8 @@ def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, pa
         pressure_rate=None if pressure is None else differentiate(pressure, dt, cutoff),
         strut_pressure=values("strut_pressure"),
         spool=values("spool_position"),
+        spool_command=values("spool_command"),
+        supply_pressure=None if supply is None else supply[:, None],
         path=path,
     )
 
@@ -116,14 +124,30 @@ class Path(NamedTuple):
 def follow(plant: Plant, test: Measured) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke."""
     moved = plant_motion(plant, test.motion)
-    slid = moved if test.path is None else plant_motion(plant, test.motion._replace(displacement=test.path))
-    return Path(PlantMotion(*(np.ascontiguousarray(x) for x in moved)), march_states(plant, slid, test.dt))
+    moved = PlantMotion(*(np.ascontiguousarray(x) for x in moved))
+    if test.path is None:
+        return Path(moved, march_states(plant, moved, test.dt))
+    z = march_states(plant, plant_motion(plant, test.motion._replace(displacement=test.path)), test.dt)
+    smooth = np.isin(plant.rows["law"], (OSCILLATOR, GAS_HEAT))  # they average noise, and feel what a still path lacks
+    if smooth.any():
+        whole = march_states(plant, moved, test.dt)
+        for row in plant.rows[smooth]:
+            k = int(row["state"])
+            end = k + (2 if row["law"] == OSCILLATOR else 1)
+            z[:, k:end] = whole[:, k:end]
+    return Path(moved, z)
 
 
 def path_key(plant: Plant) -> bytes:
-    """What the path of a test depends on: geometry, and yield and shape of friction. Other numbers leave it alone."""
-    friction = plant.rows[np.isin(plant.rows["law"], (BOUC_WEN_1D, BOUC_WEN_2D))]["p"][:, 1:3]
-    return plant.body.tobytes() + plant.legs.tobytes() + friction.tobytes()
+    """What the path of a test depends on: geometry, and what hidden states follow. Other numbers leave it alone.
+
+    The first number of a law with hidden states is the amplitude of its force, which they do not feel.
+    """
+    legs = plant.legs.copy()
+    legs["normal_thrust"] = 0.0
+    moved = plant.rows[(plant.rows["state"] >= 0) & (plant.rows["input"] < 0)]
+    tables = plant.body, legs, *(moved[name] for name in ("law", "port", "port_2", "state")), moved["p"][:, 1:]
+    return b"".join(table.tobytes() for table in tables) + str(len(plant.states)).encode()
 
 
 def evaluate_residuals(
@@ -141,11 +165,15 @@ def evaluate_residuals(
     if test.pressure is not None:
         oil = oil_force(machine, test.pressure[:, : plant.spools], test.pressure[:, plant.spools :])
         force = oil if force is None else force
-    wants_flow = "flow" in only and test.pressure is not None and test.spool is not None
+    fed_known = test.pressure is not None and test.spool is not None
+    wants_flow = "flow" in only and fed_known
+    wants_supply = "supply" in only and fed_known and test.supply_pressure is not None
     wants_wrench = "wrench" in only and force is not None
     wrench = np.zeros((n, 6 if wants_wrench else 0))
     flow = np.zeros((n, plant.spools + int(double.sum()) if wants_flow else 0))
     length = np.zeros((n, plant.legs.size))
+    if wants_wrench and force is not None:
+        z = with_loads(plant, z, force)
     rest = plant.rows[plant.rows["input"] < 0]
     ws = make_workspace(plant, plant.zero_state())
     _, mass = platen_inertia(plant.model, machine)
@@ -153,7 +181,8 @@ def evaluate_residuals(
     chamber = np.full((plant.spools, 2), -1)
     chamber[:, 0] = np.arange(plant.spools)
     chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
-    pressures = (test.pressure, test.pressure_rate, test.spool) if wants_flow else (none, none, none)
+    pressures = (test.pressure, test.pressure_rate, test.spool) if fed_known else (none, none, none)
+    drooped = np.zeros(n if wants_flow or wants_supply else 0)
     _residuals(
         *moved,
         z,
@@ -161,25 +190,32 @@ def evaluate_residuals(
         *pressures,
         *(plant.axes, plant.legs, plant.body, plant.rows[fed], rest, np.array(plant.model.damping), plant.supply),
         *(inertia_table(plant), mass, chamber),
-        *(ws.frame, ws.port, ws.JB, ws.force, ws.motion, wrench, flow, length),
+        *(ws.frame, ws.port, ws.JB, ws.force, ws.motion, wrench, flow, length, drooped, test.dt),
     )
     gas = np.zeros((n, 0))
     if "gas" in only and test.strut_pressure is not None:
-        gas = np.log(test.strut_pressure / gas_pressure(machine, length[:, plant.spools :]))
+        gas = np.log(test.strut_pressure / gas_pressure(machine, length[:, plant.spools :]) / gas_ratio(plant, z))
     told = np.zeros((n, 0))
     if "force" in only and test.pressure is not None and test.actuator_force is not None:
         told = test.actuator_force - oil
-    return Residuals(wrench, flow, gas, told)
+    servo, supplied = np.zeros((n, 0)), np.zeros((n, 0))
+    if "servo" in only and test.spool is not None and test.spool_command is not None:
+        servo = test.spool - due_spools(plant, test.spool_command, test.dt)
+    if wants_supply and test.supply_pressure is not None:
+        supplied = test.supply_pressure - drooped[:, None]
+    return Residuals(wrench, flow, gas, told, servo, supplied)
 
 
 @compiled
 def _residuals(
     q, v, a, z, measured, pressure, pressure_rate, spool, axes, legs, body, fed, rest, damping, supply, inertia, mass,
-    chamber, frame, port, JB, force, motion, wrench, flow, length,
+    chamber, frame, port, JB, force, motion, wrench, flow, length, drooped, dt,
 ):  # fmt: skip
     work = np.zeros((2, 6))
     miss = np.zeros(axes.size)
     left = np.zeros(6)
+    oil, last = np.zeros(z.shape[1]), np.zeros(4)
+    high, low = supply[0], supply[1]
     for k in range(q.shape[0]):
         motion[V_SEEN] = v[k]
         pose_stage(q[k], axes, legs, body, frame, port, JB)
@@ -197,22 +233,8 @@ def _residuals(
                 for j in range(axes.size):
                     left[axes[i]] += mass[axes[i], axes[j]] * miss[j]
             add_at_c(1.0, left.reshape(1, 6), 0, body[0].rho_c, frame, wrench[k])
+        if drooped.size > 0:
+            high, low = follow_supply(k, fed, chamber, pressure, spool, supply, dt, oil, last)
+            drooped[k] = high
         if flow.shape[1] > 0:
-            for i in range(fed.size):
-                row = fed[i]
-                p = row.p
-                s, sd = port[S, row.port], port[SD, row.port]
-                at_a, at_b = chamber[i, 0], chamber[i, 1]
-                opened = opening(spool[k, i], p[6])
-                pressure_a = pressure[k, at_a]
-                if row.law == HYDRAULIC_DOUBLE:
-                    pressure_b = pressure[k, at_b]
-                    q_a, q_b, _, _ = flows_double(
-                        opened, pressure_a, pressure_b, p[2], p[3], p[4], p[5], p[7], supply[0], supply[1], p[11]
-                    )
-                    rate = chamber_rate(q_b, p[1], -sd, p[9] - s, p[10])
-                    flow[k, at_b] = (pressure_rate[k, at_b] - rate) * p[1] * (p[9] - s) / p[10]
-                else:
-                    q_a, _ = flows_single(opened, pressure_a, p[2], p[4], p[7], supply[0], supply[1], p[11])
-                rate = chamber_rate(q_a, p[0], sd, p[8] + s, p[10])
-                flow[k, at_a] = (pressure_rate[k, at_a] - rate) * p[0] * (p[8] + s) / p[10]
+            flow_misses(k, fed, chamber, pressure, pressure_rate, spool, high, low, dt, port[S], port[SD], oil, flow)

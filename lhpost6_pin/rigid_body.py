@@ -46,7 +46,7 @@ def make_model(machine: "Machine") -> Any:
         placement = pin.SE3(np.eye(3), np.array(platen.centre_of_gravity))
     index = model.addJoint(0, joint, placement, "platen")
     model.addJointFrame(index)
-    inertia = pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia))
+    inertia = _altered(pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia)), machine)
     model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
     top = pin.SE3(np.eye(3), -np.array(platen.centre_of_gravity))
     model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
@@ -59,6 +59,20 @@ def make_model(machine: "Machine") -> Any:
     extra[: axes.size] = armature[axes]
     model.armature = model.armature + extra
     return model
+
+
+def _altered(inertia: Any, machine: "Machine") -> Any:
+    """Inertia of the platen with what effects add to it: mass with its weight, first and second moments about B."""
+    for effect in machine.alterations:
+        if effect.law == "more_inertia":
+            for mass, x, y, z, xx, yy, zz, xy, xz, yz in effect.params:
+                total = inertia.mass + mass
+                if total <= 0.0:
+                    raise ParameterError(f"{effect.name}: {mass:g} kg leave the platen no mass")
+                lever = (inertia.mass * inertia.lever + np.array([x, y, z])) / total
+                about_b = inertia.matrix()[3:, 3:] + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+                inertia = pin.Inertia(total, lever, about_b + total * pin.skew(lever) @ pin.skew(lever))
+    return inertia
 
 
 def _mount(model: Any, specimen: Specimen) -> Any:

@@ -48,8 +48,8 @@ class RunningPlant:
         self._advance = make_stepper(plant, scheme, 1.0 / steps_per_second)
         self._ws = make_workspace(plant, rest.state)
         self._window = np.zeros((steps, plant.spools))
-        self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 3, 1))
-        self._fed = hydraulic_rows(plant)
+        self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))
+        self._path, self._fed = plant.command_path, hydraulic_rows(plant)
         settle(plant, self._ws, np.ascontiguousarray(rest.spool))
 
     @property
@@ -98,12 +98,12 @@ class RunningPlant:
             raise SimulationError(f"a command is {self.plant.spools} finite spool values; got {command}")
         self.clipped += int(np.count_nonzero(np.abs(command) > 1.0))
         if self.sample == 0:  # what came before the first command was the same
-            self._history[:] = np.clip(command, -1.0, 1.0)
+            self._history[:] = self._window[:] = np.clip(command, -1.0, 1.0)
         else:
             self._history[:-1] = self._history[1:]
             self._history[-1] = np.clip(command, -1.0, 1.0)
         first = self.sample - len(self._history) + 1
-        spool_windows(self._history, first, self.sample, self.plant.delays, float(SAMPLE_RATE), self._window)
+        spool_windows(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
         status = self._advance(self._ws, self._window)
         self.sample += 1
         if status:

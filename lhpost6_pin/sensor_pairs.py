@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .alignment import gas_pressure
+from .alignment import due_spools, gas_pressure
 from .conditioning import resolution
 from .fusion import kinematic_jacobian
 from .names import AXES
@@ -19,7 +19,7 @@ from .plant import Plant
 from .pose import forward_kinematics, leg_displacements
 from .records import sample_interval
 from .sensors import Sensors, spectrum
-from .signals import Band, align, differentiate
+from .signals import Band, differentiate
 
 __all__ = ["Comparison", "Term", "comparisons"]
 
@@ -297,7 +297,7 @@ def _spools(view: _View) -> Iterator[Comparison]:
     if not view.has("spool_command", "spool_position"):
         return
     delays = view.plant.delays
-    command = align(view.values("spool_command"), -delays, view.dt)
+    command = due_spools(view.plant, view.values("spool_command"), view.dt)
     measured, (due, rate) = view.signal(view.values("spool_position")), view.signals(command, 0, 1)
     fast = command - Band(high=FAST / view.dt).apply(command, view.dt)
     folded = fast[:: view.step][view.trim :][: len(due)] * np.sqrt(2 * BAND.high * view.dt)

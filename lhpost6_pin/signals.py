@@ -19,6 +19,7 @@ __all__ = [
     "differentiate",
     "drift_rate",
     "hold",
+    "lag",
     "lowpass_zero_phase",
     "peak_ratio",
     "resample_band_limited",
@@ -130,6 +131,17 @@ def align(signal: ArrayLike, delay: ArrayLike, dt: float) -> Array:
     t = np.add.outer(dt * np.arange(len(x)), tau)
     shifted = np.where(t < 0, ends[0], shifted)
     return np.where(t > (len(x) - 1) * dt, ends[1], shifted)
+
+
+def lag(signal: ArrayLike, time: ArrayLike, dt: float) -> Array:
+    """First-order answer to a signal, T dy/dt + y = x with its time constant T [s], one or one per column.
+
+    In the Fourier domain, as `align`: exact for band-limited signals, and at rest in their slope at the start.
+    """
+    x = np.asarray(signal, dtype=float)
+    constant = np.broadcast_to(np.asarray(time, dtype=float), x.shape[1:])
+    late = _filtered(x, dt, lambda f: 1.0 / (1.0 + 2j * np.pi * np.multiply.outer(f, constant)))
+    return late - (x[-1] - x[0]) / ((len(x) - 1) * dt) * constant
 
 
 def lowpass_zero_phase(x: ArrayLike, dt: float, cutoff: float, order: int = 8) -> Array:

@@ -128,8 +128,9 @@ def simulate(
         start, (spool, clipped) = drive.start, _clip(drive.spool)
         first = spool[0]
     else:
-        start, spool, clipped = drive.rest.state, np.zeros((1, plant.spools)), 0
+        start, clipped = drive.rest.state, 0
         first = drive.rest.spool
+        spool = np.tile(first, (steps, 1))
     ws = make_workspace(plant, start)
     log_ = _Log(plant, -(-samples // record_every))
     command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
@@ -259,7 +260,7 @@ class _Job(NamedTuple):
     samples: int
     steps: int  # model steps a sample
     dt: float  # of one [s]
-    spool: Array  # (samples * k, n_actuators), open loop
+    spool: Array  # (samples * k, n_actuators), open loop; (steps, n_actuators) of the last sample, closed
     command: Array  # (samples, n_actuators), closed loop
     every: int
     progress: Progress | None
@@ -269,7 +270,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     """Run all samples step by step; returns (status, samples done, commands clipped)."""
     plant, ws, steps = job.plant, job.ws, job.steps
     advance = make_stepper(plant, job.scheme, job.dt)
-    window = np.zeros((steps, plant.spools))
+    window = np.zeros((steps, plant.spools)) if isinstance(job.drive, OpenLoop) else job.spool
     spools = _spools_from(job)
     clipped = 0
     for sample in range(job.samples):
@@ -305,7 +306,7 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
         state = ws.port, ws.force, fed, ws.frame, ws.motion
         call: Any = control_sample_flat
         values = np.ascontiguousarray(drive.drive, float)  # any other kind would be compiled for anew
-        rest = (values, *state, *loop.flat_tables(), loop.init(), command, plant.delays, rate)
+        rest = (values, *state, *loop.flat_tables(), loop.init(), command, plant.command_path, rate)
 
         def compiled_loop(sample: int, window: Array) -> int:
             return int(call(sample, *rest, window))
@@ -315,13 +316,13 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
     wanted = wanted_from(drive.displacement, drive.velocity, drive.acceleration)
     own = start_plugged(users, plant, drive.rest)
     sensors = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
-    body = plant.body.view(float)
+    body, path = plant.body.view(float), plant.command_path
 
     def plugged(sample: int, window: Array) -> int:
         sense_flat(ws.port, ws.force, fed, body, plant.axes, ws.frame, ws.motion, *sensors)
         asked = step_plugged(users, own, sample, wanted(sample), sensors)
         command[sample], clipped = _clip(asked)
-        spool_windows(command, 0, sample, plant.delays, rate, window)
+        spool_windows(command, 0, sample, path, rate, window)
         return clipped
 
     return plugged
@@ -355,7 +356,7 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
             plant.rows,
             damping,
             ws.supply,
-            plant.delays,
+            plant.command_path,
             inertia,
             ws.q,
             ws.z,

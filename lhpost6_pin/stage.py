@@ -4,8 +4,8 @@ Four loops run around these functions: the per-step Pinocchio engine, the fused 
 search for missing effects. Each function walks the effect table and calls the law's kernel.
 
 Arrays: s (n_ports,) port coordinates, sd rates, z (n_states,) hidden states, spool (n_actuators,) valve spools -1..1,
-supply (2,) supply and return pressure [Pa], force (n_rows, 2) the ledger: force of each row on its port and second
-port [N or N m], port_force (n_ports,) their sum per port.
+supply the supply's numbers, pressures first (`supply`), force (n_rows, 2) the ledger: force of each row on its port and
+second port [N or N m], port_force (n_ports,) their sum per port.
 """
 
 from .compiled import compiled, compiled_inline
@@ -32,7 +32,9 @@ from .laws.chamber import (
 from .laws.orifice import opening
 from .laws.strut import strut_force
 from .laws.viscous import viscous_force
-from .stage_added import added_force, added_rates, advance_added
+from .oil import advance_oil, oil_rates
+from .stage_added import added_rates, advance_added, apply_added
+from .supply import close_supply, open_supply, supply_pressures, supply_rates
 
 __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
 
@@ -40,6 +42,11 @@ __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
 @compiled
 def state_rates(rows, s, sd, spool, supply, z, zd):
     """Fill zd (n_states,) with the rates of all hidden states (schemes `euler` and `rk4`)."""
+    more = altered = False
+    high, low = supply[0], supply[1]
+    if supply.size > 2:
+        high, low = supply_pressures(supply, z)
+        supply_rates(rows, spool, supply, z, zd)
     for i in range(rows.size):
         row = rows[i]
         k = row.state
@@ -52,19 +59,23 @@ def state_rates(rows, s, sd, spool, supply, z, zd):
             zd[k], _ = bouc_wen_rate(sd[a], 0.0, z[k], 0.0, p[1], p[2])
         elif law == BOUC_WEN_2D:
             zd[k], zd[k + 1] = bouc_wen_rate(sd[a], sd[row.port_2], z[k], z[k + 1], p[1], p[2])
+        elif row.altered != 0:
+            altered = True
         elif law == HYDRAULIC_DOUBLE:
             opened = opening(spool[row.input], p[6])
-            q_a, q_b, _, _ = flows_double(
-                opened, z[k], z[k + 1], p[2], p[3], p[4], p[5], p[7], supply[0], supply[1], p[11]
-            )
+            q_a, q_b, _, _ = flows_double(opened, z[k], z[k + 1], p[2], p[3], p[4], p[5], p[7], high, low, p[11])
             zd[k] = chamber_rate(q_a, p[0], sd[a], p[8] + s[a], p[10])
             zd[k + 1] = chamber_rate(q_b, p[1], -sd[a], p[9] - s[a], p[10])
         elif law == HYDRAULIC_SINGLE:
             opened = opening(spool[row.input], p[6])
-            q_a, _ = flows_single(opened, z[k], p[2], p[4], p[7], supply[0], supply[1], p[11])
+            q_a, _ = flows_single(opened, z[k], p[2], p[4], p[7], high, low, p[11])
             zd[k] = chamber_rate(q_a, p[0], sd[a], p[8] + s[a], p[10])
         else:
-            added_rates(rows, i, s, sd, z, zd)
+            more = True
+    if altered:
+        oil_rates(rows, s, sd, spool, high, low, z, zd)
+    if more:
+        added_rates(rows, s, sd, z, zd)
 
 
 @compiled_inline
@@ -73,6 +84,12 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
 
     This is the one-step rule that inverse dynamics marches along a measured motion, too.
     """
+    more = altered = False
+    high, low = supply[0], supply[1]
+    before = (0.0, 0.0, 0.0, 0.0)
+    if supply.size > 2:
+        before = open_supply(rows, spool, supply, dt, z)
+        high, low = supply_pressures(supply, z)
     for i in range(rows.size):
         row = rows[i]
         k = row.state
@@ -85,6 +102,8 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
             z[k] = bouc_wen_advance_1d(ds[a], z[k], p[1], p[2])
         elif law == BOUC_WEN_2D:
             z[k], z[k + 1] = bouc_wen_advance(ds[a], ds[row.port_2], z[k], z[k + 1], p[1], p[2])
+        elif row.altered != 0:
+            altered = True
         elif law == HYDRAULIC_DOUBLE:
             opened = opening(spool[row.input], p[6])
             z[k], z[k + 1] = advance_double(
@@ -103,8 +122,8 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
                 p[5],
                 p[7],
                 p[10],
-                supply[0],
-                supply[1],
+                high,
+                low,
                 p[11],
             )
         elif law == HYDRAULIC_SINGLE:
@@ -120,17 +139,24 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
                 p[4],
                 p[7],
                 p[10],
-                supply[0],
-                supply[1],
+                high,
+                low,
                 p[11],
             )
         else:
-            advance_added(rows, i, s, ds, dt, z)
+            more = True
+    if altered:
+        advance_oil(rows, s, ds, dt, spool, high, low, z)
+    if supply.size > 2:
+        close_supply(rows, spool, supply, dt, before, z)
+    if more:
+        advance_added(rows, s, ds, dt, z)
 
 
 @compiled_inline
 def apply_forces(rows, s, sd, z, force, port_force):
     """Fill the ledger force (n_rows, 2) and its sum per port."""
+    more = False
     port_force[:] = 0.0
     for i in range(rows.size):
         row = rows[i]
@@ -154,12 +180,13 @@ def apply_forces(rows, s, sd, z, force, port_force):
         elif law == VISCOUS:
             first = viscous_force(sd[a], p[0])
         else:
-            first, second = added_force(rows, i, s, sd, z)
-            if row.port_2 >= 0:
-                port_force[row.port_2] += second
+            more = True
+            continue
         force[i, 0] = first
         force[i, 1] = second
         port_force[a] += first
+    if more:
+        apply_added(rows, s, sd, z, force, port_force)
 
 
 @compiled_inline

@@ -25,7 +25,7 @@ class Workspace:
     JB: Array  # (2, n_ports, 6)
     frame: Array  # (8, 3)
     force: Array  # (n_rows, 2)
-    supply: Array  # (2,) supply and return pressure [Pa]
+    supply: Array  # the plant's
 
 
 def make_workspace(plant: Plant, start: State) -> Workspace:

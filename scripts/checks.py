@@ -19,7 +19,7 @@ def main() -> int:
         "lint": ["ruff", "check", "."],
         "format": ["ruff", "format", "--check", "."],
         "types": ["mypy"],
-        "tests": ["pytest", *slow],
+        "tests": ["pytest", "-n", "auto", *slow],
     }
     failed = []
     for name, command in checks.items():

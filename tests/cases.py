@@ -93,6 +93,10 @@ KERNELS = {
         Kernel(chamber.flows_double, (_OPEN, _PRESSURE, _PRESSURE, _K, _K, _K, _K, _LEAK, _HIGH, _LOW, _ROOT)),
         Kernel(chamber.flows_single, (_OPEN, _PRESSURE, _K, _K, _LEAK, _HIGH, _LOW, _ROOT)),
         Kernel(
+            chamber.pressure_rises,
+            (*((-0.5, 0.5),) * 2, *((-1e-8, 0.0),) * 2, _LEAK, _STROKE, _DT, _AREA, _AREA, *((1e9, 1e11),) * 2),
+        ),
+        Kernel(
             chamber.advance_double,
             (_OPEN, _PRESSURE, _PRESSURE, _LENGTH, _LENGTH, _STROKE, _DT, _AREA, _AREA, *(_K,) * 4, *_REST),
         ),

@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, machine_knobs, with_knobs
 from lhpost6_pin.calibration.errors import corrected, sensor_unknowns
-from lhpost6_pin.calibration.fit import _ready
 from lhpost6_pin.calibration.knobs import Knob
 from lhpost6_pin.calibration.override import save_override
+from lhpost6_pin.calibration.prepare import _ready
 from lhpost6_pin.calibration.problem import Comparison, Problem
 from lhpost6_pin.calibration.simulation import by_simulation
 from lhpost6_pin.calibration.spectra import make_whitener, spectrum_of
@@ -244,8 +244,8 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
 
 
 def test_whitened_residuals_hold_as_many_columns_as_their_kinds(problem):
-    r = evaluate_residuals(make_plant(problem.machine), problem.tests[0])
-    assert problem.widths == tuple(x.shape[1] for x in r) == (6, 14, 3, 10)
+    r = evaluate_residuals(make_plant(problem.machine), problem.tests[0], problem.kinds)
+    assert problem.widths == tuple(x.shape[1] for x in r) == (6, 14, 3, 10, 0, 0)
     assert sum(problem.rows(k).sum() for k in ("wrench", "flow", "gas", "force")) == 33
 
 

@@ -8,7 +8,8 @@ import pytest
 from machine_cases import MACHINES, frame_array, machine_named, plant_named, random_poses
 
 from lhpost6_pin import kinematics as kin
-from lhpost6_pin.ports import PLATEN_PORTS, evaluate_ports, platen_pose, port_names
+from lhpost6_pin import ports
+from lhpost6_pin.ports import PLATEN_PORTS, SWIVEL_TURNS, evaluate_ports, platen_pose, port_names
 
 ROUNDING = 1e-13  # some ten operations on numbers below 10 in double precision
 CASES = [(name, thrust) for name in MACHINES for thrust in ("report", "normal")]
@@ -22,19 +23,26 @@ def ports_at(plant, pose, evaluate=evaluate_ports):
     return s, J, B
 
 
+def platen_rows(machine):
+    """Where the platen's six ports are."""
+    first = port_names(machine).index("platen.x")
+    return slice(first, first + 6)
+
+
 def row_of_force(machine, pose, at, force):
     """Wrench at B in platen axes, Pinocchio's order, of a force in {s} at a point `at` from C in {s}."""
     wrench_c = kin.p_J_c(at).T @ np.concatenate([np.zeros(3), force])
     return kin.to_pinocchio_order(kin.c_J_b(machine, pose).T @ wrench_c)
 
 
-def test_port_names_are_legs_pads_and_platen_in_that_order():
+def test_port_names_are_legs_pads_platen_and_swivels_in_that_order():
     names = port_names(machine_named("lhpost6"))
     assert names[:13] == ("H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6", "S1", "S2", "S3")
     assert names[13:17] == ("V1.x", "V1.y", "V2.x", "V2.y")
-    assert names[-6:] == PLATEN_PORTS
-    assert len(names) == 13 + 12 + 6
-    assert port_names(machine_named("stewart")) == (*(f"L{i}" for i in range(1, 7)), *PLATEN_PORTS)
+    assert names[25:31] == PLATEN_PORTS
+    assert names[31:] == tuple(f"H{i}.{turn}" for i in range(1, 5) for turn in SWIVEL_TURNS)
+    legs = [f"L{i}" for i in range(1, 7)]
+    assert port_names(machine_named("stewart"))[:12] == (*legs, *PLATEN_PORTS)
 
 
 @pytest.mark.parametrize("name, thrust", CASES)
@@ -90,21 +98,22 @@ def test_platen_ports_move_with_c_and_carry_the_wrench_there(name):
     machine, plant = machine_named(name), plant_named(name)
     for pose in random_poses(machine, 12):
         s, J, B = ports_at(plant, pose)
-        assert np.allclose(s[-6:], pose, rtol=0.0, atol=ROUNDING)  # displacement of C and Euler angles
+        at = platen_rows(machine)
+        assert np.allclose(s[at], pose, rtol=0.0, atol=ROUNDING)  # displacement of C and Euler angles
         c_J_b = kin.to_pinocchio_order(kin.to_pinocchio_order(kin.c_J_b(machine, pose)).T).T
-        assert np.allclose(J[-6:], c_J_b, rtol=0.0, atol=ROUNDING)  # twist in {c}: omega, not Euler angle rates
-        assert np.array_equal(J[-6:], B[-6:])
+        assert np.allclose(J[at], c_J_b, rtol=0.0, atol=ROUNDING)  # twist in {c}: omega, not Euler angle rates
+        assert np.array_equal(J[at], B[at])
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_arrays_without_room_for_platen_ports_hold_the_others_alike(name):
+def test_arrays_without_room_for_platen_or_swivel_ports_hold_the_others_alike(name):
     machine, plant = machine_named(name), plant_named(name)
-    n = len(port_names(machine)) - len(PLATEN_PORTS)
-    for pose in random_poses(machine, 4):
-        s, J, B = np.full(n, np.nan), np.full((n, 6), np.nan), np.full((n, 6), np.nan)
-        evaluate_ports(frame_array(machine, pose), plant.legs, plant.body, s, J, B)
-        for short, whole in zip((s, J, B), ports_at(plant, pose), strict=True):
-            assert np.array_equal(short, whole[:n])
+    for n in (platen_rows(machine).start, platen_rows(machine).stop):
+        for pose in random_poses(machine, 4):
+            s, J, B = np.full(n, np.nan), np.full((n, 6), np.nan), np.full((n, 6), np.nan)
+            evaluate_ports(frame_array(machine, pose), plant.legs, plant.body, s, J, B)
+            for short, whole in zip((s, J, B), ports_at(plant, pose), strict=True):
+                assert np.array_equal(short, whole[:n])
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -129,7 +138,8 @@ def test_leg_coordinates_change_at_the_rate_of_their_rows(name):
             s_at.append(s)
         rate = (s_at[0] - s_at[1]) / (2.0 * h)
         assert np.allclose(rate[:legs], J[:legs] @ twist, rtol=0.0, atol=2e-9)
-        assert np.allclose(rate[-6:-3], J[-6:-3] @ twist, rtol=0.0, atol=2e-9)
+        first = platen_rows(machine).start
+        assert np.allclose(rate[first : first + 3], J[first : first + 3] @ twist, rtol=0.0, atol=2e-9)
 
 
 class Table(list):
@@ -141,11 +151,13 @@ class Table(list):
         self.size = len(self)
 
 
-def test_compiled_ports_are_the_python_they_are_written_in():
+def test_compiled_ports_are_the_python_they_are_written_in(monkeypatch):
     plant = plant_named("lhpost6")
 
     def plain(frame, legs, body, s, J, B):
-        evaluate_ports.py_func(frame, Table(legs), Table(body), s, J, B)
+        with monkeypatch.context() as patch:
+            patch.setattr(ports, "_swivel_ports", ports._swivel_ports.py_func)
+            evaluate_ports.py_func(frame, Table(legs), Table(body), s, J, B)
 
     for pose in random_poses(plant.machine, 4):
         for fast, slow in zip(ports_at(plant, pose), ports_at(plant, pose, plain), strict=True):

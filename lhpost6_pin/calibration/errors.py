@@ -10,16 +10,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from ..machine import Machine
 from ..names import AXES
 from ..pose import PlatenMotion
+from ..records import sample_interval
 from ..residuals import Measured
-from ..sensors import Sensors
+from ..sensors import GROUPS, Sensors
 from ..signals import align
 
-__all__ = ["CHANNELS", "SensorUnknown", "corrected", "sensor_unknowns"]
+__all__ = ["CHANNELS", "SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
 
 Array = NDArray[np.float64]
 
@@ -46,6 +48,7 @@ CHANNELS = {
     "chamber_pressure_b": "Pa",
     "strut_pressure": "Pa",
     "spool_position": "1",
+    "supply_pressure": "Pa",
 }
 """Channels that a machine is calibrated by, with their units."""
 
@@ -55,6 +58,7 @@ _FIELDS: Mapping[str, tuple[tuple[str, bool], ...]] = {
     "chamber_pressure_b": (("pressure", True), ("pressure_rate", False)),
     "strut_pressure": (("strut_pressure", True),),
     "spool_position": (("spool", True),),
+    "supply_pressure": (("supply_pressure", True),),
 }
 """Fields of a test that a channel's error is in, and whether an offset is in them."""
 
@@ -63,6 +67,7 @@ _DELAYED: Mapping[str, tuple[str, ...]] = {
     "chamber_pressure": ("pressure", "pressure_rate"),
     "strut_pressure": ("strut_pressure",),
     "spool_position": ("spool",),
+    "spool_command": ("spool_command",),
 }
 """Fields of a test that the delay of a group of channels is in."""
 
@@ -77,6 +82,7 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
         "chamber_pressure_b": machine.double_acting if test.pressure is not None else (),
         "strut_pressure": machine.strut_names if test.strut_pressure is not None else (),
         "spool_position": machine.actuator_names if test.spool is not None else (),
+        "supply_pressure": ("",) if test.supply_pressure is not None else (),
     }
     found = []
     for channel, unit in CHANNELS.items():
@@ -89,7 +95,7 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
                     continue  # a guided platen
                 found.append(
                     SensorUnknown(
-                        f"{kind} {channel}[{label}]",
+                        f"{kind} {channel}[{label}]" if label else f"{kind} {channel}",
                         kind,
                         channel,
                         first + i,
@@ -98,8 +104,10 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
                         _alone(machine, kind, channel, i, forces=test.actuator_force is not None),
                     )
                 )
+    columns["spool_command"] = machine.actuator_names if test.spool_command is not None else ()
     for group in _DELAYED:
-        sd = sensors.delay_sd(group)
+        # a command is no measurement, but what records it has a clock of its own, and holds it for a sample
+        sd = sensors.delay_sd("spool_position" if group == "spool_command" else group)
         if sd > 0.0 and columns[{"chamber_pressure": "chamber_pressure_a"}.get(group, group)]:
             found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
     return tuple(found)
@@ -152,6 +160,28 @@ def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array
             if path is not None:
                 path[:, k] -= part * shares.displacement[:, k]
     return replace(test, motion=motion, path=path, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
+
+
+def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], errors: Array) -> xr.Dataset:
+    """A record as perfect sensors would have shown it, if these were their errors, one an unknown."""
+    out = record.copy(deep=True)
+    dt = sample_interval(record)
+    for unknown, value in zip(unknowns, errors, strict=True):
+        if unknown.kind == "delay":
+            for channel in GROUPS.get(unknown.channel, (unknown.channel,)):
+                if channel in out:
+                    out[channel].values[:] = align(out[channel].values, float(value), dt)
+    for unknown, value in zip(unknowns, errors, strict=True):
+        if unknown.kind == "delay" or unknown.channel not in out:
+            continue
+        first = len(record["actuator"]) if unknown.channel == "chamber_pressure_b" else 0
+        values = out[unknown.channel].values
+        column = values[:, unknown.column - first] if values.ndim > 1 else values
+        if unknown.kind == "gain":
+            column /= 1.0 + value
+        else:
+            column -= value
+    return out
 
 
 def _field(test: Measured, field: str) -> Array:

@@ -107,9 +107,17 @@ class Solution(NamedTuple):
 
 
 def solve(
-    problem: Problem, replicas: Sequence[Problem], numbers: Parameters, start: Array, progress: Progress
+    problem: Problem,
+    replicas: Sequence[Problem],
+    numbers: Parameters,
+    start: Array,
+    progress: Progress,
+    known: Normal | None = None,
 ) -> Solution:
-    """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on."""
+    """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on.
+
+    Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again.
+    """
     x = start.copy()
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     bias: Bias | None = None
@@ -117,12 +125,12 @@ def solve(
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
     for done in range(1, rounds + 1):
         at = done - 1 if done == 1 else done - 1 + len(replicas)
-        normal = Normal(problem, x, _between(progress, shares[at], shares[at + 1]))
+        normal = Normal(problem, x, _between(progress, shares[at], shares[at + 1]), known)
         if done == 1:
             before = misfit(problem, normal.rest)
         if done == 2:  # near enough to the end, and the same from there on
             parts = [_between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
-            bias = Bias(normal, replicas, x, parts)
+            bias = Bias(normal, replicas, x, parts, known)
         if bias is not None:
             normal = normal.less(bias)
         step = bounded_step(normal, x, problem, numbers)

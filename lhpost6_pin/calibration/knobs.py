@@ -42,10 +42,17 @@ class Knob:
     shows_in: tuple[str, ...]  # residuals that can tell of it
     lowest: float = -math.inf  # coordinate below which no machine can be built
     highest: float = math.inf
+    step: float | None = None  # of the coordinate, for derivatives; None: the comparison's share of sd
 
     def at(self, coordinate: float) -> float:
         """Value in `unit` at a coordinate."""
         return self.value * math.exp(coordinate) if self.relative else self.value + coordinate
+
+    def within(self, low: float, high: float) -> "Knob":
+        """The same knob with its values between low and high, where its coordinate can say so."""
+        bounds = (-math.inf if self.relative and v <= 0.0 else self.coordinate(v) for v in (low, high))
+        lowest, highest = bounds
+        return replace(self, lowest=lowest, highest=highest)
 
     def coordinate(self, value: float) -> float:
         """Coordinate of a value in `unit`."""

@@ -21,11 +21,15 @@ Progress = Callable[[float], None]
 class Normal:
     """Normal equations at x, H dx = -g: by test and column of the residuals, so that they can be summed as wanted."""
 
-    def __init__(self, problem: Problem, x: Array, report: Progress) -> None:
-        """Evaluate residuals and their derivatives at x (p,)."""
+    def __init__(self, problem: Problem, x: Array, report: Progress, known: "Normal | None" = None) -> None:
+        """Evaluate residuals and their derivatives at x (p,), those by unknowns of `known` are taken from there."""
         self.problem = problem
         self.rest = problem.whitened(x)
-        self.slope = problem.slopes(x, np.ones(len(x), bool), report)
+        old, fresh = _shared(problem, known)
+        self.slope = problem.slopes(x, fresh, report)
+        if known is not None:
+            for slope, before in zip(self.slope, known.slope, strict=True):
+                slope[..., ~fresh] = before[..., old]
         self.power = [np.ones(r.shape) for r in self.rest]
         self.bias: Bias | None = None
 
@@ -68,20 +72,42 @@ class Normal:
 class Bias:
     """What noise adds to the normal equations: the mean product of its changes in slopes and residuals."""
 
-    def __init__(self, normal: Normal, replicas: Sequence[Problem], x: Array, reports: Sequence[Progress]) -> None:
-        """Evaluate the same at x with more noise in the tests, as often as there are replicas."""
-        free = np.ones(len(x), bool)
-        self.changes = []
-        for replica, report in zip(replicas, reports, strict=True):
-            noisy = zip(replica.whitened(x), replica.slopes(x, free, report), strict=True)
+    def __init__(
+        self,
+        normal: Normal,
+        replicas: Sequence[Problem],
+        x: Array,
+        reports: Sequence[Progress],
+        known: Normal | None = None,
+    ) -> None:
+        """Evaluate the same at x with more noise in the tests, as often as there are replicas.
+
+        Changes of derivatives by unknowns of `known`, which is corrected, are taken from there.
+        """
+        old, fresh = _shared(normal.problem, known)
+        self.changes: list[list[tuple[Complex, Complex]]] = []
+        for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
+            noisy = zip(replica.whitened(x), replica.slopes(x, fresh, report), strict=True)
             clean = zip(normal.rest, normal.slope, strict=True)
-            self.changes.append([(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)])
+            changes = [(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)]
+            if known is not None and known.bias is not None:
+                for (_, change), (_, before) in zip(changes, known.bias.changes[i], strict=True):
+                    change[..., ~fresh] = before[..., old]
+            self.changes.append(changes)
 
     def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
         added = [squares(c[test][1][:, columns], c[test][0][:, columns], power) for c in self.changes]
         matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
         return matrix, right
+
+
+def _shared(problem: Problem, known: Normal | None) -> tuple[list[int], Mask]:
+    """Places in `known` of the unknowns that both have, in the problem's order; and which (p,) `known` lacks."""
+    if known is None:
+        return [], np.ones(len(problem.names), bool)
+    place = {name: i for i, name in enumerate(known.problem.names)}
+    return [place[n] for n in problem.names if n in place], np.array([n not in place for n in problem.names])
 
 
 def squares(slope: Complex, rest: Complex, power: Array) -> tuple[Array, Array]:

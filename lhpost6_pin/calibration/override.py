@@ -1,10 +1,11 @@
 """The override file that a calibration leaves: the numbers found, with where they come from."""
 
-import json
+from dataclasses import replace
 from pathlib import Path
 
 from ..files import write_whole
-from ..parameters import Value
+from ..machine_toml import quantity_toml, section_of, sections_toml
+from ..parameters import Quantity
 from .knobs import knob_changes
 from .result import Calibration
 
@@ -27,39 +28,21 @@ def save_override(calibration: Calibration, path: Path) -> Path:
             known = stated if isinstance(stated, tuple) else (stated or 0.0,)
             deviations.setdefault(name, list(known))[max(component, 0)] = sd
     source = f"calibrated from campaign {calibration.campaign}: {', '.join(calibration.tests)}"
-    entries: dict[str, str] = {}
+    entries: dict[str, Quantity] = {}
     for name, value in values.items():
-        spread = deviations[name] if isinstance(value, list) else deviations[name][0]
-        entries[name] = _entry(value, machine.parameters[name].unit, "calibrated", source, spread)
+        spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
+        number = tuple(value) if isinstance(value, list) else value
+        entries[name] = Quantity(number, machine.parameters[name].unit, "calibrated", source, spread)
     for name, quantity in machine.parameters.items():
         earlier = quantity.evidence in ("override", "calibrated") and not name.endswith(".valves")  # those of the tests
         if earlier and name not in entries:
-            entries[name] = _entry(quantity.value, quantity.unit, quantity.evidence, quantity.source, quantity.sd)
-    kinds, names = ({getattr(c, which) for c in machine.components} for which in ("kind", "name"))
+            entries[name] = replace(quantity, printed=None)
     groups: dict[str, list[str]] = {}
-    for name, entry in entries.items():
-        section, _, key = name.partition(".")
-        group = f"kind.{section}" if section in kinds else f"component.{section}" if section in names else section
-        groups.setdefault(group, []).append(f"{key} = {{ {entry} }}")
-    title = " ".join(f"# Numbers of {machine.name}, {source}.".split())  # on one line
-    lines = [title, "# sd is the predicted standard deviation."]
-    for group, rows in groups.items():
-        lines += ["", f"[{group}]", *rows]
+    for name, quantity in entries.items():
+        section, key = section_of(machine, name)
+        groups.setdefault(section, []).append(f"{key} = {quantity_toml(quantity)}")
+    title = " ".join(f"Numbers of {machine.name}, {source}.".split())  # on one line
     with write_whole(path) as beside:
-        beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        text = sections_toml([title, "sd is the predicted standard deviation."], groups)
+        beside.write_text(text, encoding="utf-8")
     return path
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)  # TOML's basic strings are JSON's
-
-
-def _entry(value: Value | list[float], unit: str, evidence: str, source: str, sd: Value | list[float] | None) -> str:
-    spread = "" if sd is None else f", sd = {_toml(sd)}"
-    return f'value = {_toml(value)}, unit = "{unit}", evidence = "{evidence}", source = {_text(source)}{spread}'
-
-
-def _toml(value: Value | list[float]) -> str:
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(repr(float(v)) for v in value)}]"
-    return repr(float(value))

@@ -18,7 +18,8 @@ from ..records import channel_name, layout_faults
 from ..residuals import Measured, make_measured
 from ..sensors import Sensors, add_noise
 from .errors import CHANNELS
-from .problem import Comparison, Problem
+from .knobs import Knob
+from .problem import KINDS, Comparison, Problem
 from .spectra import spectrum_of
 
 __all__ = ["Prepared", "prepare_problem"]
@@ -32,6 +33,17 @@ class Prepared:
     replicas: tuple[Problem, ...]  # each with all tests once more
     noisy: tuple[Measured, ...]  # the tests in order, as often as the whitener has draws
 
+    def only(self, places: Sequence[int]) -> "Prepared":
+        """The same with some of the tests."""
+        count = len(self.problem.tests)
+        noisy = tuple(t for i, t in enumerate(self.noisy) if i % count in places)
+        return Prepared(self.problem.only(places), tuple(r.only(places) for r in self.replicas), noisy)
+
+    def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Prepared":
+        """The same tests and noise with another machine, or other knobs."""
+        replicas = tuple(r.with_machine(machine, knobs) for r in self.replicas)
+        return Prepared(self.problem.with_machine(machine, knobs), replicas, self.noisy)
+
 
 def prepare_problem(
     machine: Machine,
@@ -39,6 +51,7 @@ def prepare_problem(
     sensors: Sensors,
     numbers: Parameters,
     *,
+    kinds: tuple[str, ...] = KINDS,
     seed: int = 0,
     jobs: int = -1,
 ) -> Prepared:
@@ -64,7 +77,7 @@ def prepare_problem(
         _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
     ]
     more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
-    problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs)
+    problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds)
     replicas = tuple(problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again))
     return Prepared(problem, replicas, tuple(noisy))
 

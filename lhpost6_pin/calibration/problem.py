@@ -20,10 +20,14 @@ from .errors import corrected, sensor_unknowns
 from .knobs import Knob, machine_knobs, with_knobs
 from .spectra import make_whitener, spectrum_of
 
-__all__ = ["Comparison", "Problem", "Term"]
+__all__ = ["KINDS", "Base", "Comparison", "Problem", "Term"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+KINDS = ("wrench", "flow", "gas", "force")
+"""Kinds of residuals that are compared unless others are asked for."""
 
 
 class Comparison(NamedTuple):
@@ -47,7 +51,9 @@ _SHOWS_IN = {
     "chamber_pressure_a": ("flow", "force"),
     "chamber_pressure_b": ("flow", "force"),
     "strut_pressure": ("gas",),
-    "spool_position": ("flow",),
+    "spool_position": ("flow", "servo"),
+    "supply_pressure": ("supply",),
+    "spool_command": ("servo",),
     "platen_displacement": ("wrench", "flow", "gas"),
     "platen_velocity": ("wrench", "flow", "gas"),
     "platen_acceleration": ("wrench", "flow", "gas"),
@@ -66,28 +72,31 @@ class Problem:
         comparison: Comparison,
         *,
         jobs: int = -1,
+        kinds: tuple[str, ...] = KINDS,
     ) -> None:
         """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added.
 
         All tests have the same channels. Raises RecordError where they are too short together.
         """
-        self.tests, self.comparison, self.jobs = tuple(tests), comparison, jobs
-        self.unknowns = sensor_unknowns(machine, sensors, tests[0])
+        self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
+        unknowns = sensor_unknowns(machine, sensors, tests[0])
+        told = {"supply_pressure": "supply", "spool_command": "servo"}  # by one kind of residual alone
+        self.unknowns = tuple(u for u in unknowns if told.get(u.channel, kinds[0]) in kinds)
         self._turn(machine, machine_knobs(machine))
         plant = make_plant(machine)
-        clean = [evaluate_residuals(plant, t) for t in tests]
+        clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
         noise: list[list[Complex]] = [[] for _ in tests]
-        self.frequency = [self._bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
+        self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
         for i, test in enumerate(noisy):
             at = i % len(tests)
-            noise[at].append(self._bins(_less(evaluate_residuals(plant, test), clean[at]), test.dt)[0])
+            noise[at].append(self.bins(_less(evaluate_residuals(plant, test, kinds), clean[at]), test.dt)[0])
         for found, test, base in zip(noise, tests, clean, strict=True):
             # what friction remembers is not known better than by its memory along the path as measured, and quieted;
             # that counts as much as all draws together
-            other = evaluate_residuals(plant, replace(test, path=None))
+            other = evaluate_residuals(plant, replace(test, path=None), kinds)
             draws = len(found)
-            found.append(self._bins(_less(other, base), test.dt)[0] * np.sqrt(draws))
+            found.append(self.bins(_less(other, base), test.dt)[0] * np.sqrt(draws))
             found[:] = [bins * np.sqrt((draws + 1) / draws) for bins in found]
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
@@ -95,6 +104,8 @@ class Problem:
         self.machine, self.knobs = machine, knobs
         self.names = (*(k.name for k in knobs), *(u.name for u in self.unknowns))
         self.prior = np.array([*(k.sd for k in knobs), *(u.sd for u in self.unknowns)])
+        share = self.comparison.step
+        self.step = np.array([*(k.step or share * k.sd for k in knobs), *(share * u.sd for u in self.unknowns)])
         self.lowest = np.array([*(k.lowest for k in knobs), *(-np.inf for _ in self.unknowns)])
         self.highest = np.array([*(k.highest for k in knobs), *(np.inf for _ in self.unknowns)])
         self.terms = self._terms()
@@ -111,6 +122,14 @@ class Problem:
         other.tests = tuple(tests)
         return other
 
+    def only(self, places: Sequence[int]) -> "Problem":
+        """The same problem with some of its tests; noise is weighed as with all."""
+        other = copy(self)
+        other.tests = tuple(self.tests[t] for t in places)
+        other.frequency = [self.frequency[t] for t in places]
+        other.whitener = self.whitener._replace(factor=self.whitener.factor[list(places)])
+        return other
+
     def rows(self, kind: str, *places: int) -> NDArray[np.bool_]:
         """Columns of the stacked residuals that are of a kind, all or those at some places."""
         at = RESIDUALS.index(kind)
@@ -124,13 +143,13 @@ class Problem:
         plant, tests = self.plant_at(x), self._corrected(x)
         found = []
         for i, test in enumerate(tests):
-            bins, f = self._bins(evaluate_residuals(plant, test), test.dt)
+            bins, f = self.bins(evaluate_residuals(plant, test, self.kinds), test.dt)
             found.append(self.whitener.apply(i, bins[..., None], f)[..., 0])
         return found
 
     def slopes(self, x: Array, free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Complex]:
         """Derivatives (m, c, p) of the whitened bins of every test, by differences; zero where not free."""
-        base = _Base(self, x)
+        base = Base(self, x)
         terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
         out = [np.zeros((len(f), sum(self.widths), len(x)), np.complex128) for f in self.frequency]
         with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
@@ -139,32 +158,42 @@ class Problem:
                     for slope, change in zip(out, bins, strict=True):
                         slope[:, :, i] = change
                 progress((done + 1) / len(terms))
-        for slope in out:
+        for i, (slope, f) in enumerate(zip(out, self.frequency, strict=True)):
+            slope[:, :, free] = self.whitener.apply(i, slope[:, :, free], f)
             slope[:, :, ~free] = 0.0
-        return [self.whitener.apply(i, slope, f) for i, (slope, f) in enumerate(zip(out, self.frequency, strict=True))]
+        return out
 
-    def _difference(self, x: Array, base: "_Base", term: Term) -> list[tuple[int, list[Complex]]]:
+    def _difference(self, x: Array, base: "Base", term: Term) -> list[tuple[int, list[Complex]]]:
         knobs = len(self.knobs)
+        step = np.where(x + self.step > self.highest, -self.step, self.step)
         more = np.zeros(len(x))
         for i, _ in term.members:
-            more[i] = self.comparison.step * self.prior[i]
+            more[i] = step[i]
         if term.members[0][0] < knobs:
-            plant, tests = self.plant_at(x + more), base.tests
+            changes = self.change(base, self.plant_at(x + more), term.residuals)
         else:  # what is left of an error after correction is as good as the error itself
-            plant, tests = base.plant, [corrected(t, self.unknowns, more[knobs:]) for t in base.tests]
-        known = path_key(plant) == base.key
-        changes = []
-        for k, test in enumerate(tests):
-            path = base.paths[k] if known and test.motion is base.tests[k].motion else None
-            after = evaluate_residuals(plant, test, term.residuals, path=path)
-            changes.append(self._bins(_less(after, base.residuals[k]), test.dt)[0])
+            tests = [corrected(t, self.unknowns, more[knobs:]) for t in base.tests]
+            changes = self.change(base, base.plant, term.residuals, tests)
         out = []
         for i, place in term.members:
             rows = np.ones(sum(self.widths), bool)
             if place >= 0:
-                rows = self.rows("gas", place) if term.residuals == ("gas",) else self._rows_of_actuator(place)
-            out.append((i, [np.where(rows, c, 0.0) / (self.comparison.step * self.prior[i]) for c in changes]))
+                rows = self.rows("gas", place) if term.residuals == ("gas",) else self.rows_of_actuator(place)
+            out.append((i, [np.where(rows, c, 0.0) / step[i] for c in changes]))
         return out
+
+    def change(
+        self, base: "Base", plant: Plant, residuals: tuple[str, ...], tests: Sequence[Measured] | None = None
+    ) -> list[Complex]:
+        """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
+        known = path_key(plant) == base.key
+        kinds = tuple(k for k in residuals if k in self.kinds)
+        changes = []
+        for k, test in enumerate(tests or base.tests):
+            path = base.paths[k] if known and test.motion is base.tests[k].motion else None
+            after = evaluate_residuals(plant, test, kinds, path=path)
+            changes.append(self.bins(_less(after, base.residuals[k]), test.dt)[0])
+        return changes
 
     def plant_at(self, x: Array) -> Plant:
         """Plant with its knobs turned to x (p,)."""
@@ -173,7 +202,7 @@ class Problem:
     def _corrected(self, x: Array) -> list[Measured]:
         return [corrected(t, self.unknowns, x[len(self.knobs) :]) for t in self.tests]
 
-    def _bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
+    def bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
         """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
         c = self.comparison
         bins, f = spectrum_of(residuals.stacked(), dt, c.bands[0], c.bands[-1], c.edge)
@@ -187,9 +216,10 @@ class Problem:
                 at += part.shape[1]
         return out, f
 
-    def _rows_of_actuator(self, place: int) -> NDArray[np.bool_]:
+    def rows_of_actuator(self, place: int) -> NDArray[np.bool_]:
+        """Columns of the stacked residuals that are of one actuator's chambers."""
         names, double = self.machine.actuator_names, self.machine.double_acting
-        rows = self.rows("flow", place) | self.rows("force", place)
+        rows = self.rows("flow", place) | self.rows("force", place) | self.rows("servo", place)
         if names[place] in double:
             rows |= self.rows("flow", len(names) + double.index(names[place]))
         return rows
@@ -208,15 +238,16 @@ class Problem:
         return tuple(terms)
 
 
-class _Base:
+class Base:
     """What differences are taken from: everything evaluated once at x."""
 
     def __init__(self, problem: Problem, x: Array) -> None:
+        """Evaluate a problem's tests at x (p,)."""
         self.plant, self.tests = problem.plant_at(x), problem._corrected(x)
         self.key = path_key(self.plant)
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
-        self.residuals = [evaluate_residuals(self.plant, t, path=p) for t, p in pairs]
+        self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
 
 
 def _less(after: Residuals, before: Residuals) -> Residuals:

@@ -12,7 +12,7 @@ dE/dt = h(P) Q - P A dL_c/dt exactly. Source: report Section 4.1.3; energy deriv
 
 import math
 
-from ..compiled import compiled
+from ..compiled import compiled, compiled_inline
 from .orifice import port_flow
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "flows_double",
     "flows_single",
     "piston_force",
+    "pressure_rises",
 ]
 
 
@@ -95,6 +96,38 @@ def flows_single(
     return flow - leakage * pressure_a, slope
 
 
+@compiled_inline
+def pressure_rises(
+    flow_a: float,
+    flow_b: float,
+    slope_a: float,
+    slope_b: float,
+    across: float,
+    stroke: float,
+    dt: float,
+    area_a: float,
+    area_b: float,
+    rise_per_oil_a: float,
+    rise_per_oil_b: float,
+) -> tuple[float, float]:
+    """Rises of both pressures over one linearly implicit step [Pa].
+
+    Flows into the chambers [m3/s] at the step's start; slope_* [m3/s/Pa] theirs with their own pressure, but for the
+    leak across the piston, whose slope is `across`; rise_per_oil_* [Pa/m3] at mid-step, zero for a chamber not there.
+    """
+    rise_a = rise_per_oil_a * (dt * flow_a - area_a * stroke)
+    rise_b = rise_per_oil_b * (dt * flow_b + area_b * stroke)
+    half_a = 0.5 * dt * rise_per_oil_a
+    half_b = 0.5 * dt * rise_per_oil_b
+    # (I - dt/2 J) rise = dt rate, J = d(rates)/d(pressures)
+    m_aa = 1.0 - half_a * (slope_a - across)
+    m_ab = -half_a * across
+    m_ba = -half_b * across
+    m_bb = 1.0 - half_b * (slope_b - across)
+    scale = 1.0 / (m_aa * m_bb - m_ab * m_ba)
+    return scale * (m_bb * rise_a - m_ab * rise_b), scale * (m_aa * rise_b - m_ba * rise_a)
+
+
 @compiled
 def advance_double(
     opened: float,
@@ -125,22 +158,20 @@ def advance_double(
     q_a, q_b, slope_a, slope_b = flows_double(
         opened, pressure_a, pressure_b, k_pa, k_bt, k_at, k_pb, leakage, supply, back, linear_below
     )
-    rise_per_oil_a = bulk / (area_a * (length_a + 0.5 * stroke))  # [Pa/m3]
-    rise_per_oil_b = bulk / (area_b * (length_b - 0.5 * stroke))
-    rise_a = rise_per_oil_a * (dt * q_a - area_a * stroke)
-    rise_b = rise_per_oil_b * (dt * q_b + area_b * stroke)
-    half_a = 0.5 * dt * rise_per_oil_a
-    half_b = 0.5 * dt * rise_per_oil_b
-    # (I - dt/2 J) rise = dt rate, J = d(rates)/d(pressures)
-    m_aa = 1.0 - half_a * (slope_a - leakage)
-    m_ab = -half_a * leakage
-    m_ba = -half_b * leakage
-    m_bb = 1.0 - half_b * (slope_b - leakage)
-    scale = 1.0 / (m_aa * m_bb - m_ab * m_ba)
-    return (
-        pressure_a + scale * (m_bb * rise_a - m_ab * rise_b),
-        pressure_b + scale * (m_aa * rise_b - m_ba * rise_a),
+    rise_a, rise_b = pressure_rises(
+        q_a,
+        q_b,
+        slope_a,
+        slope_b,
+        leakage,
+        stroke,
+        dt,
+        area_a,
+        area_b,
+        bulk / (area_a * (length_a + 0.5 * stroke)),
+        bulk / (area_b * (length_b - 0.5 * stroke)),
     )
+    return pressure_a + rise_a, pressure_b + rise_b
 
 
 @compiled

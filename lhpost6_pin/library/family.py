@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError, UnknownNameError
 from ..files import models_folder
+from ..ports import PLATEN_PORTS
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -39,7 +40,7 @@ class Family:
     name: str
     title: str
     equation: str
-    acts_on: tuple[str, ...]  # "actuator", "double-acting", "single-acting", "bearing", "strut", "platen", "supply"
+    acts_on: tuple[str, ...]  # kinds of components, "platen", "axis" or "level axis" of the platen, "supply"
     shapes: tuple[Shape, ...]  # the amplitude first
     shows_in: tuple[str, ...]  # kinds of residuals
     confused_with: tuple[str, ...]
@@ -47,7 +48,7 @@ class Family:
     twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
 
     def components(self, machine: "Machine") -> tuple[str, ...]:
-        """Names of all components of a machine that it can act on; ``platen`` or ``supply`` where it has none."""
+        """Names of all components of a machine that it can act on; also ``platen``, its axes, and ``supply``."""
         found = []
         for actuator in machine.actuators:
             acting = {"actuator", "double-acting" if actuator.area_b is not None else "single-acting"}
@@ -56,16 +57,19 @@ class Family:
                 found.append(actuator.name)
         if "strut" in self.acts_on:
             found += machine.strut_names
-        return tuple(found) + tuple(word for word in ("platen", "supply") if word in self.acts_on)
+        found += [word for word in ("platen", "supply") if word in self.acts_on]
+        axes = PLATEN_PORTS if "axis" in self.acts_on else PLATEN_PORTS[:2] if "level axis" in self.acts_on else ()
+        found += [axis for axis in axes if machine.motion in ("free", axis.removeprefix("platen."))]
+        return tuple(found)
 
     def groups(self, machine: "Machine") -> tuple[tuple[str, ...], ...]:
-        """Sets of components that a search tries: all of them, all of each kind, and each alone."""
+        """Sets of components that a search tries: all but axes of the platen, all of each kind, and each alone."""
         names = self.components(machine)
         kinds: dict[str, list[str]] = {}
         for component in machine.components:
             if component.name in names:
                 kinds.setdefault(component.kind, []).append(component.name)
-        found = [names]
+        found = [tuple(name for name in names if not name.startswith("platen."))]
         if self.twins == "kind":
             found += [tuple(members) for members in kinds.values()]
             found += [(name,) for name in names]

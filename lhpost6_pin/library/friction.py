@@ -1,16 +1,98 @@
-"""Friction beyond the report's Bouc-Wen and viscous laws."""
+"""Friction and drag beyond the report's Bouc-Wen and viscous laws.
+
+What rubs as the report's friction does has its yield and shape: those of the component's seal, or of its pad.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+from ..ports import SWIVEL_TURNS
 
 if TYPE_CHECKING:
     from ..machine import Machine
 
 __all__ = ["BUILD"]
 
+Values = Mapping[str, float]
 
-def _local_viscous(machine: "Machine", components: Sequence[str], values: Mapping[str, float]) -> Any:
+
+def _each(machine: "Machine", components: Sequence[str]) -> list[Any]:
+    known = {c.name: c for c in machine.components}
+    return [known[name] for name in components]
+
+
+def _seal(component: Any) -> tuple[float, float]:
+    return component.seal_yield, component.seal_shape
+
+
+def _stribeck(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    rows = [(values["friction"], *_seal(c), values["speed"]) for c in _each(machine, components)]
+    return "stribeck", components, rows
+
+
+def _asymmetric(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "asymmetric", components, [(values["friction"], *_seal(c)) for c in _each(machine, components)]
+
+
+def _warm_up(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "warm_up", components, [(values["growth"], *_seal(c), values["memory"]) for c in _each(machine, components)]
+
+
+def _load_dependent(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    ports, rows = [], []
+    for c in _each(machine, components):
+        slides = c.mount == "bearing"  # under its load the platen slides on the pad; else the piston's seal feels it
+        ports.append(c.name if slides else f"{c.name} -")
+        rubs = (c.pad_yield, c.pad_shape) if slides else _seal(c)
+        rows.append((values["coefficient"], *rubs, c.area_a, c.area_b or 0.0))
+    return "load_friction", ports, rows
+
+
+def _backlash(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return (
+        "backlash",
+        components,
+        [(values["friction"], c.seal_yield, values["gap"]) for c in _each(machine, components)],
+    )
+
+
+def _strut(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "bouc_wen_1d", components, [(values["friction"], *_seal(c)) for c in _each(machine, components)]
+
+
+def _bearing(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    rows = [(values["friction"], c.pad_yield, c.pad_shape) for c in _each(machine, components)]
+    return "bouc_wen_2d", components, rows
+
+
+def _swivel(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    ends = [f"{c}.{SWIVEL_TURNS[k]} {c}.{SWIVEL_TURNS[k + 1]}" for c in components for k in (0, 2)]
+    shapes = [c.seal_shape for c in _each(machine, components) for _ in range(2)]
+    return "bouc_wen_2d", ends, [(values["moment"], values["yield_turn"], shape) for shape in shapes]
+
+
+def _viscous(machine: "Machine", components: Sequence[str], values: Values) -> Any:
     return "viscous", components, [(values["coefficient"],)] * len(components)
 
 
-BUILD = {"local_viscous": _local_viscous}
+def _quadratic(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "drag", components, [(values["coefficient"], 2.0)] * len(components)
+
+
+def _power(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "drag", components, [(values["force"], values["exponent"])] * len(components)
+
+
+BUILD = {
+    "stribeck_friction": _stribeck,
+    "asymmetric_friction": _asymmetric,
+    "friction_warm_up": _warm_up,
+    "load_dependent_friction": _load_dependent,
+    "backlash": _backlash,
+    "strut_friction": _strut,
+    "bearing_friction": _bearing,
+    "swivel_friction": _swivel,
+    "local_viscous": _viscous,
+    "quadratic_drag": _quadratic,
+    "power_law_viscous": _power,
+}

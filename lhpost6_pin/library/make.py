@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from ..effects import Effect
 from ..errors import ParameterError
 from ..parameters import EffectEntry, Quantity, to_unit
-from . import friction, oil
+from . import friction, motion, oil
 from .family import Family, find_family
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ Made = tuple[str, Sequence[str], Sequence[tuple[float, ...]]]
 Build = Callable[["Machine", Sequence[str], Mapping[str, float]], Made]
 """(machine, components, values) -> law, ports, params."""
 
-_BUILD: Mapping[str, Build] = {**friction.BUILD, **oil.BUILD}
+_BUILD: Mapping[str, Build] = {**friction.BUILD, **motion.BUILD, **oil.BUILD}
 
 
 def make_effect(
@@ -30,14 +30,14 @@ def make_effect(
     name: str = "",
     source: str = "given by hand",
 ) -> Effect:
-    """An effect of a family on some components (none: all that it can act on); values in SI, typical ones else.
+    """An effect of a family on some components (none: the first of its groups); values in SI, typical ones else.
 
     Raises UnknownNameError for a family that the library has not; ParameterError for a component that it cannot act on
     and for a number that it does not have or that is out of its bounds.
     """
     known = find_family(family)
     possible = known.components(machine)
-    chosen = tuple(components) or possible
+    chosen = tuple(components) or next(iter(known.groups(machine)), ())
     if wrong := [c for c in chosen if c not in possible]:
         raise ParameterError(
             f"{family}: cannot act on {', '.join(wrong)}; it can on {', '.join(possible) or 'nothing'}"
@@ -82,7 +82,10 @@ def _numbers(family: Family, values: Mapping[str, float]) -> dict[str, float]:
     found = {}
     for key, shape in shapes.items():
         value = float(values.get(key, shape.typical))
-        if not shape.low <= value <= shape.high:
+        rounding = 1e-6 * (shape.high - shape.low)  # of a search that ends at a bound
+        if shape.low - rounding <= value <= shape.high + rounding:
+            value = min(max(value, shape.low), shape.high)
+        else:
             raise ParameterError(
                 f"{family.name}: {key} = {value:g} {shape.unit} is not between {shape.low:g} and {shape.high:g}"
             )

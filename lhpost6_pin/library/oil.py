@@ -1,6 +1,6 @@
-"""What oil does beyond the report's equations."""
+"""What oil does beyond the report's equations, in actuators, valves and supply."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -9,8 +9,29 @@ if TYPE_CHECKING:
 __all__ = ["BUILD"]
 
 
-def _piston_leakage(machine: "Machine", components: Sequence[str], values: Mapping[str, float]) -> Any:
-    return "extra_leakage", components, [(values["leakage"],)] * len(components)
+def _altering(law: str, *names: str) -> Callable[..., Any]:
+    """A family whose numbers are the law's, in this order, alike on all its components."""
+
+    def build(machine: "Machine", components: Sequence[str], values: Mapping[str, float]) -> Any:
+        return law, components, [tuple(values[name] for name in names)] * len(components)
+
+    return build
 
 
-BUILD = {"piston_leakage": _piston_leakage}
+BUILD = {
+    "piston_leakage": _altering("extra_leakage", "leakage"),
+    "turbulent_leakage": _altering("turbulent_leakage", "coefficient"),
+    "external_leakage": _altering("external_leakage", "leakage"),
+    "entrained_air": _altering("entrained_air", "air", "polytropic_index"),
+    "dead_volume": _altering("dead_volume", "volume"),
+    "valve_deadband": _altering("deadband", "overlap"),
+    "null_leakage": _altering("null_leakage", "leakage", "width"),
+    "spool_null_bias": _altering("null_bias", "bias"),
+    "spool_lag": _altering("valve_lag", "time"),
+    "transport_delay": _altering("valve_delay", "delay"),
+    "supply_droop": _altering("supply_droop", "droop", "time", "weight"),
+    "return_back_pressure": _altering("back_pressure", "rise", "time"),
+    "flow_curve_error": _altering("flow_curve", "error", "side", "power"),
+    "cavitation": _altering("cavitation", "share", "vapour_pressure"),
+    "line_dynamics": _altering("line", "time", "damping"),
+}

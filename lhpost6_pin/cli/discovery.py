@@ -1,0 +1,57 @@
+"""The command that finds what the model lacks: discover."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import ParameterError
+from .app import app, progress_bar
+from .options import MachineName, Out, SensorsName, find_machine, folder_for
+from .runs import repeating_command
+
+__all__ = ["discover"]
+
+
+@app.command()
+def discover(
+    campaign: Annotated[Path, typer.Argument(help="Folder of records of one machine in one state.")],
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", "--override", help="TOML file of numbers and effects to replace."),
+    ] = None,
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(help="Test not to be searched, which proves what was found; may be given again. none: no test."),
+    ] = None,
+    out: Out = None,
+    machine: MachineName = "lhpost6",
+    sensors: SensorsName = "lhpost6",
+    seed: Annotated[int, typer.Option(help="Of the simulated sensor noise.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
+) -> None:
+    """Find the effect that the model lacks, name it, add it, prove it; leaves verdict.json, model.toml, report.html."""
+    from ..campaign import load_campaign
+    from ..discover import discover as search
+    from ..discover import save_verdict
+    from ..discovery_table import print_discovery
+    from ..machine_toml import save_machine_toml
+    from ..report.discover_report import write_discover_report
+    from ..sensors import load_sensors
+
+    if jobs == 0:
+        raise ParameterError("--jobs 0: give a number of threads, or -1 for as many as there are cores")
+    table = find_machine(machine, model)
+    known, tests = load_sensors(sensors), load_campaign(campaign, table)
+    held = None if hold_out is None else [] if hold_out == ["none"] else hold_out
+    folder = folder_for(out, f"{tests.name}_discovery")
+    with progress_bar(f"searching {tests.name} for what {table.name} lacks") as progress:
+        found = search(table, tests, known, hold_out=held, seed=seed, jobs=jobs, progress=progress)
+    command = repeating_command()
+    paths = [save_verdict(found, folder / "verdict.json")]
+    title = f"{table.name} with what was found in campaign {tests.name}; {command}"
+    paths.append(save_machine_toml(found.fitted, folder / "model.toml", title))
+    paths.append(write_discover_report(found, folder / "report.html", command=command))
+    print_discovery(found)
+    for path in paths:
+        typer.echo(f"wrote {path}")

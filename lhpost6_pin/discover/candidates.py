@@ -1,0 +1,71 @@
+"""Candidates: effects of the library as a search tries them, each a family on some components with some shape."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+from ..calibration import Knob
+from ..library import Family, Shape, families
+from ..machine import Machine
+from ..residuals import RESIDUALS
+
+__all__ = ["Candidate", "list_candidates"]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A family on a group of components, with its shapes at given values."""
+
+    family: Family
+    components: tuple[str, ...]
+    shape: tuple[tuple[str, float], ...]  # (name, value) of what is no amplitude
+
+    @property
+    def name(self) -> str:
+        """Name of the effect in a machine."""
+        return f"{self.family.name}_{'_'.join(self.components)}"
+
+    @property
+    def amplitudes(self) -> tuple[Shape, ...]:
+        """Numbers with which the effect vanishes."""
+        return tuple(s for s in self.family.shapes if s.amplitude)
+
+    def at(self, components: tuple[str, ...]) -> "Candidate":
+        """The same on other components."""
+        return replace(self, components=components)
+
+    def on(self, machine: Machine, amplitudes: tuple[float, ...]) -> Machine:
+        """The machine with this effect, amplitudes in the order of `amplitudes`."""
+        values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
+        return machine.with_effect(self.family.name, self.components, name=self.name, **values)
+
+    def knobs(self, amplitudes: tuple[float, ...], spread: float) -> tuple[Knob, ...]:
+        """Unknowns of a fit that starts here: amplitudes within `spread` typical ones, shapes by their logarithm."""
+        values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
+        found = []
+        for s in self.family.shapes:
+            value = values[s.name]
+            relative = not s.amplitude and s.low > 0.0
+            knob = Knob(
+                name=f"{self.name}.{s.name}",
+                paths=((f"effect.{self.name}.{s.name}", -1),),
+                unit=s.unit,
+                value=value,
+                sd=1.0 if relative else spread * s.typical,
+                relative=relative,
+                shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
+                step=None if relative else s.typical,
+            )
+            found.append(knob.within(s.low, s.high))
+        return tuple(found)
+
+
+def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
+    """All candidates of the library for a machine: each family at each start of its shapes, on each group together."""
+    found = []
+    for family in families().values():
+        shapes = [s for s in family.shapes if not s.amplitude]
+        names = [s.name for s in shapes]
+        for values in product(*(s.start for s in shapes)):
+            shape = tuple(zip(names, values, strict=True))
+            found.append(tuple(Candidate(family, group, shape) for group in family.groups(machine)))
+    return tuple(group for group in found if group)

@@ -1,0 +1,246 @@
+"""The search: refit, screen the library, add what passes, refit everything jointly, and again; then prune.
+
+A candidate passes if it gains enough, on tests that it was not fitted on, too, and explains enough of what is more than
+noise. Among those that pass, the one with the largest gain is added and its numbers are fitted together with all known
+parameters and sensor errors.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from ..calibration.fit import Solution, solve
+from ..calibration.knobs import with_knobs
+from ..calibration.prepare import Prepared
+from ..calibration.problem import Base, Problem
+from ..machine import Machine
+from ..parameters import Parameters
+from .background import make_background, scatter_of
+from .candidates import Candidate, list_candidates
+from .columns import columns_of
+from .screen import Background, Score, make_block, real_bins, score
+
+__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand"]
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+SCATTER = (("piston_leakage", "leakage"), ("local_viscous", "viscous"), ("bearing_friction", "pad_friction"))
+"""Effects by which twins differ, and the number of theirs that is shared."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A candidate with what it explains, and whether it may be added."""
+
+    candidate: Candidate
+    score: Score
+    closure: float  # share of what is more than noise
+    refused: str  # why it is not added; empty if it may be
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A family that was fitted in full for the same place, and how far it stands behind the one that was added."""
+
+    candidate: Candidate
+    behind: float  # log-likelihood; 0 for the one added
+
+
+@dataclass(frozen=True)
+class Added:
+    """An effect that the search has added."""
+
+    candidate: Candidate
+    gain: float  # linear, of all candidates at that time
+    tried: int  # candidates in that round
+    contest: tuple[Contest, ...]
+
+
+@dataclass(frozen=True)
+class Round:
+    """One screening of the library; candidates by falling gain."""
+
+    scored: tuple[Scored, ...]
+    misfit: float  # mean square of the whitened residuals before it
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The search's place, ready for candidates."""
+
+    base: Base
+    background: Background
+
+
+@dataclass
+class Search:
+    """Where a search stands, and how it came there."""
+
+    ready: Prepared
+    solution: Solution
+    refit: Solution  # without any effect
+    added: list[Added] = field(default_factory=list)
+    rounds: list[Round] = field(default_factory=list)
+
+    @property
+    def problem(self) -> Problem:
+        """The problem with the effects added."""
+        return self.ready.problem
+
+
+def search(
+    ready: Prepared, calibration: Parameters, numbers: Parameters, progress: Progress
+) -> tuple[Search, Standing]:
+    """Search the library for what the machine of a prepared campaign lacks; also what is needed to go on from there.
+
+    calibration and numbers are those of `models/procedures`.
+    """
+    start = np.zeros(len(ready.problem.prior))
+    first = solve(ready.problem, ready.replicas, calibration, start, _part(progress, 0.0, 0.4))
+    found = Search(ready, first, first)
+    most = int(numbers.number("accept.effects"))
+    for k in range(most + 1):
+        begin, end = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
+        standing = stand(found, numbers)
+        one = screen(found, standing, numbers, _part(progress, begin, 0.5 * (begin + end)))
+        found.rounds.append(one)
+        passed = [s for s in one.scored if not s.refused]
+        if not passed or k == most:
+            break
+        found = _add(found, passed, calibration, numbers, _part(progress, 0.5 * (begin + end), end))
+    progress(1.0)
+    return found, standing
+
+
+def stand(found: Search, numbers: Parameters) -> Standing:
+    """Normal equations of the background about the solution."""
+    problem, solution = found.problem, found.solution
+    base = Base(problem, solution.at)
+    scatter = scatter_of(problem, SCATTER, numbers.number("scatter.share"))
+    return Standing(base, make_background(problem, solution.normal, solution.at, base, scatter))
+
+
+def screen(found: Search, standing: Standing, numbers: Parameters, progress: Progress) -> Round:
+    """Score all candidates."""
+    problem, base, background = found.problem, standing.base, standing.background
+    taken = {a.candidate.name for a in found.added}
+    groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
+    results: list[tuple[Candidate, Score]] = []
+
+    def of_group(group: Sequence[Candidate]) -> list[tuple[Candidate, Score]]:
+        columns, parts = columns_of(problem, base, group)
+        block = make_block(background, columns)
+        return [(c, score(background, block.select(p), *_bounds(c))) for c, p in zip(group, parts, strict=True)]
+
+    with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
+        for done, some in enumerate(parallel(delayed(of_group)(g) for g in groups)):
+            results += some
+            progress((done + 1) / len(groups))
+    results.sort(key=lambda r: -r[1].gain)
+    least = numbers.number("accept.gain")
+    rest = found.solution.normal.rest
+    misfit = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
+    scored = []
+    for candidate, one in results:
+        less = share = 0.0
+        if one.gain >= least:
+            columns, (part,) = columns_of(problem, base, [candidate])
+            less, share = lowered(background, [c @ part for c in columns], one)
+        scored.append(Scored(candidate, one, share, _refusal(one, less, share, misfit, numbers)))
+    return Round(tuple(scored), misfit)
+
+
+def lowered(background: Background, columns: Sequence[NDArray[np.complex128]], one: Score) -> tuple[float, float]:
+    """By how much a candidate lowers the squares of what is left, with the refit that comes with it.
+
+    As twice a log-likelihood; and as a share of what is more than noise.
+    """
+    before = after = count = 0.0
+    for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
+        weight = np.concatenate([root.ravel(), root.ravel()])
+        explained = real_bins(column, root) @ one.amplitude
+        before += float(np.sum((weight * (rest + slope @ background.alone)) ** 2))
+        after += float(np.sum((weight * (rest + slope @ one.change + explained)) ** 2))
+        count += len(rest)
+    return before - after, (before - after) / max(before - count, 1e-9 * count)
+
+
+def _refusal(one: Score, less: float, share: float, misfit: float, numbers: Parameters) -> str:
+    """Why a candidate may not be added."""
+    if one.gain < numbers.number("accept.gain"):
+        return "gains too little"
+    if less < one.gain:  # twice it, if residuals are as noisy as they should be: the noise in derivatives is all it has
+        return "does not lower what is left"
+    held = one.held_out
+    if held.sum() < numbers.number("accept.held_out") * one.gain:
+        return "does not hold on tests that it was not fitted on"
+    if np.mean(held > -numbers.number("accept.worse") * one.gain) < numbers.number("accept.better"):
+        return "makes tests worse that it was not fitted on"
+    if misfit > numbers.number("accept.noise") and share < numbers.number("accept.closure"):
+        return "explains too little of what is more than noise"
+    return ""
+
+
+def _bounds(candidate: Candidate) -> tuple[Array, Array]:
+    shapes = candidate.amplitudes
+    return np.array([s.low for s in shapes]), np.array([s.high for s in shapes])
+
+
+def _add(
+    found: Search, passed: Sequence[Scored], calibration: Parameters, numbers: Parameters, progress: Progress
+) -> Search:
+    """Add the best candidate: the first of each family that comes near it is fitted in full, with its shapes."""
+    near = numbers.number("accept.near") * passed[0].score.gain
+    firsts: dict[str, Scored] = {}
+    for one in passed:
+        if one.score.gain >= near:
+            firsts.setdefault(one.candidate.family.name, one)
+    rivals = list(firsts.values())[: int(numbers.number("accept.rivals"))]
+    fitted = []
+    for i, rival in enumerate(rivals):
+        share = _part(progress, i / len(rivals), (i + 1) / len(rivals))
+        fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
+    power = found.solution.normal.power
+    left = [_objective(ready.problem, solution.x, power) for ready, solution in fitted]
+    order = np.argsort(left)
+    best = int(order[0])
+    contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best])) for i in order)
+    ready, solution = fitted[best]
+    added = Added(rivals[best].candidate, rivals[best].score.gain, len(found.rounds[-1].scored), contest)
+    return Search(ready, solution, found.refit, [*found.added, added], found.rounds)
+
+
+def _fit_jointly(
+    found: Search, one: Scored, calibration: Parameters, numbers: Parameters, progress: Progress
+) -> tuple[Prepared, Solution]:
+    """Fit a candidate together with everything, from where the linear estimate puts it."""
+    problem, candidate = found.problem, one.candidate
+    low, high = _bounds(candidate)
+    amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
+    machine: Machine = candidate.on(problem.machine, amplitudes)
+    knobs = (*problem.knobs, *candidate.knobs(amplitudes, numbers.number("fit.spread")))
+    ready = found.ready.with_machine(machine, knobs)
+    count, known = len(problem.knobs), len(found.solution.x)
+    moved = one.score.change[:known] * problem.prior + found.solution.at
+    start = np.insert(moved, count, np.zeros(len(knobs) - count))
+    return ready, solve(ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal)
+
+
+def _objective(problem: Problem, x: Array, power: Sequence[Array]) -> float:
+    """Negative log-likelihood and log-prior at x, residuals weighed as before anything was added."""
+    misfit = sum(float(np.sum(np.abs(r) ** 2 / p)) for r, p in zip(problem.whitened(x), power, strict=True))
+    return misfit + 0.5 * float(np.sum((x / problem.prior) ** 2))
+
+
+def fitted_machine(found: Search) -> Machine:
+    """The machine with its effects, all numbers as fitted."""
+    problem = found.problem
+    return with_knobs(problem.machine, problem.knobs, found.solution.x[: len(problem.knobs)])
+
+
+def _part(progress: Progress, first: float, last: float) -> Progress:
+    return lambda share: progress(first + (last - first) * share)

@@ -1,0 +1,36 @@
+"""The verdict in a sentence."""
+
+from ..library import find_family
+from .discover import Discovery
+
+__all__ = ["said", "title_of", "where"]
+
+
+def said(found: Discovery) -> str:
+    """What was found, in a sentence or two."""
+    verdict = found.verdict
+    effects = " and ".join(f"{title_of(one.family)} ({where(one.components)})" for one in verdict.effects)
+    if verdict.word == "none":
+        return "the model explains the campaign; no parameter differs from what the machine file states."
+    if verdict.word == "parameters_only":
+        return f"no effect is missing; {len(verdict.changed)} parameters differ: {', '.join(verdict.changed)}."
+    if verdict.word == "sensor":
+        return f"no effect is missing; sensors beyond what is stated: {', '.join(s.name for s in verdict.sensors)}."
+    if verdict.word == "named":
+        return f"{effects}."
+    if verdict.word == "ambiguous":
+        rivals = " and ".join(" or ".join(map(title_of, (e.family, *e.rivals))) for e in verdict.effects if e.rivals)
+        return f"{effects}; the campaign cannot tell {rivals}."
+    left = verdict.left
+    place = "more than noise is left" if left is None else f"something acts on {left.component}, by its {left.state}"
+    return f"{effects + '; beyond that ' if effects else ''}{place}, and the library has no name for it."
+
+
+def title_of(family: str) -> str:
+    """A family in words."""
+    return find_family(family).title
+
+
+def where(components: tuple[str, ...]) -> str:
+    """Components in few words."""
+    return ", ".join(components) if len(components) < 4 else f"{components[0]} to {components[-1]}"

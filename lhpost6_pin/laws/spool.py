@@ -1,0 +1,27 @@
+"""A spool as its ports see it: off its null, overlapped, with a flow curve of its own.
+
+x -> dz(x + x_0, d),  dz(x, d) = sgn(x) max(|x| - d, 0)
+g -> g (1 + e s |g|^m) of the opening g, s the share of the side on which it opens
+
+x [1] spool over stroke, x_0 null bias, d overlap, e relative error of the flow, m its power of the opening.
+Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); the curve's error is a first-order correction.
+"""
+
+import math
+
+from ..compiled import compiled
+
+__all__ = ["corrected_opening", "dead_zone"]
+
+
+@compiled
+def dead_zone(x: float, overlap: float) -> float:
+    """What is left of x [1] beyond an overlap [1]."""
+    return math.copysign(max(abs(x) - overlap, 0.0), x)
+
+
+@compiled
+def corrected_opening(opened: float, error: float, side: float, power: float) -> float:
+    """Signed opening with the flow curve's error; side 1: supply to A only, -1: A to return only, 0: both."""
+    share = min(1.0, 1.0 + side) if opened >= 0.0 else min(1.0, 1.0 - side)
+    return opened * (1.0 + error * share * abs(opened) ** power)

@@ -1,0 +1,254 @@
+"""The oil of an altered actuator: flows, stiffness, and the step and rates of its hidden states.
+
+The report's actuators keep the shorter way through `stage`; where none of these alterations is in force, both agree.
+p is a row's numbers, double whether it has a chamber B (else P_B = 0), high and low supply and return pressure [Pa].
+"""
+
+from .compiled import compiled
+from .law_table import (
+    AIR,
+    AIR_INDEX,
+    CURVE_ERROR,
+    CURVE_POWER,
+    CURVE_SIDE,
+    DEADBAND,
+    EXTERNAL,
+    HYDRAULIC_DOUBLE,
+    LINE_DAMPING,
+    LINE_TIME,
+    NULL_BIAS,
+    NULL_LEAKAGE,
+    NULL_WIDTH,
+    TURBULENT,
+    VAPOUR,
+    VOIDS,
+)
+from .laws.bulk import air_modulus, enthalpy_of, void_share
+from .laws.chamber import flow_enthalpy, pressure_rises
+from .laws.leaks import null_leak, turbulent_leak
+from .laws.lines import line_step
+from .laws.orifice import opening, port_flow
+from .laws.spool import corrected_opening, dead_zone
+
+__all__ = ["advance_line", "advance_oil", "bulk_modulus", "exchanged", "leak_flows", "net_flows", "oil_power"]
+__all__ += ["oil_rates", "start_line", "valve_flows"]
+
+
+@compiled
+def _opened(p, spool):
+    opened = opening(dead_zone(spool + p[NULL_BIAS], p[DEADBAND]), p[6])
+    if p[CURVE_ERROR] != 0.0:
+        opened = corrected_opening(opened, p[CURVE_ERROR], p[CURVE_SIDE], p[CURVE_POWER])
+    return opened
+
+
+@compiled
+def _null(p, spool, pressure, high, low):
+    if p[NULL_LEAKAGE] == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    return null_leak(spool + p[NULL_BIAS], pressure, p[NULL_LEAKAGE], p[NULL_WIDTH], high, low, p[11])
+
+
+@compiled
+def valve_flows(p, double, spool, pressure_a, pressure_b, high, low):
+    """Flows from the valve into chambers A and B [m3/s] and their slopes [m3/s/Pa]: orifices and null leakage."""
+    opened = _opened(p, spool)
+    flow_a, slope_a = port_flow(opened, p[2], p[4], high, low, pressure_a, p[11])
+    into, out, slope_in, slope_out = _null(p, spool, pressure_a, high, low)
+    flow_a += into - out
+    slope_a -= slope_in + slope_out
+    if not double:
+        return flow_a, 0.0, slope_a, 0.0
+    flow_b, slope_b = port_flow(-opened, p[5], p[3], high, low, pressure_b, p[11])
+    into, out, slope_in, slope_out = _null(p, spool, pressure_b, high, low)
+    return flow_a, flow_b + into - out, slope_a, slope_b - slope_in - slope_out
+
+
+@compiled
+def exchanged(p, double, spool, pressure_a, pressure_b, high, low):
+    """Flows drawn from the supply and given to the return [m3/s], and their slopes [m3/s/Pa].
+
+    Slopes are by the supply's pressure and, sign reversed, by the return's: neither is below zero.
+    """
+    opened = _opened(p, spool)
+    drawn, returned, slope_drawn, slope_returned = _null(p, spool, pressure_a, high, low)
+    flow, slope = port_flow(opened, p[2], p[4], high, low, pressure_a, p[11])
+    if opened >= 0.0:
+        drawn, slope_drawn = drawn + flow, slope_drawn - slope
+    else:
+        returned, slope_returned = returned - flow, slope_returned - slope
+    if double:
+        into, out, slope_in, slope_out = _null(p, spool, pressure_b, high, low)
+        drawn, returned = drawn + into, returned + out
+        slope_drawn, slope_returned = slope_drawn + slope_in, slope_returned + slope_out
+        flow, slope = port_flow(-opened, p[5], p[3], high, low, pressure_b, p[11])
+        if opened <= 0.0:
+            drawn, slope_drawn = drawn + flow, slope_drawn - slope
+        else:
+            returned, slope_returned = returned - flow, slope_returned - slope
+    return drawn, returned, slope_drawn, slope_returned
+
+
+@compiled
+def leak_flows(p, double, pressure_a, pressure_b, low):
+    """Leaks [m3/s]: across the piston with its slope [m3/s/Pa], and out of chambers A and B with theirs."""
+    across = p[7] * (pressure_a - pressure_b)
+    slope = p[7]
+    if p[TURBULENT] != 0.0:
+        more, steeper = turbulent_leak(pressure_a - pressure_b, p[TURBULENT], p[11])
+        across, slope = across + more, slope + steeper
+    out_b = p[EXTERNAL] * (pressure_b - low) if double else 0.0
+    return across, slope, p[EXTERNAL] * (pressure_a - low), out_b, p[EXTERNAL]
+
+
+@compiled
+def net_flows(rows, i, spool, pressure_a, pressure_b, high, low, z):
+    """Flows into chambers A and B of row i [m3/s], their slopes but for the leak across the piston, and its slope."""
+    row = rows[i]
+    p = row.p
+    double = row.law == HYDRAULIC_DOUBLE
+    if p[LINE_TIME] > 0.0:
+        k = row.more
+        flow_a, flow_b, slope_a, slope_b = z[k], z[k + 2], 0.0, 0.0
+    else:
+        flow_a, flow_b, slope_a, slope_b = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
+    across, cross, out_a, out_b, slope_out = leak_flows(p, double, pressure_a, pressure_b, low)
+    return flow_a - across - out_a, flow_b + across - out_b, slope_a - slope_out, slope_b - slope_out, cross
+
+
+@compiled
+def bulk_modulus(p, pressure):
+    """Bulk modulus at a pressure [Pa], and the share of it that voids leave."""
+    modulus, left = p[10], 1.0
+    if p[AIR] != 0.0:
+        modulus = air_modulus(pressure, modulus, p[AIR], p[AIR_INDEX], p[11])
+    if p[VOIDS] != 0.0:
+        left = void_share(pressure, p[VAPOUR], p[VOIDS])
+    return modulus, left
+
+
+@compiled
+def _enthalpy(p, pressure):
+    if p[AIR] == 0.0 and p[VOIDS] == 0.0:
+        return flow_enthalpy(pressure, p[10])
+    index = p[AIR_INDEX] if p[AIR] != 0.0 else 1.0
+    return enthalpy_of(pressure, p[10], p[AIR], index, p[VAPOUR], p[VOIDS], p[11])
+
+
+@compiled
+def oil_power(row, s, z, spool, high, low):
+    """Inflow through the valve and power lost in leaks [W], and energy stored in the chambers [J], of one row."""
+    p = row.p
+    k = row.state
+    double = row.law == HYDRAULIC_DOUBLE
+    pressure_a = z[k]
+    pressure_b = z[k + 1] if double else 0.0
+    if p[LINE_TIME] > 0.0:
+        flow_a, flow_b = z[row.more], z[row.more + 2]
+    else:
+        flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
+    across, _, out_a, out_b, _ = leak_flows(p, double, pressure_a, pressure_b, low)
+    h_a, h_b = _enthalpy(p, pressure_a), _enthalpy(p, pressure_b)
+    stored = p[0] * (p[8] + s) * (h_a - pressure_a)
+    if double:
+        stored += p[1] * (p[9] - s) * (h_b - pressure_b)
+    return h_a * flow_a + h_b * flow_b, (h_a - h_b) * across + h_a * out_a + h_b * out_b, stored
+
+
+@compiled
+def advance_line(rows, i, spool, pressure_a, pressure_b, high, low, dt, z):
+    """Advance the lines of row i, if it has any, by dt [s] at these pressures."""
+    row = rows[i]
+    p = row.p
+    if p[LINE_TIME] <= 0.0:
+        return
+    k = row.more
+    flow_a, flow_b, _, _ = valve_flows(p, row.law == HYDRAULIC_DOUBLE, spool, pressure_a, pressure_b, high, low)
+    z[k], z[k + 1] = line_step(z[k], z[k + 1], flow_a, dt, p[LINE_TIME], p[LINE_DAMPING])
+    z[k + 2], z[k + 3] = line_step(z[k + 2], z[k + 3], flow_b, dt, p[LINE_TIME], p[LINE_DAMPING])
+
+
+@compiled
+def start_line(rows, i, spool, pressure_a, pressure_b, high, low, z):
+    """Put the lines of row i, if it has any, at rest in what flows through them."""
+    row = rows[i]
+    p = row.p
+    if p[LINE_TIME] <= 0.0:
+        return
+    k = row.more
+    z[k], z[k + 2], _, _ = valve_flows(p, row.law == HYDRAULIC_DOUBLE, spool, pressure_a, pressure_b, high, low)
+    z[k + 1] = z[k + 3] = 0.0
+
+
+@compiled
+def advance_oil(rows, s, ds, dt, spool, high, low, z):
+    """Advance the states of altered rows by one step in which their ports move by ds from s.
+
+    The rule is `chamber.advance_double`'s; lines take half a step before it and half a step behind it. A modulus that
+    depends on the pressure is that at mid-step, found in a first pass.
+    """
+    for i in range(rows.size):
+        row = rows[i]
+        if row.input < 0 or row.altered == 0:
+            continue
+        p = row.p
+        k = row.state
+        double = row.law == HYDRAULIC_DOUBLE
+        x = spool[row.input]
+        pressure_a = z[k]
+        pressure_b = z[k + 1] if double else 0.0
+        advance_line(rows, i, x, pressure_a, pressure_b, high, low, 0.5 * dt, z)
+        flow_a, flow_b, slope_a, slope_b, cross = net_flows(rows, i, x, pressure_a, pressure_b, high, low, z)
+        middle = s[row.port] + 0.5 * ds[row.port]
+        per_a = 1.0 / (p[0] * (p[8] + middle))
+        per_b = 1.0 / (p[1] * (p[9] - middle)) if double else 0.0
+        passes = 2 if p[AIR] != 0.0 or p[VOIDS] != 0.0 else 1
+        rise_a = rise_b = 0.0
+        for _ in range(passes):
+            bulk_a, left_a = bulk_modulus(p, pressure_a + 0.5 * rise_a)
+            bulk_b, left_b = bulk_modulus(p, pressure_b + 0.5 * rise_b)
+            rise_a, rise_b = pressure_rises(
+                flow_a,
+                flow_b,
+                slope_a,
+                slope_b,
+                cross,
+                ds[row.port],
+                dt,
+                p[0],
+                p[1],
+                left_a * bulk_a * per_a,
+                left_b * bulk_b * per_b,
+            )
+        z[k] = pressure_a + rise_a
+        if double:
+            z[k + 1] = pressure_b + rise_b
+        advance_line(rows, i, x, pressure_a + rise_a, pressure_b + rise_b, high, low, 0.5 * dt, z)
+
+
+@compiled
+def oil_rates(rows, s, sd, spool, high, low, z, zd):
+    """Fill the rates of the states of altered rows."""
+    for i in range(rows.size):
+        row = rows[i]
+        if row.input < 0 or row.altered == 0:
+            continue
+        p = row.p
+        k = row.state
+        double = row.law == HYDRAULIC_DOUBLE
+        x = spool[row.input]
+        pressure_a = z[k]
+        pressure_b = z[k + 1] if double else 0.0
+        flow_a, flow_b, _, _, _ = net_flows(rows, i, x, pressure_a, pressure_b, high, low, z)
+        bulk, left = bulk_modulus(p, pressure_a)
+        speed = sd[row.port]
+        zd[k] = left * bulk / (p[8] + s[row.port]) * (flow_a / p[0] - speed)
+        if double:
+            bulk, left = bulk_modulus(p, pressure_b)
+            zd[k + 1] = left * bulk / (p[9] - s[row.port]) * (flow_b / p[1] + speed)
+        if p[LINE_TIME] > 0.0:
+            k = row.more
+            flow_a, flow_b, _, _ = valve_flows(p, double, x, pressure_a, pressure_b, high, low)
+            zd[k], zd[k + 2] = z[k + 1] / p[LINE_TIME], z[k + 3] / p[LINE_TIME]
+            zd[k + 1] = (flow_a - z[k] - 2.0 * p[LINE_DAMPING] * z[k + 1]) / p[LINE_TIME]
+            zd[k + 3] = (flow_b - z[k + 2] - 2.0 * p[LINE_DAMPING] * z[k + 3]) / p[LINE_TIME]

@@ -1,0 +1,217 @@
+"""Figures of a search for missing effects: where the gap is, what explains it, how it shrinks, what has no name."""
+
+import html
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..discover import Discovery
+from ..discover.left import Left
+from ..discover.search import Round
+from ..names import AXES
+from .layout import stacked_layout
+from .page import Figure, Markup, figure, paragraph, table, text
+from .plots import BLACK, BLUE, GREY, VERMILLION
+
+__all__ = ["gain_figure", "gap_figure", "left_figure", "map_blocks"]
+
+Array = NDArray[np.float64]
+
+SHOWN = 10  # families in a figure
+_SHADES = (
+    (1.3, "#eef4fa", "#1b1f24"),
+    (3.0, "#93c0e0", "#1b1f24"),
+    (10.0, "#2f76ad", "#ffffff"),
+    (np.inf, "#0a3358", "#ffffff"),
+)
+"""Misfit up to which a cell has a ground and ink."""
+
+_KINDS = {
+    "wrench": "Wrench",
+    "flow": "Flow",
+    "gas": "Gas law",
+    "force": "Force against pressure",
+    "servo": "Spool against command",
+    "supply": "Supply pressure",
+}
+
+
+def map_blocks(found: Discovery) -> list[Markup]:
+    """Return, for each kind of residual, the misfit of every column in every band, before and after."""
+    first, last = found.search.refit, found.search.solution
+    problem = found.search.problem
+    before, after = first.normal.rest, problem.whitened(last.x)
+    machine = problem.machine
+    chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
+    labels = {"wrench": AXES, "flow": chambers, "gas": machine.strut_names, "force": machine.actuator_names}
+    labels |= {"servo": machine.actuator_names, "supply": ("supply",)}
+    edges = problem.whitener.edges
+    groups = [(0, 2), (2, 4), (4, 6), (6, len(edges) - 1)]
+    heads = [f"{edges[a]:g}–{edges[b]:g} Hz" for a, b in groups]
+    blocks = [
+        paragraph(
+            "Mean square of the whitened residuals, known parameters and sensor errors refitted: one is sensor noise "
+            "alone. Each cell: without any effect → with the effects found."
+        )
+    ]
+    for kind, words in _KINDS.items():
+        columns = np.flatnonzero(problem.rows(kind))
+        rows = []
+        for label, column in zip(labels[kind], columns.tolist(), strict=False):
+            cells = []
+            for a, b in groups:
+                pair = [_mean(rest, problem, column, edges[a], edges[b]) for rest in (before, after)]
+                cells.append(_cell(*pair))
+            rows.append((label, *cells))
+        if rows:
+            blocks.append(table(words, ("", *heads), rows))
+    return blocks
+
+
+def _mean(rest: Sequence[NDArray[np.complex128]], problem: Any, column: int, low: float, high: float) -> float:
+    parts = [np.abs(r[(f >= low) & (f < high), column]) ** 2 for r, f in zip(rest, problem.frequency, strict=True)]
+    values = np.concatenate(parts)
+    return float(values.mean()) if values.size else float("nan")
+
+
+def _cell(before: float, after: float) -> Markup:
+    """Before and after, on a ground that says how much was there before."""
+    if not np.isfinite(before):
+        return text("–")
+    _, ground, ink = next(shade for shade in _SHADES if before <= shade[0])
+    style = f"display:inline-block;padding:.1em .45em;border-radius:3px;background:{ground};color:{ink}"
+    style += ";print-color-adjust:exact;-webkit-print-color-adjust:exact"
+    return Markup(f'<span style="{style}">{_short(before)} → {_short(after)}</span>')
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
+
+
+def gain_figure(one: Round, number: int, least: float) -> Figure:
+    """Return the best candidate of each family in one round: what it gains, and what is refused."""
+    best: dict[str, Any] = {}
+    for scored in one.scored:
+        best.setdefault(scored.candidate.family.name, scored)
+    shown = [s for s in best.values() if s.score.gain > 1.0][:SHOWN] or list(best.values())[:3]
+    names = [f"{s.candidate.family.name}, {_where(s.candidate.components)}" for s in shown]
+    traces = []
+    for words, color, keep in (("may be added", BLUE, True), ("refused", "#6e7781", False)):
+        some = [i for i, s in enumerate(shown) if (not s.refused) == keep]
+        if some:
+            said = [shown[i].refused or "passes" for i in some]
+            traces.append(
+                {
+                    "type": "bar",
+                    "orientation": "h",
+                    "name": words,
+                    "x": [max(shown[i].score.gain, 1.0) for i in some],
+                    "y": some,
+                    "text": [html.escape(s) for s in said],
+                    "textposition": "none",
+                    "hovertemplate": "%{x:.4g}: %{text}",
+                    "marker": {"color": color},
+                }
+            )
+    layout = stacked_layout([""], "Gain of log-likelihood", row_height=26 * max(len(names), 3))
+    layout["yaxis"] |= _rows(names)
+    layout["xaxis"] |= {"type": "log"}
+    layout["margin"]["l"] = 250
+    layout["hovermode"] = "closest"
+    layout["shapes"].append(_upright(least))
+    words = (
+        "The best candidate of each family, everything known refitted beside it. "
+        f"The dashed line is the least gain, {least:g}."
+    )
+    return Figure(f"gains-{number}", f"Round {number}: what could explain it", words, traces, layout, layout["height"])
+
+
+def gap_figure(found: Discovery) -> Figure:
+    """Return the gap of every phase of every held-out test: delivered, refitted, after."""
+    assert found.proof is not None
+    gaps = found.proof.gaps
+    names = [f"{gap.phase}, {gap.test}" for gap in gaps]
+    traces = []
+    series = (
+        ("as delivered", "delivered", GREY),
+        ("refitted", "refitted", VERMILLION),
+        ("with the effects", "after", BLUE),
+    )
+    for words, key, color in series:
+        traces.append(
+            {
+                "type": "bar",
+                "orientation": "h",
+                "name": words,
+                "x": [getattr(gap, key) for gap in gaps],
+                "y": list(range(len(gaps))),
+                "hovertemplate": "%{x:.3g} × noise",
+                "marker": {"color": color},
+            }
+        )
+    layout = stacked_layout([""], "Gap over sensor noise", row_height=62 * max(len(names), 1))
+    layout["yaxis"] |= _rows(names)
+    layout["xaxis"] |= {"type": "log"}
+    layout["margin"]["l"] = 170
+    layout["barmode"] = "group"
+    layout["hovermode"] = "closest"
+    layout["shapes"].append(_upright(1.0))
+    words = "Root mean square error over everything that moves, in deviations of noise; the dashed line is noise alone."
+    return Figure("gap", "The gap on tests that were not searched", words, traces, layout, layout["height"])
+
+
+def left_figure(left: Left) -> Figure:
+    """Return a free function of a leg's state with two deviations on either side."""
+    title = {"position": "Elongation [m]", "velocity": "Rate of elongation [m/s]"}[left.state]
+    layout = stacked_layout([f"Force along {left.component} [kN]"], title, row_height=240)
+    nodes, value, sd = left.nodes.tolist(), left.value / 1e3, left.sd / 1e3
+    band = [*(value + 2 * sd).tolist(), *(value - 2 * sd)[::-1].tolist()]
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "x": [*nodes, *nodes[::-1]],
+            "y": band,
+            "fill": "toself",
+            "line": {"width": 0},
+            "fillcolor": "rgba(0,114,178,0.2)",
+            "name": "two deviations",
+            "hoverinfo": "skip",
+        },
+        {
+            "type": "scatter",
+            "mode": "lines+markers",
+            "x": nodes,
+            "y": value.tolist(),
+            "line": {"color": BLUE},
+            "name": "force",
+        },
+    ]
+    words = f"A force along {left.component} as a free function of its {left.state}, fitted to what is left."
+    return Figure("left", "What has no name", words, traces, layout, layout["height"])
+
+
+def figures(*drawn: Figure) -> list[Markup]:
+    """Return places for figures."""
+    return [figure(one) for one in drawn]
+
+
+def _rows(names: Sequence[str]) -> dict[str, Any]:
+    return {
+        "range": [len(names) - 0.5, -0.5],
+        "tickvals": list(range(len(names))),
+        "ticktext": [html.escape(name) for name in names],
+        "tickfont": {"size": 11},
+        "zeroline": False,
+    }
+
+
+def _upright(x: float) -> dict[str, Any]:
+    place = {"type": "line", "xref": "x", "x0": x, "x1": x, "yref": "paper", "y0": 0, "y1": 1}
+    return place | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}}
+
+
+def _where(components: Sequence[str]) -> str:
+    return " ".join(components) if len(components) < 4 else f"{components[0]}–{components[-1]}"

@@ -1,0 +1,190 @@
+"""The report of a search for missing effects: where the gap is, its name, what else was considered, how it shrinks."""
+
+import math
+from pathlib import Path
+
+from ..discover import Discovery
+from ..discover.save import next_tests
+from ..discover.search import Scored
+from ..discover.words import said, title_of, where
+from ..library import find_family
+from .control_blocks import load_of
+from .discover_plots import gain_figure, gap_figure, left_figure, map_blocks
+from .page import (
+    Headline,
+    Level,
+    Markup,
+    Page,
+    Section,
+    bullet_list,
+    details,
+    figure,
+    number,
+    paragraph,
+    save_page,
+    table,
+    versions,
+)
+
+__all__ = ["write_discover_report"]
+
+_LEVELS: dict[str, Level] = {"none": "good", "parameters_only": "good", "named": "good", "unexplained": "bad"}
+
+
+def write_discover_report(found: Discovery, path: Path | str, command: str = "") -> Path:
+    """Write the self-contained HTML report of a search to `path` and return the path."""
+    verdict = found.verdict
+    tests = f"{len(found.used)} test{'s' * (len(found.used) != 1)}: {', '.join(found.used)}"
+    held = f"; {', '.join(found.held_out)} held out" if found.held_out else ""
+    page = Page(
+        kind="Discovery",
+        title=f"What {found.machine.name} lacks to explain {found.campaign}",
+        asked=f"Find effects that the model of {load_of(found.machine)} lacks, from {tests}{held}.",
+        verdict=f"{verdict.word}: {said(found)}",
+        level=_LEVELS.get(verdict.word, "attention"),
+        headlines=_headlines(found),
+        sections=[
+            Section("effects", "What was found", _effect_blocks(found)),
+            Section("proof", "The gap, before and after", _proof_blocks(found)),
+            Section("where", "Where the gap is", map_blocks(found)),
+            Section("considered", "What was considered, and why not", _considered(found)),
+            Section("parameters", "Parameters and sensors", _parameter_blocks(found)),
+            Section("assumptions", "Assumptions and numbers used", _assumptions(found)),
+        ],
+        command=command or None,
+        versions=versions(),
+    )
+    return save_page(page, path)
+
+
+def _headlines(found: Discovery) -> list[Headline]:
+    verdict = found.verdict
+    named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
+    shown = [Headline(verdict.word.replace("_", " "), "Verdict"), Headline(named, "Effects")]
+    if found.proof and found.proof.gaps:
+        first = found.proof.gaps[0]
+        shown.append(
+            Headline(
+                f"{number(first.refitted)} → {number(first.after)}",
+                f"Gap, {first.phase}, {first.test}",
+                "over sensor noise; 1 is noise alone",
+            )
+        )
+    return shown
+
+
+def _effect_blocks(found: Discovery) -> list[Markup]:
+    verdict = found.verdict
+    if not verdict.effects and verdict.word != "unexplained":
+        return [paragraph("No effect is missing.")]
+    blocks: list[Markup] = []
+    for one in verdict.effects:
+        family = find_family(one.family)
+        rows = [
+            (name, f"{value.value:.4g}", f"{value.low:.4g} to {value.high:.4g}", value.unit)
+            for name, value in one.parameters.items()
+        ]
+        header = ("Number", "Value", "90 % interval", "Unit")
+        blocks.append(table(f"{family.title}, on {where(one.components)}", header, rows))
+        confused = ", ".join(map(_title, family.confused_with))
+        blocks.append(
+            paragraph(
+                f"{family.equation}. Gain of log-likelihood {number(one.gain)}; chance of as much by noise alone, of "
+                f"all candidates, {one.p_value:.1g}. Often confused with: {confused}."
+            )
+        )
+    if lines := next_tests(found):
+        blocks += [paragraph("The campaign cannot tell these apart. What would:"), bullet_list(lines)]
+    if verdict.left is not None:
+        blocks.append(figure(left_figure(verdict.left)))
+    elif verdict.word == "unexplained":
+        blocks.append(paragraph("More than noise is left, and no single leg's position or speed explains it."))
+    return blocks
+
+
+def _title(name: str) -> str:
+    from ..library import families
+
+    known = families()
+    return known[name].title if name in known else name.replace("_", " ")
+
+
+def _proof_blocks(found: Discovery) -> list[Markup]:
+    if found.proof is None:
+        return [paragraph("No test was held out; give one with --hold-out.")]
+    rows = [
+        (
+            f"{gap.phase}, {gap.test}",
+            number(gap.delivered),
+            number(gap.refitted),
+            number(gap.after),
+            "1",
+            "–" if math.isnan(gap.closure) else f"{100 * gap.closure:.0f} %",
+        )
+        for gap in found.proof.gaps
+    ]
+    header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
+    return [
+        figure(gap_figure(found)),
+        table("Gap over sensor noise", header, rows),
+        paragraph(
+            "Closure is (refitted − with the effects) over (refitted − floor); – where next to nothing was open."
+        ),
+    ]
+
+
+def _considered(found: Discovery) -> list[Markup]:
+    least = found.numbers.number("accept.gain")
+    blocks: list[Markup] = []
+    for k, one in enumerate(found.search.rounds, start=1):
+        blocks.append(figure(gain_figure(one, k, least)))
+        best: dict[str, Scored] = {}
+        for scored in one.scored:
+            best.setdefault(scored.candidate.family.name, scored)
+        rows = [
+            (
+                s.candidate.family.name,
+                where(s.candidate.components),
+                number(s.score.gain),
+                number(float(s.score.held_out.sum())),
+                f"{100 * s.closure:.0f} %" if s.closure else "–",
+                s.refused or "passes",
+            )
+            for s in best.values()
+        ]
+        header = ("Family", "On", "Gain", "On tests not fitted", "Of the gap", "Added?")
+        blocks.append(details(f"Round {k}: all families", table("Best candidate of each family", header, rows)))
+        if k <= len(found.search.added):
+            contest = found.search.added[k - 1].contest
+            tried = [(c.candidate.family.name, where(c.candidate.components), number(c.behind)) for c in contest]
+            blocks.append(table("Fitted in full, by log-likelihood behind the best", ("Family", "On", "Behind"), tried))
+    return blocks
+
+
+def _parameter_blocks(found: Discovery) -> list[Markup]:
+    verdict = found.verdict
+    rows = [
+        (name, f"{value.value:.5g}", f"{value.low:.5g} to {value.high:.5g}", value.unit)
+        for name, value in verdict.changed.items()
+    ]
+    header = ("Parameter", "Value", "90 % interval", "Unit")
+    blocks = [table("Parameters that differ, within calibration", header, rows) if rows else paragraph("None differs.")]
+    if verdict.sensors:
+        sensors = [
+            (s.name, f"{s.estimate.value:.4g} {s.estimate.unit}", f"{s.stated:.3g}", s.family) for s in verdict.sensors
+        ]
+        blocks.append(table("Sensors beyond what is stated", ("Error", "Value", "Stated", "Family"), sensors))
+    else:
+        blocks.append(paragraph("No sensor is off beyond what its file states."))
+    return blocks
+
+
+def _assumptions(found: Discovery) -> list[Markup]:
+    lines = [
+        "Priors of parameters and ranges of sensor errors are those of the machine's and the sensors' files; most are "
+        "assumed. Noise is simulated from the sensors' file, not estimated from what is left.",
+        "A parameter beyond three stated deviations counts as an effect of its family; within them, as calibration.",
+        "Candidates are ranked to first order; the best are fitted in full with everything else.",
+    ]
+    rows = [(path, f"{q.value:g}", q.evidence, q.source) for path, q in found.numbers.items()]
+    return [bullet_list(lines), table("Numbers used", ("Number", "Value", "Evidence", "Source"), rows)]

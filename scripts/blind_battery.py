@@ -1,0 +1,140 @@
+"""A blind battery: cases of another simulator with sealed labels, searched, then unsealed and scored.
+
+    python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast] [--jobs 2] [--out FOLDER] [--baselines] [--dask]
+
+Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
+searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests.
+--baselines adds what correlation and a bagged sparse regression (pysindy) name on the same cases. --dask runs the cases
+on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes.
+"""
+
+import argparse
+import json
+import time
+import tomllib
+from contextlib import nullcontext
+from pathlib import Path
+
+from battery.generate import draw_cases, seal, unseal, write_case
+from battery.reach import measured_label
+from battery.scoring import Share, families, reach, score
+from joblib import Parallel, delayed, parallel_config
+
+from lhpost6_pin.campaign import load_campaign
+from lhpost6_pin.discover import discover, save_verdict
+from lhpost6_pin.errors import LhpostError
+from lhpost6_pin.files import write_whole
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.sensors import load_sensors
+
+
+def make(case, folder: Path) -> dict:
+    """Write a case's campaign, unless it is there; its label."""
+    if not (folder / case.id / "campaign.toml").exists():
+        write_case(case, folder)
+    return measured_label(case)
+
+
+def search(name: str, folder: Path, with_baselines: bool) -> None:
+    """Search one case, unless that was done; leaves verdict.json in its folder, or error.txt."""
+    home = folder / name
+    if (home / "verdict.json").exists():
+        return
+    machine, sensors = load_machine(), load_sensors()
+    campaign = load_campaign(home, machine)
+    hold_out = tomllib.loads((home / "campaign.toml").read_text(encoding="utf-8"))["hold_out"]
+    begin = time.perf_counter()
+    try:
+        found = discover(machine, campaign, sensors, hold_out=hold_out, phases=(1, 2), jobs=1)
+    except LhpostError as error:
+        (home / "error.txt").write_text(str(error), encoding="utf-8")
+        return
+    (home / "seconds.txt").write_text(f"{time.perf_counter() - begin:.1f}", encoding="utf-8")
+    if with_baselines:
+        from battery.baselines import baselines
+
+        used = [r for r in campaign.records if str(r.attrs["test"]) not in hold_out]
+        named = baselines(machine, used, sensors, seed=0)
+        (home / "baselines.json").write_text(json.dumps(named), encoding="utf-8")
+    save_verdict(found, home / "verdict.json")
+
+
+def report(folder: Path, labels: dict[str, dict]) -> str:
+    """Scores of all cases with a verdict, as Markdown; then every case, the wrong ones marked."""
+    names = [n for n in labels if (folder / n / "verdict.json").exists()]
+    answers = [json.loads((folder / n / "verdict.json").read_text(encoding="utf-8")) for n in names]
+    pairs = [(labels[n], answer) for n, answer in zip(names, answers, strict=True)]
+    lines = [f"{len(pairs)} of {len(labels)} cases searched", "", "| metric | value |", "|---|---|"]
+    for metric, value in score(pairs).items():
+        lines.append(f"| {metric} | {value.text if isinstance(value, Share) else f'{value:.2f}'} |")
+    lines += baseline_rows(folder, names, pairs)
+    files = [folder / n / "seconds.txt" for n in names]
+    if seconds := sorted(float(f.read_text(encoding="utf-8")) for f in files if f.exists()):
+        lines.append(f"| seconds a case, median | {seconds[len(seconds) // 2]:.0f} |")
+    lines += ["", "| case | sort | gap | hidden | verdict | named |", "|---|---|---|---|---|---|"]
+    lines += sorted(case_row(n, *pair) for n, pair in zip(names, pairs, strict=True))
+    for n in labels:
+        if (folder / n / "error.txt").exists():
+            lines.append(f"\n{n}: {(folder / n / 'error.txt').read_text(encoding='utf-8')}")
+    return "\n".join(lines) + "\n"
+
+
+def baseline_rows(folder: Path, names: list[str], pairs: list[tuple[dict, dict]]) -> list[str]:
+    """What the simpler methods named, where all cases have it."""
+    files = [folder / n / "baselines.json" for n in names]
+    if not files or not all(f.exists() for f in files):
+        return []
+    named = [json.loads(f.read_text(encoding="utf-8")) for f in files]
+    rows = []
+    for method in named[0]:
+        effects = [[{"family": f, "components": []} for f in one[method]] for one in named]
+        found = score([(label, {**answer, "effects": e}) for (label, answer), e in zip(pairs, effects, strict=True)])
+        rows += [f"| {method}: {m} | {found[m].text} |" for m in ("family first", "false name on nulls")]
+    return rows
+
+
+def case_row(name: str, label: dict, answer: dict) -> str:
+    """One case: what was hidden, what was said."""
+    hidden = [f"{e['family']} {' '.join(e['components'])}" for e in (*label["effects"], *label["decoys"])]
+    hidden += [s["family"] for s in label["sensors"]]
+    named = [f"{e['family']} {' '.join(e['components'])}" for e in answer["effects"]]
+    right = set(families(label)) == set(families(answer)) and answer["verdict"] in label["accept"]
+    cells = (label["sort"], f"{reach(label):.1f}", ", ".join(hidden), answer["verdict"], ", ".join(named))
+    return f"| {' | '.join((name if right else f'{name} (wrong)', *cells))} |"
+
+
+def main() -> None:
+    """Draw, seal, search, unseal, score."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--fast", action="store_true")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("out") / "battery")
+    parser.add_argument("--baselines", action="store_true")
+    parser.add_argument("--dask", action="store_true")
+    asked = parser.parse_args()
+    folder = asked.out
+    folder.mkdir(parents=True, exist_ok=True)
+    cases = draw_cases(asked.cases, asked.seed, asked.fast)
+    cluster = nullcontext()
+    if asked.dask:
+        from dask.distributed import Client, LocalCluster
+
+        cluster = Client(LocalCluster(n_workers=asked.jobs, threads_per_worker=1))
+    with cluster, parallel_config("dask" if asked.dask else "loky", n_jobs=asked.jobs):
+        if not (folder / "seals.txt").exists():
+            seal(Parallel()(delayed(make)(case, folder) for case in cases), folder)
+            print(f"{len(cases)} labels sealed in {folder / 'seals.txt'}", flush=True)
+        for done, _ in enumerate(
+            Parallel(return_as="generator_unordered")(delayed(search)(c.id, folder, asked.baselines) for c in cases), 1
+        ):
+            print(f"searched {done} of {len(cases)}", flush=True)
+    text = report(folder, unseal(folder))
+    with write_whole(folder / "scores.md") as beside:
+        beside.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()

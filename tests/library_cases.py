@@ -1,0 +1,39 @@
+"""What the tests of the library's families share: a short run that moves all axes, and its record as if measured."""
+
+import numpy as np
+
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.machine import Machine
+from lhpost6_pin.outputs import record_of_run
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.pose import PlatenMotion
+from lhpost6_pin.residuals import Measured, make_measured
+from lhpost6_pin.simulate import OpenLoop, Run, simulate
+
+
+def record_at_model_steps(machine: Machine, samples: int) -> np.ndarray:
+    """Spools (samples, n_actuators) about rest, a sine each, some decimetres and degrees in a second."""
+    rest = find_equilibrium(make_plant(machine)).spool
+    t = np.arange(samples)[:, None] / 2048
+    count = np.arange(len(rest))
+    wave = 0.2 * np.minimum(1.0, t / 0.1) * np.sin(2 * np.pi * (0.7 + 0.37 * count) * t + count)
+    return rest + wave * [1.0 if a.area_b is not None else 0.15 for a in machine.actuators]
+
+
+def shaken(machine: Machine, samples: int = 1024, engine: str = "fused") -> Run:
+    """Open-loop run from rest that moves all axes, a model step a sample."""
+    plant = make_plant(machine)
+    drive = OpenLoop(record_at_model_steps(machine, samples), find_equilibrium(plant).state)
+    return simulate(plant, drive, samples=samples, engine=engine, steps_per_second=2048)
+
+
+def measured_of(run: Run) -> Measured:
+    """The run's record, free of noise, ready for residuals."""
+    record = record_of_run(run, {"test": "shaken"})
+    motion = PlatenMotion(*(record[f"platen_{x}"].values for x in ("displacement", "velocity", "acceleration")))
+    return make_measured(record, motion, 200.0)
+
+
+def rms(columns: np.ndarray) -> np.ndarray:
+    """Root mean square of each column, edges left out."""
+    return np.sqrt((columns[20:-20] ** 2).mean(axis=0))

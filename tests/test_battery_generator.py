@@ -1,0 +1,246 @@
+"""The blind battery's generator: its table obeys mechanics, its cases hide what their labels say and nothing else."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lhpost6_pin.records import load_record
+
+SCRIPTS = str(Path(__file__).parents[1] / "scripts")
+sys.path.insert(0, SCRIPTS)
+from battery import cases, generate, hidden, motions, rates, reach, sensors, simulate, table  # noqa: E402
+
+sys.path.remove(SCRIPTS)
+
+
+def nominal() -> tuple[np.ndarray, np.ndarray]:
+    return table.make_table(table.nominal_values(cases.model()), 0.8)
+
+
+def rates_of(y: np.ndarray, spool: np.ndarray, legs: np.ndarray, platen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    dy, shown = np.zeros(rates.STATES), np.zeros(rates.SHOWN)
+    rates.rates(1.0, y, spool, 2e5 * float(platen[0]["surge"] != 0), legs, platen, inverse(platen), dy, shown)
+    return dy, shown
+
+
+def inverse(platen: np.ndarray) -> np.ndarray:
+    return np.linalg.inv(table.mass_matrix(platen))
+
+
+def lively(random: np.random.Generator) -> np.ndarray:
+    """A state in the midst of a violent motion, every hidden state away from zero."""
+    y = random.normal(0.0, 0.01, rates.STATES)
+    y[:12] = random.uniform(0.5, 1.0, 12) * [0.2, 0.15, 0.04, 0.01, 0.01, 0.02, 0.4, 0.3, 0.1, 0.03, 0.02, 0.04]
+    y[rates.PA : rates.PB + 4] = random.uniform(2e6, 9e6, 14)
+    y[rates.SEAL : rates.SPOOL] = random.uniform(0.2, 0.7, 25)
+    y[rates.HEAT : rates.PAST] = 0.5
+    return y
+
+
+def test_the_table_at_rest_has_the_pressures_of_the_reports_machine():
+    y, spool = simulate.at_rest(*nominal())
+    # model.md's static equilibrium, closed form: zero horizontal force, leakage fed by the spool; four digits are given
+    assert y[rates.PA : rates.PA + 4] == pytest.approx(5.504e6, rel=2e-4)
+    assert y[rates.PB : rates.PB + 4] == pytest.approx(8.601e6, rel=2e-4)
+    assert y[rates.PA + 4 : rates.PA + 10] == pytest.approx(2.767e6, rel=2e-4)
+    assert spool[0] == pytest.approx(-4.57e-4, rel=1e-3)
+    assert spool[4] == pytest.approx(1.91e-4, rel=3e-3)
+
+
+def test_the_platen_rings_on_its_oil_columns_at_the_known_frequencies():
+    legs, platen = nominal()
+    legs["seal"] = legs["pad"] = legs["viscous"] = legs["leakage"] = 0.0
+    y, closed = simulate.at_rest(*nominal())[0], np.zeros(10)
+    matrix = np.empty((26, 26))
+    for j in range(26):
+        there, here = y.copy(), y.copy()
+        step = 1e-6 if j < 12 else 100.0
+        there[j] += step
+        here[j] -= step
+        matrix[:, j] = (rates_of(there, closed, legs, platen)[0] - rates_of(here, closed, legs, platen)[0])[:26]
+        matrix[:, j] /= 2 * step
+    modes = np.linalg.eigvals(matrix).imag / (2 * np.pi)
+    # yaw, X, Y to the digits given, the upright three to the hertz; gravity and struts shift them by some 0.01 Hz
+    assert np.sort(modes[modes > 1])[:3] == pytest.approx([9.29, 10.99, 11.74], abs=0.02)
+    assert np.sort(modes[modes > 1])[3:] == pytest.approx([35, 37, 46], abs=0.6)
+
+
+def test_the_power_of_all_forces_is_the_rate_of_kinetic_energy():
+    legs, platen = nominal()
+    legs["seal"] = legs["pad"] = legs["viscous"] = 0.0
+    platen["thrust"] = 1.0  # the report's vertical thrust does not conserve energy, nor do masses by direction
+    platen["mass_x"] = platen["mass_y"] = platen["mass_z"]
+    y = lively(np.random.default_rng(1))
+    dy, shown = rates_of(y, np.zeros(10), legs, platen)
+    inertia = table.mass_matrix(platen)
+    kinetic = y[6:12] @ inertia @ dy[6:12]  # gyroscopic forces do no work
+    h = 1e-6
+    speeds = (table.lengths(y[:6] + h * dy[:6], legs, platen) - table.lengths(y[:6] - h * dy[:6], legs, platen)) / 2 / h
+    cog = np.array([platen[0][f"cog_{axis}"] for axis in "xyz"])
+    climb = dy[2] + (table.rotation(y[:6]) @ np.cross(y[9:12], cog))[2]
+    power = shown[rates.PULL : rates.PULL + 13] @ speeds - platen[0]["mass_z"] * platen[0]["gravity"] * climb
+    assert kinetic == pytest.approx(power, rel=1e-7)  # central differences of 1e-6 s
+
+
+def every_variant() -> list[tuple[str, str, int]]:
+    groups = ("effect", "unknown", "absorbable", "unexcited")
+    return [(g, name, i) for g in groups for name, kinds in cases.numbers()[g].items() for i in range(len(kinds))]
+
+
+@pytest.mark.parametrize(("group", "name", "variant"), every_variant())
+def test_every_effect_acts_on_a_lively_table(group, name, variant):
+    random = np.random.default_rng(3)
+    effect = cases.draw_effect(name, cases.numbers()[group][name], cases.numbers()["strength"], random, 1.0, variant)
+    y, spool = lively(random), random.uniform(-0.2, 0.2, 10)
+    y[:3] *= 3.5 if group == "unexcited" else 1.0  # into the end stops that no test reaches
+    spool[:2] = 1e-3  # two valves near null, for what lives there
+    plain, changed = nominal(), nominal()
+    hidden.switch_on(effect, *changed, table.LEGS)
+    before, after = rates_of(y, spool, *plain), rates_of(y, spool, *changed)
+    if name == "transport_delay":
+        assert (changed[0]["late"] > 0).any()  # a delay is the loop's, not the right-hand side's
+    else:
+        assert not all(np.array_equal(b, a) for b, a in zip(before, after, strict=True))
+
+
+def test_friction_saturates_at_its_plateau_and_turns_with_the_motion():
+    z = 0.0
+    for _ in range(2000):
+        z += 1e-4 * table.bristle(z, 0.01, 1e-4)
+    assert z == pytest.approx(1.0, abs=1e-6)  # 20 spans of slip
+    assert table.bristle(z, -0.01, 1e-4) < 0
+
+
+@pytest.mark.parametrize("name", list(cases.numbers()["test"]))
+def test_motions_start_and_end_at_rest_and_stay_within_the_stroke(name):
+    motion = motions.make_motion(cases.numbers()["test"][name], 5)
+    calm = round(motions.CALM * simulate.RATE)
+    assert not motion[:calm].any()
+    assert np.abs(motion[-calm // 2 :]).max() < 1e-12
+    # half strokes of 0.75 m along the legs and of 0.127 m upright, two degrees of tilt
+    assert (np.abs(motion).max(axis=0) < [0.5, 0.4, 0.1, 0.03, 0.03, 0.06]).all()
+
+
+def test_the_same_seed_draws_the_same_cases_in_the_stated_mix():
+    first, second = cases.draw_cases(100, 7, fast=True), cases.draw_cases(100, 7, fast=True)
+    assert [case.label for case in first] == [case.label for case in second]
+    assert len({case.id for case in first}) == 100
+    sorts = [case.label["sort"] for case in first]
+    assert {sort: sorts.count(sort) for sort in set(sorts)} == cases.numbers()["mix"]
+    families = {effect.family for case in first if case.label["sort"] == "one" for effect in case.effects}
+    assert len(families) == 31  # one of each before any comes again
+    assert {case.id for case in first}.isdisjoint(case.id for case in cases.draw_cases(20, 8, fast=True))
+
+
+def test_bold_parameters_are_three_deviations_off_and_others_within_the_clip():
+    nulls = [cases.draw_case("null", seed=seed) for seed in range(40)]
+    moves = [np.abs(list(case.label["parameters_sd"].values())) for case in nulls]
+    far = [move.max() > 2.9 for move in moves]
+    assert 8 <= sum(far) <= 32  # half of forty, four binomial deviations
+    assert all(np.all((move <= 2.5) | (move == 3.0)) for move in moves)
+    twins = nulls[0].values
+    assert twins["component.H1"]["platen_point"][0] == -twins["component.H4"]["platen_point"][0]
+
+
+def test_a_delayed_channel_shows_late_and_a_gain_shows_as_a_gain():
+    time = np.arange(8192) / simulate.RATE
+    wave = np.sin(2 * np.pi * 2 * time)[:, None]
+    true = {name: wave * np.ones(10) for name in ("actuator_displacement", "actuator_force")}
+    rule = {**cases.numbers()["sensors"], "noise": {"actuator_displacement": 0.0, "actuator_force": 0.0}}
+    faults = (
+        sensors.Fault("channel_delay", (("actuator_displacement", 0),), delay=0.004),
+        sensors.Fault("length_sensor_error", (("actuator_displacement", 3),), gain=0.05),
+    )
+    exact = {**rule, "gain": 0.0, "skew": 0.0, "offset": {}}
+    seen = sensors.observe(
+        true, sensors.draw_instruments(exact, np.random.default_rng(0), faults), rule, np.random.default_rng(0)
+    )
+    middle = slice(200, 1800)
+    late = np.sin(2 * np.pi * 2 * (time[::4] - 0.004))
+    # 16-bit steps of 3e-5 and the low-pass's ends
+    assert seen["actuator_displacement"][middle, 0] == pytest.approx(late[middle], abs=2e-4)
+    assert seen["actuator_displacement"][middle, 3] == pytest.approx(1.05 * late[middle], abs=2e-4)
+    assert seen["actuator_force"][middle, 0] == pytest.approx(wave[::4, 0][middle], abs=2e-4)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    case = cases.draw_case("one", ("local_viscous",), seed=21, fast=True, strength=3.0, variant=0)
+    return case, generate.write_case(case, tmp_path_factory.mktemp("battery"))
+
+
+def test_a_written_case_is_a_campaign_of_valid_records_that_do_not_tell(written):
+    case, folder = written
+    assert sorted(path.name for path in folder.iterdir()) == [
+        *("EQ.nc", "TX.nc", "TY.nc", "TZ.nc", "WN.nc", "campaign.toml"),
+    ]
+    for test in case.tests:
+        record = load_record(folder / f"{test.name}.nc")
+        assert record.attrs["kind"] == "measured"
+        assert "viscous" not in json.dumps({k: str(v) for k, v in record.attrs.items()})
+        platen = record["platen_displacement"].values
+        assert np.abs(platen[:50, :3]).max() < 1e-4  # at rest in the control zero-position, noise 6 um
+        error = platen - record["reference_displacement"].values
+        moved = np.abs(record["reference_displacement"].values).max(axis=0) > 1e-3
+        rms = np.sqrt(np.mean(error**2, axis=0) / np.mean(record["reference_displacement"].values ** 2 + 1e-30, axis=0))
+        assert rms[moved].max() < 0.2  # tests follow what was asked for
+        assert np.abs(record["spool_command"].values).max() < 0.9
+        assert record["chamber_pressure_a"].values.min() > 0.5e6
+
+
+def test_recorded_noise_is_that_of_the_instruments(written):
+    _, folder = written
+    calm = load_record(folder / "TX.nc")["chamber_pressure_a"].values[10:200]
+    # 190 samples, coloured: the estimate scatters by some 10 %, the colour adds as much
+    assert calm.std(axis=0) == pytest.approx(
+        sensors.floor_of("chamber_pressure_a", cases.numbers()["sensors"]), rel=0.5
+    )
+
+
+def test_velocity_and_acceleration_are_the_derivatives_of_the_displacement(written):
+    case, _ = written
+    true = generate.run_test(case, case.tests[-1]).truth()
+    slope = np.gradient(true["platen_displacement"], 1 / simulate.RATE, axis=0)
+    curve = np.gradient(true["platen_velocity"], 1 / simulate.RATE, axis=0)
+    inner = slice(100, -100)
+    for values, derivative in ((true["platen_velocity"], slope), (true["platen_acceleration"], curve)):
+        worst = np.abs(values - derivative)[inner].max(axis=0) / np.abs(derivative).max(axis=0)
+        assert worst.max() < 0.02  # central differences of motions up to 50 Hz: (w h)^2 / 6 = 0.4 %, and the held spool
+
+
+def test_the_label_measures_what_the_effect_does(written):
+    case, _ = written
+    label = reach.measured_label(case)
+    effect = label["effects"][0]
+    assert effect["family"] == "local_viscous"
+    assert len(effect["components"]) == 1
+    # 1.5e5 N s/m at some 0.1 m/s is 1.5e4 N on 168 t, 0.09 m/s2 over a floor of 0.015
+    assert 2 < effect["own"] < 20
+    assert effect["gap"] > 2
+    assert effect["gaps"]["strut_pressure"] < 0.1  # the struts' nitrogen hardly notices
+    assert json.loads(json.dumps(label)) == label
+
+
+def test_half_the_step_gives_the_same_motion(written, monkeypatch):
+    case, _ = written
+    test = case.tests[-1]
+    coarse = generate.run_test(case, test).channels.state
+    monkeypatch.setitem(cases.numbers()["integration"], "substeps", 8)
+    fine = generate.run_test(case, test).channels.state
+    assert np.abs(coarse - fine)[:, :6].max() < 1e-7  # far below the displacement noise of 6e-6
+    assert np.abs(coarse - fine)[:, rates.PA : rates.PB + 4].max() < 500.0  # pressure noise is 3 kPa
+
+
+def test_a_label_touched_after_sealing_is_found_out(tmp_path):
+    labels = [case.label for case in cases.draw_cases(6, 9, fast=True)]
+    generate.seal(labels, tmp_path)
+    assert generate.unseal(tmp_path) == {label["id"]: label for label in labels}
+    path = tmp_path / "sealed" / "labels.json"
+    salted = json.loads(path.read_text())
+    salted[labels[2]["id"]]["label"]["verdict"] = "none of it"
+    path.write_text(json.dumps(salted))
+    with pytest.raises(ValueError, match=labels[2]["id"]):
+        generate.unseal(tmp_path)

@@ -1,0 +1,212 @@
+"""The search for missing effects: its columns are derivatives, its gains are gains, its verdicts are true."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lhpost6_pin.calibration import calibration_numbers
+from lhpost6_pin.calibration.errors import corrected_record
+from lhpost6_pin.calibration.prepare import Prepared, prepare_problem
+from lhpost6_pin.calibration.problem import Base
+from lhpost6_pin.campaign import Campaign, save_campaign, simulate_campaign
+from lhpost6_pin.cli import app
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.discover import Discovery, discover, verdict_entries
+from lhpost6_pin.discover.candidates import Candidate, list_candidates
+from lhpost6_pin.discover.columns import columns_of
+from lhpost6_pin.discover.left import _hats
+from lhpost6_pin.discover.screen import Background, Block, score
+from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
+from lhpost6_pin.library import families, find_family
+from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.machine_toml import save_machine_toml
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.sensors import Sensors, load_sensors
+
+TESTS = ("TX", "TY", "WN")
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    """The LHPOST6."""
+    return load_machine()
+
+
+@pytest.fixture(scope="module")
+def sensors() -> Sensors:
+    """Its sensors."""
+    return load_sensors()
+
+
+def measured(machine: Machine, sensors: Sensors, seed: int, tests: tuple[str, ...] = TESTS) -> Campaign:
+    """A simulated campaign of a machine as its sensors show it, with their errors."""
+    return simulate_campaign(machine, load_controller("lhpost6"), sensors, seed=seed, tests=tests)
+
+
+@pytest.fixture(scope="module")
+def rubbing(machine: Machine, sensors: Sensors) -> Campaign:
+    """A campaign with breakaway friction on the horizontal seals."""
+    names = ("H1", "H2", "H3", "H4")
+    return measured(machine.with_effect("stribeck_friction", names, friction=9e3, speed=0.04), sensors, 1)
+
+
+@pytest.fixture(scope="module")
+def ready(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Prepared:
+    """One of its tests made ready."""
+    return prepare_problem(machine, rubbing.records[2:], sensors, calibration_numbers())
+
+
+@pytest.fixture(scope="module")
+def found(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Discovery:
+    """What is found in it, with one test held out."""
+    return discover(machine, rubbing, sensors, hold_out=["TY"], phases=(1,))
+
+
+def candidate(family: str, *components: str, **shape: float) -> Candidate:
+    """A candidate by family and components."""
+    known = find_family(family)
+    starts = {s.name: s.start[0] for s in known.shapes if not s.amplitude}
+    return Candidate(known, components, tuple((starts | shape).items()))
+
+
+@pytest.mark.parametrize(
+    ("family", "components"),
+    [("stribeck_friction", ("H1", "V2")), ("local_viscous", ("H3", "S1")), ("piston_leakage", ("H2", "V5"))],
+)
+def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, family, components):
+    problem = ready.problem
+    base = Base(problem, np.zeros(len(problem.prior)))
+    alone = [candidate(family, c) for c in components]
+    (columns,), parts = columns_of(problem, base, [*alone, candidate(family, *components)])
+    for one, part in zip(alone, parts, strict=False):
+        size = one.amplitudes[0].typical
+        kinds = one.family.shows_in
+        (change,) = problem.change(base, make_plant(one.on(problem.machine, (size,))), kinds)
+        direct = problem.whitener.apply(0, change[..., None], problem.frequency[0])[..., 0] / size
+        # forward dynamics and its inverse, and a quieted path marched with other states beside it: rounding
+        np.testing.assert_allclose((columns @ part)[..., 0], direct, rtol=0.0, atol=1e-6 * np.abs(direct).max())
+    both = sum(columns @ part for part in parts[:2])
+    np.testing.assert_array_equal(columns @ parts[2], both)
+
+
+def test_a_gain_is_what_a_refit_with_the_candidate_gains():
+    """Against least squares written out: half the fall of the sum of squares, priors included."""
+    rng = np.random.default_rng(3)
+    tests, rows, p, q = 3, 40, 5, 2
+    j, c, r = rng.normal(size=(tests, rows, p)), rng.normal(size=(tests, rows, q)), rng.normal(size=(tests, rows))
+    place = rng.normal(size=p)
+    matrix, side = np.einsum("tni,tnj->tij", j, j), np.einsum("tni,tn->ti", j, r)
+    background = Background(list(j), list(r), [], matrix, side, place)
+    block = Block(np.einsum("tni,tnj->tij", j, c), np.einsum("tni,tnj->tij", c, c), np.einsum("tni,tn->ti", c, r))
+    free = np.full(q, np.inf)
+    one = score(background, block, -free, free)
+
+    def least(some: list[int], more: bool) -> tuple[float, np.ndarray]:
+        a = np.concatenate([np.hstack([j[t], c[t]]) if more else j[t] for t in some])
+        prior = np.hstack([np.eye(p), np.zeros((p, q))]) if more else np.eye(p)
+        x, *_ = np.linalg.lstsq(np.vstack([a, prior]), -np.concatenate([*r[some], place]), rcond=None)
+        left = np.concatenate([a @ x + np.concatenate(r[some]), prior @ x + place])
+        return 0.5 * float(left @ left), x
+
+    every = list(range(tests))
+    assert one.gain == pytest.approx(least(every, False)[0] - least(every, True)[0], rel=1e-9)  # rounding
+    for t in every:
+        others = [k for k in every if k != t]
+        (_, without), (_, with_it) = least(others, False), least(others, True)
+        gain = 0.5 * np.sum((r[t] + j[t] @ without) ** 2) - 0.5 * np.sum(
+            (r[t] + np.hstack([j[t], c[t]]) @ with_it) ** 2
+        )
+        assert one.held_out[t] == pytest.approx(gain, rel=1e-9)
+
+
+def test_amplitudes_stay_within_their_bounds():
+    background = Background([np.zeros((1, 1))], [np.zeros(1)], [], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1))
+    block = Block(np.zeros((1, 1, 1)), np.ones((1, 1, 1)), np.array([[4.0]]))
+    one = score(background, block, np.array([-1.0]), np.array([1.0]))
+    assert one.amplitude[0] == -1.0
+    assert one.gain == pytest.approx(4.0 - 0.5)  # -(theta^2 / 2 + 4 theta) at the bound, not 8 at the free optimum
+
+
+def test_every_family_is_a_candidate_on_every_group_at_every_start(machine):
+    groups = list_candidates(machine)
+    assert {g[0].family.name for g in groups} == set(families())
+    assert all(len({(c.family.name, c.shape) for c in g}) == 1 for g in groups)
+
+
+def test_free_functions_are_exact_for_straight_lines():
+    nodes = np.linspace(-1.0, 2.0, 7)
+    x = np.linspace(-1.0, 2.0, 50)
+    np.testing.assert_allclose(_hats(x, nodes) @ (3.0 * nodes + 1.0), 3.0 * x + 1.0, atol=1e-14)  # rounding
+
+
+def test_what_was_hidden_is_named_and_measured(found):
+    assert found.verdict.word == "named"
+    (effect,) = found.verdict.effects
+    assert (effect.family, effect.components) == ("stribeck_friction", ("H1", "H2", "H3", "H4"))
+    # hidden 9 kN and 0.04 m/s; intervals know of sensor noise alone, not of friction along a quieted path
+    assert effect.parameters["friction"].value == pytest.approx(9e3, rel=0.1)
+    assert effect.parameters["speed"].value == pytest.approx(0.04, rel=0.15)
+
+
+def test_the_gap_shrinks_on_the_test_that_was_not_searched(found):
+    assert (found.used, found.held_out) == (("TX", "WN"), ("TY",))
+    (gap,) = found.proof.gaps
+    assert gap.after < gap.refitted
+    assert gap.closure > 0.7  # the issue asks for 0.8 in the median
+
+
+def test_the_verdict_goes_through_json_and_the_model_through_toml(found, tmp_path):
+    entries = json.loads(json.dumps(verdict_entries(found)))
+    assert entries["verdict"] == "named"
+    assert entries["effects"][0]["family"] == "stribeck_friction"
+    assert entries["closure"]["inverse dynamics"]["TY"]["floor"] == 1.0
+    again = load_machine(save_machine_toml(found.fitted, tmp_path / "model.toml"))
+    assert again.added_effects == found.fitted.added_effects
+    assert again.actuators == found.fitted.actuators
+
+
+def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
+    """Gain and offset of one channel: what a sensor shows is (1 + gain) true + offset."""
+    unknowns = ready.problem.unknowns
+    names = [u.name for u in unknowns]
+    values = np.zeros(len(unknowns))
+    values[names.index("gain chamber_pressure_b[H2]")] = 0.01
+    values[names.index("offset chamber_pressure_b[H2]")] = 2e4
+    record = rubbing.records[0]
+    clean = corrected_record(record, unknowns, values)
+    column = clean["chamber_pressure_b"].values[:, 1]
+    np.testing.assert_allclose(1.01 * (column + 2e4), record["chamber_pressure_b"].values[:, 1], rtol=1e-12)
+    np.testing.assert_array_equal(clean["chamber_pressure_a"], record["chamber_pressure_a"])
+
+
+def test_tests_that_are_not_there_cannot_be_held_out(machine, sensors, rubbing):
+    with pytest.raises(UnknownNameError, match="no test of the campaign named 'TZ'"):
+        discover(machine, rubbing, sensors, hold_out=["TZ"])
+    with pytest.raises(RecordError, match="leave at least one to search"):
+        discover(machine, rubbing, sensors, hold_out=list(TESTS))
+
+
+def test_an_effect_made_by_hand_is_in_no_machine_file(machine, tmp_path):
+    own = machine.with_effect(replace(machine.effects[-1], name="mine"))
+    with pytest.raises(ParameterError, match="mine: made by hand"):
+        save_machine_toml(own, tmp_path / "model.toml")
+
+
+def test_nothing_is_found_where_nothing_is_hidden(machine, sensors, tmp_path):
+    """By the command, which leaves verdict, model and report."""
+    save_campaign(measured(machine, sensors, 2), tmp_path / "campaign")
+    result = CliRunner().invoke(app, ["discover", str(tmp_path / "campaign"), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"verdict.json", "model.toml", "report.html"}
+    entries = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert entries["verdict"] in ("none", "parameters_only")
+    assert (entries["effects"], entries["closure"], entries["held_out"]) == ([], {}, [])
+
+
+def test_no_jobs_at_all_are_refused(tmp_path):
+    result = CliRunner().invoke(app, ["discover", str(tmp_path), "--jobs", "0"])
+    assert result.exit_code == 1  # `main` makes it 2 and prints it
+    assert "--jobs 0" in str(result.exception)

@@ -127,7 +127,9 @@ def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters
     from scipy.optimize import lsq_linear
 
     prior = problem.prior
-    trust, reach = numbers.number("fit.trust"), numbers.number("fit.reach")
+    known = np.arange(len(prior)) < len(problem.knobs)
+    trust = np.where(known, numbers.number("fit.trust"), numbers.number("fit.sensor_trust"))
+    reach = np.where(known, numbers.number("fit.reach"), numbers.number("fit.sensor_reach"))
     right = normal.whole[1]
     factor = np.linalg.cholesky(normal.posterior(prior) * np.outer(prior, prior))
     wanted = np.linalg.solve(factor, -(right + x / prior**2) * prior)

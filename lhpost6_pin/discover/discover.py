@@ -2,12 +2,12 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 
-from ..calibration import calibration_numbers
+from ..calibration import Knob, calibration_numbers
 from ..calibration.prepare import Prepared, prepare_problem
 from ..campaign import Campaign
 from ..errors import RecordError, UnknownNameError
@@ -69,10 +69,13 @@ def discover(
     report = progress or (lambda share: None)
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     calibration = override_parameters(
-        calibration_numbers(), {f"fit.{key}": numbers.number(f"fit.{key}") for key in ("reach", "rounds")}
+        calibration_numbers(),
+        {f"fit.{key}": numbers.number(f"fit.{key}") for key in ("reach", "rounds", "sensor_reach")},
     )
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     ready = prepare_problem(machine, campaign.records, sensors, calibration, kinds=RESIDUALS, seed=seed, jobs=jobs)
+    knobs = tuple(_narrowed(k, numbers.number("fit.wrench_reach")) for k in ready.problem.knobs)
+    ready = ready.with_machine(ready.problem.machine, knobs)
     report(0.1)
     held = _held_out(ready, names, hold_out)
     used = [i for i in range(len(names)) if i not in held]
@@ -102,6 +105,13 @@ def discover(
         seed=seed,
         hashes={name: _hash(record) for name, record in zip(names, campaign.records, strict=True)},
     )
+
+
+def _narrowed(knob: Knob, reach: float) -> Knob:
+    """A knob that acts on the platen, within so many of its standard deviations; others as they are."""
+    if "wrench" not in knob.shows_in:
+        return knob
+    return replace(knob, lowest=max(knob.lowest, -reach * knob.sd), highest=min(knob.highest, reach * knob.sd))
 
 
 def _held_out(ready: Prepared, names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:

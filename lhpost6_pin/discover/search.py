@@ -7,6 +7,7 @@ parameters and sensor errors.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -111,7 +112,10 @@ def search(
         passed = [s for s in one.scored if not s.refused]
         if not passed or k == most:
             break
-        found = _add(found, passed, calibration, numbers, _part(progress, 0.5 * (begin + end), end))
+        more = _add(found, passed, calibration, numbers, _part(progress, 0.5 * (begin + end), end))
+        if more is None:
+            break
+        found = more
     progress(1.0)
     return found, standing
 
@@ -141,47 +145,78 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
             results += some
             progress((done + 1) / len(groups))
     results.sort(key=lambda r: -r[1].gain)
-    least = numbers.number("accept.gain")
     rest = found.solution.normal.rest
     misfit = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
+    first = excess_by_kind(found.refit.normal.problem, found.refit.normal.rest)
     scored = []
     for candidate, one in results:
-        less = share = 0.0
-        if one.gain >= least:
+        less = Lowered(0.0, 0.0, 0.0)
+        if one.gain >= numbers.number("accept.gain"):
             columns, (part,) = columns_of(problem, base, [candidate])
-            less, share = lowered(background, [c @ part for c in columns], one)
-        scored.append(Scored(candidate, one, share, _refusal(one, less, share, misfit, numbers)))
+            less = lowered(problem, background, [c @ part for c in columns], one, first)
+        scored.append(Scored(candidate, one, less.share, _refusal(one, less, misfit, numbers)))
     return Round(tuple(scored), misfit)
 
 
-def lowered(background: Background, columns: Sequence[NDArray[np.complex128]], one: Score) -> tuple[float, float]:
-    """By how much a candidate lowers the squares of what is left, with the refit that comes with it.
+class Lowered(NamedTuple):
+    """By how much a candidate lowers the squares of what is left, with the refit that comes with it."""
 
-    As twice a log-likelihood; and as a share of what is more than noise.
-    """
-    before = after = count = 0.0
+    squares: float  # twice a log-likelihood
+    share: float  # of what is more than noise
+    of_first: float  # in the kind where this is most: of what was more than noise before any effect was added
+
+
+def lowered(
+    problem: Problem,
+    background: Background,
+    columns: Sequence[NDArray[np.complex128]],
+    one: Score,
+    first: dict[str, float],
+) -> Lowered:
+    """How a candidate lowers what is left; first is the excess by kind before any effect was added."""
+    before: list[Array] = []
+    after: list[Array] = []
     for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
-        weight = np.concatenate([root.ravel(), root.ravel()])
         explained = real_bins(column, root) @ one.amplitude
-        before += float(np.sum((weight * (rest + slope @ background.alone)) ** 2))
-        after += float(np.sum((weight * (rest + slope @ one.change + explained)) ** 2))
-        count += len(rest)
-    return before - after, (before - after) / max(before - count, 1e-9 * count)
+        for sums, left in (
+            (before, rest + slope @ background.alone),
+            (after, rest + slope @ one.change + explained),
+        ):
+            half = root.size
+            sums.append(((left[:half] ** 2 + left[half:] ** 2).reshape(root.shape) * root**2).sum(axis=0))
+    old, new = np.sum(before, axis=0), np.sum(after, axis=0)  # by column
+    count = float(sum(len(rest) for rest in background.rest))
+    fall = float((old - new).sum())
+    of_first = max(float((old - new)[problem.rows(kind)].sum()) / more for kind, more in first.items())
+    return Lowered(fall, fall / max(float(old.sum()) - count, 1e-9 * count), of_first)
 
 
-def _refusal(one: Score, less: float, share: float, misfit: float, numbers: Parameters) -> str:
+def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:
+    """Squares of whitened residuals beyond noise, twice, by kind; no less than a tenth of what noise has."""
+    found = {}
+    for kind in problem.kinds:
+        rows = problem.rows(kind)
+        if rows.any():
+            count = 2.0 * sum(r[:, rows].size for r in rest)
+            found[kind] = max(2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest) - count, 0.1 * count)
+    return found
+
+
+def _refusal(one: Score, less: Lowered, misfit: float, numbers: Parameters) -> str:
     """Why a candidate may not be added."""
     if one.gain < numbers.number("accept.gain"):
         return "gains too little"
-    if less < one.gain:  # twice it, if residuals are as noisy as they should be: the noise in derivatives is all it has
+    if less.squares < one.gain:  # twice it, if what is left is noise: the noise in derivatives is all it has
         return "does not lower what is left"
     held = one.held_out
     if held.sum() < numbers.number("accept.held_out") * one.gain:
         return "does not hold on tests that it was not fitted on"
     if np.mean(held > -numbers.number("accept.worse") * one.gain) < numbers.number("accept.better"):
         return "makes tests worse that it was not fitted on"
-    if misfit > numbers.number("accept.noise") and share < numbers.number("accept.closure"):
+    if misfit > numbers.number("accept.noise") and less.share < numbers.number("accept.closure"):
         return "explains too little of what is more than noise"
+    if less.of_first < numbers.number("accept.of_first"):
+        return "explains too little of what was there at first"
     return ""
 
 
@@ -192,8 +227,11 @@ def _bounds(candidate: Candidate) -> tuple[Array, Array]:
 
 def _add(
     found: Search, passed: Sequence[Scored], calibration: Parameters, numbers: Parameters, progress: Progress
-) -> Search:
-    """Add the best candidate: the first of each family that comes near it is fitted in full, with its shapes."""
+) -> Search | None:
+    """Add the best candidate: the first of each family that comes near it is fitted in full, with its shapes.
+
+    None if none of them lowers what is left when it is fitted in full.
+    """
     near = numbers.number("accept.near") * passed[0].score.gain
     firsts: dict[str, Scored] = {}
     for one in passed:
@@ -205,9 +243,12 @@ def _add(
         share = _part(progress, i / len(rivals), (i + 1) / len(rivals))
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
     power = found.solution.normal.power
+    before = _objective(found.problem, found.solution.x, power)
     left = [_objective(ready.problem, solution.x, power) for ready, solution in fitted]
     order = np.argsort(left)
     best = int(order[0])
+    if before - left[best] < numbers.number("accept.gain"):
+        return None
     contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best])) for i in order)
     ready, solution = fitted[best]
     added = Added(rivals[best].candidate, rivals[best].score.gain, len(found.rounds[-1].scored), contest)
@@ -224,9 +265,8 @@ def _fit_jointly(
     machine: Machine = candidate.on(problem.machine, amplitudes)
     knobs = (*problem.knobs, *candidate.knobs(amplitudes, numbers.number("fit.spread")))
     ready = found.ready.with_machine(machine, knobs)
-    count, known = len(problem.knobs), len(found.solution.x)
-    moved = one.score.change[:known] * problem.prior + found.solution.at
-    start = np.insert(moved, count, np.zeros(len(knobs) - count))
+    count = len(problem.knobs)
+    start = np.insert(found.solution.at, count, np.zeros(len(knobs) - count))
     return ready, solve(ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal)
 
 

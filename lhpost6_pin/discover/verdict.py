@@ -15,7 +15,7 @@ from scipy.stats import chi2, norm
 from ..calibration import Knob
 from ..parameters import Parameters
 from .left import Left
-from .search import Added, Search
+from .search import Added, Search, excess_by_kind
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
 
@@ -177,13 +177,14 @@ def _sensors(found: Search, sd: Array, reach: float, numbers: Parameters) -> tup
 
 def _unnamed(found: Search, left: Sequence[Left], numbers: Parameters) -> bool:
     """Whether more is left than noise."""
-    problem = found.problem
+    problem, rest = found.problem, numbers.number("verdict.rest")
     whitened = problem.whitened(found.solution.x)
-    for kind in problem.kinds:
+    first = excess_by_kind(problem, found.refit.normal.rest)
+    last = excess_by_kind(problem, whitened)
+    for kind, excess in last.items():
         rows = problem.rows(kind)
-        if rows.any() and np.mean([np.mean(np.abs(r[:, rows]) ** 2) for r in whitened]) > numbers.number(
-            "verdict.unexplained"
-        ):
+        misfit = np.mean([np.mean(np.abs(r[:, rows]) ** 2) for r in whitened])
+        if misfit > numbers.number("verdict.unexplained") and excess > rest * first[kind]:
             return True
     return _first(left, numbers) is not None
 

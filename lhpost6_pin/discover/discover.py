@@ -70,7 +70,7 @@ def discover(
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     calibration = override_parameters(
         calibration_numbers(),
-        {f"fit.{key}": numbers.number(f"fit.{key}") for key in ("reach", "rounds", "sensor_reach")},
+        {f"fit.{key}": numbers.number(f"fit.{key}") for key in ("reach", "rounds", "sensor_reach", "trust")},
     )
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     ready = prepare_problem(machine, campaign.records, sensors, calibration, kinds=RESIDUALS, seed=seed, jobs=jobs)

@@ -51,7 +51,7 @@ def _sensors(calibration: Calibration) -> Table:
 
 
 def _misfits(calibration: Calibration) -> Table:
-    kinds = [k for k in range(len(RESIDUALS)) if np.isfinite(calibration.misfit_after[:, k]).any()]
+    kinds = [k for k, after in enumerate(calibration.misfit_after.T) if np.isfinite(after).any()]
     title = "Misfit before, after; 1 is sensor noise alone"
     table = _table(title, "test", *(RESIDUALS[k] for k in kinds))
     for test, before, after in zip(calibration.tests, calibration.misfit_before, calibration.misfit_after, strict=True):

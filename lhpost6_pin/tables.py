@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Column, Table
 
+from .console import make_console
 from .machine import Machine
 
 if TYPE_CHECKING:
@@ -32,11 +32,6 @@ __all__ = [
     "print_sensor_findings",
     "report_limits",
 ]
-
-
-def _console() -> Console:
-    """Console as wide as the terminal, and wide enough for tables where the output is a file or a pipe."""
-    return Console() if Console().is_terminal else Console(width=140)
 
 
 def _text(value: float | tuple[float, ...]) -> str:
@@ -71,7 +66,7 @@ def report_limits(plant: "Plant") -> dict[str, Any]:
 
 def print_machine(machine: Machine) -> None:
     """Print every quantity with unit, evidence and source; assumed ones are marked."""
-    console = _console()
+    console = make_console()
     console.print(f"[bold]{escape(machine.name)}[/]: {escape(machine.title)}")
     console.print(
         f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
@@ -121,7 +116,7 @@ def print_capacity(machine: Machine) -> None:
     for line in capacity_table(machine):
         deviation = f"{100 * line.deviation:+.1f} %"
         table.add_row(line.name, f"{line.model:.4g}", f"{line.printed:.4g}", line.unit, deviation, line.how)
-    _console().print(table)
+    make_console().print(table)
 
 
 def print_modes(machine: Machine) -> None:
@@ -136,7 +131,7 @@ def print_modes(machine: Machine) -> None:
         other = full.get(mode.axis)
         cells = (f"{other.frequency:.2f}", f"{100 * other.damping:.2f}") if other else ("", "")
         table.add_row(mode.axis, f"{mode.frequency:.2f}", *cells)
-    _console().print(table)
+    make_console().print(table)
 
 
 def print_motions(name: str | None = None) -> None:
@@ -144,7 +139,7 @@ def print_motions(name: str | None = None) -> None:
     from .errors import UnknownNameError
     from .motions import list_motions, motion_options
 
-    console, known = _console(), list_motions()
+    console, known = make_console(), list_motions()
     if name is None:
         table = Table(Column("name", no_wrap=True), "kind", "what it is", Column("needs", no_wrap=True))
         for m in known:
@@ -174,7 +169,7 @@ def print_findings(file: str, findings: "Sequence[Finding]") -> None:
     for f in findings:
         sample = "" if f.sample is None else str(f.sample)
         table.add_row(colour[f.severity], escape(f.channel), sample, escape(f.message), escape(f.remedy))
-    console = _console()
+    console = make_console()
     console.print(table)
     counts = {s: sum(f.severity == s for f in findings) for s in ("error", "warning")}
     console.print(f"{counts['error']} errors, {counts['warning']} warnings")
@@ -184,7 +179,7 @@ def print_sensor_findings(findings: "Sequence[SensorFinding]") -> None:
     """Print comparisons between sensors that stand out, and how many there were."""
     suspicious = [f for f in findings if f.verdict == "suspicious"]
     untested = sum(f.verdict == "untested" for f in findings)
-    console = _console()
+    console = make_console()
     if suspicious:
         names = ("comparison", "channel", "quantity", "unit", "estimate", "expected", "within", "deviations")
         table = Table(*names, title="Sensors that disagree")
@@ -229,12 +224,12 @@ def print_comparison(measured: "xr.Dataset", simulated: "xr.Dataset") -> None:
             moved = peak[k] > _SILENT * peak.max()
             cells = (f"{peak[k]:.4g} {u}", f"{apart[k]:.3g} {u}", f"{ratio[k]:.3g}" if moved else "")
             table.add_row(f"{name} {label}", *cells, f"{drift[k]:.3g} {u}/s")
-    _console().print(table)
+    make_console().print(table)
 
 
 def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
     """Print where results are and what they say first."""
-    console = _console()
+    console = make_console()
     if summary is not None:
         console.print(f"[bold]{escape(summary.verdict)}[/]")
         delay = escape("delay [ms]")

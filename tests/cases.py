@@ -4,6 +4,7 @@ The ports of a case are `PORTS`: a leg, and two slip directions of a pad. The nu
 but not the machine's, so that a test of a law cannot lean on them.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -111,3 +112,19 @@ KERNELS = {
     )
 }
 """Every kernel of `laws/`, by its name."""
+
+
+class Motion:
+    """A smooth motion of the ports; s and its rate at a time [s]."""
+
+    frequency = 2 * math.pi * np.array([3.0, 2.0, 5.0])
+    phase = np.array([0.0, 0.4, 1.1])
+    size = 0.002
+
+    def s(self, t: float) -> np.ndarray:
+        """Coordinates (3,) [m]."""
+        return self.size * (np.sin(self.frequency * t + self.phase) - np.sin(self.phase))
+
+    def sd(self, t: float) -> np.ndarray:
+        """Rates (3,) [m/s]."""
+        return self.size * self.frequency * np.cos(self.frequency * t + self.phase)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import CASES, KERNELS, PORTS, SUPPLY, Case
+from cases import CASES, KERNELS, PORTS, SUPPLY, Case, Motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -22,22 +22,6 @@ TIGHT = dict(rtol=1e-12, atol=1e-12, method="DOP853")
 
 
 # ------------------------------------------------------------- the standard tests, run on every law
-class Motion:
-    """A smooth motion of the ports; s and its rate at a time [s]."""
-
-    frequency = 2 * math.pi * np.array([3.0, 2.0, 5.0])
-    phase = np.array([0.0, 0.4, 1.1])
-    size = 0.002
-
-    def s(self, t: float) -> np.ndarray:
-        """Coordinates (3,) [m]."""
-        return self.size * (np.sin(self.frequency * t + self.phase) - np.sin(self.phase))
-
-    def sd(self, t: float) -> np.ndarray:
-        """Rates (3,) [m/s]."""
-        return self.size * self.frequency * np.cos(self.frequency * t + self.phase)
-
-
 def forces(case: Case, s: np.ndarray, sd: np.ndarray, z: np.ndarray, python: bool = False) -> tuple:
     """Ledger (rows, 2) and port forces (3,)."""
     force, port_force = np.zeros((len(case.rows), 2)), np.zeros(len(PORTS))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from cases import PORTS, SUPPLY, Case, Kernel
+from cases import PORTS, SUPPLY, Case, Kernel, Motion
 from library_cases import measured_of, record_at_model_steps, rms, shaken
 from machine_cases import frame_array, machine_named, random_poses
 from scipy.integrate import solve_ivp
@@ -84,22 +84,6 @@ KERNELS = {
         Kernel(gas.advance_heat, ((-1, 1), (-1, 1), (-1, 1), _DT, (0.01, 10))),
     )
 }
-
-
-class Motion:
-    """A smooth motion of the ports; s and its rate at a time [s]."""
-
-    frequency = 2 * math.pi * np.array([3.0, 2.0, 5.0])
-    phase = np.array([0.0, 0.4, 1.1])
-    size = 0.002
-
-    def s(self, t: float) -> np.ndarray:
-        """Coordinates (3,) [m]."""
-        return self.size * (np.sin(self.frequency * t + self.phase) - np.sin(self.phase))
-
-    def sd(self, t: float) -> np.ndarray:
-        """Rates (3,) [m/s]."""
-        return self.size * self.frequency * np.cos(self.frequency * t + self.phase)
 
 
 def port_forces(case: Case, s: np.ndarray, sd: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import lhpost6_pin
 PACKAGE = Path(lhpost6_pin.__file__).parent
 
 LAYERS = [
-    {"", "errors", "files", "compiled", "names"},  # "" is the package itself: its version
+    {"", "errors", "files", "compiled", "names", "progress", "console"},  # "" is the package itself: its version
     {"laws"},
     {"parameters", "specimen", "signals", "transfer", "distortion"},
     {"schema", "records", "motions", "conditioning"},

@@ -11,7 +11,7 @@ the rest counts as noise, too: it is weighed less, and predicted deviations grow
 the predicted covariance, with a floor under its deviations.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..machine import Machine
 from ..names import AXES
 from ..parameters import Parameters
+from ..progress import Progress, between
 from ..residuals import RESIDUALS
 from ..sensors import Sensors
 from .normal import Bias, Normal, bounded_step, positive
@@ -33,7 +34,6 @@ __all__ = ["Solution", "calibrate", "misfit", "solve"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Progress = Callable[[float], None]
 
 
 def calibrate(
@@ -61,7 +61,7 @@ def calibrate(
     ready = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
     problem, noisy = ready.problem, ready.noisy
     report(0.1)
-    found = solve(problem, ready.replicas, numbers, np.zeros(len(problem.prior)), _between(report, 0.1, 0.8))
+    found = solve(problem, ready.replicas, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
     normal, x = found.normal, found.x
     floor = numbers.number("fit.floor") * problem.prior
     covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64)
@@ -73,7 +73,7 @@ def calibrate(
         band=numbers.vector("simulation.bands"),
         floor=numbers.number("simulation.floor"),
         told_below=told_below,
-        progress=_between(report, 0.8, 1.0),
+        progress=between(report, 0.8, 1.0),
     )
     report(1.0)
     return Calibration(
@@ -125,11 +125,11 @@ def solve(
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
     for done in range(1, rounds + 1):
         at = done - 1 if done == 1 else done - 1 + len(replicas)
-        normal = Normal(problem, x, _between(progress, shares[at], shares[at + 1]), known)
+        normal = Normal(problem, x, between(progress, shares[at], shares[at + 1]), known)
         if done == 1:
             before = misfit(problem, normal.rest)
         if done == 2:  # near enough to the end, and the same from there on
-            parts = [_between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
+            parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
             bias = Bias(normal, replicas, x, parts, known)
         if bias is not None:
             normal = normal.less(bias)
@@ -140,10 +140,6 @@ def solve(
             converged = True
             break
     return Solution(x, x - step, normal, before, done, converged)
-
-
-def _between(report: Progress, first: float, last: float) -> Progress:
-    return lambda share: report(first + (last - first) * share)
 
 
 def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:

@@ -5,9 +5,19 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
 from .app import app, progress_bar
-from .options import Locked, MachineName, Out, Override, SensorsName, SpecimenAt, SpecimenName, find_table, folder_for
+from .options import (
+    Locked,
+    MachineName,
+    Out,
+    Override,
+    SensorsName,
+    SpecimenAt,
+    SpecimenName,
+    find_table,
+    folder_for,
+    refuse_no_jobs,
+)
 from .runs import repeating_command
 
 __all__ = ["calibrate"]
@@ -34,8 +44,7 @@ def calibrate(
     from ..report import write_calibrate_report
     from ..sensors import load_sensors
 
-    if jobs == 0:
-        raise ParameterError("--jobs 0: give a number of threads, or -1 for as many as there are cores")
+    refuse_no_jobs(jobs)
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     known = load_sensors(sensors)
     tests = load_campaign(campaign, table)

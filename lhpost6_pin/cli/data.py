@@ -78,15 +78,15 @@ def export(
 
 def _print_channels(record: "xr.Dataset", sources: dict[str, str]) -> None:
     """Print every channel with its source and range, so that a wrong unit is seen at once."""
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
+    from ..console import make_console
     from ..importing import channel_units
 
     rows = Table("channel", "from", "unit", "least", "most", title=escape(str(record.attrs["title"])))
     for name, unit, values in channel_units(record):
         cells = (name, sources.get(name, "derived"), unit, f"{values.min():.6g}", f"{values.max():.6g}")
         rows.add_row(*map(escape, cells))
-    console = Console() if Console().is_terminal else Console(width=140)
+    console = make_console()
     console.print(rows)

@@ -5,9 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
 from .app import app, progress_bar
-from .options import MachineName, Out, SensorsName, find_machine, folder_for
+from .options import MachineName, Out, SensorsName, find_machine, folder_for, refuse_no_jobs
 from .runs import repeating_command
 
 __all__ = ["discover"]
@@ -39,8 +38,7 @@ def discover(
     from ..report.discover_report import write_discover_report
     from ..sensors import load_sensors
 
-    if jobs == 0:
-        raise ParameterError("--jobs 0: give a number of threads, or -1 for as many as there are cores")
+    refuse_no_jobs(jobs)
     table = find_machine(machine, model)
     known, tests = load_sensors(sensors), load_campaign(campaign, table)
     held = None if hold_out is None else [] if hold_out == ["none"] else hold_out

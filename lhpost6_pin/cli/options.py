@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["Axes", "Beyond", "ControllerName", "EngineName", "HighPass", "Locked", "LowPass", "MachineName", "Motion"]
 __all__ += ["Out", "Override", "Rate", "Scale", "Scheme", "Set", "SettingsName", "SpecimenAt", "SpecimenName", "Valves"]
 __all__ += ["find_controller", "find_machine", "find_settings", "find_target", "find_table", "folder_for"]
+__all__ += ["refuse_no_jobs"]
 
 MachineName = Annotated[str, typer.Option("--machine", help="Shipped machine name, or a TOML file.")]
 Override = Annotated[Path | None, typer.Option("--override", help="TOML file with parameters to replace.")]
@@ -120,6 +121,12 @@ def find_target(
     return make_target(
         ground, scale=scale, axes=axes or own, high_pass=high_pass, low_pass=low_pass, rate=float(SAMPLE_RATE)
     )
+
+
+def refuse_no_jobs(jobs: int, what: str = "threads") -> None:
+    """Raise ParameterError for no jobs at all; `what` they are, in words."""
+    if jobs == 0:
+        raise ParameterError(f"--jobs 0: give a number of {what}, or -1 for as many as there are cores")
 
 
 def folder_for(out: Path | None, name: str) -> Path:

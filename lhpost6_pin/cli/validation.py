@@ -18,6 +18,7 @@ from .options import (
     find_settings,
     find_table,
     folder_for,
+    refuse_no_jobs,
 )
 from .runs import repeating_command
 
@@ -49,8 +50,7 @@ def validate(
     from ..validation import validate as validate_campaign
     from ..validation.table import print_validation
 
-    if jobs == 0:
-        raise ParameterError("--jobs 0: give a number of tests at a time, or -1 for as many as there are cores")
+    refuse_no_jobs(jobs, "tests at a time")
     wanted = _phases(phases)
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     settings = find_settings(controller, table) if controller else None

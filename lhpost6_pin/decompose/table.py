@@ -1,10 +1,10 @@
 """What a terminal shows of a decomposed record."""
 
 import numpy as np
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..console import make_console
 from ..names import AXES
 from .agreement import Agreement
 from .record import Decomposed
@@ -14,7 +14,7 @@ __all__ = ["print_agreement"]
 
 def print_agreement(found: Decomposed, agreement: Agreement) -> None:
     """Print errors of the forces, the residual and what it is to be expected of, axis by axis."""
-    console = Console() if Console().is_terminal else Console(width=140)
+    console = make_console()
     console.print(_errors(found, agreement))
     console.print(_residual(found, agreement))
 

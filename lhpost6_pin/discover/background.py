@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.normal import Normal
+from ..calibration.normal import Normal, positive
 from ..calibration.problem import Base, Problem
 from ..library import find_family
 from .candidates import Candidate
@@ -63,13 +63,7 @@ def make_background(
         slope.append(j)
         rest.append(left)
         root.append(w)
-        matrix.append(positive_part(h))
+        matrix.append(positive(h, np.ones(len(h))))
         side.append(g)
     place = np.append(x / problem.prior, np.zeros(len(scatter)))
     return Background(slope, rest, root, np.array(matrix), np.array(side), place)
-
-
-def positive_part(matrix: Array) -> Array:
-    """A symmetric matrix without its negative directions."""
-    value, vector = np.linalg.eigh(matrix)
-    return np.asarray((vector * np.maximum(value, 0.0)) @ vector.T)

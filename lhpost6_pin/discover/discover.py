@@ -1,7 +1,7 @@
 """The whole search for missing effects: from a campaign of records to a verdict and its proof."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..errors import RecordError, UnknownNameError
 from ..files import models_folder
 from ..machine import Machine
 from ..parameters import Parameters, load_parameters, override_parameters
+from ..progress import Progress, between
 from ..residuals import RESIDUALS
 from ..sensors import Sensors
 from .left import Left, what_is_left
@@ -23,7 +24,6 @@ from .verdict import Verdict, judge
 
 __all__ = ["Discovery", "discover"]
 
-Progress = Callable[[float], None]
 
 FEWEST = 3  # tests that are searched; with more, one is held out
 
@@ -79,16 +79,16 @@ def discover(
     report(0.1)
     held = _held_out(ready, names, hold_out)
     used = [i for i in range(len(names)) if i not in held]
-    found, standing = search(ready.only(used), calibration, numbers, _part(report, 0.1, 0.75))
+    found, standing = search(ready.only(used), calibration, numbers, between(report, 0.1, 0.75))
     left: tuple[Left, ...] = ()
-    if _more_than_noise(found, numbers.number("left.noise")):
+    if found.misfit("wrench") > numbers.number("left.noise"):
         left = what_is_left(found.problem, standing.base, standing.background, numbers)
     report(0.8)
     proof = None
     if held:
         records = [campaign.records[i] for i in held]
         delivered = ready.problem.machine
-        part = _part(report, 0.8, 1.0)
+        part = between(report, 0.8, 1.0)
         proof = prove(delivered, found, records, sensors, phases=phases, jobs=jobs, progress=part)
     report(1.0)
     return Discovery(
@@ -144,13 +144,6 @@ def _tells_least(ready: Prepared) -> int:
     return int(np.argmax([np.linalg.slogdet(m)[1] for m in without]))
 
 
-def _more_than_noise(found: Search, limit: float) -> bool:
-    problem = found.problem
-    rows = problem.rows("wrench")
-    rest = problem.whitened(found.solution.x)
-    return bool(rows.any() and np.mean([np.mean(np.abs(r[:, rows]) ** 2) for r in rest]) > limit)
-
-
 def _hash(record: xr.Dataset) -> str:
     """SHA-256 of a record's numbers."""
     digest = hashlib.sha256()
@@ -158,7 +151,3 @@ def _hash(record: xr.Dataset) -> str:
         digest.update(name.encode())
         digest.update(np.ascontiguousarray(record[name].values).tobytes())
     return digest.hexdigest()
-
-
-def _part(progress: Progress, first: float, last: float) -> Progress:
-    return lambda share: progress(first + (last - first) * share)

@@ -8,6 +8,7 @@ from typing import Any
 
 from .. import __version__
 from ..files import write_whole
+from ..library import find_family
 from .discover import Discovery
 from .verdict import Estimate, Finding
 
@@ -53,8 +54,6 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
 
 def next_tests(found: Discovery) -> list[str]:
     """Tests that would tell rivals apart, in words of the library."""
-    from ..library import find_family
-
     rivals = [name for one in found.verdict.effects if one.rivals for name in (one.family, *one.rivals)]
     return [f"{name}: {find_family(name).tell_apart}" for name in dict.fromkeys(rivals)]
 

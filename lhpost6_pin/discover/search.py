@@ -1,24 +1,27 @@
-"""The search: refit, screen the library, add what passes, refit everything jointly, and again; then prune.
+"""The search: refit, screen the library, add what passes, refit everything jointly, and again.
 
 A candidate passes if it gains enough, on tests that it was not fitted on, too, and explains enough of what is more than
 noise. Among those that pass, the one with the largest gain is added and its numbers are fitted together with all known
 parameters and sensor errors.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from ..calibration.fit import Solution, solve
+from ..calibration.fit import Solution, misfit, solve
 from ..calibration.knobs import with_knobs
 from ..calibration.prepare import Prepared
 from ..calibration.problem import Base, Problem
 from ..machine import Machine
 from ..parameters import Parameters
+from ..progress import Progress, between
+from ..residuals import RESIDUALS
 from .background import make_background, scatter_of
 from .candidates import Candidate, list_candidates
 from .columns import columns_of
@@ -27,7 +30,6 @@ from .screen import Background, Score, make_block, real_bins, score
 __all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand"]
 
 Array = NDArray[np.float64]
-Progress = Callable[[float], None]
 
 SCATTER = (("piston_leakage", "leakage"), ("local_viscous", "viscous"), ("bearing_friction", "pad_friction"))
 """Effects by which twins differ, and the number of theirs that is shared."""
@@ -68,6 +70,14 @@ class Round:
     scored: tuple[Scored, ...]
     misfit: float  # mean square of the whitened residuals before it
 
+    @property
+    def best(self) -> dict[str, Scored]:
+        """The best candidate of each family, by falling gain."""
+        found: dict[str, Scored] = {}
+        for one in self.scored:
+            found.setdefault(one.candidate.family.name, one)
+        return found
+
 
 @dataclass(frozen=True)
 class Standing:
@@ -92,6 +102,15 @@ class Search:
         """The problem with the effects added."""
         return self.ready.problem
 
+    @cached_property
+    def rest(self) -> list[NDArray[np.complex128]]:
+        """What is left at the solution: whitened bins (m, c) of every test."""
+        return self.problem.whitened(self.solution.x)
+
+    def misfit(self, kind: str) -> float:
+        """Mean square of what is left of one kind, over all tests alike; nan where there is none."""
+        return float(np.mean(misfit(self.problem, self.rest)[:, RESIDUALS.index(kind)]))
+
 
 def search(
     ready: Prepared, calibration: Parameters, numbers: Parameters, progress: Progress
@@ -101,18 +120,18 @@ def search(
     calibration and numbers are those of `models/procedures`.
     """
     start = np.zeros(len(ready.problem.prior))
-    first = solve(ready.problem, ready.replicas, calibration, start, _part(progress, 0.0, 0.4))
+    first = solve(ready.problem, ready.replicas, calibration, start, between(progress, 0.0, 0.4))
     found = Search(ready, first, first)
     most = int(numbers.number("accept.effects"))
     for k in range(most + 1):
         begin, end = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
         standing = stand(found, numbers)
-        one = screen(found, standing, numbers, _part(progress, begin, 0.5 * (begin + end)))
+        one = screen(found, standing, numbers, between(progress, begin, 0.5 * (begin + end)))
         found.rounds.append(one)
         passed = [s for s in one.scored if not s.refused]
         if not passed or k == most:
             break
-        more = _add(found, passed, calibration, numbers, _part(progress, 0.5 * (begin + end), end))
+        more = _add(found, passed, calibration, numbers, between(progress, 0.5 * (begin + end), end))
         if more is None:
             break
         found = more
@@ -133,29 +152,27 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     problem, base, background = found.problem, standing.base, standing.background
     taken = {a.candidate.name for a in found.added}
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
-    results: list[tuple[Candidate, Score]] = []
+    rest = found.solution.normal.rest
+    left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
+    first = excess_by_kind(found.refit.normal.problem, found.refit.normal.rest)
 
-    def of_group(group: Sequence[Candidate]) -> list[tuple[Candidate, Score]]:
+    def of_group(group: Sequence[Candidate]) -> list[Scored]:
         columns, parts = columns_of(problem, base, group)
         block = make_block(background, columns)
-        return [(c, score(background, block.select(p), *_bounds(c))) for c, p in zip(group, parts, strict=True)]
+        scored = []
+        for candidate, part in zip(group, parts, strict=True):
+            one, less = score(background, block.select(part), *_bounds(candidate)), Lowered(0.0, 0.0, 0.0)
+            if one.gain >= numbers.number("accept.gain"):
+                less = lowered(problem, background, [c @ part for c in columns], one, first)
+            scored.append(Scored(candidate, one, less.share, _refusal(one, less, left, numbers)))
+        return scored
 
+    scored: list[Scored] = []
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
         for done, some in enumerate(parallel(delayed(of_group)(g) for g in groups)):
-            results += some
+            scored += some
             progress((done + 1) / len(groups))
-    results.sort(key=lambda r: -r[1].gain)
-    rest = found.solution.normal.rest
-    misfit = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
-    first = excess_by_kind(found.refit.normal.problem, found.refit.normal.rest)
-    scored = []
-    for candidate, one in results:
-        less = Lowered(0.0, 0.0, 0.0)
-        if one.gain >= numbers.number("accept.gain"):
-            columns, (part,) = columns_of(problem, base, [candidate])
-            less = lowered(problem, background, [c @ part for c in columns], one, first)
-        scored.append(Scored(candidate, one, less.share, _refusal(one, less, misfit, numbers)))
-    return Round(tuple(scored), misfit)
+    return Round(tuple(sorted(scored, key=lambda one: -one.score.gain)), left)
 
 
 class Lowered(NamedTuple):
@@ -202,7 +219,7 @@ def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> 
     return found
 
 
-def _refusal(one: Score, less: Lowered, misfit: float, numbers: Parameters) -> str:
+def _refusal(one: Score, less: Lowered, left: float, numbers: Parameters) -> str:
     """Why a candidate may not be added."""
     if one.gain < numbers.number("accept.gain"):
         return "gains too little"
@@ -213,7 +230,7 @@ def _refusal(one: Score, less: Lowered, misfit: float, numbers: Parameters) -> s
         return "does not hold on tests that it was not fitted on"
     if np.mean(held > -numbers.number("accept.worse") * one.gain) < numbers.number("accept.better"):
         return "makes tests worse that it was not fitted on"
-    if misfit > numbers.number("accept.noise") and less.share < numbers.number("accept.closure"):
+    if left > numbers.number("accept.noise") and less.share < numbers.number("accept.closure"):
         return "explains too little of what is more than noise"
     if less.of_first < numbers.number("accept.of_first"):
         return "explains too little of what was there at first"
@@ -240,25 +257,24 @@ def _add(
     rivals = list(firsts.values())[: int(numbers.number("accept.rivals"))]
     fitted = []
     for i, rival in enumerate(rivals):
-        share = _part(progress, i / len(rivals), (i + 1) / len(rivals))
+        share = between(progress, i / len(rivals), (i + 1) / len(rivals))
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
     power = found.solution.normal.power
-    before = _objective(found.problem, found.solution.x, power)
-    left = [_objective(ready.problem, solution.x, power) for ready, solution in fitted]
+    before, *left = (_objective(one, power) for one in (found, *fitted))
     order = np.argsort(left)
     best = int(order[0])
     if before - left[best] < numbers.number("accept.gain"):
         return None
     contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best])) for i in order)
-    ready, solution = fitted[best]
     added = Added(rivals[best].candidate, rivals[best].score.gain, len(found.rounds[-1].scored), contest)
-    return Search(ready, solution, found.refit, [*found.added, added], found.rounds)
+    fitted[best].added.append(added)
+    return fitted[best]
 
 
 def _fit_jointly(
     found: Search, one: Scored, calibration: Parameters, numbers: Parameters, progress: Progress
-) -> tuple[Prepared, Solution]:
-    """Fit a candidate together with everything, from where the linear estimate puts it."""
+) -> Search:
+    """The search with a candidate fitted together with everything, from where the linear estimate puts it."""
     problem, candidate = found.problem, one.candidate
     low, high = _bounds(candidate)
     amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
@@ -267,20 +283,17 @@ def _fit_jointly(
     ready = found.ready.with_machine(machine, knobs)
     count = len(problem.knobs)
     start = np.insert(found.solution.at, count, np.zeros(len(knobs) - count))
-    return ready, solve(ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal)
+    solution = solve(ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal)
+    return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 
-def _objective(problem: Problem, x: Array, power: Sequence[Array]) -> float:
-    """Negative log-likelihood and log-prior at x, residuals weighed as before anything was added."""
-    misfit = sum(float(np.sum(np.abs(r) ** 2 / p)) for r, p in zip(problem.whitened(x), power, strict=True))
-    return misfit + 0.5 * float(np.sum((x / problem.prior) ** 2))
+def _objective(found: Search, power: Sequence[Array]) -> float:
+    """Negative log-likelihood and log-prior at the solution, residuals weighed as before anything was added."""
+    squares = sum(float(np.sum(np.abs(r) ** 2 / p)) for r, p in zip(found.rest, power, strict=True))
+    return squares + 0.5 * float(np.sum((found.solution.x / found.problem.prior) ** 2))
 
 
 def fitted_machine(found: Search) -> Machine:
     """The machine with its effects, all numbers as fitted."""
     problem = found.problem
     return with_knobs(problem.machine, problem.knobs, found.solution.x[: len(problem.knobs)])
-
-
-def _part(progress: Progress, first: float, last: float) -> Progress:
-    return lambda share: progress(first + (last - first) * share)

@@ -4,7 +4,7 @@ An effect is one that the search has added; or a parameter so far from what the 
 that it stands for a mechanism of its own (seven times the leakage: worn seals).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -121,16 +121,19 @@ def judge(found: Search, left: Sequence[Left], calibration: Parameters, numbers:
         elif abs(x[i]) > calibration.number("report.deviations") * sd[i] and distance > material:
             changed[knob.name] = estimate(i, knob)
     sensors = _sensors(found, sd, reach, numbers)
-    unnamed = _unnamed(found, left, numbers)
-    return Verdict(_word(effects, changed, sensors, unnamed), _merged(effects), changed, sensors, _first(left, numbers))
+    free = _first(left, numbers)
+    unnamed = free is not None or _more_than_noise(found, numbers)
+    return Verdict(_word(effects, changed, sensors, unnamed), _merged(effects), changed, sensors, free)
 
 
-def _of_added(added: Added, knobs: Sequence[Knob], estimate: object, numbers: Parameters) -> Finding:
+def _of_added(
+    added: Added, knobs: Sequence[Knob], estimate: Callable[[int, Knob], Estimate], numbers: Parameters
+) -> Finding:
     candidate = added.candidate
     values = {}
     for i, knob in enumerate(knobs):
         if knob.name.startswith(f"{candidate.name}."):
-            values[knob.name.removeprefix(f"{candidate.name}.")] = estimate(i, knob)  # type: ignore[operator]
+            values[knob.name.removeprefix(f"{candidate.name}.")] = estimate(i, knob)
     chance = float(chi2.sf(2.0 * added.gain, len(values)))
     apart = numbers.number("accept.apart")
     rivals = tuple(c.candidate.family.name for c in added.contest[1:] if c.behind < apart)
@@ -175,18 +178,12 @@ def _sensors(found: Search, sd: Array, reach: float, numbers: Parameters) -> tup
     return tuple(findings)
 
 
-def _unnamed(found: Search, left: Sequence[Left], numbers: Parameters) -> bool:
-    """Whether more is left than noise."""
-    problem, rest = found.problem, numbers.number("verdict.rest")
-    whitened = problem.whitened(found.solution.x)
-    first = excess_by_kind(problem, found.refit.normal.rest)
-    last = excess_by_kind(problem, whitened)
-    for kind, excess in last.items():
-        rows = problem.rows(kind)
-        misfit = np.mean([np.mean(np.abs(r[:, rows]) ** 2) for r in whitened])
-        if misfit > numbers.number("verdict.unexplained") and excess > rest * first[kind]:
-            return True
-    return _first(left, numbers) is not None
+def _more_than_noise(found: Search, numbers: Parameters) -> bool:
+    """Whether more is left than noise, and than the form of the effects found."""
+    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
+    first = excess_by_kind(found.problem, found.refit.normal.rest)
+    last = excess_by_kind(found.problem, found.rest)
+    return any(found.misfit(kind) > limit and excess > rest * first[kind] for kind, excess in last.items())
 
 
 def _first(left: Sequence[Left], numbers: Parameters) -> Left | None:

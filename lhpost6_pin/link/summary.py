@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from rich.console import Console
 from rich.table import Table
 
+from ..console import make_console
 from .statistics import Histogram
 
 __all__ = ["print_link"]
@@ -31,7 +31,7 @@ _MEANING = {
 
 def print_link(title: str, counts: Mapping[str, int], times: Mapping[str, Histogram]) -> None:
     """Print counts with their meaning, then times at the median, 99 %, 99.9 % and the largest."""
-    console = Console() if Console().is_terminal else Console(width=140)
+    console = make_console()
     table = Table("count", "number", "what", title=title)
     for name, number in counts.items():
         table.add_row(name.replace("_", " "), str(number), _MEANING[name])

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from ..discover import Discovery
 from ..discover.left import Left
+from ..discover.proof import FLOOR
 from ..discover.search import Round
+from ..discover.words import where
 from ..names import AXES
 from .layout import stacked_layout
-from .page import Figure, Markup, figure, paragraph, table, text
+from .page import Figure, Markup, paragraph, table, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
 
 __all__ = ["gain_figure", "gap_figure", "left_figure", "map_blocks"]
@@ -40,9 +42,8 @@ _KINDS = {
 
 def map_blocks(found: Discovery) -> list[Markup]:
     """Return, for each kind of residual, the misfit of every column in every band, before and after."""
-    first, last = found.search.refit, found.search.solution
     problem = found.search.problem
-    before, after = first.normal.rest, problem.whitened(last.x)
+    before, after = found.search.refit.normal.rest, found.search.rest
     machine = problem.machine
     chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
     labels = {"wrench": AXES, "flow": chambers, "gas": machine.strut_names, "force": machine.actuator_names}
@@ -92,11 +93,9 @@ def _short(value: float) -> str:
 
 def gain_figure(one: Round, number: int, least: float) -> Figure:
     """Return the best candidate of each family in one round: what it gains, and what is refused."""
-    best: dict[str, Any] = {}
-    for scored in one.scored:
-        best.setdefault(scored.candidate.family.name, scored)
-    shown = [s for s in best.values() if s.score.gain > 1.0][:SHOWN] or list(best.values())[:3]
-    names = [f"{s.candidate.family.name}, {_where(s.candidate.components)}" for s in shown]
+    best = list(one.best.values())
+    shown = [s for s in best if s.score.gain > 1.0][:SHOWN] or best[:3]
+    names = [f"{s.candidate.family.name}, {where(s.candidate.components)}" for s in shown]
     traces = []
     for words, color, keep in (("may be added", BLUE, True), ("refused", "#6e7781", False)):
         some = [i for i, s in enumerate(shown) if (not s.refused) == keep]
@@ -115,12 +114,7 @@ def gain_figure(one: Round, number: int, least: float) -> Figure:
                     "marker": {"color": color},
                 }
             )
-    layout = stacked_layout([""], "Gain of log-likelihood", row_height=26 * max(len(names), 3))
-    layout["yaxis"] |= _rows(names)
-    layout["xaxis"] |= {"type": "log"}
-    layout["margin"]["l"] = 250
-    layout["hovermode"] = "closest"
-    layout["shapes"].append(_upright(least))
+    layout = _bars(names, "Gain of log-likelihood", 26 * max(len(names), 3), 250, least)
     words = (
         "The best candidate of each family, everything known refitted beside it. "
         f"The dashed line is the least gain, {least:g}."
@@ -151,13 +145,7 @@ def gap_figure(found: Discovery) -> Figure:
                 "marker": {"color": color},
             }
         )
-    layout = stacked_layout([""], "Gap over sensor noise", row_height=62 * max(len(names), 1))
-    layout["yaxis"] |= _rows(names)
-    layout["xaxis"] |= {"type": "log"}
-    layout["margin"]["l"] = 170
-    layout["barmode"] = "group"
-    layout["hovermode"] = "closest"
-    layout["shapes"].append(_upright(1.0))
+    layout = _bars(names, "Gap over sensor noise", 62 * max(len(names), 1), 170, FLOOR) | {"barmode": "group"}
     words = "Root mean square error over everything that moves, in deviations of noise; the dashed line is noise alone."
     return Figure("gap", "The gap on tests that were not searched", words, traces, layout, layout["height"])
 
@@ -193,25 +181,19 @@ def left_figure(left: Left) -> Figure:
     return Figure("left", "What has no name", words, traces, layout, layout["height"])
 
 
-def figures(*drawn: Figure) -> list[Markup]:
-    """Return places for figures."""
-    return [figure(one) for one in drawn]
-
-
-def _rows(names: Sequence[str]) -> dict[str, Any]:
-    return {
+def _bars(names: Sequence[str], x_title: str, height: int, left: int, mark: float) -> dict[str, Any]:
+    """Layout of rows of bars over a logarithmic axis: height of all, room for names [CSS px], a line at `mark`."""
+    layout = stacked_layout([""], x_title, row_height=height)
+    layout["yaxis"] |= {
         "range": [len(names) - 0.5, -0.5],
         "tickvals": list(range(len(names))),
         "ticktext": [html.escape(name) for name in names],
         "tickfont": {"size": 11},
         "zeroline": False,
     }
-
-
-def _upright(x: float) -> dict[str, Any]:
-    place = {"type": "line", "xref": "x", "x0": x, "x1": x, "yref": "paper", "y0": 0, "y1": 1}
-    return place | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}}
-
-
-def _where(components: Sequence[str]) -> str:
-    return " ".join(components) if len(components) < 4 else f"{components[0]}–{components[-1]}"
+    layout["xaxis"] |= {"type": "log"}
+    layout["margin"]["l"] = left
+    layout["hovermode"] = "closest"
+    place = {"type": "line", "xref": "x", "x0": mark, "x1": mark, "yref": "paper", "y0": 0, "y1": 1}
+    layout["shapes"].append(place | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}})
+    return layout

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from ..discover import Discovery
 from ..discover.save import next_tests
-from ..discover.search import Scored
 from ..discover.words import said, title_of, where
 from ..library import find_family
 from .control_blocks import load_of
@@ -86,7 +85,7 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         ]
         header = ("Number", "Value", "90 % interval", "Unit")
         blocks.append(table(f"{family.title}, on {where(one.components)}", header, rows))
-        confused = ", ".join(map(_title, family.confused_with))
+        confused = ", ".join(map(title_of, family.confused_with))
         blocks.append(
             paragraph(
                 f"{family.equation}. Gain of log-likelihood {number(one.gain)}; chance of as much by noise alone, of "
@@ -100,13 +99,6 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
     elif verdict.word == "unexplained":
         blocks.append(paragraph("More than noise is left, and no single leg's position or speed explains it."))
     return blocks
-
-
-def _title(name: str) -> str:
-    from ..library import families
-
-    known = families()
-    return known[name].title if name in known else name.replace("_", " ")
 
 
 def _proof_blocks(found: Discovery) -> list[Markup]:
@@ -138,9 +130,6 @@ def _considered(found: Discovery) -> list[Markup]:
     blocks: list[Markup] = []
     for k, one in enumerate(found.search.rounds, start=1):
         blocks.append(figure(gain_figure(one, k, least)))
-        best: dict[str, Scored] = {}
-        for scored in one.scored:
-            best.setdefault(scored.candidate.family.name, scored)
         rows = [
             (
                 s.candidate.family.name,
@@ -150,7 +139,7 @@ def _considered(found: Discovery) -> list[Markup]:
                 f"{100 * s.closure:.0f} %" if s.closure else "–",
                 s.refused or "passes",
             )
-            for s in best.values()
+            for s in one.best.values()
         ]
         header = ("Family", "On", "Gain", "On tests not fitted", "Of the gap", "Added?")
         blocks.append(details(f"Round {k}: all families", table("Best candidate of each family", header, rows)))

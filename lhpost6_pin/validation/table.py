@@ -1,9 +1,9 @@
 """What a terminal shows of a validation."""
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ..console import make_console
 from .phases import PHASES, Phase
 from .validate import Validation
 
@@ -12,7 +12,7 @@ __all__ = ["print_validation"]
 
 def print_validation(found: Validation) -> None:
     """Print the worst RRMSE of every quantity, by test and phase, with the column where it is."""
-    console = Console() if Console().is_terminal else Console(width=140)
+    console = make_console()
     table = Table(title="Worst RRMSE, delay removed, of what moves", title_justify="left")
     quantities = ("wrench", "displacement", "velocity", "acceleration", "spool_command")
     for head in ("test", "phase", "force", *quantities[1:]):

@@ -23,8 +23,8 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
     """
     ready = prepare_problem(machine, records, sensors, calibration_numbers(), seed=seed, jobs=1)
     problem = ready.problem
-    base = Base(problem, np.zeros(len(problem.prior)))
-    rest = np.concatenate([r.ravel() for r in problem.whitened(base_x(problem))])
+    x = np.zeros(len(problem.prior))
+    base, rest = Base(problem, x), np.concatenate([r.ravel() for r in problem.whitened(x)])
     best: dict[str, tuple[float, np.ndarray]] = {}
     for group in list_candidates(base.plant.machine):
         columns, parts = columns_of(problem, base, group)
@@ -37,11 +37,6 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
                     best[group[0].family.name] = (float(like), column / size)
     order = sorted(best, key=lambda name: -best[name][0])
     return {"correlation": order[:1], "e_sindy": _e_sindy(order, [best[n][1] for n in order], rest, seed)}
-
-
-def base_x(problem: Any) -> np.ndarray:
-    """Nothing refitted."""
-    return np.zeros(len(problem.prior))
 
 
 def _e_sindy(names: list[str], columns: list[np.ndarray], rest: np.ndarray, seed: int) -> list[str]:

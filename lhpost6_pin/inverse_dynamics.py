@@ -159,23 +159,41 @@ def seen_velocity(motion: PlantMotion, dt: float) -> Array:
 
 
 def march_states(
-    plant: Plant, motion: PlantMotion, dt: float, start: Array | None = None, *, spool: Array | None = None
+    plant: Plant,
+    motion: PlantMotion,
+    dt: float,
+    start: Array | None = None,
+    *,
+    spool: Array | None = None,
+    rows: NDArray[np.void] | None = None,
 ) -> Array:
     """Hidden states (n, n_states) along a motion, from `start` (n_states,) or all zero, one step a sample.
 
-    Friction states only; with spool (n - 1 or more, n_actuators), the mean over each step, chamber pressures as well.
-    Raises RecordError naming the sample where a leg is out of its stroke.
+    Friction states only, or those of some rows of the plant's alone; with spool (n - 1 or more, n_actuators), the mean
+    over each step, chamber pressures as well. Raises RecordError naming the sample where a leg is out of its stroke.
     """
-    rows = plant.rows
+    moved = plant.rows if rows is None else rows
     if spool is None:
-        rows = rows[rows["input"] < 0]
+        moved = moved[moved["input"] < 0]
         spool = np.zeros((1, plant.spools))
     z = np.zeros((len(motion.q), len(plant.states)))
     if start is not None:
         z[0] = start
     ws = make_workspace(plant, plant.zero_state())
     held = np.ascontiguousarray(spool, float)
-    arrays = plant.axes, plant.legs, plant.body, rows, ws.frame, ws.port, ws.JB, dt, held, plant.supply, z
+    arrays = (
+        plant.axes,
+        plant.legs,
+        plant.body,
+        np.ascontiguousarray(moved),
+        ws.frame,
+        ws.port,
+        ws.JB,
+        dt,
+        held,
+        plant.supply,
+        z,
+    )
     sample, status = _march(np.ascontiguousarray(motion.q), *arrays)
     if status:
         names = (*plant.machine.actuator_names, *plant.machine.strut_names)

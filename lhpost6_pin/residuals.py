@@ -25,18 +25,18 @@ from .engine_fused import inertia_table, platen_acceleration
 from .equilibrium import hydraulic_rows
 from .gas import gas_ratio
 from .inverse_dynamics import march_states, with_loads
-from .law_table import GAS_HEAT, OSCILLATOR
+from .law_table import GAS_HEAT, LAWS, OSCILLATOR
 from .ledger import add_at_c
 from .oil_residuals import flow_misses, follow_supply
 from .plant import Plant
 from .pose import PlantMotion, PlatenMotion, plant_motion
 from .records import require, sample_interval
 from .rigid_body import platen_inertia
-from .schemes import SD, TAU, V_SEEN, S, forces_stage, pose_stage
+from .schemes import SD, TAU, V_SEEN, S, forces_stage, port_rates, pose_stage, set_twist
 from .signals import differentiate
 from .workspace import make_workspace
 
-__all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured", "path_key"]
+__all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured"]
 
 Array = NDArray[np.float64]
 
@@ -118,36 +118,69 @@ class Path(NamedTuple):
     """A test's motion in a plant's coordinates, and the friction states that it leaves behind."""
 
     motion: PlantMotion
+    along: PlantMotion  # what friction follows
     z: Array  # (n, n_states)
 
 
-def follow(plant: Plant, test: Measured) -> Path:
-    """Path of a test; raises RecordError naming the sample where a leg is out of its stroke."""
-    moved = plant_motion(plant, test.motion)
-    moved = PlantMotion(*(np.ascontiguousarray(x) for x in moved))
-    if test.path is None:
-        return Path(moved, march_states(plant, moved, test.dt))
-    z = march_states(plant, plant_motion(plant, test.motion._replace(displacement=test.path)), test.dt)
-    smooth = np.isin(plant.rows["law"], (OSCILLATOR, GAS_HEAT))  # they average noise, and feel what a still path lacks
-    if smooth.any():
-        whole = march_states(plant, moved, test.dt)
-        for row in plant.rows[smooth]:
-            k = int(row["state"])
-            end = k + (2 if row["law"] == OSCILLATOR else 1)
-            z[:, k:end] = whole[:, k:end]
-    return Path(moved, z)
+def follow(plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None) -> Path:
+    """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
-
-def path_key(plant: Plant) -> bytes:
-    """What the path of a test depends on: geometry, and what hidden states follow. Other numbers leave it alone.
-
-    The first number of a law with hidden states is the amplitude of its force, which they do not feel.
+    What does not differ from the `known` path of the same motion, of another plant, is taken from there.
     """
+    if known is None or _geometry(known[0]) != _geometry(plant):
+        moved = PlantMotion(*(np.ascontiguousarray(x) for x in plant_motion(plant, test.motion)))
+        along = moved
+        if test.path is not None:
+            along = plant_motion(plant, test.motion._replace(displacement=test.path))
+        there = {}
+    else:
+        moved, along, old = known[1]
+        if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
+            return known[1]
+        there = {_marched(row): old[:, _states(row)] for row in _moving(known[0])}
+    rows = _moving(plant)
+    fresh = {key: row for row in rows if (key := _marched(row)) not in there}
+    # oscillators and heat average noise, and feel what a still path lacks
+    smooth = [r for r in fresh.values() if int(r["law"]) in (OSCILLATOR, GAS_HEAT)] if test.path is not None else []
+    rough = [r for r in fresh.values() if not any(r is other for other in smooth)]
+    for some, motion in ((rough, along), (smooth, moved)):
+        if some or (known is None and motion is along):  # also to see that no leg is out of its stroke
+            marched = march_states(plant, motion, test.dt, rows=np.array(some, plant.rows.dtype))
+            there |= {_marched(row): marched[:, _states(row)] for row in some}
+    z = np.zeros((test.samples, len(plant.states)))
+    for row in rows:
+        z[:, _states(row)] = there[_marched(row)]
+    return Path(moved, along, z)
+
+
+_WIDTH = {law.code: len(law.states) for law in LAWS.values() if law.code >= 0}
+
+
+def _moving(plant: Plant) -> Array:
+    """Rows with hidden states that the motion alone drives."""
+    return np.asarray(plant.rows[(plant.rows["state"] >= 0) & (plant.rows["input"] < 0)])
+
+
+def _marched(row: np.void) -> tuple[object, ...]:
+    """What hidden states of a row depend on: the first number is the amplitude of its force, which they do not feel."""
+    return int(row["law"]), int(row["port"]), int(row["port_2"]), row["p"][1:].tobytes()
+
+
+def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
+    """Whether two tables leave hidden states that are alike."""
+    same = some.shape == others.shape and (some["p"][:, 1:] == others["p"][:, 1:])[some["input"] < 0].all()
+    return bool(same) and all((some[k] == others[k]).all() for k in ("law", "port", "port_2", "state", "input"))
+
+
+def _states(row: np.void) -> slice:
+    return slice(int(row["state"]), int(row["state"]) + _WIDTH[int(row["law"])])
+
+
+def _geometry(plant: Plant) -> bytes:
+    """What the motion of a plant's ports depends on."""
     legs = plant.legs.copy()
     legs["normal_thrust"] = 0.0
-    moved = plant.rows[(plant.rows["state"] >= 0) & (plant.rows["input"] < 0)]
-    tables = plant.body, legs, *(moved[name] for name in ("law", "port", "port_2", "state")), moved["p"][:, 1:]
-    return b"".join(table.tobytes() for table in tables) + str(len(plant.states)).encode()
+    return plant.body.tobytes() + legs.tobytes()
 
 
 def evaluate_residuals(
@@ -158,7 +191,7 @@ def evaluate_residuals(
     path is that of `follow`, if it is known. Raises RecordError naming the sample where a leg is out of its stroke.
     """
     n, machine = test.samples, plant.machine
-    moved, z = path or follow(plant, test)
+    moved, _, z = path or follow(plant, test)
     fed = hydraulic_rows(plant)
     double = np.array([name in machine.double_acting for name in machine.actuator_names])
     force = test.actuator_force
@@ -219,9 +252,12 @@ def _residuals(
     for k in range(q.shape[0]):
         motion[V_SEEN] = v[k]
         pose_stage(q[k], axes, legs, body, frame, port, JB)
-        forces_stage(axes, legs, body, rest, damping, frame, port, JB, z[k], force, motion)
         length[k] = port[S, : legs.size]
-        if wrench.shape[1] > 0:
+        if wrench.shape[1] == 0:
+            set_twist(v[k], axes, frame)
+            port_rates(JB[0], frame, port[SD])
+        else:
+            forces_stage(axes, legs, body, rest, damping, frame, port, JB, z[k], force, motion)
             for i in range(measured.shape[1]):
                 for j in range(axes.size):
                     motion[TAU, j] += JB[1, i, axes[j]] * measured[k, i]

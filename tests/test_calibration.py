@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, machine_knobs, with_knobs
 from lhpost6_pin.calibration.errors import corrected, sensor_unknowns
-from lhpost6_pin.calibration.knobs import Knob
+from lhpost6_pin.calibration.knobs import Knob, plan_knobs, scatter_knobs
 from lhpost6_pin.calibration.override import save_override
 from lhpost6_pin.calibration.prepare import _ready
 from lhpost6_pin.calibration.problem import Comparison, Problem
@@ -95,6 +95,28 @@ def test_a_height_moves_all_points_of_a_kind_and_the_bearing_plane_with_them(mac
     assert lifted.platen.bearing_plane[2] - machine.platen.bearing_plane[2] == pytest.approx(0.03, abs=1e-12)
 
 
+def test_a_twin_differs_by_a_factor_of_what_its_kind_has(machine):
+    shared, own = knob(machine, "horizontal.flow"), scatter_knobs(machine, 0.05, 3.0)
+    twin = next(k for k in own if k.name == "H2.flow")
+    turned = with_knobs(machine, [twin, shared], np.array([0.1, -0.2]))
+    flows = [a.flow / b.flow for a, b in zip(turned.actuators, machine.actuators, strict=True)]
+    assert flows[:4] == pytest.approx(np.exp([-0.2, -0.1, -0.2, -0.2]), rel=1e-12)
+    assert flows[4:] == [1.0] * 6
+    assert {k.name.split(".")[0] for k in own} == set(machine.actuator_names)
+    assert not [k for k in scatter_knobs(turned, 0.05, 3.0) if k.name == "H2.flow"]  # it has a number of its own
+
+
+def test_points_move_in_plan_as_mirror_images(machine):
+    knobs = {k.name: k for k in plan_knobs(machine)}
+    moved = with_knobs(machine, [knobs["horizontal.base_x"], knobs["vertical.platen_y"]], np.array([0.02, 0.01]))
+    for before, after in zip(machine.components, moved.components, strict=True):
+        shift = np.subtract(after.base_point, before.base_point)
+        kind = before.kind
+        wanted = [0.02 * np.sign(before.base_point[0]) * (kind == "horizontal"), 0.01 * np.sign(before.base_point[1])]
+        assert shift == pytest.approx([wanted[0], wanted[1] * (kind == "vertical"), 0.0], abs=1e-12)
+    assert "hold_down.platen_y" not in knobs  # all struts are on the axis
+
+
 def test_a_chamber_is_not_turned_shorter_than_its_stroke(machine):
     k = knob(machine, "horizontal.chamber_a")
     assert k.at(k.lowest) > machine.actuators[0].stroke
@@ -138,10 +160,33 @@ def test_whitened_noise_has_unit_power_and_no_correlation(test):
     assert 0.2 < means < 0.8
 
 
-def test_noise_of_fewer_samples_than_columns_is_refused():
+def test_columns_of_independent_noise_stay_as_they_are():
+    """Correlations by chance must not carry what is wrong in one column into another."""
+    rng, edges = np.random.default_rng(2), np.array([0.0, 10.0])
+    first, second = rng.standard_normal((2, 400, 1)) + 1j * rng.standard_normal((2, 400, 1))
+    noise = np.hstack([first, second, 0.1 * first + 0.02 * second])  # the third is of both
+    f = np.linspace(0.1, 9.9, 400)
+    (factor,) = make_whitener([[noise]], [f], edges).factor[0]
+    assert factor[1, 0] == 0.0
+    assert abs(factor[2, 0]) > 1.0 and abs(factor[2, 1]) > 1.0
+    assert np.array_equal(factor, np.tril(factor))
+
+
+def test_noise_of_too_few_samples_is_refused():
     noise = [[np.ones((2, 7), complex)] * 3]  # the first band counts with the second
-    with pytest.raises(RecordError, match=r"6 samples of the noise between 1 and 2 Hz for 7 columns"):
+    with pytest.raises(RecordError, match=r"6 samples of the noise between 1 and 2 Hz"):
         make_whitener(noise, [np.array([1.0, 2.5])], np.array([1.0, 2.0, 3.0]))
+
+
+def test_columns_that_are_zero_are_whitened_as_all_others():
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal((300, 5)) @ rng.standard_normal((5, 5)) + 0j
+    f = np.linspace(0.1, 9.9, 300)
+    whitener = make_whitener([[noise]], [f], np.array([0.0, 5.0, 10.0]))
+    bins = rng.standard_normal((300, 5, 2)) * np.array([0, 1, 0, 1, 0])[:, None] + 0j
+    whole = np.array([whitener.factor[0, b] @ x for b, x in zip(whitener.band(f), bins, strict=True)])
+    assert np.allclose(whitener.apply(0, bins, f), whole, rtol=1e-12, atol=1e-12)
+    assert not whitener.apply(0, 0.0 * bins, f).any()
 
 
 # ------------------------------------------------------------------------------------------------------- errors

@@ -113,32 +113,51 @@ def solve(
     start: Array,
     progress: Progress,
     known: Normal | None = None,
+    *,
+    first: Normal | None = None,
+    frugal: bool = False,
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on.
 
-    Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again.
+    Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
+    the normal equations at `start`, if they have been evaluated. A frugal
+    search finds the correction at `start`, and evaluates derivatives by sensor errors and by what hardly bends the
+    equations there alone, the others as long as steps gain much.
     """
     x = start.copy()
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
+    fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
+    bent = np.array([*(k.bends for k in problem.knobs), *(False for _ in problem.unknowns)])
+    again = fresh & bent if frugal else fresh
+    gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: Bias | None = None
+    normal: Normal | None = None
     converged = False
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
     for done in range(1, rounds + 1):
         at = done - 1 if done == 1 else done - 1 + len(replicas)
-        normal = Normal(problem, x, between(progress, shares[at], shares[at + 1]), known)
-        if done == 1:
+        share = between(progress, shares[at], shares[at + 1])
+        if normal is None:
+            normal = first or Normal(problem, x, share, known)
             before = misfit(problem, normal.rest)
-        if done == 2:  # near enough to the end, and the same from there on
+        else:
+            renewed = not frugal or (gain > numbers.number("fit.renew") and done <= int(numbers.number("fit.renewals")))
+            normal = Normal(problem, x, share, normal, again if renewed else np.zeros_like(again))
+        if done == (1 if frugal else 2):  # near enough to the end, and the same from there on
             parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
             bias = Bias(normal, replicas, x, parts, known)
-        if bias is not None:
+        if bias is not None and done > 1:
             normal = normal.less(bias)
         step = bounded_step(normal, x, problem, numbers)
+        slope = normal.whole[1] + x / problem.prior**2
+        gain = -float(slope @ step + 0.5 * step @ normal.posterior(problem.prior) @ step)
         x = x + step
         sd = np.sqrt(np.diag(np.linalg.inv(normal.posterior(problem.prior))) + floor**2)
-        if done > 1 and np.max(np.abs(step) / sd) < numbers.number("fit.converged"):
+        still = np.max(np.abs(step) / sd) < numbers.number("fit.converged")
+        if done > 1 and (still or (frugal and gain < numbers.number("fit.still"))):
             converged = True
             break
+    assert normal is not None
     return Solution(x, x - step, normal, before, done, converged)
 
 

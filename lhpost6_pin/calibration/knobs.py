@@ -6,7 +6,7 @@ zero is the machine as given, and its prior is normal with the stated standard d
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..machine import Machine
 from ..parameters import Quantity
 from ..residuals import RESIDUALS
 
-__all__ = ["Knob", "machine_knobs", "with_knobs"]
+__all__ = ["Knob", "machine_knobs", "plan_knobs", "scatter_knobs", "with_knobs"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,12 @@ _MECHANICAL = (
     *("seal_friction", "seal_yield", "seal_shape"),
     *("pad_friction", "pad_yield", "pad_shape"),
 )
+
+_SCATTER: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("flow", "flow_curve", "leakage"), ("flow",)),
+    **dict.fromkeys(("viscous", "seal_friction", "pad_friction"), ("wrench",)),
+}
+"""Numbers in which twins differ: parts that wear and are adjusted; and the residuals that can tell of each."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +49,14 @@ class Knob:
     lowest: float = -math.inf  # coordinate below which no machine can be built
     highest: float = math.inf
     step: float | None = None  # of the coordinate, for derivatives; None: the comparison's share of sd
+    of: str = ""  # the kind's number that a component's own is a factor of
+    place: int = -1  # actuator on whose residuals alone it acts; -1: on all
+    mirrored: bool = False  # points move away from the axis they are beside, those on it stay
+
+    @property
+    def bends(self) -> bool:
+        """Whether the equations bend with it within its range: forces by twins' factors and shifts in plan do not."""
+        return not (self.of and self.place < 0) and not self.mirrored
 
     def at(self, coordinate: float) -> float:
         """Value in `unit` at a coordinate."""
@@ -137,6 +151,52 @@ def _heights(machine: Machine, kind: str) -> list[Knob]:
     return found
 
 
+def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
+    """Knobs of where, in plan, the points of each kind's components are: mirror images of each other, moved alike.
+
+    A bearing and its foot move together.
+    """
+    if machine.motion != "free":
+        return ()
+    found = []
+    for kind in dict.fromkeys(c.kind for c in machine.components):
+        members = [c for c in machine.components if c.kind == kind]
+        bearing = getattr(members[0], "mount", "swivel") == "bearing"
+        ends: tuple[tuple[str, ...], ...] = (("platen_point",), ("base_point",))
+        for points in (("platen_point", "base_point"),) if bearing else ends:
+            for i in range(2):
+                beside = [c for c in members if getattr(c, points[0])[i] != 0.0]
+                paths = tuple((f"{c.name}.{point}", i) for c in beside for point in points)
+                stated = [machine.parameters[path].sd for path, _ in paths]
+                sds = [sd[i] if isinstance(sd, tuple) else sd for sd in stated if sd is not None]
+                if len(beside) < 2 or len(sds) < len(paths):
+                    continue
+                value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
+                name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
+                shows_in = ("wrench", "flow", "gas")
+                found.append(Knob(name, paths, "m", value, float(np.mean(sds)), False, shows_in, mirrored=True))
+    return tuple(found)
+
+
+def scatter_knobs(machine: Machine, share: float, reach: float) -> tuple[Knob, ...]:
+    """Knobs of twins that are not quite alike: factors, about one, of numbers that components of a kind share.
+
+    share is their standard deviation, reach how many of it they may go. Components with numbers of their own are left
+    out, and kinds of which there is one.
+    """
+    found = []
+    kinds = [c.kind for c in machine.components]
+    for name, shows_in in _SCATTER.items():
+        for i, component in enumerate(machine.components):
+            kind, own = f"{component.kind}.{name}", f"{component.name}.{name}"
+            known = machine.parameters.quantities
+            if kind not in known or own in known or not known[kind].value or kinds.count(component.kind) == 1:
+                continue
+            most, place = share * reach, i if shows_in == ("flow",) else -1
+            found.append(Knob(own, ((own, -1),), "1", 1.0, share, True, shows_in, -most, most, of=kind, place=place))
+    return tuple(found)
+
+
 def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> Machine:
     """Copy of a machine with its knobs turned to coordinates (k,); raises ParameterError for what cannot be."""
     return machine.with_params(knob_changes(machine, knobs, coordinates))
@@ -145,8 +205,9 @@ def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> M
 def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> dict[str, float | list[float]]:
     """New values by path for coordinates (k,), as `Machine.with_params` takes them."""
     values: dict[str, float | list[float]] = {}
-    for knob, x in zip(knobs, coordinates, strict=True):
-        for path, i in knob.paths:
+    turned = list(zip(knobs, coordinates, strict=True))
+    for knob, x in turned:
+        for path, i in knob.paths if not knob.of else ():
             if i < 0:
                 values[path] = knob.at(float(x))
                 continue
@@ -154,5 +215,11 @@ def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) ->
             vector = values.setdefault(path, list(now) if isinstance(now, tuple) else [now])
             assert isinstance(vector, list)
             # points of a kind may stand at different heights: each is shifted
-            vector[i] = knob.at(float(x)) if len(knob.paths) == 1 else vector[i] + float(x)
+            side = math.copysign(1.0, vector[i]) * bool(vector[i]) if knob.mirrored else 1.0
+            vector[i] = knob.at(float(x)) if len(knob.paths) == 1 else vector[i] + side * float(x)
+    for knob, x in turned:
+        if knob.of:
+            shared = values.get(knob.of, machine.parameters[knob.of].value)
+            assert isinstance(shared, float)
+            values[knob.paths[0][0]] = shared * knob.at(float(x))
     return values

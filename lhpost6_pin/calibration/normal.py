@@ -1,6 +1,7 @@
 """Normal equations of a calibration: summed by test and column as wanted, corrected for noise, solved within bounds."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -21,17 +22,30 @@ Progress = Callable[[float], None]
 class Normal:
     """Normal equations at x, H dx = -g: by test and column of the residuals, so that they can be summed as wanted."""
 
-    def __init__(self, problem: Problem, x: Array, report: Progress, known: "Normal | None" = None) -> None:
-        """Evaluate residuals and their derivatives at x (p,), those by unknowns of `known` are taken from there."""
+    def __init__(
+        self, problem: Problem, x: Array, report: Progress, known: "Normal | None" = None, again: Mask | None = None
+    ) -> None:
+        """Evaluate residuals and their derivatives at x (p,).
+
+        Derivatives by unknowns of `known` are taken from there, but for those to evaluate `again` (p,).
+        """
         self.problem = problem
         self.rest = problem.whitened(x)
-        old, fresh = _shared(problem, known)
+        old, place, fresh = _shared(problem, known, again)
         self.slope = problem.slopes(x, fresh, report)
         if known is not None:
             for slope, before in zip(self.slope, known.slope, strict=True):
-                slope[..., ~fresh] = before[..., old]
+                slope[..., place] = before[..., old]
         self.power = [np.ones(r.shape) for r in self.rest]
         self.bias: Bias | None = None
+
+    def only(self, places: Sequence[int]) -> "Normal":
+        """The same of some of the tests, not corrected."""
+        other = copy(self)
+        other.problem = self.problem.only(places)
+        for name in ("rest", "slope", "power"):
+            setattr(other, name, [getattr(self, name)[i] for i in places])
+        return other
 
     def less(self, bias: "Bias") -> "Normal":
         """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
@@ -84,15 +98,16 @@ class Bias:
 
         Changes of derivatives by unknowns of `known`, which is corrected, are taken from there.
         """
-        old, fresh = _shared(normal.problem, known)
+        old, place, fresh = _shared(normal.problem, known)
         self.changes: list[list[tuple[Complex, Complex]]] = []
         for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
             noisy = zip(replica.whitened(x), replica.slopes(x, fresh, report), strict=True)
             clean = zip(normal.rest, normal.slope, strict=True)
-            changes = [(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)]
+            pairs = zip(noisy, clean, strict=True)
+            changes = [(r - r0, j - j0) for (r, j), (r0, j0) in pairs]
             if known is not None and known.bias is not None:
                 for (_, change), (_, before) in zip(changes, known.bias.changes[i], strict=True):
-                    change[..., ~fresh] = before[..., old]
+                    change[..., place] = before[..., old]
             self.changes.append(changes)
 
     def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
@@ -102,18 +117,29 @@ class Bias:
         return matrix, right
 
 
-def _shared(problem: Problem, known: Normal | None) -> tuple[list[int], Mask]:
-    """Places in `known` of the unknowns that both have, in the problem's order; and which (p,) `known` lacks."""
-    if known is None:
-        return [], np.ones(len(problem.names), bool)
-    place = {name: i for i, name in enumerate(known.problem.names)}
-    return [place[n] for n in problem.names if n in place], np.array([n not in place for n in problem.names])
+def _shared(problem: Problem, known: Normal | None, again: Mask | None = None) -> tuple[list[int], list[int], Mask]:
+    """Places in `known`, and in the problem, of unknowns to take from there; and which (p,) to evaluate.
+
+    Those to evaluate again, if `again` says which; else those that `known` lacks.
+    """
+    names = problem.names
+    place = {} if known is None else {name: i for i, name in enumerate(known.problem.names)}
+    fresh = np.array([name not in place for name in names]) if again is None else again
+    taken = [i for i, name in enumerate(names) if name in place and not fresh[i]]
+    return [place[names[i]] for i in taken], taken, fresh
 
 
 def squares(slope: Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
     """Normal matrix (p, p) and right side (p,) of bins (m, c) and their derivatives (m, c, p) over a power (m, c)."""
-    j = (slope / np.sqrt(power)[..., None]).reshape(-1, slope.shape[-1])
-    return 2.0 * (j.conj().T @ j).real, 2.0 * (j.conj().T @ (rest / np.sqrt(power)).ravel()).real
+    weight = np.sqrt(2.0 / power)
+    whole = (slope * weight[..., None]).reshape(-1, slope.shape[-1])
+    left = (rest * weight).ravel()
+    matrix, right = np.zeros(2 * (slope.shape[-1],)), np.zeros(slope.shape[-1])
+    for j, r in ((whole.real, left.real), (whole.imag, left.imag)):
+        part = np.ascontiguousarray(j)
+        matrix += part.T @ part
+        right += part.T @ r
+    return matrix, right
 
 
 def positive(matrix: Array, prior: Array) -> Array:
@@ -137,4 +163,7 @@ def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters
     least, most = np.maximum(-reach, problem.lowest / prior), np.minimum(reach, problem.highest / prior)
     low, high = np.maximum(-trust, np.minimum(least - place, 0.0)), np.minimum(trust, np.maximum(most - place, 0.0))
     low, high = low - 1e-9, high + 1e-9  # no empty interval
+    freely = np.linalg.solve(factor.T, wanted)
+    if np.all((freely >= low) & (freely <= high)):
+        return np.asarray(freely * prior)
     return np.asarray(lsq_linear(factor.T, wanted, bounds=(low, high)).x * prior)

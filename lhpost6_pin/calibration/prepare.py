@@ -1,6 +1,6 @@
 """A campaign made ready to be fitted: aligned, fused, with noisier copies of every test."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -44,6 +44,11 @@ class Prepared:
         replicas = tuple(r.with_machine(machine, knobs) for r in self.replicas)
         return Prepared(self.problem.with_machine(machine, knobs), replicas, self.noisy)
 
+    def with_free(self, name: str, share: float) -> "Prepared":
+        """The same with one more unknown free of its prior."""
+        replicas = tuple(r.with_free(name, share) for r in self.replicas)
+        return Prepared(self.problem.with_free(name, share), replicas, self.noisy)
+
 
 def prepare_problem(
     machine: Machine,
@@ -52,12 +57,14 @@ def prepare_problem(
     numbers: Parameters,
     *,
     kinds: tuple[str, ...] = KINDS,
+    form: Callable[[Machine], Machine] | None = None,
     seed: int = 0,
     jobs: int = -1,
 ) -> Prepared:
     """Make a campaign ready; `numbers` are those of `models/procedures/calibration.toml`. Raises what `calibrate` does.
 
-    Deterministic for a seed (of the simulated noise).
+    form gives a machine another form of its laws, of which nobody knows which is right: by how much it differs is
+    noise. Deterministic for a seed (of the simulated noise).
     """
     comparison = Comparison(
         bands=numbers.vector("comparison.bands"),
@@ -77,7 +84,8 @@ def prepare_problem(
         _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
     ]
     more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
-    problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds)
+    other = None if form is None else form(machine)
+    problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, other=other)
     replicas = tuple(problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again))
     return Prepared(problem, replicas, tuple(noisy))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..machine import Machine
 from ..plant import Plant, make_plant
-from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow, path_key
+from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow
 from ..sensors import Sensors
 from .errors import corrected, sensor_unknowns
 from .knobs import Knob, machine_knobs, with_knobs
@@ -73,15 +73,18 @@ class Problem:
         *,
         jobs: int = -1,
         kinds: tuple[str, ...] = KINDS,
+        other: Machine | None = None,
     ) -> None:
         """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added.
 
-        All tests have the same channels. Raises RecordError where they are too short together.
+        By how much an `other` machine's residuals differ, whose laws have another form, is noise, too. All tests have
+        the same channels. Raises RecordError where they are too short together.
         """
         self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         told = {"supply_pressure": "supply", "spool_command": "servo"}  # by one kind of residual alone
         self.unknowns = tuple(u for u in unknowns if told.get(u.channel, kinds[0]) in kinds)
+        self.free: dict[str, float] = {}  # share of the stated deviation that priors of unknowns have, but for one
         self._turn(machine, machine_knobs(machine))
         plant = make_plant(machine)
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
@@ -91,19 +94,22 @@ class Problem:
         for i, test in enumerate(noisy):
             at = i % len(tests)
             noise[at].append(self.bins(_less(evaluate_residuals(plant, test, kinds), clean[at]), test.dt)[0])
+        alike = None if other is None else make_plant(other)
         for found, test, base in zip(noise, tests, clean, strict=True):
             # what friction remembers is not known better than by its memory along the path as measured, and quieted;
-            # that counts as much as all draws together
-            other = evaluate_residuals(plant, replace(test, path=None), kinds)
+            # that counts as much as all draws together, and so does another form of the laws
+            more = [evaluate_residuals(plant, replace(test, path=None), kinds)]
+            more += [] if alike is None else [evaluate_residuals(alike, test, kinds)]
             draws = len(found)
-            found.append(self.bins(_less(other, base), test.dt)[0] * np.sqrt(draws))
-            found[:] = [bins * np.sqrt((draws + 1) / draws) for bins in found]
+            found += [self.bins(_less(one, base), test.dt)[0] * np.sqrt(draws) for one in more]
+            found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
     def _turn(self, machine: Machine, knobs: tuple[Knob, ...]) -> None:
         self.machine, self.knobs = machine, knobs
         self.names = (*(k.name for k in knobs), *(u.name for u in self.unknowns))
-        self.prior = np.array([*(k.sd for k in knobs), *(u.sd for u in self.unknowns)])
+        self.stated = np.array([*(k.sd for k in knobs), *(u.sd for u in self.unknowns)])
+        self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
         share = self.comparison.step
         self.step = np.array([*(k.step or share * k.sd for k in knobs), *(share * u.sd for u in self.unknowns)])
         self.lowest = np.array([*(k.lowest for k in knobs), *(-np.inf for _ in self.unknowns)])
@@ -114,6 +120,13 @@ class Problem:
         """The same tests and noise with another machine, or other knobs."""
         other = copy(self)
         other._turn(machine, knobs)
+        return other
+
+    def with_free(self, name: str, share: float) -> "Problem":
+        """The same with one more unknown free of its prior, whose deviation is `share` of the stated one now."""
+        other = copy(self)
+        other.free = {**self.free, name: share}
+        other._turn(self.machine, self.knobs)
         return other
 
     def with_tests(self, tests: Sequence[Measured]) -> "Problem":
@@ -149,9 +162,11 @@ class Problem:
 
     def slopes(self, x: Array, free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Complex]:
         """Derivatives (m, c, p) of the whitened bins of every test, by differences; zero where not free."""
-        base = Base(self, x)
         terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
         out = [np.zeros((len(f), sum(self.widths), len(x)), np.complex128) for f in self.frequency]
+        if not terms:
+            return out
+        base = Base(self, x)
         with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
             for done, found in enumerate(parallel(delayed(self._difference)(x, base, term) for term in terms)):
                 for i, bins in found:
@@ -186,11 +201,12 @@ class Problem:
         self, base: "Base", plant: Plant, residuals: tuple[str, ...], tests: Sequence[Measured] | None = None
     ) -> list[Complex]:
         """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
-        known = path_key(plant) == base.key
         kinds = tuple(k for k in residuals if k in self.kinds)
         changes = []
         for k, test in enumerate(tests or base.tests):
-            path = base.paths[k] if known and test.motion is base.tests[k].motion else None
+            path = None
+            if test.motion is base.tests[k].motion:
+                path = follow(plant, test, (base.plant, base.paths[k]))
             after = evaluate_residuals(plant, test, kinds, path=path)
             changes.append(self.bins(_less(after, base.residuals[k]), test.dt)[0])
         return changes
@@ -225,7 +241,12 @@ class Problem:
         return rows
 
     def _terms(self) -> tuple[Term, ...]:
-        terms = [Term(((i, -1),), knob.shows_in) for i, knob in enumerate(self.knobs)]
+        terms = [Term(((i, -1),), knob.shows_in) for i, knob in enumerate(self.knobs) if knob.place < 0]
+        twins: dict[str, list[tuple[int, int]]] = {}
+        for i, knob in enumerate(self.knobs):
+            if knob.place >= 0:
+                twins.setdefault(knob.of.partition(".")[2], []).append((i, knob.place))
+        terms += [Term(tuple(members), self.knobs[members[0][0]].shows_in) for members in twins.values()]
         together: dict[str, list[tuple[int, int]]] = {}
         for i, unknown in enumerate(self.unknowns):
             together.setdefault(unknown.alone[0], []).append((len(self.knobs) + i, unknown.alone[1]))
@@ -244,7 +265,6 @@ class Base:
     def __init__(self, problem: Problem, x: Array) -> None:
         """Evaluate a problem's tests at x (p,)."""
         self.plant, self.tests = problem.plant_at(x), problem._corrected(x)
-        self.key = path_key(self.plant)
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]

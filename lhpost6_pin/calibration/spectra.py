@@ -19,6 +19,9 @@ __all__ = ["Whitener", "excess", "make_whitener", "spectrum_of"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+CERTAIN = 16.0
+"""Squared partial correlation times samples from which two columns of noise count as correlated; chance gives one."""
+
 
 def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tuple[Complex, Array]:
     """Bins (m, k) of columns (n, k) from `low` to `high` [Hz], and their frequencies (m,) [Hz].
@@ -54,10 +57,11 @@ class Whitener(NamedTuple):
         """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
         out = np.empty_like(bins)
         band = self.band(f)
+        told = np.flatnonzero(bins.any(axis=(0, 2)))  # the rest would be multiplied for nothing
         for b in np.unique(band):
-            part = bins[band == b]
-            mixed = self.factor[test, b] @ part.swapaxes(0, 1).reshape(part.shape[1], -1)
-            out[band == b] = mixed.reshape(part.shape[1], part.shape[0], -1).swapaxes(0, 1)
+            part = bins[band == b][:, told]
+            mixed = self.factor[test, b][:, told] @ part.swapaxes(0, 1).reshape(len(told), len(part) * bins.shape[2])
+            out[band == b] = mixed.reshape(-1, len(part), bins.shape[2]).swapaxes(0, 1)
         return out
 
 
@@ -99,11 +103,41 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
             factors[t, b] = np.diag(1.0 / scale)
     for b in range(count):
         rows = np.vstack(scaled[b] + (scaled[1] if b == 0 else []))
-        if len(rows) <= k:
-            where = f"between {edges[b]:g} and {edges[b + 1]:g} Hz"
-            what = f"{len(rows)} samples of the noise {where} for {k} columns of residuals"
+        if len(rows) <= CERTAIN:  # nothing could be told of correlations
+            what = f"{len(rows)} samples of the noise between {edges[b]:g} and {edges[b + 1]:g} Hz"
             raise RecordError(f"the tests are too short together: they give {what}; add tests, or longer ones")
-        correlation = rows.T @ rows.conj() / len(rows) + 1e-9 * np.eye(k)  # E[x x^H]
-        # the inverse of a matrix that was estimated from n samples is too large by n / (n - k)
-        factors[:, b] = np.linalg.inv(np.linalg.cholesky(correlation)) * np.sqrt(1.0 - k / len(rows)) @ factors[:, b]
+        factors[:, b] = _uncorrelated(rows.T @ rows.conj() / len(rows), len(rows)) @ factors[:, b]  # of E[x x^H]
     return Whitener(edges, factors)
+
+
+def _uncorrelated(matrix: Complex, count: int) -> Complex:
+    """Triangular matrix (k, k) that makes columns of a cross-spectral matrix (k, k) uncorrelated, with unit power.
+
+    Each column is rid of what those before it tell of it. Only columns whose correlation `count` samples show beyond
+    doubt are asked: correlations by chance would carry what is wrong in one kind of residual into all others.
+    """
+    k = len(matrix)
+    out = np.zeros((k, k), np.complex128)
+    for i in range(k):
+        power = float(matrix[i, i].real)
+        left, right = matrix[:i, :i].copy(), matrix[:i, i].copy()  # of columns before, rid of those that were asked
+        asked: list[int] = []
+        while len(asked) < i:
+            own = left.diagonal().real
+            free = own > 1e-9 * matrix.diagonal().real[:i]
+            share = np.where(free, np.abs(right) ** 2 / np.where(free, own, 1.0), 0.0) / max(power, 1e-12)
+            j = int(np.argmax(share))
+            if share[j] * (count - len(asked)) < CERTAIN:
+                break
+            asked.append(j)
+            power -= float(abs(right[j]) ** 2 / own[j])
+            ratio = left[:, j] / own[j]
+            right = right - ratio * right[j]
+            left = left - np.outer(ratio, left[j])
+        power = max(power, 1e-9 * float(matrix[i, i].real)) or 1.0
+        weights = np.linalg.solve(matrix[np.ix_(asked, asked)] + 1e-9 * np.eye(len(asked)), matrix[asked, i])
+        # what is left of a sample that was fitted is too small
+        scale = np.sqrt((1.0 - (len(asked) + 1) / count) / power)
+        out[i, i] = scale
+        out[i, asked] = -scale * weights.conj()
+    return out

@@ -25,7 +25,7 @@ from ..inverse_dynamics import leg_wrenches
 from ..machine import Machine
 from ..plant import make_plant
 from ..pose import PlatenMotion
-from ..residuals import Measured, evaluate_residuals, follow, make_measured, path_key
+from ..residuals import Measured, evaluate_residuals, follow, make_measured
 from ..sensors import Sensors, add_noise
 from ..signals import Band, correlation, differentiate, peak_ratio, rrmse
 from .record import Decomposed, decompose_numbers, take_apart
@@ -194,7 +194,7 @@ def _pressures(machine: Machine, found: Decomposed) -> Iterator[tuple[str, int, 
 def _by_parameters(found: Decomposed) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each number of the platen and the kinds."""
     machine, measured = found.plant.machine, _measured(found)
-    key, path_as_it_is = path_key(found.plant), follow(found.plant, measured)
+    as_it_is = follow(found.plant, measured)
     sections = {"platen", *(c.kind for c in machine.components)}
     for path, quantity in machine.parameters.items():
         section, _, name = path.partition(".")
@@ -202,12 +202,12 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
             continue
         values, sds = np.atleast_1d(quantity.value), np.atleast_1d(quantity.sd)
         for k, sd in enumerate(np.broadcast_to(sds, values.shape)):
-            moved = values.astype(float)
-            moved[k] += sd
-            value = moved.tolist() if isinstance(quantity.value, tuple) else float(moved[0])
+            shifted = values.astype(float)
+            shifted[k] += sd
+            value = shifted.tolist() if isinstance(quantity.value, tuple) else float(shifted[0])
             plant = make_plant(machine.with_params({path: value}))
-            known = path_as_it_is if path_key(plant) == key else None
-            yield evaluate_residuals(plant, measured, ("wrench",), path=known).wrench - found.whole.residual
+            moved = follow(plant, measured, (found.plant, as_it_is))
+            yield evaluate_residuals(plant, measured, ("wrench",), path=moved).wrench - found.whole.residual
 
 
 def _measured(found: Decomposed) -> Measured:

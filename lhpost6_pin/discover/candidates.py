@@ -8,21 +8,22 @@ from ..library import Family, Shape, families
 from ..machine import Machine
 from ..residuals import RESIDUALS
 
-__all__ = ["Candidate", "list_candidates"]
+__all__ = ["Candidate", "list_candidates", "with_background", "with_other_form"]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A family on a group of components, with its shapes at given values."""
+    """A family on a group of components, with its shapes at given values; or an unknown that is set free."""
 
     family: Family
     components: tuple[str, ...]
     shape: tuple[tuple[str, float], ...]  # (name, value) of what is no amplitude
+    release: str = ""  # the parameter or sensor error that is free of its prior; empty where an effect is added
 
     @property
     def name(self) -> str:
-        """Name of the effect in a machine."""
-        return f"{self.family.name}_{'_'.join(self.components)}"
+        """Name of the effect in a machine, or of what is free."""
+        return self.release or f"{self.family.name}_{'_'.join(self.components)}"
 
     @property
     def amplitudes(self) -> tuple[Shape, ...]:
@@ -59,10 +60,47 @@ class Candidate:
         return tuple(found)
 
 
+def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[Knob, ...]]:
+    """The machine with the library's effects of the background, absent as yet, alike for each kind; and their knobs.
+
+    spread is the standard deviation of an amplitude in typical ones.
+    """
+    knobs: list[Knob] = []
+    for one in _of_background(machine):
+        absent = tuple(0.0 for _ in one.amplitudes)
+        machine = one.on(machine, absent)
+        amplitudes = [f"{one.name}.{s.name}" for s in one.amplitudes]
+        knobs += [k for k in one.knobs(absent, spread) if k.name in amplitudes]
+    return machine, tuple(knobs)
+
+
+def with_other_form(machine: Machine, size: float) -> Machine:
+    """The machine with every effect of the library's background, `size` of the typical one."""
+    for one in _of_background(machine):
+        machine = one.on(machine, tuple(size * s.typical for s in one.amplitudes))
+    return machine
+
+
+def _of_background(machine: Machine) -> list["Candidate"]:
+    """Effects of the library's background, on all of each kind that rubs."""
+    found = []
+    for family in families().values():
+        names = family.components(machine) if family.background else ()
+        for kind in dict.fromkeys(c.kind for c in machine.components):
+            members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
+            one = Candidate(family, members, tuple((s.name, s.start[0]) for s in family.shapes if not s.amplitude))
+            typical = tuple(s.typical for s in one.amplitudes)
+            if members and any(p[0] for p in one.on(machine, typical).added_effects[-1].params):
+                found.append(one)
+    return found
+
+
 def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
     """All candidates of the library for a machine: each family at each start of its shapes, on each group together."""
     found = []
     for family in families().values():
+        if family.background:
+            continue
         shapes = [s for s in family.shapes if not s.amplitude]
         names = [s.name for s in shapes]
         for values in product(*(s.start for s in shapes)):

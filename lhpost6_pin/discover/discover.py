@@ -3,27 +3,30 @@
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import xarray as xr
 
-from ..calibration import Knob, calibration_numbers
-from ..calibration.prepare import Prepared, prepare_problem
+from ..calibration import calibration_numbers
+from ..calibration.knobs import plan_knobs, scatter_knobs
+from ..calibration.normal import Normal
+from ..calibration.prepare import prepare_problem
 from ..campaign import Campaign
 from ..errors import RecordError, UnknownNameError
 from ..files import models_folder
 from ..machine import Machine
-from ..parameters import Parameters, load_parameters, override_parameters
+from ..parameters import Parameters, load_parameters
 from ..progress import Progress, between
 from ..residuals import RESIDUALS
 from ..sensors import Sensors
+from .candidates import with_background, with_other_form
 from .left import Left, what_is_left
 from .proof import Proof, prove
 from .search import Search, fitted_machine, search
 from .verdict import Verdict, judge
 
 __all__ = ["Discovery", "discover"]
-
 
 FEWEST = 3  # tests that are searched; with more, one is held out
 
@@ -68,18 +71,25 @@ def discover(
     """
     report = progress or (lambda share: None)
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
-    calibration = override_parameters(
-        calibration_numbers(),
-        {f"fit.{key}": numbers.number(f"fit.{key}") for key in ("reach", "rounds", "sensor_reach", "trust")},
-    )
+    common = calibration_numbers()
+    own = {path: quantity for path, quantity in numbers.items() if path.startswith("fit.")}
+    calibration = replace(common, quantities={**common.quantities, **own})
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
-    ready = prepare_problem(machine, campaign.records, sensors, calibration, kinds=RESIDUALS, seed=seed, jobs=jobs)
-    knobs = tuple(_narrowed(k, numbers.number("fit.wrench_reach")) for k in ready.problem.knobs)
-    ready = ready.with_machine(ready.problem.machine, knobs)
+    form = partial(with_other_form, size=numbers.number("scatter.form"))
+    ready = prepare_problem(
+        machine, campaign.records, sensors, calibration, kinds=RESIDUALS, form=form, seed=seed, jobs=jobs
+    )
+    machine = ready.problem.machine
+    knobs = (*ready.problem.knobs, *plan_knobs(machine))
+    twins = scatter_knobs(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
+    whole, forms = with_background(machine, numbers.number("scatter.spread"))
+    ready = ready.with_machine(whole, (*knobs, *twins, *forms))
     report(0.1)
-    held = _held_out(ready, names, hold_out)
+    problem = ready.problem
+    first = Normal(problem, np.zeros(len(problem.prior)), between(report, 0.1, 0.2))
+    held = _held_out(first, names, hold_out)
     used = [i for i in range(len(names)) if i not in held]
-    found, standing = search(ready.only(used), calibration, numbers, between(report, 0.1, 0.75))
+    found, standing = search(ready.only(used), first.only(used), calibration, numbers, between(report, 0.2, 0.75))
     left: tuple[Left, ...] = ()
     if found.misfit("wrench") > numbers.number("left.noise"):
         left = what_is_left(found.problem, standing.base, standing.background, numbers)
@@ -87,13 +97,12 @@ def discover(
     proof = None
     if held:
         records = [campaign.records[i] for i in held]
-        delivered = ready.problem.machine
         part = between(report, 0.8, 1.0)
-        proof = prove(delivered, found, records, sensors, phases=phases, jobs=jobs, progress=part)
+        proof = prove(machine, found, records, sensors, phases=phases, jobs=jobs, progress=part)
     report(1.0)
     return Discovery(
         campaign=campaign.name,
-        machine=ready.problem.machine,
+        machine=machine,
         fitted=fitted_machine(found),
         used=tuple(names[i] for i in used),
         held_out=tuple(names[i] for i in held),
@@ -107,14 +116,7 @@ def discover(
     )
 
 
-def _narrowed(knob: Knob, reach: float) -> Knob:
-    """A knob that acts on the platen, within so many of its standard deviations; others as they are."""
-    if "wrench" not in knob.shows_in:
-        return knob
-    return replace(knob, lowest=max(knob.lowest, -reach * knob.sd), highest=min(knob.highest, reach * knob.sd))
-
-
-def _held_out(ready: Prepared, names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
+def _held_out(first: Normal, names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
     """Places of the tests to hold out."""
     if wanted is not None:
         for name in wanted:
@@ -126,21 +128,18 @@ def _held_out(ready: Prepared, names: Sequence[str], wanted: Sequence[str] | Non
         return held
     if len(names) <= FEWEST:
         return []
-    return [_tells_least(ready)]
+    return [_tells_least(first)]
 
 
-def _tells_least(ready: Prepared) -> int:
+def _tells_least(first: Normal) -> int:
     """The test without which the others tell most of the machine's parameters; what was measured in it has no say."""
-    problem = ready.problem
-    x = np.zeros(len(problem.prior))
-    free = np.arange(len(x)) < len(problem.knobs)
-    slopes = problem.slopes(x, free, lambda share: None)
-    prior = problem.prior[free]
+    count = len(first.problem.knobs)
+    prior = first.problem.prior[:count]
     own = []
-    for slope in slopes:
-        j = slope[..., free].reshape(-1, len(prior)) * prior
+    for slope in first.slope:
+        j = slope[..., :count].reshape(-1, count) * prior
         own.append(2.0 * (j.conj().T @ j).real)
-    without = [sum(own) - one + np.eye(len(prior)) for one in own]
+    without = [sum(own) - one + np.eye(count) for one in own]
     return int(np.argmax([np.linalg.slogdet(m)[1] for m in without]))
 
 

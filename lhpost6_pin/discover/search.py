@@ -5,9 +5,9 @@ noise. Among those that pass, the one with the largest gain is added and its num
 parameters and sensor errors.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,23 +16,22 @@ from numpy.typing import NDArray
 
 from ..calibration.fit import Solution, misfit, solve
 from ..calibration.knobs import with_knobs
+from ..calibration.normal import Normal
 from ..calibration.prepare import Prepared
 from ..calibration.problem import Base, Problem
 from ..machine import Machine
 from ..parameters import Parameters
 from ..progress import Progress, between
 from ..residuals import RESIDUALS
-from .background import make_background, scatter_of
+from .background import make_background
 from .candidates import Candidate, list_candidates
 from .columns import columns_of
+from .releases import block_of, list_releases
 from .screen import Background, Score, make_block, real_bins, score
 
 __all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand"]
 
 Array = NDArray[np.float64]
-
-SCATTER = (("piston_leakage", "leakage"), ("local_viscous", "viscous"), ("bearing_friction", "pad_friction"))
-"""Effects by which twins differ, and the number of theirs that is shared."""
 
 
 @dataclass(frozen=True)
@@ -113,25 +112,26 @@ class Search:
 
 
 def search(
-    ready: Prepared, calibration: Parameters, numbers: Parameters, progress: Progress
+    ready: Prepared, begin: Normal, calibration: Parameters, numbers: Parameters, progress: Progress
 ) -> tuple[Search, Standing]:
     """Search the library for what the machine of a prepared campaign lacks; also what is needed to go on from there.
 
-    calibration and numbers are those of `models/procedures`.
+    begin are its normal equations where all unknowns are zero; calibration and numbers those of `models/procedures`.
     """
     start = np.zeros(len(ready.problem.prior))
-    first = solve(ready.problem, ready.replicas, calibration, start, between(progress, 0.0, 0.4))
+    share = between(progress, 0.0, 0.4)
+    first = solve(ready.problem, ready.replicas, calibration, start, share, first=begin, frugal=True)
     found = Search(ready, first, first)
     most = int(numbers.number("accept.effects"))
     for k in range(most + 1):
-        begin, end = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
-        standing = stand(found, numbers)
-        one = screen(found, standing, numbers, between(progress, begin, 0.5 * (begin + end)))
+        low, high = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
+        standing = stand(found)
+        one = screen(found, standing, numbers, between(progress, low, 0.5 * (low + high)))
         found.rounds.append(one)
         passed = [s for s in one.scored if not s.refused]
         if not passed or k == most:
             break
-        more = _add(found, passed, calibration, numbers, between(progress, 0.5 * (begin + end), end))
+        more = _add(found, passed, calibration, numbers, between(progress, 0.5 * (low + high), high))
         if more is None:
             break
         found = more
@@ -139,12 +139,10 @@ def search(
     return found, standing
 
 
-def stand(found: Search, numbers: Parameters) -> Standing:
+def stand(found: Search) -> Standing:
     """Normal equations of the background about the solution."""
     problem, solution = found.problem, found.solution
-    base = Base(problem, solution.at)
-    scatter = scatter_of(problem, SCATTER, numbers.number("scatter.share"))
-    return Standing(base, make_background(problem, solution.normal, solution.at, base, scatter))
+    return Standing(Base(problem, solution.at), make_background(problem, solution.normal, solution.at))
 
 
 def screen(found: Search, standing: Standing, numbers: Parameters, progress: Progress) -> Round:
@@ -156,23 +154,42 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
     first = excess_by_kind(found.refit.normal.problem, found.refit.normal.rest)
 
+    def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
+        less = Lowered(0.0, 0.0, 0.0)
+        if one.gain >= numbers.number("accept.gain"):
+            less = lowered(problem, background, explained(), one, first)
+        return Scored(candidate, one, less.share, _refusal(one, less, left, numbers))
+
     def of_group(group: Sequence[Candidate]) -> list[Scored]:
         columns, parts = columns_of(problem, base, group)
         block = make_block(background, columns)
         scored = []
         for candidate, part in zip(group, parts, strict=True):
-            one, less = score(background, block.select(part), *_bounds(candidate)), Lowered(0.0, 0.0, 0.0)
-            if one.gain >= numbers.number("accept.gain"):
-                less = lowered(problem, background, [c @ part for c in columns], one, first)
-            scored.append(Scored(candidate, one, less.share, _refusal(one, less, left, numbers)))
+            one = score(background, block.select(part), *_bounds(candidate))
+            scored.append(judged(candidate, one, partial(_explained, background, columns, part @ one.amplitude)))
         return scored
 
     scored: list[Scored] = []
+    for candidate in list_releases(problem):
+        place = problem.names.index(candidate.release)
+        free = np.full(1, np.inf)
+        one = score(background, block_of(background, place), -free, free)
+        scored.append(judged(candidate, one, partial(_of_unknown, background, place, one.amplitude)))
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
         for done, some in enumerate(parallel(delayed(of_group)(g) for g in groups)):
             scored += some
             progress((done + 1) / len(groups))
     return Round(tuple(sorted(scored, key=lambda one: -one.score.gain)), left)
+
+
+def _explained(background: Background, columns: Sequence[NDArray[np.complex128]], amplitude: Array) -> list[Array]:
+    """Real bins (n,) of every test that columns (m, c, k) explain."""
+    return [real_bins(c, root) @ amplitude for c, root in zip(columns, background.root, strict=True)]
+
+
+def _of_unknown(background: Background, place: int, amplitude: Array) -> list[Array]:
+    """Real bins (n,) of every test that an unknown of the background explains."""
+    return [slope[:, place] * amplitude for slope in background.slope]
 
 
 class Lowered(NamedTuple):
@@ -186,18 +203,17 @@ class Lowered(NamedTuple):
 def lowered(
     problem: Problem,
     background: Background,
-    columns: Sequence[NDArray[np.complex128]],
+    explained: Sequence[Array],
     one: Score,
     first: dict[str, float],
 ) -> Lowered:
-    """How a candidate lowers what is left; first is the excess by kind before any effect was added."""
+    """How a candidate lowers what is left, explained (n,) of every test; first: excess by kind before any was added."""
     before: list[Array] = []
     after: list[Array] = []
-    for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
-        explained = real_bins(column, root) @ one.amplitude
+    for slope, rest, root, more in zip(background.slope, background.rest, background.root, explained, strict=True):
         for sums, left in (
             (before, rest + slope @ background.alone),
-            (after, rest + slope @ one.change + explained),
+            (after, rest + slope @ one.change + more),
         ):
             half = root.size
             sums.append(((left[:half] ** 2 + left[half:] ** 2).reshape(root.shape) * root**2).sum(axis=0))
@@ -276,6 +292,12 @@ def _fit_jointly(
 ) -> Search:
     """The search with a candidate fitted together with everything, from where the linear estimate puts it."""
     problem, candidate = found.problem, one.candidate
+    if candidate.release:
+        known = candidate.release in {k.name for k in problem.knobs}
+        ready = found.ready.with_free(candidate.release, numbers.number(f"fit.{'known' if known else 'sensor'}_free"))
+        start, before = found.solution.at, found.solution.normal
+        solution = solve(ready.problem, ready.replicas, calibration, start, progress, known=before, frugal=True)
+        return Search(ready, solution, found.refit, list(found.added), found.rounds)
     low, high = _bounds(candidate)
     amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
     machine: Machine = candidate.on(problem.machine, amplitudes)
@@ -283,7 +305,9 @@ def _fit_jointly(
     ready = found.ready.with_machine(machine, knobs)
     count = len(problem.knobs)
     start = np.insert(found.solution.at, count, np.zeros(len(knobs) - count))
-    solution = solve(ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal)
+    solution = solve(
+        ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal, frugal=True
+    )
     return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from ..calibration import Knob
+from ..calibration.problem import Problem
 from ..parameters import Parameters
 from .left import Left
 from .search import Added, Search, excess_by_kind
@@ -21,34 +21,6 @@ __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
 
 Array = NDArray[np.float64]
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
-
-_FAMILY_OF = {
-    "leakage": "piston_leakage",
-    "flow": "flow_curve_error",
-    "flow_curve": "flow_curve_error",
-    "bulk_modulus": "entrained_air",
-    "chamber_a": "dead_volume",
-    "chamber_b": "dead_volume",
-    "viscous": "local_viscous",
-    "pad_friction": "bearing_friction",
-    "polytropic_index": "gas_heat_transfer",
-    "mass": "added_mass",
-    "inertia": "inertia_coupling",
-}
-"""Family that a parameter belongs to when it is far off."""
-
-_SENSOR_FAMILY = {
-    "platen_acceleration": "accelerometer_error",
-    "platen_velocity": "accelerometer_error",
-    "platen_displacement": "length_sensor_error",
-    "actuator_force": "pressure_sensor_error",
-    "chamber_pressure_a": "pressure_sensor_error",
-    "chamber_pressure_b": "pressure_sensor_error",
-    "strut_pressure": "pressure_sensor_error",
-    "spool_position": "spool_null_bias",
-    "supply_pressure": "pressure_sensor_error",
-}
-"""Family of a gain or an offset beyond its range."""
 
 
 @dataclass(frozen=True)
@@ -96,57 +68,54 @@ class Verdict:
 
 def judge(found: Search, left: Sequence[Left], calibration: Parameters, numbers: Parameters) -> Verdict:
     """The verdict on a search; `left` are free functions fitted to what is left, by falling gain."""
-    problem, x = found.problem, found.solution.x
-    known = np.array([not k.name.startswith(tuple(f"{a.candidate.name}." for a in found.added)) for k in problem.knobs])
-    floor = calibration.number("fit.floor") * problem.prior
-    floor[: len(known)][~known] = 0.0  # their priors are flat
+    problem, x, added = found.problem, found.solution.x, [a.candidate for a in found.added]
+    count = len(problem.knobs)
+    own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.knobs])
+    floor = calibration.number("fit.floor") * problem.stated
+    floor[:count][own] = 0.0  # their priors are flat
     covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
     sd = np.sqrt(np.diag(covariance) + floor**2)
     reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
 
-    def estimate(i: int, knob: Knob) -> Estimate:
+    def estimate(i: int) -> Estimate:
+        if i >= count:
+            error = problem.unknowns[i - count]
+            return Estimate(float(x[i]), error.unit, float(x[i] - reach * sd[i]), float(x[i] + reach * sd[i]))
+        knob = problem.knobs[i]
         low, high = sorted(knob.at(float(x[i] + side * reach * sd[i])) for side in (-1.0, 1.0))
         return Estimate(knob.at(float(x[i])), knob.unit, low, high)
 
-    effects = [_of_added(added, problem.knobs, estimate, numbers) for added in found.added]
-    changed: dict[str, Estimate] = {}
-    limit, material = numbers.number("verdict.parameter"), calibration.number("report.material")
+    sensors = tuple(
+        SensorFinding(u.name, c.family.name, estimate(i), float(np.sqrt(3.0) * u.sd))
+        for i, u in enumerate(problem.unknowns, start=count)
+        for c in added
+        if c.release == u.name
+    )
+    errors = {s.name for s in sensors}
+    effects = [_of_added(one, problem, estimate, numbers) for one in found.added if one.candidate.name not in errors]
+    changed = {}
     for i, knob in enumerate(problem.knobs):
-        if not known[i]:
-            continue
-        distance = abs(x[i]) / problem.prior[i]
-        family = _FAMILY_OF.get(knob.name.split(".")[-1].split("[")[0])
-        if distance > limit and family:
-            effects.append(_of_parameter(found, knob, family, estimate(i, knob), float(distance)))
-        elif abs(x[i]) > calibration.number("report.deviations") * sd[i] and distance > material:
-            changed[knob.name] = estimate(i, knob)
-    sensors = _sensors(found, sd, reach, numbers)
+        sure = abs(x[i]) > calibration.number("report.deviations") * sd[i]
+        material = abs(x[i]) > calibration.number("report.material") * problem.stated[i]
+        if sure and material and not own[i] and knob.name not in problem.free:
+            changed[knob.name] = estimate(i)
     free = _first(left, numbers)
     unnamed = free is not None or _more_than_noise(found, numbers)
     return Verdict(_word(effects, changed, sensors, unnamed), _merged(effects), changed, sensors, free)
 
 
-def _of_added(
-    added: Added, knobs: Sequence[Knob], estimate: Callable[[int, Knob], Estimate], numbers: Parameters
-) -> Finding:
+def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate], numbers: Parameters) -> Finding:
     candidate = added.candidate
     values = {}
-    for i, knob in enumerate(knobs):
-        if knob.name.startswith(f"{candidate.name}."):
-            values[knob.name.removeprefix(f"{candidate.name}.")] = estimate(i, knob)
+    for i, name in enumerate(problem.names):
+        if name == candidate.release or name.startswith(f"{candidate.name}."):
+            values[name.removeprefix(f"{candidate.name}.")] = estimate(i)
     chance = float(chi2.sf(2.0 * added.gain, len(values)))
     apart = numbers.number("accept.apart")
     rivals = tuple(c.candidate.family.name for c in added.contest[1:] if c.behind < apart)
     return Finding(
         candidate.family.name, candidate.components, values, added.gain, min(1.0, chance * added.tried), rivals
     )
-
-
-def _of_parameter(found: Search, knob: Knob, family: str, value: Estimate, distance: float) -> Finding:
-    kind = knob.name.split(".")[0]
-    names = tuple(c.name for c in found.problem.machine.components if c.kind == kind) or (kind,)
-    chance = 2.0 * float(norm.sf(distance))
-    return Finding(family, names, {knob.name: value}, 0.5 * distance**2, min(1.0, chance * len(found.problem.knobs)))
 
 
 def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -164,18 +133,6 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
         else:
             merged[key] = one
     return tuple(merged.values())
-
-
-def _sensors(found: Search, sd: Array, reach: float, numbers: Parameters) -> tuple[SensorFinding, ...]:
-    problem, first = found.problem, len(found.problem.knobs)
-    findings = []
-    for i, unknown in enumerate(problem.unknowns, start=first):
-        value, stated = float(found.solution.x[i]), float(np.sqrt(3.0) * unknown.sd)
-        if abs(value) > numbers.number("verdict.sensor") * stated and abs(value) - stated > 3.0 * sd[i]:
-            family = "channel_delay" if unknown.kind == "delay" else _SENSOR_FAMILY[unknown.channel]
-            interval = Estimate(value, unknown.unit, value - reach * float(sd[i]), value + reach * float(sd[i]))
-            findings.append(SensorFinding(unknown.name, family, interval, stated))
-    return tuple(findings)
 
 
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:

@@ -46,6 +46,7 @@ class Family:
     confused_with: tuple[str, ...]
     tell_apart: str
     twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
+    background: bool  # refitted in every search and never named: another form of the report's laws
 
     def components(self, machine: "Machine") -> tuple[str, ...]:
         """Names of all components of a machine that it can act on; also ``platen``, its axes, and ``supply``."""
@@ -118,4 +119,5 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         confused_with=tuple(table["confused_with"]),
         tell_apart=table["tell_apart"],
         twins=table.get("twins", "kind"),
+        background=table.get("search") == "background",
     )

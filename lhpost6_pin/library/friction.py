@@ -71,6 +71,24 @@ def _swivel(machine: "Machine", components: Sequence[str], values: Values) -> An
     return "bouc_wen_2d", ends, [(values["moment"], values["yield_turn"], shape) for shape in shapes]
 
 
+def _presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    share, ratio, ports, rows = values["share"], values["ratio"], [], []
+    for c in _each(machine, components):
+        force, yielding, shape = share * c.seal_friction, *_seal(c)
+        ports += [c.name, c.name]
+        rows += [(force, ratio * yielding, shape), (-force, yielding, shape)]
+    return "bouc_wen_1d", ports, rows
+
+
+def _bearing_presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    share, ratio, ports, rows = values["share"], values["ratio"], [], []
+    for c in _each(machine, components):
+        force = share * c.pad_friction
+        ports += [c.name, c.name]
+        rows += [(force, ratio * c.pad_yield, c.pad_shape), (-force, c.pad_yield, c.pad_shape)]
+    return "bouc_wen_2d", ports, rows
+
+
 def _viscous(machine: "Machine", components: Sequence[str], values: Values) -> Any:
     return "viscous", components, [(values["coefficient"],)] * len(components)
 
@@ -92,6 +110,8 @@ BUILD = {
     "strut_friction": _strut,
     "bearing_friction": _bearing,
     "swivel_friction": _swivel,
+    "presliding": _presliding,
+    "bearing_presliding": _bearing_presliding,
     "local_viscous": _viscous,
     "quadratic_drag": _quadratic,
     "power_law_viscous": _power,

@@ -36,6 +36,8 @@ def make_effect(
     and for a number that it does not have or that is out of its bounds.
     """
     known = find_family(family)
+    if family not in _BUILD:
+        raise ParameterError(f"{family} is no part of a machine: state it in the file of the sensors or the controller")
     possible = known.components(machine)
     chosen = tuple(components) or next(iter(known.groups(machine)), ())
     if wrong := [c for c in chosen if c not in possible]:

@@ -15,9 +15,10 @@ from lhpost6_pin.campaign import Campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.discover import Discovery, discover, verdict_entries
-from lhpost6_pin.discover.candidates import Candidate, list_candidates
+from lhpost6_pin.discover.candidates import Candidate, list_candidates, with_background, with_other_form
 from lhpost6_pin.discover.columns import columns_of
 from lhpost6_pin.discover.left import _hats
+from lhpost6_pin.discover.releases import block_of, list_releases
 from lhpost6_pin.discover.screen import Background, Block, score
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.library import families, find_family
@@ -99,7 +100,7 @@ def test_a_gain_is_what_a_refit_with_the_candidate_gains():
     j, c, r = rng.normal(size=(tests, rows, p)), rng.normal(size=(tests, rows, q)), rng.normal(size=(tests, rows))
     place = rng.normal(size=p)
     matrix, side = np.einsum("tni,tnj->tij", j, j), np.einsum("tni,tn->ti", j, r)
-    background = Background(list(j), list(r), [], matrix, side, place)
+    background = Background(list(j), list(r), [], matrix, side, place, np.ones(p))
     block = Block(np.einsum("tni,tnj->tij", j, c), np.einsum("tni,tnj->tij", c, c), np.einsum("tni,tn->ti", c, r))
     free = np.full(q, np.inf)
     one = score(background, block, -free, free)
@@ -122,8 +123,63 @@ def test_a_gain_is_what_a_refit_with_the_candidate_gains():
         assert one.held_out[t] == pytest.approx(gain, rel=1e-9)
 
 
+def test_setting_an_unknown_free_gains_what_its_prior_costs():
+    """One unknown, one test: without its prior x = -g / h, with it -(g + x0) / (h + 1)."""
+    h, g, x0 = 3.0, 40.0, 0.5
+    background = Background(
+        [np.full((1, 1), np.sqrt(h))],
+        [np.zeros(1)],
+        [],
+        np.full((1, 1, 1), h),
+        np.full((1, 1), g),
+        np.full(1, x0),
+        np.ones(1),
+    )
+    free = np.full(1, np.inf)
+    one = score(background, block_of(background, 0), -free, free)
+    held = 0.5 * (g + x0) ** 2 / (h + 1.0) - 0.5 * x0**2
+    assert one.gain == pytest.approx(0.5 * g**2 / h - held, rel=1e-9)
+    assert one.amplitude[0] + one.change[0] == pytest.approx(-g / h, rel=1e-9)
+
+
+def test_what_is_at_its_bound_does_not_explain_what_a_candidate_does():
+    """Two columns alike, that of the background held: the candidate gains all, g^2 / 2 h."""
+    h, g = 3.0, 40.0
+    own = [np.full((1, 1), np.sqrt(h))], [np.zeros(1)], [], np.full((1, 1, 1), h), np.full((1, 1), g), np.full(1, 3.5)
+    free = np.full(1, np.inf)
+    held, moving = (Background(*own, np.full(1, x)) for x in (0.0, 1.0))
+    one, other = (score(b, block_of(b, 0), -free, free) for b in (held, moving))
+    assert one.gain == pytest.approx(0.5 * g**2 / h, rel=1e-9)
+    assert one.change[0] == 0.0
+    assert other.gain < 0.5 * one.gain
+
+
+def test_every_error_of_a_sensor_and_every_parameter_with_a_family_can_be_set_free(ready):
+    released = {c.release: c.family.name for c in list_releases(ready.problem)}
+    assert {u.name for u in ready.problem.unknowns} <= set(released)
+    assert released["gain platen_acceleration[z]"] == "accelerometer_error"
+    assert released["delay spool_position"] == "channel_delay"
+    assert released["hydraulics.bulk_modulus"] == "entrained_air"
+    free = ready.problem.with_free("hydraulics.bulk_modulus", 4.0)
+    assert "hydraulics.bulk_modulus" not in {c.release for c in list_releases(free)}
+    i = free.names.index("hydraulics.bulk_modulus")
+    assert free.prior[i] == 4.0 * ready.problem.prior[i]
+    assert np.array_equal(np.delete(free.prior, i), np.delete(ready.problem.prior, i))
+    assert np.array_equal(free.step, ready.problem.step)
+
+
+def test_friction_of_another_form_is_noise_and_a_background(machine):
+    whole, knobs = with_background(machine, 1.5)
+    assert [k.value for k in knobs] == [0.0] * len(knobs)
+    assert {e.family for e in whole.added_effects} == {f.name for f in families().values() if f.background}
+    other = with_other_form(machine, 0.7)
+    assert {e.name for e in other.added_effects} == {k.name.rpartition(".")[0] for k in knobs}
+
+
 def test_amplitudes_stay_within_their_bounds():
-    background = Background([np.zeros((1, 1))], [np.zeros(1)], [], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1))
+    background = Background(
+        [np.zeros((1, 1))], [np.zeros(1)], [], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.ones(1)
+    )
     block = Block(np.zeros((1, 1, 1)), np.ones((1, 1, 1)), np.array([[4.0]]))
     one = score(background, block, np.array([-1.0]), np.array([1.0]))
     assert one.amplitude[0] == -1.0
@@ -132,7 +188,8 @@ def test_amplitudes_stay_within_their_bounds():
 
 def test_every_family_is_a_candidate_on_every_group_at_every_start(machine):
     groups = list_candidates(machine)
-    assert {g[0].family.name for g in groups} == {f.name for f in families().values() if not f.background}
+    named = {f.name for f in families().values() if not f.background and not {"sensor", "controller"} & set(f.acts_on)}
+    assert {g[0].family.name for g in groups} == named
     assert all(len({(c.family.name, c.shape) for c in g}) == 1 for g in groups)
 
 

@@ -273,6 +273,8 @@ FAMILIES = {
     "swivel_friction": ((), {}),
     "strut_friction": (("S1",), {}),
     "bearing_friction": (("V3",), {}),
+    "presliding": (("H1", "V2"), {}),
+    "bearing_presliding": (("V3",), {}),
     "local_viscous": (("H1",), {}),
     "quadratic_drag": (("H2",), {}),
     "power_law_viscous": (("H3",), {}),
@@ -316,13 +318,16 @@ def test_amplitudes_may_be_zero_and_start_values_lie_within_bounds(family: str) 
         assert shape.low <= shape.typical <= shape.high
         assert all(shape.low <= x <= shape.high for x in shape.start)
         assert not shape.amplitude or (shape.low <= 0.0 < shape.high and shape.typical > 0.0)
-    assert set(known.confused_with) <= set(families()) | SENSORS_AND_OIL
+    assert set(known.confused_with) <= set(families())
     for group in known.groups(base()):
         make_plant(base().with_effect(family, group))
 
 
-SENSORS_AND_OIL = {"pressure_sensor_error", "line_dynamics"}
-"""Names that other parts of the library and the check of sensors hold."""
+@pytest.mark.parametrize("family", ["accelerometer_error", "channel_delay", "controller_mismatch"])
+def test_errors_of_sensors_and_controllers_are_no_part_of_a_machine(family: str) -> None:
+    assert set(find_family(family).confused_with) <= set(families())
+    with pytest.raises(ParameterError, match=f"{family} is no part of a machine"):
+        base().with_effect(family)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

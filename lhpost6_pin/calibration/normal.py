@@ -11,7 +11,7 @@ from ..parameters import Parameters
 from .problem import Problem
 from .spectra import excess
 
-__all__ = ["Bias", "Normal", "bounded_step", "positive", "squares"]
+__all__ = ["Bias", "Normal", "bounded_step", "bounds_of", "positive", "squares"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -148,6 +148,13 @@ def positive(matrix: Array, prior: Array) -> Array:
     return (vector * np.maximum(value, 0.0)) @ vector.T / np.outer(prior, prior)
 
 
+def bounds_of(problem: Problem, numbers: Parameters) -> tuple[Array, Array]:
+    """How far down and up every unknown may go (p,): within its own bounds, and the reach of its prior."""
+    known = np.arange(len(problem.prior)) < len(problem.knobs)
+    reach = np.where(known, numbers.number("fit.reach"), numbers.number("fit.sensor_reach")) * problem.prior
+    return np.maximum(-reach, problem.lowest), np.minimum(reach, problem.highest)
+
+
 def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters) -> Array:
     """Gauss-Newton step (p,) from x (p,), within the trust region and the reach of every unknown."""
     from scipy.optimize import lsq_linear
@@ -155,12 +162,11 @@ def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters
     prior = problem.prior
     known = np.arange(len(prior)) < len(problem.knobs)
     trust = np.where(known, numbers.number("fit.trust"), numbers.number("fit.sensor_trust"))
-    reach = np.where(known, numbers.number("fit.reach"), numbers.number("fit.sensor_reach"))
     right = normal.whole[1]
     factor = np.linalg.cholesky(normal.posterior(prior) * np.outer(prior, prior))
     wanted = np.linalg.solve(factor, -(right + x / prior**2) * prior)
     place = x / prior
-    least, most = np.maximum(-reach, problem.lowest / prior), np.minimum(reach, problem.highest / prior)
+    least, most = (bound / prior for bound in bounds_of(problem, numbers))
     low, high = np.maximum(-trust, np.minimum(least - place, 0.0)), np.minimum(trust, np.maximum(most - place, 0.0))
     low, high = low - 1e-9, high + 1e-9  # no empty interval
     freely = np.linalg.solve(factor.T, wanted)

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration.normal import Normal, positive
+from ..calibration.normal import Normal, bounds_of, positive
 from ..calibration.problem import Problem
+from ..parameters import Parameters
 from .screen import Background, real_bins
 
 __all__ = ["make_background"]
@@ -12,8 +13,11 @@ __all__ = ["make_background"]
 Array = NDArray[np.float64]
 
 
-def make_background(problem: Problem, normal: Normal, x: Array) -> Background:
-    """Background from the normal equations at the solution x (p,); `normal` is corrected for noise."""
+def make_background(problem: Problem, normal: Normal, x: Array, numbers: Parameters) -> Background:
+    """Background from the normal equations at the solution x (p,); `normal` is corrected for noise.
+
+    What is at its bound there, as `numbers` of the fit set it, stays: beyond it something else is wrong.
+    """
     prior = problem.prior
     slope, rest, root, matrix, side = [], [], [], [], []
     for t, (own, left, power) in enumerate(zip(normal.slope, normal.rest, normal.power, strict=True)):
@@ -24,4 +28,7 @@ def make_background(problem: Problem, normal: Normal, x: Array) -> Background:
         corrected, right = normal.of([t])
         matrix.append(positive(corrected * np.outer(prior, prior), np.ones(len(prior))))
         side.append(right * prior)
-    return Background(slope, rest, root, np.array(matrix), np.array(side), x / prior)
+    low, high = bounds_of(problem, numbers)
+    near = 1e-3 * prior
+    free = ((x > low + near) & (x < high - near)).astype(float)
+    return Background(slope, rest, root, np.array(matrix), np.array(side), x / prior, free)

@@ -51,7 +51,7 @@ class Candidate:
                 paths=((f"effect.{self.name}.{s.name}", -1),),
                 unit=s.unit,
                 value=value,
-                sd=1.0 if relative else spread * s.typical,
+                sd=0.5 if relative else spread * s.typical,  # starts are a factor of a few apart
                 relative=relative,
                 shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
                 step=None if relative else s.typical,

@@ -41,6 +41,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "closure": closure,
         "ambiguity": [[one.family, *one.rivals] for one in verdict.effects if one.rivals],
         "unexplained": None if verdict.word != "unexplained" else _left(found),
+        "not_testable": list(verdict.untestable),
         "next_test": next_tests(found),
         "campaign": found.campaign,
         "machine": found.machine.name,

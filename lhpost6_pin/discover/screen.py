@@ -45,15 +45,16 @@ class Background:
     matrix: Array  # (t, p, p)
     side: Array  # (t, p)
     place: Array  # (p,) where the background stands, in units of the priors
+    free: Array  # (p,) one, or zero for what is at its bound and stays there
 
     @cached_property
     def factors(self) -> list[tuple[tuple[Array, bool], Array]]:
         """Cholesky factor and right side with the priors: of all tests, then of all but each."""
-        found = []
+        found, both = [], np.outer(self.free, self.free)
         for without in range(-1, len(self.matrix)):
             keep = np.arange(len(self.matrix)) != without
-            matrix = self.matrix[keep].sum(axis=0) + np.eye(len(self.place))
-            found.append((cho_factor(matrix), self.side[keep].sum(axis=0) + self.place))
+            matrix = self.matrix[keep].sum(axis=0) * both + np.eye(len(self.place))
+            found.append((cho_factor(matrix), (self.side[keep].sum(axis=0) + self.place) * self.free))
         return found
 
     @cached_property
@@ -84,7 +85,7 @@ def make_block(background: Background, columns: Sequence[Complex]) -> Block:
     cross, own, side = [], [], []
     for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
         c = real_bins(column, root)
-        cross.append(slope.T @ c)
+        cross.append((slope * background.free).T @ c)
         own.append(c.T @ c)
         side.append(c.T @ rest)
     return Block(np.array(cross), np.array(own), np.array(side))

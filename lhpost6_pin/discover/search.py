@@ -125,7 +125,7 @@ def search(
     most = int(numbers.number("accept.effects"))
     for k in range(most + 1):
         low, high = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
-        standing = stand(found)
+        standing = stand(found, calibration)
         one = screen(found, standing, numbers, between(progress, low, 0.5 * (low + high)))
         found.rounds.append(one)
         passed = [s for s in one.scored if not s.refused]
@@ -139,10 +139,11 @@ def search(
     return found, standing
 
 
-def stand(found: Search) -> Standing:
+def stand(found: Search, calibration: Parameters) -> Standing:
     """Normal equations of the background about the solution."""
     problem, solution = found.problem, found.solution
-    return Standing(Base(problem, solution.at), make_background(problem, solution.normal, solution.at))
+    background = make_background(problem, solution.normal, solution.at, calibration)
+    return Standing(Base(problem, solution.at), background)
 
 
 def screen(found: Search, standing: Standing, numbers: Parameters, progress: Progress) -> Round:

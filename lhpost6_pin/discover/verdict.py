@@ -64,6 +64,7 @@ class Verdict:
     changed: dict[str, Estimate]  # parameters that differ from what the machine file states, within calibration
     sensors: tuple[SensorFinding, ...]
     left: Left | None  # what has no name
+    untestable: tuple[str, ...]  # families that this campaign could not show, of typical size
 
 
 def judge(found: Search, left: Sequence[Left], calibration: Parameters, numbers: Parameters) -> Verdict:
@@ -101,7 +102,22 @@ def judge(found: Search, left: Sequence[Left], calibration: Parameters, numbers:
             changed[knob.name] = estimate(i)
     free = _first(left, numbers)
     unnamed = free is not None or _more_than_noise(found, numbers)
-    return Verdict(_word(effects, changed, sensors, unnamed), _merged(effects), changed, sensors, free)
+    hidden, told = _untestable(found, numbers)
+    blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + told)
+    word = _word(effects, changed, sensors, unnamed, blind)
+    return Verdict(word, _merged(effects), changed, sensors, free, hidden)
+
+
+def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], int]:
+    """Families of which no candidate's typical size stands clear of its deviation; and how many are not so."""
+    clear: dict[str, bool] = {}
+    for one in found.rounds[-1].scored:
+        if not one.candidate.release:
+            shape, name = one.candidate.amplitudes[0], one.candidate.family.name
+            told = bool(one.score.sd[0] * numbers.number("verdict.clear") < shape.typical)
+            clear[name] = clear.get(name, False) or told
+    hidden = tuple(name for name, told in clear.items() if not told)
+    return hidden, len(clear) - len(hidden)
 
 
 def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate], numbers: Parameters) -> Finding:
@@ -149,11 +165,15 @@ def _first(left: Sequence[Left], numbers: Parameters) -> Left | None:
     return next((o for o in left if o.gain > numbers.number("left.gain") and o.held_out.sum() > share * o.gain), None)
 
 
-def _word(effects: Sequence[Finding], changed: object, sensors: Sequence[SensorFinding], unnamed: bool) -> Word:
+def _word(
+    effects: Sequence[Finding], changed: object, sensors: Sequence[SensorFinding], unnamed: bool, blind: bool
+) -> Word:
     if unnamed:
         return "unexplained"
     if effects:
         return "ambiguous" if any(e.rivals for e in effects) else "named"
     if sensors:
         return "sensor"
+    if blind:
+        return "not_testable"
     return "parameters_only" if changed else "none"

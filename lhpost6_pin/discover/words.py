@@ -12,6 +12,8 @@ def said(found: Discovery) -> str:
     effects = " and ".join(f"{title_of(one.family)} ({where(one.components)})" for one in verdict.effects)
     if verdict.word == "none":
         return "the model explains the campaign; no parameter differs from what the machine file states."
+    if verdict.word == "not_testable":
+        return f"nothing was found, but the campaign is no test of {len(verdict.untestable)} families: excite more."
     if verdict.word == "parameters_only":
         return f"no effect is missing; {len(verdict.changed)} parameters differ: {', '.join(verdict.changed)}."
     if verdict.word == "sensor":

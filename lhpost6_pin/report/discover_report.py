@@ -176,4 +176,6 @@ def _assumptions(found: Discovery) -> list[Markup]:
         "Candidates are ranked to first order; the best are fitted in full with everything else.",
     ]
     rows = [(path, f"{q.value:g}", q.evidence, q.source) for path, q in found.numbers.items()]
+    if hidden := found.verdict.untestable:
+        lines.append(f"This campaign is no test of {', '.join(hidden)}: their typical sizes do not stand clear of it.")
     return [bullet_list(lines), table("Numbers used", ("Number", "Value", "Evidence", "Source"), rows)]

@@ -106,8 +106,8 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
                 )
     columns["spool_command"] = machine.actuator_names if test.spool_command is not None else ()
     for group in _DELAYED:
-        # a command is no measurement, but what records it has a clock of its own, and holds it for a sample
-        sd = sensors.delay_sd("spool_position" if group == "spool_command" else group)
+        # a command is no measurement, but what records it has a clock of its own beside the spool's, and holds it
+        sd = 2.0 * sensors.delay_sd("spool_position") if group == "spool_command" else sensors.delay_sd(group)
         if sd > 0.0 and columns[{"chamber_pressure": "chamber_pressure_a"}.get(group, group)]:
             found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
     return tuple(found)

@@ -19,7 +19,7 @@ __all__ = ["Whitener", "excess", "make_whitener", "spectrum_of"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-CERTAIN = 16.0
+CERTAIN = 9.0
 """Squared partial correlation times samples from which two columns of noise count as correlated; chance gives one."""
 
 

@@ -222,7 +222,7 @@ def lowered(
     count = float(sum(len(rest) for rest in background.rest))
     fall = float((old - new).sum())
     of_first = max(float((old - new)[problem.rows(kind)].sum()) / more for kind, more in first.items())
-    return Lowered(fall, fall / max(float(old.sum()) - count, 1e-9 * count), of_first)
+    return Lowered(fall, fall / max(float(old.sum()) - count, abs(fall), 1e-9), of_first)
 
 
 def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:

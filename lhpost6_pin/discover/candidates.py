@@ -39,19 +39,25 @@ class Candidate:
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         return machine.with_effect(self.family.name, self.components, name=self.name, **values)
 
-    def knobs(self, amplitudes: tuple[float, ...], spread: float) -> tuple[Knob, ...]:
-        """Unknowns of a fit that starts here: amplitudes within `spread` typical ones, shapes by their logarithm."""
+    def knobs(self, amplitudes: tuple[float, ...], spread: float, factor: float = 0.0) -> tuple[Knob, ...]:
+        """Unknowns of a fit that starts here: amplitudes within `spread` typical ones.
+
+        Logarithms of shapes are within `factor`;
+        Shapes are left out where no factor is given.
+        """
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         found = []
         for s in self.family.shapes:
             value = values[s.name]
             relative = not s.amplitude and s.low > 0.0
+            if not s.amplitude and factor == 0.0:
+                continue
             knob = Knob(
                 name=f"{self.name}.{s.name}",
                 paths=((f"effect.{self.name}.{s.name}", -1),),
                 unit=s.unit,
                 value=value,
-                sd=0.5 if relative else spread * s.typical,  # starts are a factor of a few apart
+                sd=factor if relative else spread * s.typical,
                 relative=relative,
                 shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
                 step=None if relative else s.typical,
@@ -69,8 +75,7 @@ def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[Kno
     for one in _of_background(machine):
         absent = tuple(0.0 for _ in one.amplitudes)
         machine = one.on(machine, absent)
-        amplitudes = [f"{one.name}.{s.name}" for s in one.amplitudes]
-        knobs += [k for k in one.knobs(absent, spread) if k.name in amplitudes]
+        knobs += one.knobs(absent, spread)
     return machine, tuple(knobs)
 
 

@@ -42,8 +42,7 @@ class Candidate:
     def knobs(self, amplitudes: tuple[float, ...], spread: float, factor: float = 0.0) -> tuple[Knob, ...]:
         """Unknowns of a fit that starts here: amplitudes within `spread` typical ones.
 
-        Logarithms of shapes are within `factor`;
-        Shapes are left out where no factor is given.
+        Logarithms of shapes are within `factor`; without one shapes are left out.
         """
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         found = []

@@ -181,19 +181,8 @@ def march_states(
         z[0] = start
     ws = make_workspace(plant, plant.zero_state())
     held = np.ascontiguousarray(spool, float)
-    arrays = (
-        plant.axes,
-        plant.legs,
-        plant.body,
-        np.ascontiguousarray(moved),
-        ws.frame,
-        ws.port,
-        ws.JB,
-        dt,
-        held,
-        plant.supply,
-        z,
-    )
+    table = np.ascontiguousarray(moved)
+    arrays = plant.axes, plant.legs, plant.body, table, ws.frame, ws.port, ws.JB, dt, held, plant.supply, z
     sample, status = _march(np.ascontiguousarray(motion.q), *arrays)
     if status:
         names = (*plant.machine.actuator_names, *plant.machine.strut_names)

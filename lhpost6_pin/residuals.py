@@ -141,10 +141,11 @@ def follow(plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None
     rows = _moving(plant)
     fresh = {key: row for row in rows if (key := _marched(row)) not in there}
     # oscillators and heat average noise, and feel what a still path lacks
-    smooth = [r for r in fresh.values() if int(r["law"]) in (OSCILLATOR, GAS_HEAT)] if test.path is not None else []
-    rough = [r for r in fresh.values() if not any(r is other for other in smooth)]
-    for some, motion in ((rough, along), (smooth, moved)):
-        if some or (known is None and motion is along):  # also to see that no leg is out of its stroke
+    parts: tuple[list[np.void], list[np.void]] = [], []
+    for row in fresh.values():
+        parts[test.path is not None and int(row["law"]) in (OSCILLATOR, GAS_HEAT)].append(row)
+    for some, motion in zip(parts, (along, moved), strict=True):
+        if some or (known is None and some is parts[0]):  # also to see that no leg is out of its stroke
             marched = march_states(plant, motion, test.dt, rows=np.array(some, plant.rows.dtype))
             there |= {_marched(row): marched[:, _states(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))

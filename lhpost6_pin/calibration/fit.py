@@ -148,11 +148,12 @@ def solve(
             bias = Bias(normal, replicas, x, parts, known)
         if bias is not None and done > 1:
             normal = normal.less(bias)
-        step = bounded_step(normal, x, problem, numbers)
+        posterior = normal.posterior(problem.prior)
+        step = bounded_step(normal, posterior, x, problem, numbers)
         slope = normal.whole[1] + x / problem.prior**2
-        gain = -float(slope @ step + 0.5 * step @ normal.posterior(problem.prior) @ step)
+        gain = -float(slope @ step + 0.5 * step @ posterior @ step)
         x = x + step
-        sd = np.sqrt(np.diag(np.linalg.inv(normal.posterior(problem.prior))) + floor**2)
+        sd = np.sqrt(np.diag(np.linalg.inv(posterior)) + floor**2)
         still = np.max(np.abs(step) / sd) < numbers.number("fit.converged")
         if done > 1 and (still or (frugal and gain < numbers.number("fit.still"))):
             converged = True

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 _OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus")
 _GAS = ("pressure", "polytropic_index")
+_GEOMETRY = ("wrench", "flow", "gas")
 _MECHANICAL = (
     *("mass", "inertia", "viscous"),
     *("seal_friction", "seal_yield", "seal_shape"),
@@ -142,13 +143,19 @@ def _heights(machine: Machine, kind: str) -> list[Knob]:
         if bearing:
             paths.append(("platen.bearing_plane", 2))
         heights = [getattr(c, end)[2] for c in members]
-        stated = [machine.parameters[path].sd for path, _ in paths[: len(members)]]
-        if any(sd is None for sd in stated):
+        sd = _mean_sd(machine, paths[: len(members)])
+        if sd is None:
             continue
-        sd = float(np.mean([s[2] if isinstance(s, tuple) else s for s in stated if s is not None]))
         name = f"{kind}.{end.split('_')[0]}_height"
-        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, False, ("wrench", "flow", "gas")))
+        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, False, _GEOMETRY))
     return found
+
+
+def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None:
+    """Mean stated deviation of components of vectors; None where one states none."""
+    stated = [machine.parameters[path].sd for path, _ in paths]
+    known = [sd[i] if isinstance(sd, tuple) else sd for sd, (_, i) in zip(stated, paths, strict=True) if sd is not None]
+    return float(np.mean(known)) if len(known) == len(paths) else None
 
 
 def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
@@ -167,14 +174,11 @@ def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
             for i in range(2):
                 beside = [c for c in members if getattr(c, points[0])[i] != 0.0]
                 paths = tuple((f"{c.name}.{point}", i) for c in beside for point in points)
-                stated = [machine.parameters[path].sd for path, _ in paths]
-                sds = [sd[i] if isinstance(sd, tuple) else sd for sd in stated if sd is not None]
-                if len(beside) < 2 or len(sds) < len(paths):
+                if len(beside) < 2 or (sd := _mean_sd(machine, paths)) is None:
                     continue
                 value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
                 name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
-                shows_in = ("wrench", "flow", "gas")
-                found.append(Knob(name, paths, "m", value, float(np.mean(sds)), False, shows_in, mirrored=True))
+                found.append(Knob(name, paths, "m", value, sd, False, _GEOMETRY, mirrored=True))
     return tuple(found)
 
 

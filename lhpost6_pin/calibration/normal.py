@@ -1,6 +1,6 @@
 """Normal equations of a calibration: summed by test and column as wanted, corrected for noise, solved within bounds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parameters import Parameters
+from ..progress import Progress
 from .problem import Problem
 from .spectra import excess
 
@@ -16,7 +17,6 @@ __all__ = ["Bias", "Normal", "bounded_step", "bounds_of", "positive", "squares"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
-Progress = Callable[[float], None]
 
 
 class Normal:
@@ -103,8 +103,7 @@ class Bias:
         for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
             noisy = zip(replica.whitened(x), replica.slopes(x, fresh, report), strict=True)
             clean = zip(normal.rest, normal.slope, strict=True)
-            pairs = zip(noisy, clean, strict=True)
-            changes = [(r - r0, j - j0) for (r, j), (r0, j0) in pairs]
+            changes = [(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)]
             if known is not None and known.bias is not None:
                 for (_, change), (_, before) in zip(changes, known.bias.changes[i], strict=True):
                     change[..., place] = before[..., old]
@@ -155,15 +154,18 @@ def bounds_of(problem: Problem, numbers: Parameters) -> tuple[Array, Array]:
     return np.maximum(-reach, problem.lowest), np.minimum(reach, problem.highest)
 
 
-def bounded_step(normal: Normal, x: Array, problem: Problem, numbers: Parameters) -> Array:
-    """Gauss-Newton step (p,) from x (p,), within the trust region and the reach of every unknown."""
+def bounded_step(normal: Normal, posterior: Array, x: Array, problem: Problem, numbers: Parameters) -> Array:
+    """Gauss-Newton step (p,) from x (p,) within the trust region and the reach of every unknown.
+
+    `posterior` (p, p) is `normal`'s matrix with the prior's share.
+    """
     from scipy.optimize import lsq_linear
 
     prior = problem.prior
     known = np.arange(len(prior)) < len(problem.knobs)
     trust = np.where(known, numbers.number("fit.trust"), numbers.number("fit.sensor_trust"))
     right = normal.whole[1]
-    factor = np.linalg.cholesky(normal.posterior(prior) * np.outer(prior, prior))
+    factor = np.linalg.cholesky(posterior * np.outer(prior, prior))
     wanted = np.linalg.solve(factor, -(right + x / prior**2) * prior)
     place = x / prior
     least, most = (bound / prior for bound in bounds_of(problem, numbers))

@@ -241,12 +241,11 @@ class Problem:
         return rows
 
     def _terms(self) -> tuple[Term, ...]:
-        terms = [Term(((i, -1),), knob.shows_in) for i, knob in enumerate(self.knobs) if knob.place < 0]
         twins: dict[str, list[tuple[int, int]]] = {}
         for i, knob in enumerate(self.knobs):
-            if knob.place >= 0:
-                twins.setdefault(knob.of.partition(".")[2], []).append((i, knob.place))
-        terms += [Term(tuple(members), self.knobs[members[0][0]].shows_in) for members in twins.values()]
+            alone = knob.of.partition(".")[2] if knob.place >= 0 else knob.name
+            twins.setdefault(alone, []).append((i, knob.place))
+        terms = [Term(tuple(members), self.knobs[members[0][0]].shows_in) for members in twins.values()]
         together: dict[str, list[tuple[int, int]]] = {}
         for i, unknown in enumerate(self.unknowns):
             together.setdefault(unknown.alone[0], []).append((len(self.knobs) + i, unknown.alone[1]))

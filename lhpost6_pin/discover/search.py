@@ -293,23 +293,18 @@ def _fit_jointly(
 ) -> Search:
     """The search with a candidate fitted together with everything, from where the linear estimate puts it."""
     problem, candidate = found.problem, one.candidate
+    count, start = len(problem.knobs), found.solution.at
     if candidate.release:
-        known = candidate.release in {k.name for k in problem.knobs}
-        ready = found.ready.with_free(candidate.release, numbers.number(f"fit.{'known' if known else 'sensor'}_free"))
-        start, before = found.solution.at, found.solution.normal
-        solution = solve(ready.problem, ready.replicas, calibration, start, progress, known=before, frugal=True)
-        return Search(ready, solution, found.refit, list(found.added), found.rounds)
-    low, high = _bounds(candidate)
-    amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
-    machine: Machine = candidate.on(problem.machine, amplitudes)
-    own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
-    knobs = (*problem.knobs, *own)
-    ready = found.ready.with_machine(machine, knobs)
-    count = len(problem.knobs)
-    start = np.insert(found.solution.at, count, np.zeros(len(knobs) - count))
-    solution = solve(
-        ready.problem, ready.replicas, calibration, start, progress, known=found.solution.normal, frugal=True
-    )
+        sort = "known" if problem.names.index(candidate.release) < count else "sensor"
+        ready = found.ready.with_free(candidate.release, numbers.number(f"fit.{sort}_free"))
+    else:
+        low, high = _bounds(candidate)
+        amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
+        own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
+        ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
+        start = np.insert(start, count, np.zeros(len(own)))
+    before = found.solution.normal
+    solution = solve(ready.problem, ready.replicas, calibration, start, progress, known=before, frugal=True)
     return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 

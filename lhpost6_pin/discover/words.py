@@ -1,6 +1,6 @@
 """The verdict in a sentence."""
 
-from ..library import families
+from ..library import find_family
 from .discover import Discovery
 
 __all__ = ["said", "title_of", "where"]
@@ -29,9 +29,8 @@ def said(found: Discovery) -> str:
 
 
 def title_of(family: str) -> str:
-    """A family in words, of the library or not."""
-    known = families()
-    return known[family].title if family in known else family.replace("_", " ")
+    """A family in words."""
+    return find_family(family).title
 
 
 def where(components: tuple[str, ...]) -> str:

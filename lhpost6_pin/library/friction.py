@@ -72,21 +72,25 @@ def _swivel(machine: "Machine", components: Sequence[str], values: Values) -> An
 
 
 def _presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    share, ratio, ports, rows = values["share"], values["ratio"], [], []
-    for c in _each(machine, components):
-        force, yielding, shape = share * c.seal_friction, *_seal(c)
-        ports += [c.name, c.name]
-        rows += [(force, ratio * yielding, shape), (-force, yielding, shape)]
-    return "bouc_wen_1d", ports, rows
+    known = _each(machine, components)
+    return "bouc_wen_1d", *_two_steps(components, [(c.seal_friction, *_seal(c)) for c in known], values)
 
 
 def _bearing_presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    share, ratio, ports, rows = values["share"], values["ratio"], [], []
-    for c in _each(machine, components):
-        force = share * c.pad_friction
-        ports += [c.name, c.name]
-        rows += [(force, ratio * c.pad_yield, c.pad_shape), (-force, c.pad_yield, c.pad_shape)]
-    return "bouc_wen_2d", ports, rows
+    known = _each(machine, components)
+    return "bouc_wen_2d", *_two_steps(components, [(c.pad_friction, c.pad_yield, c.pad_shape) for c in known], values)
+
+
+def _two_steps(
+    components: Sequence[str], rubs: Sequence[tuple[float, float, float]], values: Values
+) -> tuple[Any, Any]:
+    """Ports and numbers of friction (force, yield, shape) of which a share yields at another slip."""
+    ports, rows = [], []
+    for name, (friction, yielding, shape) in zip(components, rubs, strict=True):
+        force = values["share"] * friction
+        ports += [name, name]
+        rows += [(force, values["ratio"] * yielding, shape), (-force, yielding, shape)]
+    return ports, rows
 
 
 def _viscous(machine: "Machine", components: Sequence[str], values: Values) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .alterations import alter_rows
 from .components import Actuator, Hydraulics, Strut
 from .errors import ParameterError, UnknownNameError
-from .law_table import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT, ROW, Law
+from .law_table import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT, PORTS, ROW, Law
 from .laws.orifice import width_ratios
 
 __all__ = ["Effect", "effect_table", "standard_effects", "state_names"]
@@ -25,8 +25,8 @@ class Effect:
     """A named effect: where it acts, what law it obeys, its numbers, and where they come from.
 
     ports: one name per row (``H1``, ``S2``, ``platen.z``); a two-port law takes the stem of a pad (``V1``), or
-    two names with a space between, the second a dash where one port is enough. One that alters takes the names of
-    what it alters.
+    two names with a space between, the second a dash where one port is enough; a three-port law two or three. One
+    that alters takes the names of what it alters.
     params: one tuple per row, in the law's order. spools: for a hydraulic law, the number of its spool per row.
     """
 
@@ -117,7 +117,7 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
     number = {name: i for i, name in enumerate(ports)}
     acting = [e for e in effects if not LAWS[e.law].alters]
     rows = np.zeros(sum(len(e.ports) for e in acting), ROW)
-    for column in ("link", "more"):
+    for column in (*PORTS, "link", "more"):
         rows[column] = -1
     base: dict[int, int] = {}  # row of the actuator or strut on a port
     i = state = 0
@@ -131,8 +131,8 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
             leg = number.get(names[0].split(".")[0], -1)
             row = rows[i]
             row["law"], row["effect"] = law.code, ledger
-            row["port"] = number[names[0]]
-            row["port_2"] = number[names[1]] if len(names) == 2 else -1
+            for column, name in zip(PORTS, names, strict=False):
+                row[column] = number[name]
             row["state"] = state if law.states else -1
             row["input"] = effect.spools[k] if effect.spools else -1
             row["p"][: len(law.params)] = effect.params[k]

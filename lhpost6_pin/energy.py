@@ -215,6 +215,8 @@ def _powers(
             work = force[i, 0] * sd[row.port]
             if row.port_2 >= 0:
                 work += force[i, 1] * sd[row.port_2]
+            if row.port_3 >= 0:
+                work += force[i, 2] * sd[row.port_3]
             inflow, dissipated, stored = row_power(row, s, z[k], work, spool[k], supply)
             before, _, _ = row_power(row, s, z[k], work, spool_before[k], supply)
             out = flows[k, row.effect]

@@ -17,6 +17,7 @@ __all__ = [
     "ASYMMETRIC",
     "BACK",
     "BACKLASH",
+    "BALL",
     "BACK_TIME",
     "BOUC_WEN_1D",
     "BOUC_WEN_2D",
@@ -48,6 +49,7 @@ __all__ = [
     "NULL_LEAKAGE",
     "NULL_WIDTH",
     "OSCILLATOR",
+    "PORTS",
     "RETURN",
     "RETURNED",
     "ROW",
@@ -70,6 +72,7 @@ ROW = np.dtype(
         ("effect", np.int64),  # number of the effect in the ledger
         ("port", np.int64),  # port it acts on
         ("port_2", np.int64),  # second port, -1 without
+        ("port_3", np.int64),  # third port, -1 without
         ("state", np.int64),  # number of its first hidden state, -1 without
         ("input", np.int64),  # number of the spool that feeds it, -1 without
         ("link", np.int64),  # number of the first hidden state of the actuator on the same leg or pad, -1 without
@@ -78,12 +81,15 @@ ROW = np.dtype(
         ("p", np.float64, MAX_PARAMS),  # the law's numbers, in the law's order; behind them those of alterations
     ]
 )
-"""Table row: one law on one port (or pair of ports)."""
+"""Table row: one law on one port, or on two or three."""
+
+PORTS = ("port", "port_2", "port_3")
+"""Columns of a row's ports."""
 
 # Codes of the laws that have rows, as the compiled stage reads them.
 HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS, CONSTANT = range(7)
 STRIBECK, ASYMMETRIC, WARM_UP, LOAD_FRICTION, BACKLASH, DRAG, SPRING, END_STOP = range(7, 15)
-OSCILLATOR, GAS_LEAK, GAS_HEAT = range(15, 18)
+OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL = range(15, 19)
 
 # Places of numbers in the rows of actuators: some of the report's, then those of alterations.
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
@@ -98,7 +104,7 @@ class Law(NamedTuple):
     """What a law needs."""
 
     code: int  # -1: no rows
-    ports: int  # that one set of numbers acts on
+    ports: int  # that one set of numbers acts on, at most
     params: tuple[tuple[str, str], ...]  # (name, unit)
     states: tuple[str, ...] = ()
     stores_energy: bool = False
@@ -137,6 +143,7 @@ LAWS: Mapping[str, Law] = {
     "constant": Law(CONSTANT, 1, (("force", "N | N m"),)),
     "stribeck": Law(STRIBECK, 1, (*_FRICTION, ("speed", "m/s")), ("z",)),
     "asymmetric": Law(ASYMMETRIC, 1, _FRICTION, ("z",)),
+    "ball": Law(BALL, 3, (("moment", "N m"), ("yield_turn", "rad"), ("shape", "1")), ("z_1", "z_2", "z_3")),
     "warm_up": Law(
         WARM_UP, 1, (("growth", "N s/m"), ("yield_slip", "m"), ("shape", "1"), ("memory", "s")), ("z", "mean_speed")
     ),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .compiled import compiled, compiled_inline
 from .errors import UnknownNameError
+from .law_table import PORTS
 from .plant import Plant
 from .schemes import V_SEEN, forces_stage, pose_stage
 from .simulate import Run
@@ -96,7 +97,7 @@ def force_ledger(run: "Run | States") -> Ledger:
     plant = run.plant
     effects = plant.machine.effects
     n = len(run.time)
-    by_row = np.zeros((n, plant.rows.size, 2))
+    by_row = np.zeros((n, plant.rows.size, 3))
     by_effect = np.zeros((n, len(effects), 6))
     turn = np.zeros((n, 3, 3))
     _forces(*stage_arguments(run, by_row, by_effect, turn))
@@ -109,9 +110,9 @@ def force_ledger(run: "Run | States") -> Ledger:
         guides[:, plant.axes] = 0.0
         wrench = np.concatenate([wrench, guides[:, None]], axis=1)
         names.append("guides")
-    # a law on two ports has two columns
-    used = [(i, k) for i, row in enumerate(plant.rows) for k in range(1 + (row["port_2"] >= 0))]
-    rows = [f"{names[plant.rows[i]['effect']]}.{plant.ports[plant.rows[i][('port', 'port_2')[k]]]}" for i, k in used]
+    # a law on several ports has as many columns
+    used = [(i, k) for i, row in enumerate(plant.rows) for k in range(len(PORTS)) if row[PORTS[k]] >= 0]
+    rows = [f"{names[plant.rows[i]['effect']]}.{plant.ports[plant.rows[i][PORTS[k]]]}" for i, k in used]
     force = by_row[:, [i for i, _ in used], [k for _, k in used]]
     return Ledger(run.time, tuple(rows), force, tuple(names), wrench, inertia)
 
@@ -121,7 +122,7 @@ def effect_wrenches(run: "Run | States") -> Array:
     plant = run.plant
     n = len(run.time)
     by_effect = np.zeros((n, len(plant.machine.effects), 6))
-    _forces(*stage_arguments(run, np.zeros((n, plant.rows.size, 2)), by_effect, np.zeros((n, 3, 3))))
+    _forces(*stage_arguments(run, np.zeros((n, plant.rows.size, 3)), by_effect, np.zeros((n, 3, 3))))
     return by_effect
 
 
@@ -143,7 +144,7 @@ def stage_arguments(run: "Run | States", *more: Array) -> tuple[Any, ...]:
 
 @compiled
 def _forces(q, v, z, axes, legs, body, rows, damping, frame, port, JB, force, motion, by_row, by_effect, turn):
-    """Fill by_row (n, n_rows, 2), by_effect (n, n_effects, 6) at C in {c} and turn (n, 3, 3), the rotation s_R_b."""
+    """Fill by_row (n, n_rows, 3), by_effect (n, n_effects, 6) at C in {c} and turn (n, 3, 3), the rotation s_R_b."""
     rho = body[0].rho_c
     B = JB[1]
     for k in range(q.shape[0]):
@@ -154,11 +155,11 @@ def _forces(q, v, z, axes, legs, body, rows, damping, frame, port, JB, force, mo
         turn[k] = frame[:3]
         for i in range(rows.size):
             out = by_effect[k, rows[i].effect]
-            for side in range(2):
-                p = rows[i].port if side == 0 else rows[i].port_2
-                if p < 0:
-                    continue
-                add_at_c(force[i, side], B, p, rho, frame, out)
+            add_at_c(force[i, 0], B, rows[i].port, rho, frame, out)
+            if rows[i].port_2 >= 0:
+                add_at_c(force[i, 1], B, rows[i].port_2, rho, frame, out)
+            if rows[i].port_3 >= 0:
+                add_at_c(force[i, 2], B, rows[i].port_3, rho, frame, out)
 
 
 @compiled_inline

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .alterations import command_path, supply_numbers
 from .effects import effect_table, state_names
+from .law_table import PORTS
 from .ports import PLATEN_PORTS, SWIVEL_TURNS, body_table, leg_table, port_names
 from .rigid_body import free_axes, make_model
 
@@ -76,7 +77,7 @@ def make_plant(machine: "Machine") -> Plant:
     ports = port_names(machine)
     effects = (*machine.effects, *machine.alterations)
     rows = effect_table(effects, ports)
-    used = max(rows["port"].max(), rows["port_2"].max()) if len(rows) else len(ports)
+    used = max(rows[port].max() for port in PORTS) if len(rows) else len(ports)
     swivels = sum(port.endswith(SWIVEL_TURNS) for port in ports)
     for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)):
         if used < end:

@@ -50,7 +50,7 @@ LEG = np.dtype(
             "normal_thrust",
             np.float64,
         ),  # bearing: 0 thrust along the vertical (Eq. 4-23), 1 along the normal (3-27)
-        ("swivel", np.int64),  # number of the first of its four swivel ports, -1 without
+        ("swivel", np.int64),  # number of the first of its five swivel ports, -1 without
     ]
 )
 """Table row of a leg: an actuator or a strut."""
@@ -69,8 +69,9 @@ PLATEN_PORTS = ("platen.x", "platen.y", "platen.z", "platen.roll", "platen.pitch
 """Platen ports: displacement of C along {s}, and rotation; their forces are the wrench at C in {c}."""
 
 
-SWIVEL_TURNS = ("base_1", "base_2", "tip_1", "tip_2")
-"""Swivel ports of an actuator: its rod's turn in the base, and the platen's in the rod, each about two axes."""
+SWIVEL_TURNS = ("base_1", "base_2", "tip_1", "tip_2", "tip_3")
+"""Swivel ports of an actuator: its rod's turn in the base, about two axes across it, and the platen's in the rod, about
+the same and about the rod."""
 
 
 def port_names(machine: "Machine") -> tuple[str, ...]:
@@ -172,7 +173,8 @@ def _swivel_ports(frame, legs, s, J, B):
     """Fill the swivel ports of all legs that have them: J = B^T.
 
     With u the leg's direction and v_P the platen point's velocity the rod turns at u x v_P / L in the base, and the
-    platen at omega - u x v_P / L in the rod. Their components along two axes across the leg: e_1 level, e_2 = u x e_1.
+    platen at omega - u x v_P / L in the rod. Their components along two axes across the leg: e_1 level, e_2 = u x e_1;
+    the platen's along u as well, about which the rod does not turn.
     The force column is the moment on the platen and, as the rod has no mass, its lateral force at the platen point.
     The axes turn with the leg, so that s of the base is its tilt and its turn about the vertical less a constant only
     while that tilt is small; s of the tip, which no angle belongs to, is zero.
@@ -190,7 +192,7 @@ def _swivel_ports(frame, legs, s, J, B):
         length = math.sqrt(level * level + dz * dz)
         s[k] = -math.atan2(dz, level)
         s[k + 1] = math.atan2(dy, dx)
-        s[k + 2] = s[k + 3] = 0.0
+        s[k + 2] = s[k + 3] = s[k + 4] = 0.0
         e1x, e1y = (-dy / level, dx / level) if level > 1e-9 * length else (0.0, 1.0)
         e2x, e2y, e2z = -dz / length * e1y, dz / length * e1x, (dx * e1y - dy * e1x) / length
         for n in range(2):
@@ -212,7 +214,10 @@ def _swivel_ports(frame, legs, s, J, B):
                 J[k + 2 + n, j] = -J[k + n, j]
             for j in range(3):
                 J[k + 2 + n, 3 + j] += frame[0, j] * ex + frame[1, j] * ey + frame[2, j] * ez
-        for n in range(k, k + 4):
+        for j in range(3):
+            J[k + 4, j] = 0.0
+            J[k + 4, 3 + j] = (frame[0, j] * dx + frame[1, j] * dy + frame[2, j] * dz) / length
+        for n in range(k, k + 5):
             for j in range(6):
                 B[n, j] = J[n, j]
 

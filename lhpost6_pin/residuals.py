@@ -25,7 +25,7 @@ from .engine_fused import inertia_table, platen_acceleration
 from .equilibrium import hydraulic_rows
 from .gas import gas_ratio
 from .inverse_dynamics import march_states, with_loads
-from .law_table import GAS_HEAT, LAWS, OSCILLATOR
+from .law_table import GAS_HEAT, LAWS, OSCILLATOR, PORTS
 from .ledger import add_at_c
 from .oil_residuals import flow_misses, follow_supply
 from .plant import Plant
@@ -164,13 +164,13 @@ def _moving(plant: Plant) -> Array:
 
 def _marched(row: np.void) -> tuple[object, ...]:
     """What hidden states of a row depend on: the first number is the amplitude of its force, which they do not feel."""
-    return int(row["law"]), int(row["port"]), int(row["port_2"]), row["p"][1:].tobytes()
+    return int(row["law"]), *(int(row[port]) for port in PORTS), row["p"][1:].tobytes()
 
 
 def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
     """Whether two tables leave hidden states that are alike."""
     same = some.shape == others.shape and (some["p"][:, 1:] == others["p"][:, 1:])[some["input"] < 0].all()
-    return bool(same) and all((some[k] == others[k]).all() for k in ("law", "port", "port_2", "state", "input"))
+    return bool(same) and all((some[k] == others[k]).all() for k in ("law", *PORTS, "state", "input"))
 
 
 def _states(row: np.void) -> slice:

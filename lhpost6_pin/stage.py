@@ -4,7 +4,7 @@ Four loops run around these functions: the per-step Pinocchio engine, the fused 
 search for missing effects. Each function walks the effect table and calls the law's kernel.
 
 Arrays: s (n_ports,) port coordinates, sd rates, z (n_states,) hidden states, spool (n_actuators,) valve spools -1..1,
-supply the supply's numbers, pressures first (`supply`), force (n_rows, 2) the ledger: force of each row on its port and
+supply the supply's numbers, pressures first (`supply`), force (n_rows, 3) the ledger: force of each row on its port and
 second port [N or N m], port_force (n_ports,) their sum per port.
 """
 
@@ -155,7 +155,7 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
 
 @compiled_inline
 def apply_forces(rows, s, sd, z, force, port_force):
-    """Fill the ledger force (n_rows, 2) and its sum per port."""
+    """Fill the ledger force (n_rows, 3) and its sum per port."""
     more = False
     port_force[:] = 0.0
     for i in range(rows.size):

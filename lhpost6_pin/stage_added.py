@@ -4,6 +4,7 @@ from .compiled import compiled
 from .law_table import (
     ASYMMETRIC,
     BACKLASH,
+    BALL,
     CONSTANT,
     DRAG,
     END_STOP,
@@ -17,8 +18,10 @@ from .law_table import (
     WARM_UP,
 )
 from .laws.backlash import advance_offset, backlash_energy, backlash_force, offset_rate
+from .laws.ball import advance_ball, ball_rate
 from .laws.bouc_wen import advance as bouc_wen_advance
 from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
+from .laws.bouc_wen import friction_force
 from .laws.bouc_wen import rate as bouc_wen_rate
 from .laws.friction import (
     advance_mean_speed,
@@ -38,7 +41,7 @@ __all__ = ["added_power", "added_rates", "advance_added", "apply_added", "gas_lo
 
 @compiled
 def apply_added(rows, s, sd, z, force, port_force):
-    """Fill the ledger force (n_rows, 2) of these rows and add it to the sum per port."""
+    """Fill the ledger force (n_rows, 3) of these rows and add it to the sum per port."""
     for i in range(rows.size):
         row = rows[i]
         if row.law <= VISCOUS:
@@ -49,6 +52,9 @@ def apply_added(rows, s, sd, z, force, port_force):
         port_force[row.port] += first
         if row.port_2 >= 0:
             port_force[row.port_2] += second
+        if row.port_3 >= 0:  # of a ball
+            force[i, 2] = friction_force(row.p[0], z[row.state + 2])
+            port_force[row.port_3] += force[i, 2]
 
 
 @compiled
@@ -71,6 +77,8 @@ def _force(row, s, sd, z):
         if p[4] > 0.0:
             load -= z[row.link + 1] * p[4]
         return load_force(p[0], load, z[k]), load_force(p[0], load, z[k + 1])
+    if law == BALL:
+        return friction_force(p[0], z[k]), friction_force(p[0], z[k + 1])
     if law == BACKLASH:
         return backlash_force(z[k], p[0], p[1], p[2]), 0.0
     if law == DRAG:
@@ -111,6 +119,9 @@ def _rates(row, s, sd, z, zd):
     elif law == LOAD_FRICTION:
         across = sd[row.port_2] if row.port_2 >= 0 else 0.0
         zd[k], zd[k + 1] = bouc_wen_rate(sd[a], across, z[k], z[k + 1], p[1], p[2])
+    elif law == BALL:
+        spin = sd[row.port_3] if row.port_3 >= 0 else 0.0
+        zd[k], zd[k + 1], zd[k + 2] = ball_rate(sd[a], sd[row.port_2], spin, z[k], z[k + 1], z[k + 2], p[1], p[2])
     elif law == BACKLASH:
         zd[k] = offset_rate(z[k], sd[a], p[1], p[2])
     elif law == OSCILLATOR and row.port_2 >= 0:
@@ -144,6 +155,9 @@ def _advance(row, s, ds, dt, z):
     elif law == LOAD_FRICTION:
         across = ds[row.port_2] if row.port_2 >= 0 else 0.0
         z[k], z[k + 1] = bouc_wen_advance(ds[a], across, z[k], z[k + 1], p[1], p[2])
+    elif law == BALL:
+        spin = ds[row.port_3] if row.port_3 >= 0 else 0.0
+        z[k], z[k + 1], z[k + 2] = advance_ball(ds[a], ds[row.port_2], spin, z[k], z[k + 1], z[k + 2], p[1], p[2])
     elif law == BACKLASH:
         z[k] = advance_offset(z[k], ds[a], p[1], p[2])
     elif law == OSCILLATOR and row.port_2 >= 0:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .law_table import PORTS
 from .plant import Plant, State
 from .schemes import V
 
@@ -24,7 +25,7 @@ class Workspace:
     port: Array  # (4, n_ports)
     JB: Array  # (2, n_ports, 6)
     frame: Array  # (8, 3)
-    force: Array  # (n_rows, 2)
+    force: Array  # (n_rows, 3)
     supply: Array  # the plant's
 
 
@@ -41,6 +42,6 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
         port=np.zeros((4, n)),
         JB=np.zeros((2, n, 6)),
         frame=np.zeros((8, 3)),
-        force=np.zeros((plant.rows.size, 2)),
+        force=np.zeros((plant.rows.size, len(PORTS))),
         supply=plant.supply.copy(),
     )

@@ -23,8 +23,8 @@ TIGHT = dict(rtol=1e-12, atol=1e-12, method="DOP853")
 
 # ------------------------------------------------------------- the standard tests, run on every law
 def forces(case: Case, s: np.ndarray, sd: np.ndarray, z: np.ndarray, python: bool = False) -> tuple:
-    """Ledger (rows, 2) and port forces (3,)."""
-    force, port_force = np.zeros((len(case.rows), 2)), np.zeros(len(PORTS))
+    """Ledger (rows, 3) and port forces (3,)."""
+    force, port_force = np.zeros((len(case.rows), 3)), np.zeros(len(PORTS))
     if python:
         apply_forces.py_func(case.rows.view(np.recarray), s, sd, z, force, port_force)
     else:

@@ -9,6 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from cases import PORTS, SUPPLY, Case, Kernel, Motion
+from hypothesis import given
+from hypothesis import strategies as st
 from library_cases import measured_of, record_at_model_steps, rms, shaken
 from machine_cases import frame_array, machine_named, random_poses
 from scipy.integrate import solve_ivp
@@ -20,12 +22,13 @@ from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.errors import ParameterError
 from lhpost6_pin.inverse_dynamics import inverse_dynamics
 from lhpost6_pin.law_table import LAWS
-from lhpost6_pin.laws import backlash, friction, gas, oscillator, spring, strut
+from lhpost6_pin.law_table import PORTS as ROW_PORTS
+from lhpost6_pin.laws import backlash, ball, bouc_wen, friction, gas, oscillator, spring, strut
 from lhpost6_pin.ledger import force_ledger
 from lhpost6_pin.library import families, find_family
 from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.plant import make_plant
-from lhpost6_pin.ports import evaluate_ports, port_names
+from lhpost6_pin.ports import SWIVEL_TURNS, evaluate_ports, port_names
 from lhpost6_pin.residuals import evaluate_residuals, follow
 from lhpost6_pin.rigid_body import platen_inertia
 from lhpost6_pin.simulate import OpenLoop, simulate
@@ -44,6 +47,7 @@ CASES = {
     for case in (
         _case("stribeck", "leg", (9e3, 2e-4, 0.1, 0.02), (0.3,)),
         _case("asymmetric", "leg", (9e3, 2e-4, 0.1), (0.3,)),
+        _case("ball", "pad.x pad.y leg", (9e3, 2e-4, 0.1), (0.3, -0.4, 0.2)),
         _case("warm_up", "leg", (9e3, 2e-4, 0.1, 0.3), (0.3, 0.01)),
         _case("backlash", "leg", (9e3, 2e-4, 5e-4), (1e-4,)),
         _case("drag", "leg", (9e3, 1.7)),
@@ -66,6 +70,8 @@ KERNELS = {
         Kernel(friction.warm_up_force, ((0, 2e4), (0, 1), _Z)),
         Kernel(friction.mean_speed_rate, ((0, 1), (-1, 1), (0.1, 10))),
         Kernel(friction.advance_mean_speed, ((0, 1), _SLIP, _DT, (0.1, 10))),
+        Kernel(ball.ball_rate, ((-1, 1),) * 3 + ((-0.5, 0.5),) * 3 + ((1e-4, 1e-3), (0, 0.5))),
+        Kernel(ball.advance_ball, (_SLIP,) * 3 + ((-0.5, 0.5),) * 3 + ((1e-4, 1e-3), (0, 0.5))),
         Kernel(backlash.backlash_force, ((-2e-3, 2e-3), (0, 2e4), (1e-4, 1e-3), (0, 1e-3))),
         Kernel(backlash.backlash_energy, ((-2e-3, 2e-3), (0, 2e4), (1e-4, 1e-3), (0, 1e-3))),
         Kernel(backlash.advance_offset, ((-2e-3, 2e-3), _SLIP, (1e-4, 1e-3), (0, 1e-3))),
@@ -87,7 +93,7 @@ KERNELS = {
 
 
 def port_forces(case: Case, s: np.ndarray, sd: np.ndarray, z: np.ndarray) -> np.ndarray:
-    force, total = np.zeros((len(case.rows), 2)), np.zeros(len(PORTS))
+    force, total = np.zeros((len(case.rows), 3)), np.zeros(len(PORTS))
     apply_forces(case.rows, s, sd, z, force, total)
     assert force.sum() == pytest.approx(total.sum(), rel=1e-12)
     return total
@@ -112,7 +118,7 @@ def march(case: Case, duration: float, steps: int) -> np.ndarray:
 def test_every_law_of_these_families_has_a_case_and_every_kernel_its_arguments() -> None:
     added = {name for name, law in LAWS.items() if law.code > LAWS["constant"].code}
     assert set(CASES) == added - {"load_friction"}
-    public = {n for module in (friction, backlash, spring, oscillator, gas) for n in module.__all__}
+    public = {n for module in (friction, ball, backlash, spring, oscillator, gas) for n in module.__all__}
     assert set(KERNELS) == public
 
 
@@ -136,7 +142,8 @@ def test_the_compiled_stage_equals_its_python_original(law: str) -> None:
     row = case.rows.view(np.recarray)[0]
     s, sd = Motion().s(0.1), Motion().sd(0.1)
     total = np.zeros(len(PORTS))
-    for port, f in zip((row.port, row.port_2), stage_added._force.py_func(row, s, sd, z), strict=True):
+    spin = -row.p[0] * z[2] if law == "ball" else 0.0
+    for port, f in zip(row[list(ROW_PORTS)], (*stage_added._force.py_func(row, s, sd, z), spin), strict=True):
         total[port] += f if port >= 0 else 0.0
     np.testing.assert_allclose(port_forces(case, s, sd, z), total, rtol=1e-13)  # rounding of a power
     if z.size:
@@ -191,7 +198,7 @@ def test_what_flows_in_is_stored_dissipated_or_delivered(law: str) -> None:
             assert LAWS[law].stores_energy or stored(t, z) == 0.0
 
 
-@pytest.mark.parametrize("law", ["stribeck", "warm_up", "backlash", "drag", "oscillator"])
+@pytest.mark.parametrize("law", ["stribeck", "ball", "warm_up", "backlash", "drag", "oscillator"])
 def test_a_dissipative_law_takes_energy_from_any_cycle(law: str) -> None:
     case, motion, steps = CASES[law], Motion(), 10000
     z = march(case, 4.0, steps)  # the motion repeats every second; the last one is taken
@@ -200,6 +207,28 @@ def test_a_dissipative_law_takes_energy_from_any_cycle(law: str) -> None:
         [port_forces(case, motion.s(x), motion.sd(x), y) @ motion.sd(x) for x, y in zip(t, z, strict=True)]
     )
     assert np.trapezoid(power[-steps // 4 :], t[-steps // 4 :]) < -0.005 * np.abs(power).max()
+
+
+@given(
+    st.lists(st.floats(-1e-3, 1e-3), min_size=3, max_size=3), st.lists(st.floats(-0.57, 0.57), min_size=3, max_size=3)
+)
+def test_a_ball_turned_about_one_axis_is_as_an_ode_solver_says(turn: list[float], z: list[float]) -> None:
+    """And stays in the unit ball."""
+    exact = solve_ivp(
+        lambda _, y: ball.ball_rate(*turn, *y, 2e-4, 0.1), (0, 1), z, method="LSODA", rtol=1e-10, atol=1e-12
+    ).y[:, -1]
+    found = ball.advance_ball(*turn, *z, 2e-4, 0.1)
+    np.testing.assert_allclose(found, exact, atol=1e-7)  # the solver's, where H has its kink
+    assert np.linalg.norm(found) <= 1.0 + 1e-12
+
+
+def test_a_ball_about_one_axis_is_a_seal_and_slides_as_coulomb_says() -> None:
+    for d in (1e-4, -3e-4):
+        assert ball.advance_ball(0.0, d, 0.0, 0.0, 0.4, 0.0, 2e-4, 0.1)[1] == pytest.approx(
+            bouc_wen.advance_1d(d, 0.4, 2e-4, 0.1), rel=1e-12
+        )
+    axis = np.array([2.0, -1.0, 0.5]) / np.linalg.norm([2.0, -1.0, 0.5])
+    np.testing.assert_allclose(ball.advance_ball(*(5e-3 * axis), 0.3, 0.8, -0.1, 2e-4, 0.1), axis, atol=1e-9)
 
 
 def test_backlash_crosses_its_gap_without_force_after_each_reversal() -> None:
@@ -480,7 +509,7 @@ def test_swivels_turn_as_the_rod_does(name: str) -> None:
         twist = rng.uniform(-1.0, 1.0, 6)
         s, J, B = np.zeros(len(names)), np.zeros((len(names), 6)), np.zeros((len(names), 6))
         evaluate_ports(frame, plant.legs, plant.body, s, J, B)
-        np.testing.assert_array_equal(J[-4:], B[-4:])
+        np.testing.assert_array_equal(J[-5:], B[-5:])
         for leg, component in zip(plant.legs, machine.components, strict=True):
             if leg["swivel"] < 0:
                 continue
@@ -496,6 +525,7 @@ def test_swivels_turn_as_the_rod_does(name: str) -> None:
             assert k == leg["swivel"]
             np.testing.assert_allclose(J[k : k + 2] @ twist, axes @ turn, atol=1e-8)  # rounding over h
             np.testing.assert_allclose(J[k + 2 : k + 4] @ twist, axes @ (platen - turn), atol=1e-8)
+            assert J[k + 4] @ twist == pytest.approx(u @ platen, abs=1e-12)
 
 
 def test_swivel_friction_takes_the_moments_of_both_ends_from_the_platen() -> None:
@@ -503,9 +533,11 @@ def test_swivel_friction_takes_the_moments_of_both_ends_from_the_platen() -> Non
     machine = base().with_effect("swivel_friction", ("H1",), moment=1e4, yield_turn=1e-5, name="extra")
     run = shaken(machine, samples=400)
     ledger, plant = force_ledger(run), run.plant
-    force = [ledger.force[:, ledger.row(f"extra.H1.{end}")] for end in ("base_1", "base_2", "tip_1", "tip_2")]
-    sliding = np.hypot(force[0], force[1]) > 0.999 * 1e4
-    assert sliding.mean() > 0.5
+    force = [ledger.force[:, ledger.row(f"extra.H1.{end}")] for end in SWIVEL_TURNS]
+    for end in (force[:2], force[2:]):
+        moment = np.linalg.norm(end, axis=0)
+        assert moment.max() <= 1e4 * (1.0 + 1e-12)
+        assert (moment > 0.999 * 1e4).mean() > 0.5
     leg = machine.actuators[0]
     for k in (150, 399):
         turn = pin.Quaternion(run.q[k, 3:7]).toRotationMatrix()
@@ -517,12 +549,13 @@ def test_swivel_friction_takes_the_moments_of_both_ends_from_the_platen() -> Non
         first = np.cross([0, 0, 1], u) / np.linalg.norm(np.cross([0, 0, 1], u))
         axes = np.array([first, np.cross(u, first)])
         base_moment, tip_moment = (force[i][k] * axes[0] + force[i + 1][k] * axes[1] for i in (0, 2))
+        tip_moment += force[4][k] * u
         # the rod balances: moments on it are the base's and the reaction of the tip's, a lateral couple the rest
         lateral = np.cross(base_moment - tip_moment, u) / length
         expected = np.concatenate([lateral, tip_moment + np.cross(lever, lateral)])
         np.testing.assert_allclose(ledger.wrench[k, ledger.effect("extra")], expected, atol=1e-6)
-    assert plant.ports[-1].endswith("tip_2")
-    assert not any(port.endswith("tip_2") for port in make_plant(base()).ports)
+    assert plant.ports[-1].endswith("tip_3")
+    assert not any(port.endswith("tip_3") for port in make_plant(base()).ports)
 
 
 def test_a_record_at_the_models_steps_comes_apart_to_rounding_with_the_velocity_that_forces_saw() -> None:

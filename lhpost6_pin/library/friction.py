@@ -66,9 +66,10 @@ def _bearing(machine: "Machine", components: Sequence[str], values: Values) -> A
 
 
 def _swivel(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    ends = [f"{c}.{SWIVEL_TURNS[k]} {c}.{SWIVEL_TURNS[k + 1]}" for c in components for k in (0, 2)]
-    shapes = [c.seal_shape for c in _each(machine, components) for _ in range(2)]
-    return "bouc_wen_2d", ends, [(values["moment"], values["yield_turn"], shape) for shape in shapes]
+    ends = (SWIVEL_TURNS[:2], SWIVEL_TURNS[2:])
+    ports = [" ".join(f"{c}.{turn}" for turn in end) for c in components for end in ends]
+    shapes = [c.seal_shape for c in _each(machine, components) for _ in ends]
+    return "ball", ports, [(values["moment"], values["yield_turn"], shape) for shape in shapes]
 
 
 def _presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:

@@ -132,11 +132,13 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterato
     doubt = (1 + noise_range) ** 2
     tolerance = CONFIDENCE * np.sqrt(np.sum(moved**2, axis=1)) + (doubt - 1) * share * np.abs(theta)
     gain = theta[0] if len(theta) and theta[0] else 1.0
-    buried = bool((share > MOST_NOISE).any())
-    for term, value, sigma, range_ in zip(s.terms, theta, error, tolerance, strict=True):
+    hidden = share > MOST_NOISE
+    whole = bool(np.any([h and not term.beside for h, term in zip(hidden, s.terms, strict=True)]))
+    for term, value, sigma, range_, buried in zip(s.terms, theta, error, tolerance, hidden, strict=True):
         if term.delay is not None:
             value, sigma = term.delay - value / gain, sigma / abs(gain)
-        yield _finding(check, channel, term.quantity, term.unit or unit_y, value, sigma, term.expected, range_, buried)
+        numbers = value, sigma, term.expected, range_
+        yield _finding(check, channel, term.quantity, term.unit or unit_y, *numbers, whole or bool(buried))
     rms, floor = np.sqrt(max(square, 0.0)), np.sqrt(noise)
     range_ = np.sqrt(doubt * noise + CONFIDENCE**2 * allowed) - floor
     yield _finding(check, channel, "residual", unit_y, rms, floor / np.sqrt(2 * s.independent), floor, range_)

@@ -127,7 +127,9 @@ def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[f
         ends = [flows(pressure_a, pressure_b, x)[0] for x in (-1.0, 1.0)]
         if ends[0] >= 0.0 or ends[1] <= 0.0:
             return -1.0 if ends[0] >= 0.0 else 1.0
-        return float(brentq(lambda x: flows(pressure_a, pressure_b, x)[0], -1.0, 1.0, xtol=1e-18, rtol=1e-15))
+        return float(
+            brentq(lambda x: flows(pressure_a, pressure_b, x)[0], -1.0, 1.0, xtol=1e-18, rtol=1e-15, maxiter=1000)
+        )
 
     area_a, area_b = float(p[AREA_A]), float(p[AREA_B])
     if not double:
@@ -141,7 +143,7 @@ def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[f
 
     least, most = max(low, (low * area_b + force) / area_a), min(high, (high * area_b + force) / area_a)
     if least < most and miss(least) > 0.0 > miss(most):
-        a = float(brentq(miss, least, most, xtol=1e-6, rtol=1e-15))
+        a = float(brentq(miss, least, most, xtol=1e-6, rtol=1e-15, maxiter=1000))
     else:  # no pressures within the supply's: what the report's law has, which says so
         a = float(rest_pressures(row, force, supply)[0][0])
     return (a, other(a)), spool_for(a, other(a))

@@ -18,6 +18,8 @@ __all__ = [
     "BACK",
     "BACKLASH",
     "BALL",
+    "BY_POSITION",
+    "BY_SPEED",
     "BACK_TIME",
     "BOUC_WEN_1D",
     "BOUC_WEN_2D",
@@ -45,6 +47,7 @@ __all__ = [
     "LOAD_FRICTION",
     "MAX_PARAMS",
     "NITROGEN_STRUT",
+    "NODES",
     "NULL_BIAS",
     "NULL_LEAKAGE",
     "NULL_WIDTH",
@@ -89,7 +92,7 @@ PORTS = ("port", "port_2", "port_3")
 # Codes of the laws that have rows, as the compiled stage reads them.
 HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS, CONSTANT = range(7)
 STRIBECK, ASYMMETRIC, WARM_UP, LOAD_FRICTION, BACKLASH, DRAG, SPRING, END_STOP = range(7, 15)
-OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL = range(15, 19)
+OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED = range(15, 21)
 
 # Places of numbers in the rows of actuators: some of the report's, then those of alterations.
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
@@ -127,6 +130,9 @@ _HYDRAULIC = (
 _FRICTION = (("friction", "N"), ("yield_slip", "m"), ("shape", "1"))
 _GAS = (("pressure", "Pa"), ("area", "m2"), ("gas_length", "m"), ("polytropic_index", "1"))
 
+NODES = 24  # of a force by a table
+_TABLE = tuple((f"force_{k + 1}", "N") for k in range(NODES))
+
 LAWS: Mapping[str, Law] = {
     "hydraulic_double": Law(HYDRAULIC_DOUBLE, 1, _HYDRAULIC, ("pressure_a", "pressure_b"), True, True),
     "hydraulic_single": Law(HYDRAULIC_SINGLE, 1, _HYDRAULIC, ("pressure_a",), True, True),
@@ -157,6 +163,8 @@ LAWS: Mapping[str, Law] = {
     "drag": Law(DRAG, 1, (("force", "N"), ("exponent", "1"))),
     "spring": Law(SPRING, 1, (("stiffness", "N/m | N m/rad"),), stores_energy=True),
     "end_stop": Law(END_STOP, 1, (("force", "N"), ("start", "m"), ("exponent", "1")), stores_energy=True),
+    "by_position": Law(BY_POSITION, 1, (("share", "1"), ("first", "m"), ("last", "m"), *_TABLE)),
+    "by_speed": Law(BY_SPEED, 1, (("share", "1"), ("first", "m/s"), ("last", "m/s"), *_TABLE)),
     "oscillator": Law(
         OSCILLATOR,
         2,

@@ -122,10 +122,13 @@ class Path(NamedTuple):
     z: Array  # (n, n_states)
 
 
-def follow(plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None) -> Path:
+def follow(
+    plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None, *, start: Array | None = None
+) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
-    What does not differ from the `known` path of the same motion, of another plant, is taken from there.
+    What does not differ from the `known` path of the same motion, of another plant, is taken from there. start
+    (n_states,) is what friction remembers from before the test, if not nothing.
     """
     if known is None or _geometry(known[0]) != _geometry(plant):
         moved = PlantMotion(*(np.ascontiguousarray(x) for x in plant_motion(plant, test.motion)))
@@ -146,7 +149,7 @@ def follow(plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None
         parts[test.path is not None and int(row["law"]) in (OSCILLATOR, GAS_HEAT)].append(row)
     for some, motion in zip(parts, (along, moved), strict=True):
         if some or (known is None and some is parts[0]):  # also to see that no leg is out of its stroke
-            marched = march_states(plant, motion, test.dt, rows=np.array(some, plant.rows.dtype))
+            marched = march_states(plant, motion, test.dt, start, rows=np.array(some, plant.rows.dtype))
             there |= {_marched(row): marched[:, _states(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))
     for row in rows:

@@ -39,6 +39,7 @@ class Term(NamedTuple):
     column: Array  # (n,)
     variance: float = 0.0  # of its noise
     delay: float | None = None  # already taken out [s]; the coefficient is what is left, times minus the gain
+    beside: bool = False  # where noise hides it, the others still tell
 
 
 class Comparison(NamedTuple):
@@ -230,7 +231,10 @@ def _parity(view: _View) -> Iterator[Comparison]:
 
 
 def _rates(view: _View) -> Iterator[Comparison]:
-    """platen_velocity and platen_acceleration against derivatives of platen_displacement."""
+    """platen_velocity and platen_acceleration against derivatives of platen_displacement.
+
+    An accelerometer may feel the two axes across its own, too; as much as its gain may be off is lawful.
+    """
     base = "platen_displacement"
     for order, name in ((1, "platen_velocity"), (2, "platen_acceleration")):
         if not view.has(base, name):
@@ -244,6 +248,9 @@ def _rates(view: _View) -> Iterator[Comparison]:
             terms.append(_offset_term(len(due)))
             errors = [gain_m * due[:, j], gain_x * due[:, j], delay_m * rate[:, j], delay_x * rate[:, j]]
             errors.append(offset_m * np.ones(len(due)))
+            across = [k for k in view.plant.axes if k < 3 and k != j] if order == 2 and j < 3 else []
+            terms += [Term(f"cross {AXES[k]}", "1", 0.0, due[:, k], noise[0][k], beside=True) for k in across]
+            errors += [gain_m * due[:, k] for k in across]
             check = f"{name.split('_')[1]} against displacement"
             yield _compared(view, check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
 

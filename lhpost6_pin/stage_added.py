@@ -5,12 +5,15 @@ from .law_table import (
     ASYMMETRIC,
     BACKLASH,
     BALL,
+    BY_POSITION,
+    BY_SPEED,
     CONSTANT,
     DRAG,
     END_STOP,
     GAS_HEAT,
     GAS_LEAK,
     LOAD_FRICTION,
+    NODES,
     OSCILLATOR,
     SPRING,
     STRIBECK,
@@ -35,6 +38,7 @@ from .laws.gas import advance_heat, heat_rate, pressure_change, slow_heat
 from .laws.oscillator import advance_oscillator, oscillator_force, oscillator_rate
 from .laws.spring import drag_force, end_stop_energy, end_stop_force, spring_energy, spring_force
 from .laws.strut import strut_energy, strut_force
+from .laws.table import table_force
 
 __all__ = ["added_power", "added_rates", "advance_added", "apply_added", "gas_log_ratio"]
 
@@ -79,6 +83,10 @@ def _force(row, s, sd, z):
         return load_force(p[0], load, z[k]), load_force(p[0], load, z[k + 1])
     if law == BALL:
         return friction_force(p[0], z[k]), friction_force(p[0], z[k + 1])
+    if law == BY_POSITION:
+        return p[0] * table_force(s[a], p[1], p[2], p[3 : 3 + NODES]), 0.0
+    if law == BY_SPEED:
+        return p[0] * table_force(sd[a], p[1], p[2], p[3 : 3 + NODES]), 0.0
     if law == BACKLASH:
         return backlash_force(z[k], p[0], p[1], p[2]), 0.0
     if law == DRAG:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 from typer.testing import CliRunner
 
 from lhpost6_pin.calibration import calibration_numbers
@@ -94,7 +95,7 @@ def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, fam
 
 
 def test_a_gain_is_what_a_refit_with_the_candidate_gains():
-    """Against least squares written out: half the fall of the sum of squares, priors included."""
+    """Against least squares written out, and held out against the probability of one test given the others."""
     rng = np.random.default_rng(3)
     tests, rows, p, q = 3, 40, 5, 2
     j, c, r = rng.normal(size=(tests, rows, p)), rng.normal(size=(tests, rows, q)), rng.normal(size=(tests, rows))
@@ -102,25 +103,28 @@ def test_a_gain_is_what_a_refit_with_the_candidate_gains():
     matrix, side = np.einsum("tni,tnj->tij", j, j), np.einsum("tni,tn->ti", j, r)
     background = Background(list(j), list(r), [], matrix, side, place, np.ones(p))
     block = Block(np.einsum("tni,tnj->tij", j, c), np.einsum("tni,tnj->tij", c, c), np.einsum("tni,tn->ti", c, r))
-    free = np.full(q, np.inf)
-    one = score(background, block, -free, free)
+    free, spread = np.full(q, np.inf), np.array([2.0, 0.5])
+    one = score(background, block, -free, free, spread)
 
-    def least(some: list[int], more: bool) -> tuple[float, np.ndarray]:
-        a = np.concatenate([np.hstack([j[t], c[t]]) if more else j[t] for t in some])
-        prior = np.hstack([np.eye(p), np.zeros((p, q))]) if more else np.eye(p)
-        x, *_ = np.linalg.lstsq(np.vstack([a, prior]), -np.concatenate([*r[some], place]), rcond=None)
-        left = np.concatenate([a @ x + np.concatenate(r[some]), prior @ x + place])
-        return 0.5 * float(left @ left), x
+    def least(more: bool) -> float:
+        a = np.concatenate([np.hstack([j[t], c[t]]) if more else j[t] for t in range(tests)])
+        prior = np.diag([*np.ones(p), *1.0 / spread]) if more else np.eye(p)
+        shift = np.concatenate([place, np.zeros(q)]) if more else place
+        x, *_ = np.linalg.lstsq(np.vstack([a, prior]), -np.concatenate([*r, shift]), rcond=None)
+        left = np.concatenate([a @ x + np.concatenate(r), prior @ x + shift])
+        return 0.5 * float(left @ left)
+
+    def log_probability(some: list[int], more: bool) -> float:
+        a, extra = np.concatenate(j[some]), np.concatenate(c[some]) * spread * more
+        covariance = np.eye(len(a)) + a @ a.T + extra @ extra.T
+        return float(multivariate_normal(a @ place, covariance).logpdf(np.concatenate(r[some])))
 
     every = list(range(tests))
-    assert one.gain == pytest.approx(least(every, False)[0] - least(every, True)[0], rel=1e-9)  # rounding
+    assert one.gain == pytest.approx(least(False) - least(True), rel=1e-9)  # rounding
     for t in every:
         others = [k for k in every if k != t]
-        (_, without), (_, with_it) = least(others, False), least(others, True)
-        gain = 0.5 * np.sum((r[t] + j[t] @ without) ** 2) - 0.5 * np.sum(
-            (r[t] + np.hstack([j[t], c[t]]) @ with_it) ** 2
-        )
-        assert one.held_out[t] == pytest.approx(gain, rel=1e-9)
+        gains = [log_probability(some, True) - log_probability(some, False) for some in (every, others)]
+        assert one.held_out[t] == pytest.approx(gains[0] - gains[1], rel=1e-8, abs=1e-8)
 
 
 def test_setting_an_unknown_free_gains_what_its_prior_costs():
@@ -136,7 +140,7 @@ def test_setting_an_unknown_free_gains_what_its_prior_costs():
         np.ones(1),
     )
     free = np.full(1, np.inf)
-    one = score(background, block_of(background, 0), -free, free)
+    one = score(background, block_of(background, 0), -free, free, np.full(1, 1e6))
     held = 0.5 * (g + x0) ** 2 / (h + 1.0) - 0.5 * x0**2
     assert one.gain == pytest.approx(0.5 * g**2 / h - held, rel=1e-9)
     assert one.amplitude[0] + one.change[0] == pytest.approx(-g / h, rel=1e-9)
@@ -148,7 +152,7 @@ def test_what_is_at_its_bound_does_not_explain_what_a_candidate_does():
     own = [np.full((1, 1), np.sqrt(h))], [np.zeros(1)], [], np.full((1, 1, 1), h), np.full((1, 1), g), np.full(1, 3.5)
     free = np.full(1, np.inf)
     held, moving = (Background(*own, np.full(1, x)) for x in (0.0, 1.0))
-    one, other = (score(b, block_of(b, 0), -free, free) for b in (held, moving))
+    one, other = (score(b, block_of(b, 0), -free, free, np.full(1, 1e6)) for b in (held, moving))
     assert one.gain == pytest.approx(0.5 * g**2 / h, rel=1e-9)
     assert one.change[0] == 0.0
     assert other.gain < 0.5 * one.gain
@@ -171,7 +175,7 @@ def test_every_error_of_a_sensor_and_every_parameter_with_a_family_can_be_set_fr
 def test_friction_of_another_form_is_noise_and_a_background(machine):
     whole, knobs = with_background(machine, 1.5)
     assert [k.value for k in knobs] == [0.0] * len(knobs)
-    assert {e.family for e in whole.added_effects} == {f.name for f in families().values() if f.background}
+    assert {e.family for e in whole.added_effects} == {f.name for f in families().values() if f.search == "background"}
     other = with_other_form(machine, 0.7)
     assert {e.name for e in other.added_effects} == {k.name.rpartition(".")[0] for k in knobs}
 
@@ -181,14 +185,16 @@ def test_amplitudes_stay_within_their_bounds():
         [np.zeros((1, 1))], [np.zeros(1)], [], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.ones(1)
     )
     block = Block(np.zeros((1, 1, 1)), np.ones((1, 1, 1)), np.array([[4.0]]))
-    one = score(background, block, np.array([-1.0]), np.array([1.0]))
+    one = score(background, block, np.array([-1.0]), np.array([1.0]), np.full(1, 1e6))
     assert one.amplitude[0] == -1.0
     assert one.gain == pytest.approx(4.0 - 0.5)  # -(theta^2 / 2 + 4 theta) at the bound, not 8 at the free optimum
 
 
 def test_every_family_is_a_candidate_on_every_group_at_every_start(machine):
     groups = list_candidates(machine)
-    named = {f.name for f in families().values() if not f.background and not {"sensor", "controller"} & set(f.acts_on)}
+    named = {
+        f.name for f in families().values() if f.search == "named" and not {"sensor", "controller"} & set(f.acts_on)
+    }
     assert {g[0].family.name for g in groups} == named
     assert all(len({(c.family.name, c.shape) for c in g}) == 1 for g in groups)
 

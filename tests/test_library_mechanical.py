@@ -21,9 +21,9 @@ from lhpost6_pin.energy import row_power
 from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.errors import ParameterError
 from lhpost6_pin.inverse_dynamics import inverse_dynamics
-from lhpost6_pin.law_table import LAWS
+from lhpost6_pin.law_table import LAWS, NODES
 from lhpost6_pin.law_table import PORTS as ROW_PORTS
-from lhpost6_pin.laws import backlash, ball, bouc_wen, friction, gas, oscillator, spring, strut
+from lhpost6_pin.laws import backlash, ball, bouc_wen, friction, gas, oscillator, spring, strut, table
 from lhpost6_pin.ledger import force_ledger
 from lhpost6_pin.library import families, find_family
 from lhpost6_pin.machine import Machine, load_machine
@@ -52,6 +52,8 @@ CASES = {
         _case("backlash", "leg", (9e3, 2e-4, 5e-4), (1e-4,)),
         _case("drag", "leg", (9e3, 1.7)),
         _case("spring", "leg", (9e5,)),
+        _case("by_position", "leg", (0.8, -1e-3, 1e-3, *(4e3 * math.sin(k) for k in range(NODES)))),
+        _case("by_speed", "leg", (0.8, -0.02, 0.03, *(4e3 * math.cos(k) for k in range(NODES)))),
         _case("end_stop", "leg", (9e5, 1e-3, 2.0)),
         _case("oscillator", "pad", (5e3, 60.0, 0.05, 1.5, 0.0), (1e-3, 0.02)),
         _case("gas_leak", "leg", (1e-2, *GAS, 0.03), (0.4,)),
@@ -231,6 +233,14 @@ def test_a_ball_about_one_axis_is_a_seal_and_slides_as_coulomb_says() -> None:
     np.testing.assert_allclose(ball.advance_ball(*(5e-3 * axis), 0.3, 0.8, -0.1, 2e-4, 0.1), axis, atol=1e-9)
 
 
+def test_a_table_is_a_straight_line_between_its_values_and_flat_beyond_them() -> None:
+    values = np.array([1.0, 4.0, -2.0])
+    x = np.array([-5.0, -1.0, -0.5, 0.0, 0.25, 1.0, 7.0])
+    expected = -np.interp(x, [-1.0, 0.0, 1.0], values)
+    for force in (table.table_force, table.table_force.py_func):
+        np.testing.assert_allclose([force(y, -1.0, 1.0, values) for y in x], expected, atol=1e-15)
+
+
 def test_backlash_crosses_its_gap_without_force_after_each_reversal() -> None:
     full, gap, slip = 1e4, 1e-3, 2e-4
     e, step = gap + slip, -1e-5
@@ -309,6 +319,8 @@ FAMILIES = {
     "power_law_viscous": (("H3",), {}),
     "stray_spring": (("H1", "platen.yaw"), {}),
     "end_stop_stiffening": (("H1",), {"start": 0.0}),
+    "unnamed_by_position": (("H1",), {}),
+    "unnamed_by_speed": (("V1",), {"share": 0.5}),
     "gravity_offset": ((), {}),
     "bearing_thrust_direction": ((), {}),
     "strut_gas_leak": (("S2",), {}),
@@ -336,8 +348,11 @@ def test_every_mechanical_family_is_tried_here() -> None:
 
     from lhpost6_pin.files import models_folder
 
-    with (models_folder() / "library" / "mechanical.toml").open("rb") as handle:
-        assert set(tomllib.load(handle)) == set(FAMILIES)
+    stated = set()
+    for file in ("mechanical.toml", "unnamed.toml"):
+        with (models_folder() / "library" / file).open("rb") as handle:
+            stated |= set(tomllib.load(handle))
+    assert stated == set(FAMILIES)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -57,14 +57,15 @@ def prepare_problem(
     numbers: Parameters,
     *,
     kinds: tuple[str, ...] = KINDS,
-    form: Callable[[Machine], Machine] | None = None,
+    others: Callable[[Machine], Sequence[Machine]] = lambda machine: (),
+    preload: float = 0.0,
     seed: int = 0,
     jobs: int = -1,
 ) -> Prepared:
     """Make a campaign ready; `numbers` are those of `models/procedures/calibration.toml`. Raises what `calibrate` does.
 
-    form gives a machine another form of its laws, of which nobody knows which is right: by how much it differs is
-    noise. Deterministic for a seed (of the simulated noise).
+    others are what the machine may as well be, for all that is known: by how much they differ is noise, and so is what
+    friction may hold when a test begins, a share `preload` of it. Deterministic for a seed (of the simulated noise).
     """
     comparison = Comparison(
         bands=numbers.vector("comparison.bands"),
@@ -84,8 +85,9 @@ def prepare_problem(
         _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
     ]
     more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
-    other = None if form is None else form(machine)
-    problem = Problem(machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, other=other)
+    problem = Problem(
+        machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, others=others(machine), preload=preload
+    )
     replicas = tuple(problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again))
     return Prepared(problem, replicas, tuple(noisy))
 

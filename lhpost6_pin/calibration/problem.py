@@ -12,6 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from ..law_table import BOUC_WEN_1D, BOUC_WEN_2D
 from ..machine import Machine
 from ..plant import Plant, make_plant
 from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow
@@ -73,12 +74,14 @@ class Problem:
         *,
         jobs: int = -1,
         kinds: tuple[str, ...] = KINDS,
-        other: Machine | None = None,
+        others: Sequence[Machine] = (),
+        preload: float = 0.0,
     ) -> None:
         """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added.
 
-        By how much an `other` machine's residuals differ, whose laws have another form, is noise, too. All tests have
-        the same channels. Raises RecordError where they are too short together.
+        By how much residuals of `others` differ is noise, too: machines of which nobody knows which is right; and what
+        friction may hold when a test begins, a share `preload` of it. All tests have the same channels. Raises
+        RecordError where they are too short together.
         """
         self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
         unknowns = sensor_unknowns(machine, sensors, tests[0])
@@ -94,12 +97,15 @@ class Problem:
         for i, test in enumerate(noisy):
             at = i % len(tests)
             noise[at].append(self.bins(_less(evaluate_residuals(plant, test, kinds), clean[at]), test.dt)[0])
-        alike = None if other is None else make_plant(other)
+        instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
         for found, test, base in zip(noise, tests, clean, strict=True):
             # what friction remembers is not known better than by its memory along the path as measured, and quieted;
-            # that counts as much as all draws together, and so does another form of the laws
+            # that counts as much as all draws together, and so do what it held before and each of the others
             more = [evaluate_residuals(plant, replace(test, path=None), kinds)]
-            more += [] if alike is None else [evaluate_residuals(alike, test, kinds)]
+            if preload > 0.0:
+                held = follow(plant, test, start=_held(plant, preload, rng))
+                more.append(evaluate_residuals(plant, test, kinds, path=held))
+            more += [evaluate_residuals(one, test, kinds) for one in instead]
             draws = len(found)
             found += [self.bins(_less(one, base), test.dt)[0] * np.sqrt(draws) for one in more]
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
@@ -267,6 +273,15 @@ class Base:
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
+
+
+def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
+    """Hidden states (n_states,) of friction that holds a share of its force, one standard deviation either way."""
+    out = np.zeros(len(plant.states))
+    for row in plant.rows[np.isin(plant.rows["law"], (BOUC_WEN_1D, BOUC_WEN_2D))]:
+        both = slice(int(row["state"]), int(row["state"]) + (2 if row["law"] == BOUC_WEN_2D else 1))
+        out[both] = np.clip(share * rng.standard_normal(len(out[both])), -0.7, 0.7)  # within the unit disc
+    return out
 
 
 def _less(after: Residuals, before: Residuals) -> Residuals:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 
-__all__ = ["Whitener", "excess", "make_whitener", "spectrum_of"]
+__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "spectrum_of", "surprise"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -73,11 +73,23 @@ def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[
     """Power (m, k) of every test's whitened bins above that of noise, by column and band; one where there is none."""
     found = []
     for bins, f in zip(whitened, frequency, strict=True):
-        power, band = np.ones(bins.shape), whitener.band(f)
-        for b in np.unique(band):
-            power[band == b] = np.maximum(1.0, np.mean(np.abs(bins[band == b]) ** 2, axis=0))
-        found.append(power)
+        means, counts = mean_squares(whitener, np.abs(bins) ** 2, f)
+        found.append(np.repeat(np.maximum(1.0, means), counts, axis=0))
     return found
+
+
+def mean_squares(whitener: Whitener, squares: Array, f: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Means (b, k) over bands of squares (m, k) of a test's bins at rising f (m,), and the bins in each band (b,)."""
+    _, first, counts = np.unique(whitener.band(f), return_index=True, return_counts=True)
+    return np.add.reduceat(squares, first, axis=0) / counts[:, None], counts
+
+
+def surprise(means: Array, counts: NDArray[np.intp]) -> Array:
+    """Negative log-likelihood (k,) of bins by their `mean_squares`.
+
+    What is left counts as noise of as much power as each band shows of it, or of unit power where it shows less.
+    """
+    return np.asarray(counts @ np.where(means < 1.0, means, 1.0 + np.log(np.maximum(means, 1.0))))
 
 
 def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:

@@ -8,7 +8,7 @@ from ..library import Family, Shape, families
 from ..machine import Machine
 from ..residuals import RESIDUALS
 
-__all__ = ["Candidate", "list_candidates", "with_background", "with_other_form"]
+__all__ = ["Candidate", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,17 @@ def with_other_form(machine: Machine, size: float) -> Machine:
     return machine
 
 
+def with_warm_oil(machine: Machine, share: float) -> Machine:
+    """The machine with oil that is softer and thinner by a share."""
+    paths = ["hydraulics.bulk_modulus", *dict.fromkeys(f"{a.kind}.viscous" for a in machine.actuators)]
+    return machine.with_params({path: (1.0 - share) * machine.parameters.number(path) for path in paths})
+
+
 def _of_background(machine: Machine) -> list["Candidate"]:
     """Effects of the library's background, on all of each kind that rubs."""
     found = []
     for family in families().values():
-        names = family.components(machine) if family.background else ()
+        names = family.components(machine) if family.search == "background" else ()
         for kind in dict.fromkeys(c.kind for c in machine.components):
             members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
             one = Candidate(family, members, tuple((s.name, s.start[0]) for s in family.shapes if not s.amplitude))
@@ -103,7 +109,7 @@ def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
     """All candidates of the library for a machine: each family at each start of its shapes, on each group together."""
     found = []
     for family in families().values():
-        if family.background:
+        if family.search != "named":
             continue
         shapes = [s for s in family.shapes if not s.amplitude]
         names = [s.name for s in shapes]

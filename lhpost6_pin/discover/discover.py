@@ -17,13 +17,15 @@ from ..errors import RecordError, UnknownNameError
 from ..files import models_folder
 from ..machine import Machine
 from ..parameters import Parameters, load_parameters
+from ..plant import make_plant
 from ..progress import Progress, between
 from ..residuals import RESIDUALS
 from ..sensors import Sensors
-from .candidates import with_background, with_other_form
-from .left import Left, what_is_left
+from .candidates import with_background, with_other_form, with_warm_oil
+from .left import Left, what_is_left, with_unnamed
 from .proof import Proof, prove
 from .search import Search, fitted_machine, search
+from .sensing import put_right, wrong_sensors
 from .verdict import Verdict, judge
 
 __all__ = ["Discovery", "discover"]
@@ -37,7 +39,7 @@ class Discovery:
 
     campaign: str
     machine: Machine  # as delivered
-    fitted: Machine  # with the effects found and all numbers fitted
+    fitted: Machine  # with the effects found and all numbers fitted; what has no name is in it, switched off
     used: tuple[str, ...]  # tests that were searched
     held_out: tuple[str, ...]  # tests that were not
     verdict: Verdict
@@ -75,9 +77,11 @@ def discover(
     own = {path: quantity for path, quantity in numbers.items() if path.startswith("fit.")}
     calibration = replace(common, quantities={**common.quantities, **own})
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
-    form = partial(with_other_form, size=numbers.number("scatter.form"))
+    faults = wrong_sensors(make_plant(machine), campaign.records, sensors)
+    records = put_right(campaign.records, faults)
+    others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
     ready = prepare_problem(
-        machine, campaign.records, sensors, calibration, kinds=RESIDUALS, form=form, seed=seed, jobs=jobs
+        machine, records, sensors, calibration, kinds=RESIDUALS, others=others, preload=preload, seed=seed, jobs=jobs
     )
     machine = ready.problem.machine
     knobs = (*ready.problem.knobs, *plan_knobs(machine))
@@ -96,17 +100,18 @@ def discover(
     report(0.8)
     proof = None
     if held:
-        records = [campaign.records[i] for i in held]
         part = between(report, 0.8, 1.0)
-        proof = prove(machine, found, records, sensors, phases=phases, jobs=jobs, progress=part)
+        proof = prove(machine, found, [records[i] for i in held], sensors, phases=phases, jobs=jobs, progress=part)
     report(1.0)
+    verdict = judge(found, left, faults, calibration, numbers)
+    fitted = fitted_machine(found)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
-        fitted=fitted_machine(found),
+        fitted=fitted if verdict.left is None else with_unnamed(fitted, verdict.left),
         used=tuple(names[i] for i in used),
         held_out=tuple(names[i] for i in held),
-        verdict=judge(found, left, calibration, numbers),
+        verdict=verdict,
         search=found,
         left=left,
         proof=proof,
@@ -114,6 +119,12 @@ def discover(
         seed=seed,
         hashes={name: _hash(record) for name, record in zip(names, campaign.records, strict=True)},
     )
+
+
+def _others(machine: Machine, numbers: Parameters) -> tuple[Machine, ...]:
+    """What the machine may as well be: with friction of another form, or with warmer oil in one test than in others."""
+    form, drift = numbers.number("scatter.form"), numbers.number("scatter.drift")
+    return with_other_form(machine, form), with_warm_oil(machine, drift)
 
 
 def _held_out(first: Normal, names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:

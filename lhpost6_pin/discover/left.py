@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from ..calibration.problem import Base, Problem
 from ..calibration.spectra import spectrum_of
 from ..inverse_dynamics import leg_wrenches
+from ..law_table import NODES
+from ..machine import Machine
 from ..parameters import Parameters
 from ..pose import leg_displacements
 from ..residuals import Measured
+from .formula import Formula, sparse_formula
 from .screen import Background, make_block, score
 
-__all__ = ["Left", "what_is_left"]
+__all__ = ["Left", "what_is_left", "with_unnamed"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -37,10 +40,30 @@ class Left:
     gain: float  # of log-likelihood
     held_out: Array  # (t,) on each test, fitted on the others
 
+    @property
+    def unit(self) -> str:
+        """Of the state."""
+        return "m" if self.state == "position" else "m/s"
+
+    @property
+    def formula(self) -> Formula:
+        """The function in few words."""
+        return sparse_formula(self.nodes, self.value, self.sd, self.unit)
+
+
+def with_unnamed(machine: Machine, left: Left) -> Machine:
+    """The machine with the free function as an effect that is switched off: share = 1 switches it on."""
+    family = {"position": "unnamed_by_position", "velocity": "unnamed_by_speed"}[left.state]
+    values = {f"force_{k + 1}": -float(v) for k, v in enumerate(left.value)}
+    ends = {"first": float(left.nodes[0]), "last": float(left.nodes[-1])}
+    return machine.with_effect(
+        family, (left.component,), name=f"{family}_{left.component}", share=0.0, **ends, **values
+    )
+
 
 def what_is_left(problem: Problem, base: Base, background: Background, numbers: Parameters) -> tuple[Left, ...]:
     """Free functions of every leg's position and of its speed, by falling gain."""
-    count = int(numbers.number("left.nodes"))
+    count = NODES
     seen = [_legs(base, t) for t in range(len(base.tests))]
     found = []
     for i, component in enumerate(base.plant.machine.components):
@@ -56,7 +79,7 @@ def what_is_left(problem: Problem, base: Base, background: Background, numbers: 
                 columns.append(_whitened(problem, t, test, wrench))
             block = make_block(background, columns)
             free = np.full(count, np.inf)
-            one = score(background, block, -free, free, numbers.number("left.spread"))
+            one = score(background, block, -free, free, np.full(count, numbers.number("left.spread")))
             found.append(Left(component.name, state, nodes, one.amplitude, one.sd, one.gain, one.held_out))
     return tuple(sorted(found, key=lambda left: -left.gain))
 

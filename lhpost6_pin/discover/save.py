@@ -86,4 +86,6 @@ def _left(found: Discovery) -> dict[str, Any] | None:
         "value": left.value.tolist(),
         "sd": left.sd.tolist(),
         "unit": "N",
+        "domain": [float(left.nodes[0]), float(left.nodes[-1]), left.unit],
+        "formula": {"text": left.formula.text("N"), "share": left.formula.share},
     }

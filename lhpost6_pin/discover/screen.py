@@ -2,12 +2,13 @@
 
 Everything is linear here: the residuals' derivatives by knobs, sensor errors and scatter between twins (the
 background), and by a candidate's amplitudes. The gain is the log-likelihood that the candidate adds to a refit without
-it; held out is what it adds on each test when everything was fitted on the others.
+it; held out is what it adds to the prediction of each test, its amplitudes fitted on the others.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,15 +64,6 @@ class Background:
         factor, side = self.factors[0]
         return np.asarray(-cho_solve(factor, side))
 
-    @cached_property
-    def still(self) -> Array:
-        """What the background alone explains (t,): of the log-likelihood of each test, fitted on the others."""
-        found = []
-        for (factor, side), matrix, own in zip(self.factors[1:], self.matrix, self.side, strict=True):
-            x = -cho_solve(factor, side)
-            found.append(0.5 * x @ matrix @ x + own @ x)
-        return np.array(found)
-
 
 def real_bins(bins: Complex, root: Array) -> Array:
     """Bins (m, c, ...) as real rows (2 m c, ...), over the roots of power (m, c)."""
@@ -98,33 +90,61 @@ class Score:
     gain: float  # of log-likelihood
     amplitude: Array  # (q,)
     sd: Array  # (q,)
-    held_out: Array  # (t,) gain on each test, fitted on the others
+    held_out: Array  # (t,) gain on each test, amplitudes fitted on the others
     change: Array  # (p,) of the background with it, in units of the priors
 
 
-def score(background: Background, block: Block, low: Array, high: Array, spread: float = np.inf) -> Score:
-    """Score a candidate whose amplitudes (q,) are within low and high, with normal priors of deviation `spread`."""
-    amplitude, change, schur, gain = _fit(background, block, low, high, spread, -1)
+def score(background: Background, block: Block, low: Array, high: Array, spread: Array) -> Score:
+    """Score a candidate whose amplitudes (q,) are within low and high, with normal priors of deviations `spread`.
+
+    Held out on a test is by how much the candidate raises the log-probability of that test given the others, whatever
+    the background, with amplitudes as well as the others tell them: the gain of all tests less that of the others, and
+    less what it costs to have been unsure, half the logarithm by which the test narrows the amplitudes. What one test
+    alone excites costs little there; what tests contradict, much.
+    """
+    whole = _profile(background, block, spread, -1)
+    amplitude = whole.best(low, high)
     held_out = []
     for t in range(len(block.own)):
-        theta, moved, _, _ = _fit(background, block, low, high, spread, t)
-        with_it = 0.5 * moved @ background.matrix[t] @ moved + background.side[t] @ moved
-        with_it += theta @ (block.cross[t].T @ moved + 0.5 * block.own[t] @ theta + block.side[t])
-        held_out.append(background.still[t] - with_it)
-    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(schur, hermitian=True)), 0.0))
-    return Score(gain, amplitude, sd, np.array(held_out), change)
+        others = _profile(background, block, spread, t)
+        narrowed = 0.5 * (whole.information - others.information)
+        held_out.append(whole.gain(amplitude) - others.gain(others.best(low, high)) - narrowed)
+    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur, hermitian=True)), 0.0))
+    return Score(whole.gain(amplitude), amplitude, sd, np.array(held_out), whole.change(amplitude))
 
 
-def _fit(
-    background: Background, block: Block, low: Array, high: Array, spread: float, without: int
-) -> tuple[Array, Array, Array, float]:
-    """Amplitudes (q,), change of the background (p,), Schur complement (q, q), gain; of all tests but one."""
+class _Profile(NamedTuple):
+    """Log-likelihood by a candidate's amplitudes alone, the background refitted for each."""
+
+    schur: Array  # (q, q), priors in it
+    side: Array  # (q,)
+    factor: tuple[Array, bool]  # of the background
+    right: Array  # (p,)
+    cross: Array  # (p, q)
+
+    def best(self, low: Array, high: Array) -> Array:
+        """The amplitudes (q,) that gain most, each kept within its bounds."""
+        return np.clip(-np.linalg.pinv(self.schur, rcond=1e-10, hermitian=True) @ self.side, low, high)
+
+    def gain(self, theta: Array) -> float:
+        """What amplitudes theta (q,) gain over none."""
+        return -float(0.5 * theta @ self.schur @ theta + self.side @ theta)
+
+    @property
+    def information(self) -> float:
+        """Logarithm of the determinant of the amplitudes' normal matrix."""
+        return float(np.linalg.slogdet(self.schur)[1])
+
+    def change(self, theta: Array) -> Array:
+        """By how much the background moves (p,) for amplitudes theta (q,)."""
+        return np.asarray(-cho_solve(self.factor, self.right + self.cross @ theta))
+
+
+def _profile(background: Background, block: Block, spread: Array, without: int) -> _Profile:
+    """Profile of all tests but one, or of all (-1)."""
     keep = np.arange(len(block.own)) != without
-    factor, side = background.factors[without + 1]
-    cross, own, right = block.cross[keep].sum(axis=0), block.own[keep].sum(axis=0), block.side[keep].sum(axis=0)
+    factor, right = background.factors[without + 1]
+    cross, own, side = block.cross[keep].sum(axis=0), block.own[keep].sum(axis=0), block.side[keep].sum(axis=0)
     through = cho_solve(factor, cross)
-    schur = own - cross.T @ through + np.eye(len(own)) / spread**2
-    rest = right - through.T @ side
-    theta = np.clip(-np.linalg.pinv(schur, rcond=1e-10, hermitian=True) @ rest, low, high)
-    gain = -float(0.5 * theta @ schur @ theta + rest @ theta)
-    return theta, -cho_solve(factor, side + cross @ theta), schur, gain
+    schur = own - cross.T @ through + np.diag(spread**-2.0)
+    return _Profile(schur, side - through.T @ right, factor, right, cross)

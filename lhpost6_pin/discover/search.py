@@ -19,6 +19,7 @@ from ..calibration.knobs import with_knobs
 from ..calibration.normal import Normal
 from ..calibration.prepare import Prepared
 from ..calibration.problem import Base, Problem
+from ..calibration.spectra import mean_squares, surprise
 from ..machine import Machine
 from ..parameters import Parameters
 from ..progress import Progress, between
@@ -40,6 +41,7 @@ class Scored:
 
     candidate: Candidate
     score: Score
+    gain: float  # of log-likelihood, with what is left weighed anew; without that where the linear gain is too little
     closure: float  # share of what is more than noise
     refused: str  # why it is not added; empty if it may be
 
@@ -49,7 +51,7 @@ class Contest:
     """A family that was fitted in full for the same place, and how far it stands behind the one that was added."""
 
     candidate: Candidate
-    behind: float  # log-likelihood; 0 for the one added
+    behind: float  # log-likelihood; 0 for the one added, below that for one that is less simple
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class Added:
     """An effect that the search has added."""
 
     candidate: Candidate
-    gain: float  # linear, of all candidates at that time
+    gain: float  # as of all candidates at that time
     tried: int  # candidates in that round
     contest: tuple[Contest, ...]
 
@@ -153,20 +155,20 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
     rest = found.solution.normal.rest
     left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
-    first = excess_by_kind(found.refit.normal.problem, found.refit.normal.rest)
+    weigh = Weighing(problem, background, squares_by_column(found.refit.normal.rest), numbers)
 
     def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
-        less = Lowered(0.0, 0.0, 0.0)
-        if one.gain >= numbers.number("accept.gain"):
-            less = lowered(problem, background, explained(), one, first)
-        return Scored(candidate, one, less.share, _refusal(one, less, left, numbers))
+        less = Lowered(one.gain, 0.0, 0.0, 0.0)
+        if one.gain >= numbers.number("accept.look"):
+            less = weigh.lowered(explained(), one)
+        return Scored(candidate, one, less.gain, less.share, _refusal(one, less, numbers))
 
     def of_group(group: Sequence[Candidate]) -> list[Scored]:
         columns, parts = columns_of(problem, base, group)
         block = make_block(background, columns)
         scored = []
         for candidate, part in zip(group, parts, strict=True):
-            one = score(background, block.select(part), *_bounds(candidate))
+            one = score(background, block.select(part), *_bounds(candidate), _spread(candidate, numbers))
             scored.append(judged(candidate, one, partial(_explained, background, columns, part @ one.amplitude)))
         return scored
 
@@ -174,13 +176,13 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     for candidate in list_releases(problem):
         place = problem.names.index(candidate.release)
         free = np.full(1, np.inf)
-        one = score(background, block_of(background, place), -free, free)
+        one = score(background, block_of(background, place), -free, free, np.full(1, numbers.number("fit.sensor_free")))
         scored.append(judged(candidate, one, partial(_of_unknown, background, place, one.amplitude)))
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
         for done, some in enumerate(parallel(delayed(of_group)(g) for g in groups)):
             scored += some
             progress((done + 1) / len(groups))
-    return Round(tuple(sorted(scored, key=lambda one: -one.score.gain)), left)
+    return Round(tuple(sorted(scored, key=lambda one: -one.gain)), left)
 
 
 def _explained(background: Background, columns: Sequence[NDArray[np.complex128]], amplitude: Array) -> list[Array]:
@@ -194,35 +196,47 @@ def _of_unknown(background: Background, place: int, amplitude: Array) -> list[Ar
 
 
 class Lowered(NamedTuple):
-    """By how much a candidate lowers the squares of what is left, with the refit that comes with it."""
+    """By how much a candidate lowers what is left, with the refit that comes with it."""
 
-    squares: float  # twice a log-likelihood
-    share: float  # of what is more than noise
-    of_first: float  # in the kind where this is most: of what was more than noise before any effect was added
+    gain: float  # of log-likelihood and log-prior
+    beyond: float  # of log-likelihood, by what even `doubt` times the stated noise would not have
+    share: float  # of what is so far beyond noise
+    of_first: float  # in the column where this is most: of the squares that were there before any effect was added
 
 
-def lowered(
-    problem: Problem,
-    background: Background,
-    explained: Sequence[Array],
-    one: Score,
-    first: dict[str, float],
-) -> Lowered:
-    """How a candidate lowers what is left, explained (n,) of every test; first: excess by kind before any was added."""
-    before: list[Array] = []
-    after: list[Array] = []
-    for slope, rest, root, more in zip(background.slope, background.rest, background.root, explained, strict=True):
-        for sums, left in (
-            (before, rest + slope @ background.alone),
-            (after, rest + slope @ one.change + more),
-        ):
-            half = root.size
-            sums.append(((left[:half] ** 2 + left[half:] ** 2).reshape(root.shape) * root**2).sum(axis=0))
-    old, new = np.sum(before, axis=0), np.sum(after, axis=0)  # by column
-    count = float(sum(len(rest) for rest in background.rest))
-    fall = float((old - new).sum())
-    of_first = max(float((old - new)[problem.rows(kind)].sum()) / more for kind, more in first.items())
-    return Lowered(fall, fall / max(float(old.sum()) - count, abs(fall), 1e-9), of_first)
+class Weighing:
+    """Weighs what is left anew, with a candidate and without: large effects count for more than their linear gain."""
+
+    def __init__(self, problem: Problem, background: Background, first: Array, numbers: Parameters) -> None:
+        """`first` (c,) are the squares before any effect was added."""
+        self.problem, self.background, self.first = problem, background, first
+        self.doubt, self.least = numbers.number("accept.doubt"), 0.5 * numbers.number("accept.gain")
+        self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
+
+    def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float, Array, float]:
+        """Negative log-likelihood (c,), that of the prior, squares (c,) and log-likelihood of what is no noise."""
+        b, total = self.background, np.zeros((2, self.first.size))
+        beyond = 0.0
+        for slope, rest, root, more, f in zip(b.slope, b.rest, b.root, explained, self.problem.frequency, strict=True):
+            left = (rest + slope @ change + more) ** 2
+            squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
+            means, counts = mean_squares(self.problem.whitener, squares, f)
+            total += surprise(means, counts), squares.sum(axis=0)
+            beyond += float(np.sum(counts @ np.log(np.maximum(means / self.doubt, 1.0))))
+        return total[0], 0.5 * float(np.sum((b.place + change) ** 2)), total[1], beyond
+
+    def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
+        """How a candidate lowers what is left, explained (n,) of every test."""
+        (old, prior, squares, beyond), (new, after, less, then) = self.before, self._left(one.change, explained)
+        gain = float((old - new).sum()) + prior - after
+        clear = old - new > self.least
+        of_first = float(np.max((squares - less)[clear] / self.first[clear], initial=0.0))
+        return Lowered(gain, beyond - then, (beyond - then) / max(beyond, 1e-9), of_first)
+
+
+def squares_by_column(rest: Sequence[NDArray[np.complex128]]) -> Array:
+    """Sums (c,) of squared whitened bins (m, c) over all tests."""
+    return np.asarray(sum((np.abs(r) ** 2).sum(axis=0) for r in rest))
 
 
 def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:
@@ -236,18 +250,20 @@ def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> 
     return found
 
 
-def _refusal(one: Score, less: Lowered, left: float, numbers: Parameters) -> str:
+def _refusal(one: Score, less: Lowered, numbers: Parameters) -> str:
     """Why a candidate may not be added."""
-    if one.gain < numbers.number("accept.gain"):
+    if one.gain < numbers.number("accept.look"):
         return "gains too little"
-    if less.squares < one.gain:  # twice it, if what is left is noise: the noise in derivatives is all it has
+    if less.gain < numbers.number("accept.gain"):  # the noise in derivatives is all it has
         return "does not lower what is left"
     held = one.held_out
     if held.sum() < numbers.number("accept.held_out") * one.gain:
         return "does not hold on tests that it was not fitted on"
     if np.mean(held > -numbers.number("accept.worse") * one.gain) < numbers.number("accept.better"):
         return "makes tests worse that it was not fitted on"
-    if left > numbers.number("accept.noise") and less.share < numbers.number("accept.closure"):
+    if less.beyond < numbers.number("accept.gain"):
+        return "explains what may be noise"
+    if less.share < numbers.number("accept.closure"):
         return "explains too little of what is more than noise"
     if less.of_first < numbers.number("accept.of_first"):
         return "explains too little of what was there at first"
@@ -259,31 +275,38 @@ def _bounds(candidate: Candidate) -> tuple[Array, Array]:
     return np.array([s.low for s in shapes]), np.array([s.high for s in shapes])
 
 
+def _spread(candidate: Candidate, numbers: Parameters) -> Array:
+    """Prior deviations of amplitudes."""
+    return numbers.number("fit.spread") * np.array([s.typical for s in candidate.amplitudes])
+
+
 def _add(
     found: Search, passed: Sequence[Scored], calibration: Parameters, numbers: Parameters, progress: Progress
 ) -> Search | None:
     """Add the best candidate: the first of each family that comes near it is fitted in full, with its shapes.
 
-    None if none of them lowers what is left when it is fitted in full.
+    Of those that explain the campaign alike the simplest counts. None if none of them lowers what is left when it is
+    fitted in full.
     """
-    near = numbers.number("accept.near") * passed[0].score.gain
+    near = numbers.number("accept.near") * passed[0].gain
     firsts: dict[str, Scored] = {}
     for one in passed:
-        if one.score.gain >= near:
+        if one.gain >= near:
             firsts.setdefault(one.candidate.family.name, one)
     rivals = list(firsts.values())[: int(numbers.number("accept.rivals"))]
     fitted = []
     for i, rival in enumerate(rivals):
         share = between(progress, i / len(rivals), (i + 1) / len(rivals))
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
-    power = found.solution.normal.power
-    before, *left = (_objective(one, power) for one in (found, *fitted))
-    order = np.argsort(left)
-    best = int(order[0])
-    if before - left[best] < numbers.number("accept.gain"):
+    before, *left = (_objective(one) for one in (found, *fitted))
+    least = min(left)
+    if before - least < numbers.number("accept.gain"):
         return None
+    alike = [i for i in range(len(left)) if left[i] - least < numbers.number("accept.apart")]
+    best = min(alike, key=lambda i: (len(rivals[i].candidate.family.shapes), left[i]))  # the simplest of them
+    order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
     contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best])) for i in order)
-    added = Added(rivals[best].candidate, rivals[best].score.gain, len(found.rounds[-1].scored), contest)
+    added = Added(rivals[best].candidate, rivals[best].gain, len(found.rounds[-1].scored), contest)
     fitted[best].added.append(added)
     return fitted[best]
 
@@ -308,10 +331,12 @@ def _fit_jointly(
     return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 
-def _objective(found: Search, power: Sequence[Array]) -> float:
-    """Negative log-likelihood and log-prior at the solution, residuals weighed as before anything was added."""
-    squares = sum(float(np.sum(np.abs(r) ** 2 / p)) for r, p in zip(found.rest, power, strict=True))
-    return squares + 0.5 * float(np.sum((found.solution.x / found.problem.prior) ** 2))
+def _objective(found: Search) -> float:
+    """Negative log-likelihood and log-prior at the solution."""
+    total = 0.5 * float(np.sum((found.solution.x / found.problem.prior) ** 2))
+    for r, f in zip(found.rest, found.problem.frequency, strict=True):
+        total += float(surprise(*mean_squares(found.problem.whitener, np.abs(r) ** 2, f)).sum())
+    return total
 
 
 def fitted_machine(found: Search) -> Machine:

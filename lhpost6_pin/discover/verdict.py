@@ -16,6 +16,7 @@ from ..calibration.problem import Problem
 from ..parameters import Parameters
 from .left import Left
 from .search import Added, Search, excess_by_kind
+from .sensing import Fault
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
 
@@ -67,8 +68,13 @@ class Verdict:
     untestable: tuple[str, ...]  # families that this campaign could not show, of typical size
 
 
-def judge(found: Search, left: Sequence[Left], calibration: Parameters, numbers: Parameters) -> Verdict:
-    """The verdict on a search; `left` are free functions fitted to what is left, by falling gain."""
+def judge(
+    found: Search, left: Sequence[Left], faults: Sequence[Fault], calibration: Parameters, numbers: Parameters
+) -> Verdict:
+    """The verdict on a search.
+
+    left are free functions fitted to what is left, by falling gain; faults are of sensors that were put right before.
+    """
     problem, x, added = found.problem, found.solution.x, [a.candidate for a in found.added]
     count = len(problem.knobs)
     own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.knobs])
@@ -86,13 +92,14 @@ def judge(found: Search, left: Sequence[Left], calibration: Parameters, numbers:
         low, high = sorted(knob.at(float(x[i] + side * reach * sd[i])) for side in (-1.0, 1.0))
         return Estimate(knob.at(float(x[i])), knob.unit, low, high)
 
-    sensors = tuple(
+    released = tuple(
         SensorFinding(u.name, c.family.name, estimate(i), float(np.sqrt(3.0) * u.sd))
         for i, u in enumerate(problem.unknowns, start=count)
         for c in added
         if c.release == u.name
     )
-    errors = {s.name for s in sensors}
+    errors = {s.name for s in released}
+    sensors = (*(_of_fault(f, reach) for f in faults), *released)
     effects = [_of_added(one, problem, estimate, numbers) for one in found.added if one.candidate.name not in errors]
     changed = {}
     for i, knob in enumerate(problem.knobs):
@@ -132,6 +139,11 @@ def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate
     return Finding(
         candidate.family.name, candidate.components, values, added.gain, min(1.0, chance * added.tried), rivals
     )
+
+
+def _of_fault(fault: Fault, reach: float) -> SensorFinding:
+    low, high = (fault.value + side * reach * fault.deviation for side in (-1.0, 1.0))
+    return SensorFinding(fault.name, fault.family, Estimate(fault.value, fault.unit, low, high), fault.stated)
 
 
 def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -46,7 +46,7 @@ class Family:
     confused_with: tuple[str, ...]
     tell_apart: str
     twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
-    background: bool  # refitted in every search and never named: another form of the report's laws
+    search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
 
     def components(self, machine: "Machine") -> tuple[str, ...]:
         """Names of all components of a machine that it can act on; also ``platen``, its axes, and ``supply``."""
@@ -107,7 +107,9 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
                 raise ParameterError(f"{file}: {name}.{key} lacks {', '.join(missing)}")
             typical, low, high = (float(entry[w]) for w in ("typical", "low", "high"))
             start = tuple(float(x) for x in entry.get("start", ()))
-            shapes.append(Shape(key, entry["unit"], typical, low, high, start, entry["source"]))
+            count = entry.get("count", 0)  # of a table
+            for label in [f"{key}_{k + 1}" for k in range(count)] or [key]:
+                shapes.append(Shape(label, entry["unit"], typical, low, high, start, entry["source"]))
     shapes.sort(key=lambda shape: not shape.amplitude)
     return Family(
         name=name,
@@ -119,5 +121,5 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         confused_with=tuple(table["confused_with"]),
         tell_apart=table["tell_apart"],
         twins=table.get("twins", "kind"),
-        background=table.get("search") == "background",
+        search=table.get("search", "named"),
     )

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..law_table import NODES
+
 if TYPE_CHECKING:
     from ..machine import Machine
 
@@ -19,6 +21,18 @@ def _spring(machine: "Machine", components: Sequence[str], values: Values) -> An
 def _end_stop(machine: "Machine", components: Sequence[str], values: Values) -> Any:
     numbers = (values["force"], values["start"], values["exponent"])
     return "end_stop", components, [numbers] * len(components)
+
+
+def _by_position(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "by_position", components, [_table(values)] * len(components)
+
+
+def _by_speed(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    return "by_speed", components, [_table(values)] * len(components)
+
+
+def _table(values: Values) -> tuple[float, ...]:
+    return tuple(values[key] for key in ("share", "first", "last", *(f"force_{k + 1}" for k in range(NODES))))
 
 
 def _thrust(machine: "Machine", components: Sequence[str], values: Values) -> Any:
@@ -84,6 +98,8 @@ def _coupling(machine: "Machine", components: Sequence[str], values: Values) -> 
 BUILD = {
     "stray_spring": _spring,
     "end_stop_stiffening": _end_stop,
+    "unnamed_by_position": _by_position,
+    "unnamed_by_speed": _by_speed,
     "gravity_offset": _gravity,
     "bearing_thrust_direction": _thrust,
     "strut_gas_leak": _leak,

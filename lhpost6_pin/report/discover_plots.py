@@ -94,7 +94,7 @@ def _short(value: float) -> str:
 def gain_figure(one: Round, number: int, least: float) -> Figure:
     """Return the best candidate of each family in one round: what it gains, and what is refused."""
     best = list(one.best.values())
-    shown = [s for s in best if s.score.gain > 1.0][:SHOWN] or best[:3]
+    shown = [s for s in best if s.gain > 1.0][:SHOWN] or best[:3]
     names = [f"{s.candidate.family.name}, {where(s.candidate.components)}" for s in shown]
     traces = []
     for words, color, keep in (("may be added", BLUE, True), ("refused", "#6e7781", False)):
@@ -106,7 +106,7 @@ def gain_figure(one: Round, number: int, least: float) -> Figure:
                     "type": "bar",
                     "orientation": "h",
                     "name": words,
-                    "x": [max(shown[i].score.gain, 1.0) for i in some],
+                    "x": [max(shown[i].gain, 1.0) for i in some],
                     "y": some,
                     "text": [html.escape(s) for s in said],
                     "textposition": "none",

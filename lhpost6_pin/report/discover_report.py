@@ -134,7 +134,7 @@ def _considered(found: Discovery) -> list[Markup]:
             (
                 s.candidate.family.name,
                 where(s.candidate.components),
-                number(s.score.gain),
+                number(s.gain),
                 number(float(s.score.held_out.sum())),
                 f"{100 * s.closure:.0f} %" if s.closure else "–",
                 s.refused or "passes",

@@ -103,16 +103,17 @@ def simulate_campaign(
     scale: float = 1.0,
     tests: tuple[str, ...] | None = None,
     name: str = "simulated",
+    procedure: str = "campaign",
     progress: Progress | None = None,
 ) -> Campaign:
-    """Rehearse the tests of `campaign.toml` (or some of them) and record them as the sensors would.
+    """Rehearse the tests of a procedure of `models/procedures` (or some of them), recorded as the sensors would.
 
     scale is a factor on all motions; errors draws calibration errors within the sensors' ranges, the same for all
     tests. Deterministic for a seed. progress is called with the share done.
 
     Raises SimulationError if a test does not last, UnknownNameError for a test that the file does not have.
     """
-    numbers = load_parameters(models_folder() / "procedures" / "campaign.toml")
+    numbers = load_parameters(models_folder() / "procedures" / f"{procedure}.toml")
     rng = np.random.default_rng(seed)
     known = tuple(path.split(".")[0] for path in numbers.words if path.endswith(".motion"))
     wanted = tests or known

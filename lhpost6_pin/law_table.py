@@ -57,6 +57,7 @@ __all__ = [
     "RETURNED",
     "ROW",
     "SPRING",
+    "SMOOTH_BALL",
     "STRIBECK",
     "SUPPLY",
     "TURBULENT",
@@ -92,7 +93,7 @@ PORTS = ("port", "port_2", "port_3")
 # Codes of the laws that have rows, as the compiled stage reads them.
 HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS, CONSTANT = range(7)
 STRIBECK, ASYMMETRIC, WARM_UP, LOAD_FRICTION, BACKLASH, DRAG, SPRING, END_STOP = range(7, 15)
-OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED = range(15, 21)
+OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL = range(15, 22)
 
 # Places of numbers in the rows of actuators: some of the report's, then those of alterations.
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
@@ -150,6 +151,7 @@ LAWS: Mapping[str, Law] = {
     "stribeck": Law(STRIBECK, 1, (*_FRICTION, ("speed", "m/s")), ("z",)),
     "asymmetric": Law(ASYMMETRIC, 1, _FRICTION, ("z",)),
     "ball": Law(BALL, 3, (("moment", "N m"), ("yield_turn", "rad"), ("shape", "1")), ("z_1", "z_2", "z_3")),
+    "smooth_ball": Law(SMOOTH_BALL, 3, (("moment", "N m"), ("slow", "rad/s"))),
     "warm_up": Law(
         WARM_UP, 1, (("growth", "N s/m"), ("yield_slip", "m"), ("shape", "1"), ("memory", "s")), ("z", "mean_speed")
     ),

@@ -15,13 +15,14 @@ from .law_table import (
     LOAD_FRICTION,
     NODES,
     OSCILLATOR,
+    SMOOTH_BALL,
     SPRING,
     STRIBECK,
     VISCOUS,
     WARM_UP,
 )
 from .laws.backlash import advance_offset, backlash_energy, backlash_force, offset_rate
-from .laws.ball import advance_ball, ball_rate
+from .laws.ball import advance_ball, ball_rate, smooth_share
 from .laws.bouc_wen import advance as bouc_wen_advance
 from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
 from .laws.bouc_wen import friction_force
@@ -50,60 +51,65 @@ def apply_added(rows, s, sd, z, force, port_force):
         row = rows[i]
         if row.law <= VISCOUS:
             continue
-        first, second = _force(row, s, sd, z)
+        first, second, third = _force(row, s, sd, z)
         force[i, 0] = first
         force[i, 1] = second
+        force[i, 2] = third
         port_force[row.port] += first
         if row.port_2 >= 0:
             port_force[row.port_2] += second
-        if row.port_3 >= 0:  # of a ball
-            force[i, 2] = friction_force(row.p[0], z[row.state + 2])
-            port_force[row.port_3] += force[i, 2]
+        if row.port_3 >= 0:
+            port_force[row.port_3] += third
 
 
 @compiled
 def _force(row, s, sd, z):
-    """Force of a row on its port and on its second port [N or N m]."""
+    """Force of a row on its port, its second and its third [N or N m]."""
     p = row.p
     a = row.port
     k = row.state
     law = row.law
     if law == CONSTANT:
-        return p[0], 0.0
+        return p[0], 0.0, 0.0
     if law == STRIBECK:
-        return stribeck_force(p[0], z[k], sd[a], p[3]), 0.0
+        return stribeck_force(p[0], z[k], sd[a], p[3]), 0.0, 0.0
     if law == ASYMMETRIC:
-        return asymmetric_force(p[0], z[k]), 0.0
+        return asymmetric_force(p[0], z[k]), 0.0, 0.0
     if law == WARM_UP:
-        return warm_up_force(p[0], z[k + 1], z[k]), 0.0
+        return warm_up_force(p[0], z[k + 1], z[k]), 0.0, 0.0
     if law == LOAD_FRICTION:
         load = z[row.link] * p[3]
         if p[4] > 0.0:
             load -= z[row.link + 1] * p[4]
-        return load_force(p[0], load, z[k]), load_force(p[0], load, z[k + 1])
+        return load_force(p[0], load, z[k]), load_force(p[0], load, z[k + 1]), 0.0
     if law == BALL:
-        return friction_force(p[0], z[k]), friction_force(p[0], z[k + 1])
+        return friction_force(p[0], z[k]), friction_force(p[0], z[k + 1]), friction_force(p[0], z[k + 2])
+    if law == SMOOTH_BALL:
+        u, v = sd[a], sd[row.port_2]
+        w = sd[row.port_3] if row.port_3 >= 0 else 0.0
+        share = p[0] * smooth_share(u, v, w, p[1])
+        return share * u, share * v, share * w
     if law == BY_POSITION:
-        return p[0] * table_force(s[a], p[1], p[2], p[3 : 3 + NODES]), 0.0
+        return p[0] * table_force(s[a], p[1], p[2], p[3 : 3 + NODES]), 0.0, 0.0
     if law == BY_SPEED:
-        return p[0] * table_force(sd[a], p[1], p[2], p[3 : 3 + NODES]), 0.0
+        return p[0] * table_force(sd[a], p[1], p[2], p[3 : 3 + NODES]), 0.0, 0.0
     if law == BACKLASH:
-        return backlash_force(z[k], p[0], p[1], p[2]), 0.0
+        return backlash_force(z[k], p[0], p[1], p[2]), 0.0, 0.0
     if law == DRAG:
-        return drag_force(sd[a], p[0], p[1]), 0.0
+        return drag_force(sd[a], p[0], p[1]), 0.0, 0.0
     if law == SPRING:
-        return spring_force(s[a], p[0]), 0.0
+        return spring_force(s[a], p[0]), 0.0, 0.0
     if law == END_STOP:
-        return end_stop_force(s[a], p[0], p[1], p[2]), 0.0
+        return end_stop_force(s[a], p[0], p[1], p[2]), 0.0, 0.0
     if law == OSCILLATOR:
         if row.port_2 < 0:
-            return -p[0] * p[4], 0.0
+            return -p[0] * p[4], 0.0, 0.0
         foot = sd[a] + p[3] * sd[row.port_2]
         f = oscillator_force(z[k], z[k + 1] - foot, p[0], p[1], p[2])
-        return f, p[3] * f
+        return f, p[3] * f, 0.0
     if law == GAS_LEAK or law == GAS_HEAT:
-        return strut_force(s[a], p[1], p[2], p[3], p[4]) * pressure_change(gas_log_ratio(row, z)), 0.0
-    return 0.0, 0.0
+        return strut_force(s[a], p[1], p[2], p[3], p[4]) * pressure_change(gas_log_ratio(row, z)), 0.0, 0.0
+    return 0.0, 0.0, 0.0
 
 
 @compiled

@@ -101,7 +101,7 @@ def test_a_gain_is_what_a_refit_with_the_candidate_gains():
     j, c, r = rng.normal(size=(tests, rows, p)), rng.normal(size=(tests, rows, q)), rng.normal(size=(tests, rows))
     place = rng.normal(size=p)
     matrix, side = np.einsum("tni,tnj->tij", j, j), np.einsum("tni,tn->ti", j, r)
-    background = Background(list(j), list(r), [], matrix, side, place, np.ones(p))
+    background = Background(list(j), list(r), [], matrix, side, place, np.zeros(p))
     block = Block(np.einsum("tni,tnj->tij", j, c), np.einsum("tni,tnj->tij", c, c), np.einsum("tni,tn->ti", c, r))
     free, spread = np.full(q, np.inf), np.array([2.0, 0.5])
     one = score(background, block, -free, free, spread)
@@ -137,7 +137,7 @@ def test_setting_an_unknown_free_gains_what_its_prior_costs():
         np.full((1, 1, 1), h),
         np.full((1, 1), g),
         np.full(1, x0),
-        np.ones(1),
+        np.zeros(1),
     )
     free = np.full(1, np.inf)
     one = score(background, block_of(background, 0), -free, free, np.full(1, 1e6))
@@ -151,7 +151,7 @@ def test_what_is_at_its_bound_does_not_explain_what_a_candidate_does():
     h, g = 3.0, 40.0
     own = [np.full((1, 1), np.sqrt(h))], [np.zeros(1)], [], np.full((1, 1, 1), h), np.full((1, 1), g), np.full(1, 3.5)
     free = np.full(1, np.inf)
-    held, moving = (Background(*own, np.full(1, x)) for x in (0.0, 1.0))
+    held, moving = (Background(*own, np.full(1, x)) for x in (-1.0, 0.0))
     one, other = (score(b, block_of(b, 0), -free, free, np.full(1, 1e6)) for b in (held, moving))
     assert one.gain == pytest.approx(0.5 * g**2 / h, rel=1e-9)
     assert one.change[0] == 0.0
@@ -182,7 +182,7 @@ def test_friction_of_another_form_is_noise_and_a_background(machine):
 
 def test_amplitudes_stay_within_their_bounds():
     background = Background(
-        [np.zeros((1, 1))], [np.zeros(1)], [], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.ones(1)
+        [np.zeros((1, 1))], [np.zeros(1)], [], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1)
     )
     block = Block(np.zeros((1, 1, 1)), np.ones((1, 1, 1)), np.array([[4.0]]))
     one = score(background, block, np.array([-1.0]), np.array([1.0]), np.full(1, 1e6))

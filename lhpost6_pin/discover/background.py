@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 def make_background(problem: Problem, normal: Normal, x: Array, numbers: Parameters) -> Background:
     """Background from the normal equations at the solution x (p,); `normal` is corrected for noise.
 
-    What is at its bound there, as `numbers` of the fit set it, stays: beyond it something else is wrong.
+    What is at its bound there, as `numbers` of the fit set it, goes no further: beyond it something else is wrong.
     """
     prior = problem.prior
     slope, rest, root, matrix, side = [], [], [], [], []
@@ -30,5 +30,5 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
         side.append(right * prior)
     low, high = bounds_of(problem, numbers)
     near = 1e-3 * prior
-    free = ((x > low + near) & (x < high - near)).astype(float)
-    return Background(slope, rest, root, np.array(matrix), np.array(side), x / prior, free)
+    inward = (x <= low + near).astype(float) - (x >= high - near)
+    return Background(slope, rest, root, np.array(matrix), np.array(side), x / prior, inward)

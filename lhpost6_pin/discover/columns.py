@@ -70,8 +70,8 @@ def _by_force(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> 
         machine = candidate.on(machine, (size,))
     plant = make_plant(machine)
     found: Columns = []
-    for test in base.tests:
-        path = follow(plant, test)
+    for test, there in zip(base.tests, base.paths, strict=True):
+        path = follow(plant, test, (base.plant, there))
         z = path.z if test.actuator_force is None else with_loads(plant, path.z, test.actuator_force)
         wrench = effect_wrenches(States(plant, test.dt * np.arange(test.samples, dtype=float), *path.motion, z))[
             :, known:

@@ -13,6 +13,7 @@ from ..calibration.knobs import plan_knobs, scatter_knobs
 from ..calibration.normal import Normal
 from ..calibration.prepare import prepare_problem
 from ..campaign import Campaign
+from ..control import load_controller
 from ..errors import RecordError, UnknownNameError
 from ..files import models_folder
 from ..machine import Machine
@@ -23,6 +24,7 @@ from ..residuals import RESIDUALS
 from ..sensors import Sensors
 from .candidates import with_background, with_other_form, with_warm_oil
 from .left import Left, what_is_left, with_unnamed
+from .next_test import NextTest, next_tests
 from .proof import Proof, prove
 from .search import Search, fitted_machine, search
 from .sensing import put_right, wrong_sensors
@@ -46,6 +48,7 @@ class Discovery:
     search: Search
     left: tuple[Left, ...]
     proof: Proof | None  # None where no test was held out
+    next_tests: tuple[NextTest, ...]  # where names cannot be told apart: tests that may, simulated
     numbers: Parameters
     seed: int
     hashes: dict[str, str]  # of the records that were read, by test
@@ -89,11 +92,16 @@ def discover(
     whole, forms = with_background(machine, numbers.number("scatter.spread"))
     ready = ready.with_machine(whole, (*knobs, *twins, *forms))
     report(0.1)
-    problem = ready.problem
-    first = Normal(problem, np.zeros(len(problem.prior)), between(report, 0.1, 0.2))
-    held = _held_out(first, names, hold_out)
+    held = _asked_for(names, hold_out)
     used = [i for i in range(len(names)) if i not in held]
-    found, standing = search(ready.only(used), first.only(used), calibration, numbers, between(report, 0.2, 0.75))
+    ready = ready.only(used)
+    first = Normal(ready.problem, np.zeros(len(ready.problem.prior)), between(report, 0.1, 0.2))
+    if hold_out is None and len(used) > FEWEST:
+        least = _tells_least(first)
+        held = [used.pop(least)]
+        rest = [i for i in range(len(names)) if i != least]
+        ready, first = ready.only(rest), first.only(rest)
+    found, standing = search(ready, first, calibration, numbers, between(report, 0.2, 0.75))
     left: tuple[Left, ...] = ()
     if found.misfit("wrench") > numbers.number("left.noise"):
         left = what_is_left(found.problem, standing.base, standing.background, numbers)
@@ -115,6 +123,7 @@ def discover(
         search=found,
         left=left,
         proof=proof,
+        next_tests=next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers),
         numbers=numbers,
         seed=seed,
         hashes={name: _hash(record) for name, record in zip(names, campaign.records, strict=True)},
@@ -127,19 +136,15 @@ def _others(machine: Machine, numbers: Parameters) -> tuple[Machine, ...]:
     return with_other_form(machine, form), with_warm_oil(machine, drift)
 
 
-def _held_out(first: Normal, names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
-    """Places of the tests to hold out."""
-    if wanted is not None:
-        for name in wanted:
-            if name not in names:
-                raise UnknownNameError("test of the campaign", name, list(names))
-        held = [i for i, name in enumerate(names) if name in wanted]
-        if len(held) == len(names):
-            raise RecordError("all tests are held out: leave at least one to search")
-        return held
-    if len(names) <= FEWEST:
-        return []
-    return [_tells_least(first)]
+def _asked_for(names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
+    """Places of the tests that are to be held out."""
+    for name in wanted or ():
+        if name not in names:
+            raise UnknownNameError("test of the campaign", name, list(names))
+    held = [i for i, name in enumerate(names) if name in (wanted or ())]
+    if len(held) == len(names):
+        raise RecordError("all tests are held out: leave at least one to search")
+    return held
 
 
 def _tells_least(first: Normal) -> int:

@@ -72,6 +72,5 @@ def _where(problem: Problem, knob: Knob) -> tuple[str, ...]:
 
 def block_of(background: Background, place: int) -> Block:
     """Block of one unknown of the background, once more: without its prior."""
-    matrix = background.matrix[:, :, place : place + 1]
-    cross = matrix * background.free[:, None]
-    return Block(cross, matrix[:, place : place + 1], background.side[:, place : place + 1])
+    cross = background.matrix[:, :, place : place + 1]
+    return Block(cross, cross[:, place : place + 1], background.side[:, place : place + 1])

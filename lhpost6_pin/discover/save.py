@@ -24,7 +24,7 @@ def save_verdict(found: Discovery, path: Path) -> Path:
 
 def verdict_entries(found: Discovery) -> dict[str, Any]:
     """The verdict as plain entries."""
-    verdict = found.verdict
+    verdict, apart = found.verdict, found.numbers.number("accept.apart")
     closure: dict[str, Any] = {}
     for gap in found.proof.gaps if found.proof else ():
         entry = {key: round(value, 4) for key, value in asdict(gap).items() if key not in ("phase", "test")}
@@ -42,7 +42,11 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "ambiguity": [[one.family, *one.rivals] for one in verdict.effects if one.rivals],
         "unexplained": None if verdict.word != "unexplained" else _left(found),
         "not_testable": list(verdict.untestable),
-        "next_test": next_tests(found),
+        "next_test": [
+            {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.margin >= apart}
+            for n in found.next_tests
+        ],
+        "advice": advice(found),
         "campaign": found.campaign,
         "machine": found.machine.name,
         "tests": list(found.used),
@@ -53,7 +57,11 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
     }
 
 
-def next_tests(found: Discovery) -> list[str]:
+def _finite(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 1)
+
+
+def advice(found: Discovery) -> list[str]:
     """Tests that would tell rivals apart, in words of the library."""
     rivals = [name for one in found.verdict.effects if one.rivals for name in (one.family, *one.rivals)]
     return [f"{name}: {find_family(name).tell_apart}" for name in dict.fromkeys(rivals)]
@@ -76,9 +84,11 @@ def _interval(value: Estimate) -> dict[str, Any]:
 
 def _left(found: Discovery) -> dict[str, Any] | None:
     left = found.verdict.left
+    nearest = {"nearest": list(found.verdict.nearest)}
     if left is None:
-        return {"where": "no single leg", "depends_on": "not known"}
+        return {"where": "no single leg", "depends_on": "not known", **nearest}
     return {
+        **nearest,
         "component": left.component,
         "depends_on": left.state,
         "gain": left.gain,

@@ -46,11 +46,16 @@ class Background:
     matrix: Array  # (t, p, p)
     side: Array  # (t, p)
     place: Array  # (p,) where the background stands, in units of the priors
-    free: Array  # (p,) one, or zero for what is at its bound and stays there
+    inward: Array  # (p,) zero; at its lowest +1, at its highest -1: what may move that way alone
+
+    @property
+    def free(self) -> Array:
+        """One, or zero for what is at a bound (p,)."""
+        return (self.inward == 0.0).astype(float)
 
     @cached_property
     def factors(self) -> list[tuple[tuple[Array, bool], Array]]:
-        """Cholesky factor and right side with the priors: of all tests, then of all but each."""
+        """Cholesky factor and right side with the priors of what is free: of all tests, then of all but each."""
         found, both = [], np.outer(self.free, self.free)
         for without in range(-1, len(self.matrix)):
             keep = np.arange(len(self.matrix)) != without
@@ -77,7 +82,7 @@ def make_block(background: Background, columns: Sequence[Complex]) -> Block:
     cross, own, side = [], [], []
     for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
         c = real_bins(column, root)
-        cross.append((slope * background.free).T @ c)
+        cross.append(slope.T @ c)
         own.append(c.T @ c)
         side.append(c.T @ rest)
     return Block(np.array(cross), np.array(own), np.array(side))
@@ -103,48 +108,80 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
     alone excites costs little there; what tests contradict, much.
     """
     whole = _profile(background, block, spread, -1)
-    amplitude = whole.best(low, high)
+    theta = whole.best(low, high)
     held_out = []
     for t in range(len(block.own)):
         others = _profile(background, block, spread, t)
         narrowed = 0.5 * (whole.information - others.information)
-        held_out.append(whole.gain(amplitude) - others.gain(others.best(low, high)) - narrowed)
-    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur, hermitian=True)), 0.0))
-    return Score(whole.gain(amplitude), amplitude, sd, np.array(held_out), whole.change(amplitude))
+        held_out.append(whole.gain(theta) - others.gain(others.best(low, high)) - narrowed)
+    count = len(low)
+    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:count, :count], hermitian=True)), 0.0))
+    return Score(whole.gain(theta), theta[:count], sd, np.array(held_out), whole.change(theta))
 
 
 class _Profile(NamedTuple):
-    """Log-likelihood by a candidate's amplitudes alone, the background refitted for each."""
+    """Log-likelihood by a candidate's amplitudes and what is at a bound, theta (q + f,), the rest refitted for each."""
 
-    schur: Array  # (q, q), priors in it
-    side: Array  # (q,)
+    schur: Array  # (q + f, q + f), priors in it
+    side: Array  # (q + f,)
     factor: tuple[Array, bool]  # of the background
     right: Array  # (p,)
-    cross: Array  # (p, q)
+    cross: Array  # (p, q + f)
+    inward: Array  # (p,)
 
     def best(self, low: Array, high: Array) -> Array:
-        """The amplitudes (q,) that gain most, each kept within its bounds."""
-        return np.clip(-np.linalg.pinv(self.schur, rcond=1e-10, hermitian=True) @ self.side, low, high)
+        """What gains most: amplitudes between low and high (q,), and what is at a bound moved inward or not at all."""
+        count = len(low)
+        way = self.inward[self.inward != 0.0]
+        moves = np.zeros(len(way), bool)
+        theta = np.zeros(len(self.side))
+        for _ in range(1 + len(way)):
+            some = np.concatenate([np.ones(count, bool), moves])
+            inverse = np.linalg.pinv(self.schur[np.ix_(some, some)], rcond=1e-10, hermitian=True)
+            theta[:] = 0.0
+            theta[some] = -inverse @ self.side[some]
+            theta[:count] = np.clip(theta[:count], low, high)
+            slope = (self.side + self.schur @ theta)[count:]
+            leaves = moves & (theta[count:] * way < 0.0)
+            enters = ~moves & (slope * way < 0.0)
+            if leaves.any():
+                moves &= ~leaves
+            elif enters.any():
+                moves[np.argmin(np.where(enters, slope * way, 0.0))] = True
+            else:
+                break
+        theta[count:] = np.where(theta[count:] * way > 0.0, theta[count:], 0.0)
+        return theta
 
     def gain(self, theta: Array) -> float:
-        """What amplitudes theta (q,) gain over none."""
+        """What theta gains over none."""
         return -float(0.5 * theta @ self.schur @ theta + self.side @ theta)
 
     @property
     def information(self) -> float:
         """Logarithm of the determinant of the amplitudes' normal matrix."""
-        return float(np.linalg.slogdet(self.schur)[1])
+        count = len(self.side) - int(np.count_nonzero(self.inward))
+        return float(np.linalg.slogdet(self.schur[:count, :count])[1])
 
     def change(self, theta: Array) -> Array:
-        """By how much the background moves (p,) for amplitudes theta (q,)."""
-        return np.asarray(-cho_solve(self.factor, self.right + self.cross @ theta))
+        """By how much the background moves (p,) with theta."""
+        moved = -cho_solve(self.factor, self.right + self.cross @ theta)
+        bound = self.inward != 0.0
+        moved[bound] = theta[len(theta) - np.count_nonzero(bound) :]
+        return np.asarray(moved)
 
 
 def _profile(background: Background, block: Block, spread: Array, without: int) -> _Profile:
     """Profile of all tests but one, or of all (-1)."""
     keep = np.arange(len(block.own)) != without
     factor, right = background.factors[without + 1]
-    cross, own, side = block.cross[keep].sum(axis=0), block.own[keep].sum(axis=0), block.side[keep].sum(axis=0)
+    bound = background.inward != 0.0
+    candidate, matrix = block.cross[keep].sum(axis=0), background.matrix[keep].sum(axis=0)[:, bound]
+    cross = np.hstack([candidate, matrix])
+    own = np.block([[block.own[keep].sum(axis=0), candidate[bound].T], [candidate[bound], matrix[bound]]])
+    held = background.side[keep].sum(axis=0)[bound] + background.place[bound]
+    side = np.concatenate([block.side[keep].sum(axis=0), held])
+    cross *= background.free[:, None]
     through = cho_solve(factor, cross)
-    schur = own - cross.T @ through + np.diag(spread**-2.0)
-    return _Profile(schur, side - through.T @ right, factor, right, cross)
+    schur = own - cross.T @ through + np.diag(np.concatenate([spread**-2.0, np.ones(len(held))]))
+    return _Profile(schur, side - through.T @ right, factor, right, cross, background.inward)

@@ -42,7 +42,7 @@ class Scored:
     candidate: Candidate
     score: Score
     gain: float  # of log-likelihood, with what is left weighed anew; without that where the linear gain is too little
-    closure: float  # share of what is more than noise
+    closure: float  # share of what is more than noise where it explains most
     refused: str  # why it is not added; empty if it may be
 
 
@@ -52,6 +52,7 @@ class Contest:
 
     candidate: Candidate
     behind: float  # log-likelihood; 0 for the one added, below that for one that is less simple
+    machine: Machine  # with it, all numbers as fitted
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,11 @@ class Added:
     """An effect that the search has added."""
 
     candidate: Candidate
-    gain: float  # as of all candidates at that time
+    gain: float  # of log-likelihood and log-prior, of the joint fit
     tried: int  # candidates in that round
     contest: tuple[Contest, ...]
+    fall: Array  # (c,) of the squares of what is left, by column
+    apart: float  # log-likelihood within which two families explained the campaign alike
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class Round:
         """The best candidate of each family, by falling gain."""
         found: dict[str, Scored] = {}
         for one in self.scored:
-            found.setdefault(one.candidate.family.name, one)
+            found.setdefault(one.candidate.family.named, one)
         return found
 
 
@@ -155,13 +158,18 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
     rest = found.solution.normal.rest
     left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
+    known = {(a.candidate.components, a.candidate.family.shows_in): a.gain for a in found.added}
     weigh = Weighing(problem, background, squares_by_column(found.refit.normal.rest), numbers)
 
     def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
         less = Lowered(one.gain, 0.0, 0.0, 0.0)
         if one.gain >= numbers.number("accept.look"):
             less = weigh.lowered(explained(), one)
-        return Scored(candidate, one, less.gain, less.share, _refusal(one, less, numbers))
+        why = _refusal(one, less, numbers)
+        before = known.get((candidate.components, candidate.family.shows_in), 0.0)
+        if not why and less.gain < numbers.number("accept.again") * before:
+            why = "may be the form of what was found there"
+        return Scored(candidate, one, less.gain, less.share, why)
 
     def of_group(group: Sequence[Candidate]) -> list[Scored]:
         columns, parts = columns_of(problem, base, group)
@@ -200,7 +208,7 @@ class Lowered(NamedTuple):
 
     gain: float  # of log-likelihood and log-prior
     beyond: float  # of log-likelihood, by what even `doubt` times the stated noise would not have
-    share: float  # of what is so far beyond noise
+    share: float  # of what is so far beyond noise in the column where it explains most of that
     of_first: float  # in the column where this is most: of the squares that were there before any effect was added
 
 
@@ -213,25 +221,25 @@ class Weighing:
         self.doubt, self.least = numbers.number("accept.doubt"), 0.5 * numbers.number("accept.gain")
         self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
 
-    def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float, Array, float]:
-        """Negative log-likelihood (c,), that of the prior, squares (c,) and log-likelihood of what is no noise."""
-        b, total = self.background, np.zeros((2, self.first.size))
-        beyond = 0.0
+    def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float]:
+        """Negative log-likelihood, squares, and log-likelihood of what is no noise (3, c); that of the prior."""
+        b, total = self.background, np.zeros((3, self.first.size))
         for slope, rest, root, more, f in zip(b.slope, b.rest, b.root, explained, self.problem.frequency, strict=True):
             left = (rest + slope @ change + more) ** 2
             squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
             means, counts = mean_squares(self.problem.whitener, squares, f)
-            total += surprise(means, counts), squares.sum(axis=0)
-            beyond += float(np.sum(counts @ np.log(np.maximum(means / self.doubt, 1.0))))
-        return total[0], 0.5 * float(np.sum((b.place + change) ** 2)), total[1], beyond
+            beyond = counts @ np.log(np.maximum(means / self.doubt, 1.0))
+            total += surprise(means, counts), squares.sum(axis=0), beyond
+        return total, 0.5 * float(np.sum((b.place + change) ** 2))
 
     def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
         """How a candidate lowers what is left, explained (n,) of every test."""
-        (old, prior, squares, beyond), (new, after, less, then) = self.before, self._left(one.change, explained)
-        gain = float((old - new).sum()) + prior - after
-        clear = old - new > self.least
-        of_first = float(np.max((squares - less)[clear] / self.first[clear], initial=0.0))
-        return Lowered(gain, beyond - then, (beyond - then) / max(beyond, 1e-9), of_first)
+        (before, prior), (after, then) = self.before, self._left(one.change, explained)
+        fall, squares, beyond = before - after
+        most = int(np.argmax(beyond))
+        of_first = float(np.max(squares[fall > self.least] / self.first[fall > self.least], initial=0.0))
+        share = float(beyond[most] / max(before[2, most], 1e-9))
+        return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
 
 
 def squares_by_column(rest: Sequence[NDArray[np.complex128]]) -> Array:
@@ -285,15 +293,30 @@ def _add(
 ) -> Search | None:
     """Add the best candidate: the first of each family that comes near it is fitted in full, with its shapes.
 
-    Of those that explain the campaign alike the simplest counts. None if none of them lowers what is left when it is
-    fitted in full.
+    Of those that explain the campaign alike the simplest counts. Where none of them lowers what is left when it is
+    fitted in full, those next in gain are tried; None if none of these does either.
     """
-    near = numbers.number("accept.near") * passed[0].gain
     firsts: dict[str, Scored] = {}
     for one in passed:
-        if one.gain >= near:
-            firsts.setdefault(one.candidate.family.name, one)
-    rivals = list(firsts.values())[: int(numbers.number("accept.rivals"))]
+        firsts.setdefault(one.candidate.family.name, one)
+    waiting = list(firsts.values())
+    most, batches = int(numbers.number("accept.rivals")), int(numbers.number("accept.batches"))
+    for batch in range(batches):
+        near = numbers.number("accept.near") * waiting[0].gain if waiting else 0.0
+        rivals = [one for one in waiting if one.gain >= near][:most]
+        if not rivals:
+            return None
+        waiting = [one for one in waiting if one not in rivals]
+        part = between(progress, batch / batches, (batch + 1) / batches)
+        if (best := _best_of(found, rivals, calibration, numbers, part)) is not None:
+            return best
+    return None
+
+
+def _best_of(
+    found: Search, rivals: Sequence[Scored], calibration: Parameters, numbers: Parameters, progress: Progress
+) -> Search | None:
+    """The search with the best of these candidates, all fitted in full; None if none lowers what is left."""
     fitted = []
     for i, rival in enumerate(rivals):
         share = between(progress, i / len(rivals), (i + 1) / len(rivals))
@@ -302,11 +325,15 @@ def _add(
     least = min(left)
     if before - least < numbers.number("accept.gain"):
         return None
-    alike = [i for i in range(len(left)) if left[i] - least < numbers.number("accept.apart")]
+    # laws are never quite those of the table: of large gains a share decides nothing
+    apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - least))
+    alike = [i for i in range(len(left)) if left[i] - least < apart]
     best = min(alike, key=lambda i: (len(rivals[i].candidate.family.shapes), left[i]))  # the simplest of them
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
-    contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best])) for i in order)
-    added = Added(rivals[best].candidate, rivals[best].gain, len(found.rounds[-1].scored), contest)
+    contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i])) for i in order)
+    first, last = (squares_by_column(one.rest) for one in (found, fitted[best]))
+    tried = len(found.rounds[-1].scored)
+    added = Added(rivals[best].candidate, before - left[best], tried, contest, first - last, apart)
     fitted[best].added.append(added)
     return fitted[best]
 

@@ -14,7 +14,9 @@ import xarray as xr
 from ..consistency import SensorFinding, check_sensors
 from ..names import AXES
 from ..plant import Plant
+from ..records import sample_interval
 from ..sensors import GROUPS, Sensors
+from ..signals import align
 
 __all__ = ["Fault", "put_right", "wrong_sensors"]
 
@@ -51,8 +53,11 @@ class Fault:
 def wrong_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors) -> tuple[Fault, ...]:
     """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does."""
     findings = check_sensors(plant, records, sensors)
+    late = _late(findings, sensors)
+    if late:  # a large delay looks like a gain as well
+        findings = check_sensors(plant, [_on_time(r, late) for r in records], sensors)
     faults = [_fault(f, sensors) for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
-    return (*(f for f in faults if f is not None), *_late(findings, sensors))
+    return (*(f for f in faults if f is not None), *late)
 
 
 def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
@@ -82,6 +87,13 @@ def _late(findings: Sequence[SensorFinding], sensors: Sensors) -> list[Fault]:
             stated = sensors.delay_range.get(next((g for g in GROUPS if channel in GROUPS[g]), channel), 0.0)
             faults.append(Fault("delay", channel, "", middle.estimate - middle.expected, "s", deviation, stated))
     return faults
+
+
+def _on_time(record: xr.Dataset, late: Sequence[Fault]) -> xr.Dataset:
+    """The record with late channels moved forward."""
+    dt = sample_interval(record)
+    moved = {f.channel: align(record[f.channel].values, f.value, dt) for f in late if f.channel in record}
+    return record.assign({name: record[name].copy(data=values) for name, values in moved.items()})
 
 
 def put_right(records: Sequence[xr.Dataset], faults: Sequence[Fault]) -> list[xr.Dataset]:

@@ -15,7 +15,7 @@ from scipy.stats import chi2, norm
 from ..calibration.problem import Problem
 from ..parameters import Parameters
 from .left import Left
-from .search import Added, Search, excess_by_kind
+from .search import Added, Search, excess_by_kind, squares_by_column
 from .sensing import Fault
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
@@ -66,6 +66,7 @@ class Verdict:
     sensors: tuple[SensorFinding, ...]
     left: Left | None  # what has no name
     untestable: tuple[str, ...]  # families that this campaign could not show, of typical size
+    nearest: tuple[str, ...] = ()  # families in the model that come nearest to what has no name
 
 
 def judge(
@@ -93,14 +94,15 @@ def judge(
         return Estimate(knob.at(float(x[i])), knob.unit, low, high)
 
     released = tuple(
-        SensorFinding(u.name, c.family.name, estimate(i), float(np.sqrt(3.0) * u.sd))
+        SensorFinding(u.name, c.family.named, estimate(i), float(np.sqrt(3.0) * u.sd))
         for i, u in enumerate(problem.unknowns, start=count)
         for c in added
         if c.release == u.name
     )
     errors = {s.name for s in released}
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
-    effects = [_of_added(one, problem, estimate, numbers) for one in found.added if one.candidate.name not in errors]
+    kept = [one for one in found.added if one.candidate.name not in errors]
+    effects = [_of_added(one, problem, estimate) for one in kept]
     changed = {}
     for i, knob in enumerate(problem.knobs):
         sure = abs(x[i]) > calibration.number("report.deviations") * sd[i]
@@ -108,11 +110,14 @@ def judge(
         if sure and material and not own[i] and knob.name not in problem.free:
             changed[knob.name] = estimate(i)
     free = _first(left, numbers)
-    unnamed = free is not None or _more_than_noise(found, numbers)
+    doubted = {one.candidate.name for one in kept if _leaves_much(one, found, numbers)}
+    unnamed = free is not None or bool(doubted) or _more_than_noise(found, numbers)
+    nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
+    effects = [e for e, one in zip(effects, kept, strict=True) if one.candidate.name not in doubted]
     hidden, told = _untestable(found, numbers)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + told)
     word = _word(effects, changed, sensors, unnamed, blind)
-    return Verdict(word, _merged(effects), changed, sensors, free, hidden)
+    return Verdict(word, _merged(effects), changed, sensors, free, hidden, nearest)
 
 
 def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], int]:
@@ -120,24 +125,24 @@ def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], in
     clear: dict[str, bool] = {}
     for one in found.rounds[-1].scored:
         if not one.candidate.release:
-            shape, name = one.candidate.amplitudes[0], one.candidate.family.name
+            shape, name = one.candidate.amplitudes[0], one.candidate.family.named
             told = bool(one.score.sd[0] * numbers.number("verdict.clear") < shape.typical)
             clear[name] = clear.get(name, False) or told
     hidden = tuple(name for name, told in clear.items() if not told)
     return hidden, len(clear) - len(hidden)
 
 
-def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate], numbers: Parameters) -> Finding:
+def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate]) -> Finding:
     candidate = added.candidate
     values = {}
     for i, name in enumerate(problem.names):
         if name == candidate.release or name.startswith(f"{candidate.name}."):
             values[name.removeprefix(f"{candidate.name}.")] = estimate(i)
     chance = float(chi2.sf(2.0 * added.gain, len(values)))
-    apart = numbers.number("accept.apart")
-    rivals = tuple(c.candidate.family.name for c in added.contest[1:] if c.behind < apart)
+    others = (c.candidate.family.named for c in added.contest[1:] if c.behind < added.apart)
+    rivals = tuple(dict.fromkeys(name for name in others if name != candidate.family.named))
     return Finding(
-        candidate.family.name, candidate.components, values, added.gain, min(1.0, chance * added.tried), rivals
+        candidate.family.named, candidate.components, values, added.gain, min(1.0, chance * added.tried), rivals
     )
 
 
@@ -169,6 +174,16 @@ def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     first = excess_by_kind(found.problem, found.refit.normal.rest)
     last = excess_by_kind(found.problem, found.rest)
     return any(found.misfit(kind) > limit and excess > rest * first[kind] for kind, excess in last.items())
+
+
+def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:
+    """Whether much is left of what an effect should have explained, where it explained most of it: a wrong name."""
+    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
+    where = added.fall > 0.1 * added.fall.max()
+    left = squares_by_column(found.rest)[where]
+    bins = sum(len(r) for r in found.rest)
+    excess = left.sum() - bins * left.size
+    return bool(left.sum() > limit * bins * left.size and excess > rest * added.fall[where].sum())
 
 
 def _first(left: Sequence[Left], numbers: Parameters) -> Left | None:

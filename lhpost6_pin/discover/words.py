@@ -25,7 +25,8 @@ def said(found: Discovery) -> str:
         return f"{effects}; the campaign cannot tell {rivals}."
     left = verdict.left
     place = "more than noise is left" if left is None else f"something acts on {left.component}, by its {left.state}"
-    return f"{effects + '; beyond that ' if effects else ''}{place}, and the library has no name for it."
+    near = f" Nearest comes {' and '.join(map(title_of, verdict.nearest))}." if verdict.nearest else ""
+    return f"{effects + '; beyond that ' if effects else ''}{place}, and the library has no name for it.{near}"
 
 
 def title_of(family: str) -> str:

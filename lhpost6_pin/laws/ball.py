@@ -1,10 +1,12 @@
-"""Friction of a ball joint: Bouc-Wen hysteresis that is the same about every axis.
+"""Friction of a ball joint, the same about every axis: Bouc-Wen hysteresis, or smoothed by speed.
 
 Y dZ/dt = w - H Z,  H = tau w.Z + (1 - tau) |w.Z|,  m = -T Z
 
 w [rad/s] relative turn, Y [rad] yield turn, tau [1] loop shape, Z [1] hysteretic state with |Z| <= 1, T [N m] sliding
 moment. About one axis this is the seal law (Eq. 4-18). Where all slides Z lies along w and m is Coulomb's moment.
-All work counts as dissipated, as in `bouc_wen`.
+All work counts as dissipated, as in `bouc_wen`. Smoothed by speed, as films are and many simulators have it:
+
+m = -T w / sqrt(w.w + w_0^2),  w_0 [rad/s] the speed at which it slides
 """
 
 import math
@@ -12,7 +14,7 @@ import math
 from ..compiled import compiled
 from .bouc_wen import advance as bouc_wen_advance
 
-__all__ = ["advance_ball", "ball_rate"]
+__all__ = ["advance_ball", "ball_rate", "smooth_share"]
 
 
 @compiled
@@ -23,6 +25,12 @@ def ball_rate(
     along = w_1 * z_1 + w_2 * z_2 + w_3 * z_3
     h = shape * along + (1.0 - shape) * abs(along)
     return (w_1 - h * z_1) / yield_turn, (w_2 - h * z_2) / yield_turn, (w_3 - h * z_3) / yield_turn
+
+
+@compiled
+def smooth_share(w_1: float, w_2: float, w_3: float, slow: float) -> float:
+    """Moment over sliding moment and turn w [s/rad]; w, slow [rad/s]."""
+    return -1.0 / math.sqrt(w_1 * w_1 + w_2 * w_2 + w_3 * w_3 + slow * slow)
 
 
 @compiled

@@ -46,6 +46,7 @@ class Family:
     confused_with: tuple[str, ...]
     tell_apart: str
     twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
+    named: str  # the family that it is a form of; usually itself
     search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
 
     def components(self, machine: "Machine") -> tuple[str, ...]:
@@ -121,5 +122,6 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         confused_with=tuple(table["confused_with"]),
         tell_apart=table["tell_apart"],
         twins=table.get("twins", "kind"),
+        named=table.get("named", name),
         search=table.get("search", "named"),
     )

@@ -66,10 +66,19 @@ def _bearing(machine: "Machine", components: Sequence[str], values: Values) -> A
 
 
 def _swivel(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    shapes = [c.seal_shape for c in _each(machine, components) for _ in range(2)]
+    return "ball", _swivel_ends(components), [(values["moment"], values["yield_turn"], shape) for shape in shapes]
+
+
+def _smooth_swivel(machine: "Machine", components: Sequence[str], values: Values) -> Any:
+    ports = _swivel_ends(components)
+    return "smooth_ball", ports, [(values["moment"], values["slow"])] * len(ports)
+
+
+def _swivel_ends(components: Sequence[str]) -> list[str]:
+    """Ports of both ends of each: the rod's turn in the base, then the platen's in the rod."""
     ends = (SWIVEL_TURNS[:2], SWIVEL_TURNS[2:])
-    ports = [" ".join(f"{c}.{turn}" for turn in end) for c in components for end in ends]
-    shapes = [c.seal_shape for c in _each(machine, components) for _ in ends]
-    return "ball", ports, [(values["moment"], values["yield_turn"], shape) for shape in shapes]
+    return [" ".join(f"{c}.{turn}" for turn in end) for c in components for end in ends]
 
 
 def _presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
@@ -115,6 +124,7 @@ BUILD = {
     "strut_friction": _strut,
     "bearing_friction": _bearing,
     "swivel_friction": _swivel,
+    "smooth_swivel_friction": _smooth_swivel,
     "presliding": _presliding,
     "bearing_presliding": _bearing_presliding,
     "local_viscous": _viscous,

@@ -95,7 +95,7 @@ def gain_figure(one: Round, number: int, least: float) -> Figure:
     """Return the best candidate of each family in one round: what it gains, and what is refused."""
     best = list(one.best.values())
     shown = [s for s in best if s.gain > 1.0][:SHOWN] or best[:3]
-    names = [f"{s.candidate.family.name}, {where(s.candidate.components)}" for s in shown]
+    names = [f"{s.candidate.family.named}, {where(s.candidate.components)}" for s in shown]
     traces = []
     for words, color, keep in (("may be added", BLUE, True), ("refused", "#6e7781", False)):
         some = [i for i, s in enumerate(shown) if (not s.refused) == keep]

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 from ..discover import Discovery
-from ..discover.save import next_tests
+from ..discover.save import advice
 from ..discover.words import said, title_of, where
 from ..library import find_family
 from .control_blocks import load_of
@@ -92,13 +92,40 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
                 f"all candidates, {one.p_value:.1g}. Often confused with: {confused}."
             )
         )
-    if lines := next_tests(found):
+    if lines := advice(found):
         blocks += [paragraph("The campaign cannot tell these apart. What would:"), bullet_list(lines)]
+    if found.next_tests:
+        blocks.append(_next_tests(found))
     if verdict.left is not None:
         blocks.append(figure(left_figure(verdict.left)))
     elif verdict.word == "unexplained":
         blocks.append(paragraph("More than noise is left, and no single leg's position or speed explains it."))
+    if verdict.nearest:
+        near = " and ".join(map(title_of, verdict.nearest))
+        blocks.append(
+            paragraph(f"Of the library, {near} comes nearest, but leaves too much to be its name; model.toml has it.")
+        )
     return blocks
+
+
+def _next_tests(found: Discovery) -> Markup:
+    """Tests simulated with the one effect and explained by the other."""
+    apart = found.numbers.number("accept.apart")
+    rows = [
+        (
+            one.test,
+            " or ".join(map(title_of, one.families)),
+            _margin(one.margin),
+            "yes" if one.margin >= apart else "no",
+        )
+        for one in found.next_tests
+    ]
+    header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood between them", "Tells them apart")
+    return table("Next tests, simulated", header, rows)
+
+
+def _margin(value: float) -> str:
+    return "cannot be run" if math.isnan(value) else number(value)
 
 
 def _proof_blocks(found: Discovery) -> list[Markup]:

@@ -1,0 +1,53 @@
+"""What has no name: its formula in few words, and its effect in the machine, switched off."""
+
+import numpy as np
+import pytest
+
+from lhpost6_pin.discover.formula import sparse_formula
+from lhpost6_pin.discover.left import Left, with_unnamed
+from lhpost6_pin.law_table import NODES
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.machine_toml import save_machine_toml
+
+X = np.linspace(-0.2, 0.3, NODES)
+
+
+def noisy(values: np.ndarray, sd: float = 200.0) -> np.ndarray:
+    """Values with noise of that deviation."""
+    return values + sd * np.random.default_rng(4).standard_normal(len(values))
+
+
+@pytest.mark.parametrize(
+    ("values", "forms"),
+    [
+        (5e4 * X, ["(x / 0.3 m)"]),
+        (8e3 * np.sign(X), ["sgn x"]),
+        (9e3 * np.sin(2 * np.pi * X / 0.125), ["sin(2 pi x / 0.125 m)", "cos(2 pi x / 0.125 m)"]),
+    ],
+)
+def test_a_simple_form_is_recognised_with_its_size(values: np.ndarray, forms: list[str]) -> None:
+    found = sparse_formula(X, noisy(values), np.full(NODES, 200.0), "m")
+    assert [label for _, label in found.terms][: len(forms)] == forms
+    assert found.share > 0.98  # the rest is noise of a fortieth of the size
+    largest = max(abs(size) for size, _ in found.terms)
+    # of the value at the largest x; noise of 200 N in 24 values
+    assert largest == pytest.approx(np.abs(values).max(), rel=0.1)
+
+
+def test_noise_has_no_formula_to_speak_of() -> None:
+    found = sparse_formula(X, noisy(np.zeros(NODES)), np.full(NODES, 200.0), "m")
+    assert len(found.terms) <= 2
+
+
+@pytest.mark.parametrize("state", ["position", "velocity"])
+def test_a_function_without_a_name_goes_into_the_machine_switched_off(state, tmp_path) -> None:
+    left = Left("H3", state, X, 1e3 * np.arange(NODES), np.full(NODES, 10.0), 500.0, np.full(3, 100.0))
+    machine = with_unnamed(load_machine(), left)
+    (effect,) = machine.added_effects
+    assert effect.params[0][0] == 0.0
+    (name,) = machine.parameters.effects
+    on = load_machine(save_machine_toml(machine, tmp_path / "model.toml")).with_params({f"effect.{name}.share": 1.0})
+    (effect,) = on.added_effects
+    assert effect.ports == ("H3",)
+    # a table's force is against its values: what was found acts as it is
+    assert effect.params[0][:5] == pytest.approx((1.0, X[0], X[-1], 0.0, -1e3))

@@ -1,0 +1,78 @@
+"""Sensors that other sensors contradict: each kind of fault is found, named and put right; good ones are left alone."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from sensor_cases import measured
+
+from lhpost6_pin.discover.sensing import put_right, wrong_sensors
+from lhpost6_pin.plant import Plant
+from lhpost6_pin.sensors import add_noise, load_sensors
+from lhpost6_pin.signals import align
+
+SENSORS = load_sensors()
+
+
+@pytest.fixture(scope="module")
+def campaign(plant: Plant) -> list[xr.Dataset]:
+    """Two records with noise and nothing wrong."""
+    return [add_noise(measured(plant, seed)[0], SENSORS, np.random.default_rng(seed)) for seed in (0, 10)]
+
+
+def changed(records: list[xr.Dataset], name: str, change) -> list[xr.Dataset]:
+    """Records with one channel's values (n, k) changed."""
+    return [r.assign({name: r[name].copy(data=change(r[name].values.copy()))}) for r in records]
+
+
+def scaled(column: int, factor: float):
+    """A change of one column by a factor."""
+
+    def change(values: np.ndarray) -> np.ndarray:
+        values[:, column] *= factor
+        return values
+
+    return change
+
+
+def crossed(values: np.ndarray) -> np.ndarray:
+    """Eight hundredths of the acceleration along y in that along x."""
+    values[:, 0] += 0.08 * values[:, 1]
+    return values
+
+
+def test_good_sensors_have_no_faults(plant: Plant, campaign) -> None:
+    assert wrong_sensors(plant, campaign, SENSORS) == ()
+    assert put_right(campaign, ())[0] is campaign[0]
+
+
+@pytest.mark.parametrize(
+    ("channel", "change", "name", "family", "value"),
+    [
+        ("platen_acceleration", scaled(2, 1.06), "gain platen_acceleration[z]", "accelerometer_error", 0.06),
+        ("platen_velocity", scaled(0, 0.95), "gain platen_velocity[x]", "accelerometer_error", -0.05),
+        ("platen_acceleration", crossed, "cross y platen_acceleration[x]", "accelerometer_error", 0.08),
+        ("actuator_displacement", scaled(3, 1.04), "gain actuator_displacement[H4]", "length_sensor_error", 0.04),
+    ],
+)
+def test_a_gain_or_cross_talk_beyond_its_range_is_named_and_measured(
+    plant: Plant, campaign, channel, change, name, family, value
+) -> None:
+    wrong = changed(campaign, channel, change)
+    faults = {f.name: f for f in wrong_sensors(plant, wrong, SENSORS)}
+    assert faults[name].family == family
+    # what calibration leaves open of both sensors that are compared: half a percent each
+    assert faults[name].value == pytest.approx(value, abs=0.012)
+    assert abs(value) > faults[name].stated
+    if channel.startswith("platen"):
+        mended = put_right(wrong, tuple(faults.values()))
+        assert wrong_sensors(plant, mended, SENSORS) == ()
+        again, first = mended[0][channel].values, campaign[0][channel].values
+        np.testing.assert_allclose(again, first, atol=0.012 * np.abs(first).max())
+
+
+def test_a_late_group_of_channels_is_named(plant: Plant, campaign) -> None:
+    dt = float(campaign[0]["time"][1] - campaign[0]["time"][0])
+    late = changed(campaign, "platen_acceleration", lambda x: align(x, -3e-3, dt))
+    (fault,) = wrong_sensors(plant, late, SENSORS)
+    assert (fault.name, fault.family) == ("delay platen_acceleration", "channel_delay")
+    assert fault.value == pytest.approx(3e-3, abs=3e-4)  # what calibration leaves open

@@ -1,11 +1,13 @@
 """A blind battery: cases of another simulator with sealed labels, searched, then unsealed and scored.
 
     python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast] [--jobs 2] [--out FOLDER] [--baselines] [--dask]
+                                    [--publish]
 
 Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
 searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the same cases. --dask runs the cases
-on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes.
+on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes. --publish writes the scores
+to scripts/battery/results.md, too.
 """
 
 import argparse
@@ -13,6 +15,7 @@ import json
 import time
 import tomllib
 from contextlib import nullcontext
+from datetime import UTC, datetime
 from pathlib import Path
 
 from battery.generate import draw_cases, seal, unseal, write_case
@@ -20,12 +23,16 @@ from battery.reach import measured_label
 from battery.scoring import Share, families, reach, score
 from joblib import Parallel, delayed, parallel_config
 
+from lhpost6_pin import __version__
 from lhpost6_pin.campaign import load_campaign
 from lhpost6_pin.discover import discover, save_verdict
 from lhpost6_pin.errors import LhpostError
 from lhpost6_pin.files import write_whole
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.sensors import load_sensors
+
+RESULTS = Path(__file__).parent / "battery" / "results.md"
+"""The latest published scores."""
 
 
 def make(case, folder: Path) -> dict:
@@ -103,6 +110,15 @@ def case_row(name: str, label: dict, answer: dict) -> str:
     return f"| {' | '.join((name if right else f'{name} (wrong)', *cells))} |"
 
 
+def described(asked: argparse.Namespace) -> str:
+    """What was run: the command, the version, the day."""
+    command = (
+        f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{' --fast' if asked.fast else ''}"
+    )
+    today = datetime.now(UTC).date().isoformat()
+    return f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."
+
+
 def main() -> None:
     """Draw, seal, search, unseal, score."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
@@ -113,6 +129,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("out") / "battery")
     parser.add_argument("--baselines", action="store_true")
     parser.add_argument("--dask", action="store_true")
+    parser.add_argument("--publish", action="store_true")
     asked = parser.parse_args()
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
@@ -134,6 +151,9 @@ def main() -> None:
     with write_whole(folder / "scores.md") as beside:
         beside.write_text(text, encoding="utf-8")
     print(text)
+    if asked.publish:
+        with write_whole(RESULTS) as beside:
+            beside.write_text(f"# What the blind battery last said\n\n{described(asked)}\n\n{text}", encoding="utf-8")
 
 
 if __name__ == "__main__":

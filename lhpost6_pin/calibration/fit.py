@@ -116,19 +116,20 @@ def solve(
     *,
     first: Normal | None = None,
     frugal: bool = False,
+    settled: bool = False,
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on.
 
     Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
     the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and
     evaluates derivatives by gains, offsets and what hardly bends the equations there alone, all others as long as steps
-    gain much.
+    gain much; of a settled one only those that `known` lacks.
     """
     x = start.copy()
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
     bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
-    again = bent if frugal else fresh
+    again = bent if frugal and not settled else fresh
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: Bias | None = None
     normal: Normal | None = None

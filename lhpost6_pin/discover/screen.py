@@ -13,11 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import lsq_linear
 
 __all__ = ["Background", "Block", "Score", "make_block", "real_bins", "score"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+WORTH = 0.5
+"""Log-likelihood below which it is not worth while to see what else moves."""
 
 
 @dataclass(frozen=True)
@@ -133,25 +137,20 @@ class _Profile(NamedTuple):
         """What gains most: amplitudes between low and high (q,), and what is at a bound moved inward or not at all."""
         count = len(low)
         way = self.inward[self.inward != 0.0]
-        moves = np.zeros(len(way), bool)
         theta = np.zeros(len(self.side))
-        for _ in range(1 + len(way)):
-            some = np.concatenate([np.ones(count, bool), moves])
-            inverse = np.linalg.pinv(self.schur[np.ix_(some, some)], rcond=1e-10, hermitian=True)
-            theta[:] = 0.0
-            theta[some] = -inverse @ self.side[some]
-            theta[:count] = np.clip(theta[:count], low, high)
-            slope = (self.side + self.schur @ theta)[count:]
-            leaves = moves & (theta[count:] * way < 0.0)
-            enters = ~moves & (slope * way < 0.0)
-            if leaves.any():
-                moves &= ~leaves
-            elif enters.any():
-                moves[np.argmin(np.where(enters, slope * way, 0.0))] = True
-            else:
-                break
-        theta[count:] = np.where(theta[count:] * way > 0.0, theta[count:], 0.0)
-        return theta
+        inverse = np.linalg.pinv(self.schur[:count, :count], rcond=1e-10, hermitian=True)
+        theta[:count] = np.clip(-inverse @ self.side[:count], low, high)
+        slope = (self.side + self.schur @ theta)[count:]
+        could_gain = 0.5 * slope**2 / np.diag(self.schur)[count:]
+        if not np.any((slope * way < 0.0) & (could_gain > WORTH)):
+            return theta
+        scale = 1.0 / np.sqrt(np.diag(self.schur))
+        least = np.concatenate([low, np.where(way > 0.0, 0.0, -np.inf)]) / scale
+        most = np.concatenate([high, np.where(way > 0.0, np.inf, 0.0)]) / scale
+        matrix = self.schur * np.outer(scale, scale)
+        factor = np.linalg.cholesky(matrix + 1e-12 * np.eye(len(scale)))
+        wanted = np.linalg.solve(factor, -self.side * scale)
+        return np.asarray(lsq_linear(factor.T, wanted, bounds=(least, most)).x * scale)
 
     def gain(self, theta: Array) -> float:
         """What theta gains over none."""

@@ -319,7 +319,7 @@ def _best_of(
     """The search with the best of these candidates, all fitted in full; None if none lowers what is left."""
     fitted = []
     for i, rival in enumerate(rivals):
-        share = between(progress, i / len(rivals), (i + 1) / len(rivals))
+        share = between(progress, 0.7 * i / len(rivals), 0.7 * (i + 1) / len(rivals))
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
     before, *left = (_objective(one) for one in (found, *fitted))
     least = min(left)
@@ -331,17 +331,28 @@ def _best_of(
     best = min(alike, key=lambda i: (len(rivals[i].candidate.family.shapes), left[i]))  # the simplest of them
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
     contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i])) for i in order)
-    first, last = (squares_by_column(one.rest) for one in (found, fitted[best]))
+    refined = _refined(fitted[best], calibration, between(progress, 0.7, 1.0))
+    first, last = (squares_by_column(one.rest) for one in (found, refined))
     tried = len(found.rounds[-1].scored)
     added = Added(rivals[best].candidate, before - left[best], tried, contest, first - last, apart)
-    fitted[best].added.append(added)
-    return fitted[best]
+    refined.added.append(added)
+    return refined
+
+
+def _refined(found: Search, calibration: Parameters, progress: Progress) -> Search:
+    """The search with everything's derivatives evaluated again."""
+    problem, at, known = found.problem, found.solution.x, found.solution.normal
+    solution = solve(problem, found.ready.replicas, calibration, at, progress, known=known, frugal=True)
+    return Search(found.ready, solution, found.refit, found.added, found.rounds)
 
 
 def _fit_jointly(
     found: Search, one: Scored, calibration: Parameters, numbers: Parameters, progress: Progress
 ) -> Search:
-    """The search with a candidate fitted together with everything, from where the linear estimate puts it."""
+    """The search with a candidate fitted together with everything, from where the linear estimate puts it.
+
+    Derivatives by everything else are those from before: enough to tell which candidate is the best.
+    """
     problem, candidate = found.problem, one.candidate
     count, start = len(problem.knobs), found.solution.at
     if candidate.release:
@@ -353,8 +364,8 @@ def _fit_jointly(
         own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
         ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
         start = np.insert(start, count, np.zeros(len(own)))
-    before = found.solution.normal
-    solution = solve(ready.problem, ready.replicas, calibration, start, progress, known=before, frugal=True)
+    before, replicas = found.solution.normal, ready.replicas
+    solution = solve(ready.problem, replicas, calibration, start, progress, before, frugal=True, settled=True)
     return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 

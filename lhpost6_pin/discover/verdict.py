@@ -116,8 +116,9 @@ def judge(
     effects = [e for e, one in zip(effects, kept, strict=True) if one.candidate.name not in doubted]
     hidden, told = _untestable(found, numbers)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + told)
-    word = _word(effects, changed, sensors, unnamed, blind)
-    return Verdict(word, _merged(effects), changed, sensors, free, hidden, nearest)
+    named = _merged(effects)
+    word = _word(named, changed, sensors, unnamed, blind)
+    return Verdict(word, named, changed, sensors, free, hidden, nearest)
 
 
 def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], int]:
@@ -160,9 +161,9 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
             first = merged[key]
             components = tuple(dict.fromkeys((*first.components, *one.components)))
             values = {**first.parameters, **one.parameters}
-            merged[key] = Finding(
-                one.family, components, values, first.gain + one.gain, min(first.p_value, one.p_value)
-            )
+            rivals = tuple(name for name in first.rivals if name in one.rivals)  # one mechanism, told by either kind
+            chance = min(first.p_value, one.p_value)
+            merged[key] = Finding(one.family, components, values, first.gain + one.gain, chance, rivals)
         else:
             merged[key] = one
     return tuple(merged.values())

@@ -103,6 +103,7 @@ def test_a_gain_is_what_a_refit_with_the_candidate_gains():
     rng = np.random.default_rng(3)
     tests, rows, p, q = 3, 40, 5, 2
     j, c, r = rng.normal(size=(tests, rows, p)), rng.normal(size=(tests, rows, q)), rng.normal(size=(tests, rows))
+    r = r + c @ np.array([1.5, -1.0])  # something to gain
     place = rng.normal(size=p)
     matrix, side = np.einsum("tni,tnj->tij", j, j), np.einsum("tni,tn->ti", j, r)
     background = Background(list(j), list(r), [], matrix, side, place, np.zeros(p))

@@ -114,13 +114,15 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
     whole = _profile(background, block, spread, -1)
     theta = whole.best(low, high)
     held_out = []
-    for t in range(len(block.own)):
+    for t in range(len(block.own) if whole.gain(theta) > WORTH else 0):
         others = _profile(background, block, spread, t)
         narrowed = 0.5 * (whole.information - others.information)
         held_out.append(whole.gain(theta) - others.gain(others.best(low, high)) - narrowed)
     count = len(low)
     sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:count, :count], hermitian=True)), 0.0))
-    return Score(whole.gain(theta), theta[:count], sd, np.array(held_out), whole.change(theta))
+    return Score(
+        whole.gain(theta), theta[:count], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta)
+    )
 
 
 class _Profile(NamedTuple):
@@ -141,16 +143,16 @@ class _Profile(NamedTuple):
         inverse = np.linalg.pinv(self.schur[:count, :count], rcond=1e-10, hermitian=True)
         theta[:count] = np.clip(-inverse @ self.side[:count], low, high)
         slope = (self.side + self.schur @ theta)[count:]
-        could_gain = 0.5 * slope**2 / np.diag(self.schur)[count:]
-        if not np.any((slope * way < 0.0) & (could_gain > WORTH)):
+        own = np.maximum(np.diag(self.schur), 1e-12)  # rounding, where the background explains a column
+        if not np.any((slope * way < 0.0) & (0.5 * slope**2 > WORTH * own[count:])):
             return theta
-        scale = 1.0 / np.sqrt(np.diag(self.schur))
+        scale = 1.0 / np.sqrt(own)
         least = np.concatenate([low, np.where(way > 0.0, 0.0, -np.inf)]) / scale
         most = np.concatenate([high, np.where(way > 0.0, np.inf, 0.0)]) / scale
-        matrix = self.schur * np.outer(scale, scale)
-        factor = np.linalg.cholesky(matrix + 1e-12 * np.eye(len(scale)))
-        wanted = np.linalg.solve(factor, -self.side * scale)
-        return np.asarray(lsq_linear(factor.T, wanted, bounds=(least, most)).x * scale)
+        value, vector = np.linalg.eigh(self.schur * np.outer(scale, scale))
+        root = np.sqrt(np.maximum(value, 1e-9))
+        wanted = -(vector.T @ (self.side * scale)) / root
+        return np.asarray(lsq_linear(root[:, None] * vector.T, wanted, bounds=(least, most)).x * scale)
 
     def gain(self, theta: Array) -> float:
         """What theta gains over none."""

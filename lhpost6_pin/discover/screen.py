@@ -68,10 +68,23 @@ class Background:
         return found
 
     @cached_property
+    def _still(self) -> tuple[Array, Array]:
+        tests, p, none = len(self.matrix), len(self.place), np.zeros(0)
+        empty = Block(np.zeros((tests, p, 0)), np.zeros((tests, 0, 0)), np.zeros((tests, 0)))
+        profiles = [_profile(self, empty, none, without) for without in range(-1, tests)]
+        best = [one.best(none, none) for one in profiles]
+        gains = np.array([one.gain(theta) for one, theta in zip(profiles, best, strict=True)])
+        return gains, profiles[0].change(best[0])
+
+    @property
+    def gains(self) -> Array:
+        """Log-likelihood that what is at a bound gains by itself, of all tests and of all but each (1 + t,)."""
+        return self._still[0]
+
+    @property
     def alone(self) -> Array:
         """What it changes (p,) where nothing is added."""
-        factor, side = self.factors[0]
-        return np.asarray(-cho_solve(factor, side))
+        return self._still[1]
 
 
 def real_bins(bins: Complex, root: Array) -> Array:
@@ -111,18 +124,18 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
     less what it costs to have been unsure, half the logarithm by which the test narrows the amplitudes. What one test
     alone excites costs little there; what tests contradict, much.
     """
-    whole = _profile(background, block, spread, -1)
+    whole, still = _profile(background, block, spread, -1), background.gains
     theta = whole.best(low, high)
+    gain = whole.gain(theta) - float(still[0])
     held_out = []
-    for t in range(len(block.own) if whole.gain(theta) > WORTH else 0):
+    for t in range(len(block.own) if gain > WORTH else 0):
         others = _profile(background, block, spread, t)
         narrowed = 0.5 * (whole.information - others.information)
-        held_out.append(whole.gain(theta) - others.gain(others.best(low, high)) - narrowed)
+        without = others.gain(others.best(low, high)) - float(still[1 + t])
+        held_out.append(gain - without - narrowed)
     count = len(low)
     sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:count, :count], hermitian=True)), 0.0))
-    return Score(
-        whole.gain(theta), theta[:count], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta)
-    )
+    return Score(gain, theta[:count], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta))
 
 
 class _Profile(NamedTuple):

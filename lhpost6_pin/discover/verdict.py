@@ -15,8 +15,9 @@ from scipy.stats import chi2, norm
 from ..calibration.problem import Problem
 from ..parameters import Parameters
 from .left import Left
-from .search import Added, Search, excess_by_kind, squares_by_column
+from .search import Added, Search
 from .sensing import Fault
+from .weighing import excess_by_kind, squares_by_column
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
 

@@ -1,0 +1,96 @@
+"""Weighing what is left: by how much a candidate lowers it, and whether that is enough to add it.
+
+Screening is linear and takes what is left for noise of the power that it has now. What a candidate explains lowers that
+power: here residuals are weighed anew, each band and column of a test as noise of its own power, so that what takes
+much away counts for as much as it should.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration.problem import Problem
+from ..calibration.spectra import mean_squares, surprise
+from ..parameters import Parameters
+from .screen import Background, Score
+
+__all__ = ["Lowered", "Weighing", "excess_by_kind", "refusal", "squares_by_column"]
+
+Array = NDArray[np.float64]
+
+
+class Lowered(NamedTuple):
+    """By how much a candidate lowers what is left, with the refit that comes with it."""
+
+    gain: float  # of log-likelihood and log-prior
+    beyond: float  # of log-likelihood, by what even `doubt` times the stated noise would not have
+    share: float  # of what is so far beyond noise in the column where it explains most of that
+    of_first: float  # in the column where this is most: of the squares that were there before any effect was added
+
+
+class Weighing:
+    """Weighs what is left anew, with a candidate and without: large effects count for more than their linear gain."""
+
+    def __init__(self, problem: Problem, background: Background, first: Array, numbers: Parameters) -> None:
+        """`first` (c,) are the squares before any effect was added."""
+        self.problem, self.background, self.first = problem, background, first
+        self.doubt, self.least = numbers.number("accept.doubt"), 0.5 * numbers.number("accept.gain")
+        self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
+
+    def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float]:
+        """Negative log-likelihood, squares, and log-likelihood of what is no noise (3, c); that of the prior."""
+        b, total = self.background, np.zeros((3, self.first.size))
+        for slope, rest, root, more, f in zip(b.slope, b.rest, b.root, explained, self.problem.frequency, strict=True):
+            left = (rest + slope @ change + more) ** 2
+            squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
+            means, counts = mean_squares(self.problem.whitener, squares, f)
+            beyond = counts @ np.log(np.maximum(means / self.doubt, 1.0))
+            total += surprise(means, counts), squares.sum(axis=0), beyond
+        return total, 0.5 * float(np.sum((b.place + change) ** 2))
+
+    def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
+        """How a candidate lowers what is left, explained (n,) of every test."""
+        (before, prior), (after, then) = self.before, self._left(one.change, explained)
+        fall, squares, beyond = before - after
+        most = int(np.argmax(beyond))
+        of_first = float(np.max(squares[fall > self.least] / self.first[fall > self.least], initial=0.0))
+        share = float(beyond[most] / max(before[2, most], 1e-9))
+        return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
+
+
+def squares_by_column(rest: Sequence[NDArray[np.complex128]]) -> Array:
+    """Sums (c,) of squared whitened bins (m, c) over all tests."""
+    return np.asarray(sum((np.abs(r) ** 2).sum(axis=0) for r in rest))
+
+
+def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:
+    """Squares of whitened residuals beyond noise, twice, by kind; no less than a tenth of what noise has."""
+    found = {}
+    for kind in problem.kinds:
+        rows = problem.rows(kind)
+        if rows.any():
+            count = 2.0 * sum(r[:, rows].size for r in rest)
+            found[kind] = max(2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest) - count, 0.1 * count)
+    return found
+
+
+def refusal(one: Score, less: Lowered, numbers: Parameters) -> str:
+    """Why a candidate may not be added."""
+    if one.gain < numbers.number("accept.look"):
+        return "gains too little"
+    if less.gain < numbers.number("accept.gain"):  # the noise in derivatives is all it has
+        return "does not lower what is left"
+    held = one.held_out
+    if held.sum() < numbers.number("accept.held_out") * one.gain:
+        return "does not hold on tests that it was not fitted on"
+    if np.mean(held > -numbers.number("accept.worse") * one.gain) < numbers.number("accept.better"):
+        return "makes tests worse that it was not fitted on"
+    if less.beyond < numbers.number("accept.gain"):
+        return "explains what may be noise"
+    if less.share < numbers.number("accept.closure"):
+        return "explains too little of what is more than noise"
+    if less.of_first < numbers.number("accept.of_first"):
+        return "explains too little of what was there at first"
+    return ""

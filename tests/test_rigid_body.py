@@ -71,7 +71,7 @@ def report_wrench(plant, pose, ws):
     for row, force in zip(plant.rows, ws.force, strict=True):
         name = plant.ports[row["port"]].split(".")[0]
         if row["law"] == LAWS["bouc_wen_2d"].code:
-            pad[name] += force
+            pad[name] += force[:2]
         elif name == "platen":
             at_c[(np.array(PLATEN_PORTS) == plant.ports[row["port"]])[[3, 4, 5, 0, 1, 2]]] += force[0]
         else:

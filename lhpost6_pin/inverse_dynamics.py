@@ -11,12 +11,14 @@ Hidden friction states are marched along the motion by the simulation's own step
 a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .compiled import compiled
+from .effects import Effect
 from .equilibrium import hydraulic_rows
 from .errors import RecordError, SimulationError
 from .law_table import LAWS, LOAD_FRICTION
@@ -31,6 +33,9 @@ from .workspace import make_workspace
 __all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity", "with_loads"]
 
 Array = NDArray[np.float64]
+
+_GAS = ("nitrogen_strut", "gas_leak", "gas_heat")
+"""Laws of the struts' gas."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +66,8 @@ class Decomposition:
 
     @property
     def struts(self) -> Array:
-        """Wrench of the struts (n, 6), of the model (Eq. 4-8)."""
-        return self._of("hold_down")
+        """Wrench of the struts (n, 6), of the model (Eq. 4-8), with what effects do to their gas."""
+        return self._sum(lambda effect: effect.law in _GAS)
 
     @property
     def struts_measured(self) -> Array | None:
@@ -73,14 +78,21 @@ class Decomposition:
 
     @property
     def dissipative(self) -> Array:
-        """Friction and viscous wrench of the model (n, 6)."""
-        return self._of("seal_friction") + self._of("pad_friction") + self._of("viscous")
+        """Friction and viscous wrench of the model (n, 6), with all that effects add beside oil and gas."""
+        return self._sum(lambda effect: effect.law not in _GAS and not LAWS[effect.law].takes_spool)
 
     @property
     def dissipative_measured(self) -> Array:
         """The same from measured forces: inertia less weight, actuators and struts (the model's without pressures)."""
         struts = self.struts if self.struts_measured is None else self.struts_measured
         return self.ledger.inertia - self._of("gravity") - self.measured - struts
+
+    def _sum(self, wanted: Callable[[Effect], bool]) -> Array:
+        total = np.zeros_like(self.ledger.inertia)
+        for effect in self.states.plant.machine.effects:
+            if wanted(effect):
+                total = total + self._of(effect.name)
+        return total
 
     def _of(self, effect: str) -> Array:
         if effect not in self.ledger.effects:

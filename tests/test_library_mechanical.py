@@ -422,6 +422,10 @@ def test_inverse_dynamics_and_residuals_leave_the_same(family: str) -> None:
     machine = with_family(family)
     plant, measured = make_plant(machine), measured_of(shaken(machine, samples=200))
     found = inverse_dynamics(plant, measured.dt * np.arange(200), measured.motion, measured.actuator_force)
+    whole = found.struts + found.dissipative + found.ledger.wrench[:, found.ledger.effect("gravity")]
+    scale = np.abs(found.ledger.wrench).max()
+    # every force beside the oil's is the gas's or dissipative; a sum in another order
+    np.testing.assert_allclose(whole, found.ledger.wrench.sum(axis=1), atol=1e-12 * scale)
     left = evaluate_residuals(plant, measured, ("wrench",)).wrench
     np.testing.assert_allclose(found.residual, left, rtol=0.0, atol=1e-4)  # rounding of meganewtons
     oil = found.ledger.effect("actuators_4_way")

@@ -71,6 +71,7 @@ def _effect(one: Finding) -> dict[str, Any]:
     return {
         "name": one.family,
         "family": one.family,
+        "form": one.form,
         "components": list(one.components),
         "parameters": {name: _interval(value) for name, value in one.parameters.items()},
         "gain": one.gain,

@@ -5,7 +5,7 @@ that it stands for a mechanism of its own (seven times the leakage: worn seals).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -45,6 +45,7 @@ class Finding:
     gain: float  # log-likelihood; of a parameter far off, half the square of its distance
     p_value: float
     rivals: tuple[str, ...] = ()  # families that explain the campaign alike
+    form: str = ""  # entry of the library, where a family has several forms
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,13 @@ def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate
     others = (c.candidate.family.named for c in added.contest[1:] if c.behind < added.apart)
     rivals = tuple(dict.fromkeys(name for name in others if name != candidate.family.named))
     return Finding(
-        candidate.family.named, candidate.components, values, added.gain, min(1.0, chance * added.tried), rivals
+        family=candidate.family.named,
+        components=candidate.components,
+        parameters=values,
+        gain=added.gain,
+        p_value=min(1.0, chance * added.tried),
+        rivals=rivals,
+        form=candidate.family.name,
     )
 
 
@@ -164,7 +171,10 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
             values = {**first.parameters, **one.parameters}
             rivals = tuple(name for name in first.rivals if name in one.rivals)  # one mechanism, told by either kind
             chance = min(first.p_value, one.p_value)
-            merged[key] = Finding(one.family, components, values, first.gain + one.gain, chance, rivals)
+            gain = first.gain + one.gain
+            merged[key] = replace(
+                first, components=components, parameters=values, gain=gain, p_value=chance, rivals=rivals
+            )
         else:
             merged[key] = one
     return tuple(merged.values())

@@ -78,7 +78,7 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         return [paragraph("No effect is missing.")]
     blocks: list[Markup] = []
     for one in verdict.effects:
-        family = find_family(one.family)
+        family = find_family(one.form or one.family)
         rows = [
             (name, f"{value.value:.4g}", f"{value.low:.4g} to {value.high:.4g}", value.unit)
             for name, value in one.parameters.items()

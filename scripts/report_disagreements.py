@@ -28,7 +28,7 @@ from lhpost6_pin.sensors import load_sensors
 HORIZONTAL = ("H1", "H2", "H3", "H4")
 EXAMPLES = {
     "drift": ("spool_null_bias", HORIZONTAL, {"bias": 0.003}),
-    "offset": ("gravity_offset", (), {"mass": 1.5e4, "moment_x": 1.2e4, "moment_y": -8e3}),
+    "offset": ("gravity_offset", (), {"mass": 2.5e4, "moment_x": 2e4, "moment_y": -1.2e4}),
     "resonance": ("piston_leakage", HORIZONTAL, {"leakage": 2.5e-10}),
 }
 """Name: family, components and numbers of what is hidden."""

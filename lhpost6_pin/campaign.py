@@ -35,8 +35,10 @@ __all__ = [
     "as_sensed",
     "draw_errors",
     "load_campaign",
+    "load_procedure",
     "save_campaign",
     "simulate_campaign",
+    "tests_of",
 ]
 
 Array = NDArray[np.float64]
@@ -113,9 +115,9 @@ def simulate_campaign(
 
     Raises SimulationError if a test does not last, UnknownNameError for a test that the file does not have.
     """
-    numbers = load_parameters(models_folder() / "procedures" / f"{procedure}.toml")
+    numbers = load_procedure(procedure)
     rng = np.random.default_rng(seed)
-    known = tuple(path.split(".")[0] for path in numbers.words if path.endswith(".motion"))
+    known = tests_of(numbers)
     wanted = tests or known
     for test in wanted:
         if test not in known:
@@ -146,6 +148,16 @@ def simulate_campaign(
         if progress is not None:
             progress((i + 1) / len(wanted))
     return Campaign(name, tuple(records))
+
+
+def load_procedure(name: str) -> Parameters:
+    """Tests of a procedure of `models/procedures`."""
+    return load_parameters(models_folder() / "procedures" / f"{name}.toml")
+
+
+def tests_of(procedure: Parameters) -> tuple[str, ...]:
+    """Names of a procedure's tests."""
+    return tuple(path.split(".")[0] for path in procedure.words if path.endswith(".motion"))
 
 
 def _target(numbers: Parameters, test: str, machine: Machine, factor: float) -> Target:

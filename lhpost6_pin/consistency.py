@@ -50,10 +50,14 @@ class SensorFinding:
     verdict: Literal["ok", "suspicious", "untested"]
 
     @property
+    def deviation(self) -> float:
+        """Standard deviation of noise and calibration together."""
+        return float(np.hypot(self.standard_error, self.tolerance / CONFIDENCE))
+
+    @property
     def significance(self) -> float:
-        """Deviation in standard deviations of noise and calibration together [1]."""
-        spread = np.hypot(self.standard_error, self.tolerance / CONFIDENCE)
-        return float((self.estimate - self.expected) / spread) if spread > 0 else 0.0
+        """How far off it is, in such deviations [1]."""
+        return (self.estimate - self.expected) / self.deviation if self.deviation > 0 else 0.0
 
     def __str__(self) -> str:
         """One line, as in `force against pressures, actuator_force[H1]: gain a 1.003 +- 0.001 1, ...`."""

@@ -11,14 +11,12 @@ Hidden friction states are marched along the motion by the simulation's own step
 a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .compiled import compiled
-from .effects import Effect
 from .equilibrium import hydraulic_rows
 from .errors import RecordError, SimulationError
 from .law_table import LAWS, LOAD_FRICTION
@@ -67,7 +65,7 @@ class Decomposition:
     @property
     def struts(self) -> Array:
         """Wrench of the struts (n, 6), of the model (Eq. 4-8), with what effects do to their gas."""
-        return self._sum(lambda effect: effect.law in _GAS)
+        return self._of(*(e.name for e in self.states.plant.machine.effects if e.law in _GAS))
 
     @property
     def struts_measured(self) -> Array | None:
@@ -79,7 +77,8 @@ class Decomposition:
     @property
     def dissipative(self) -> Array:
         """Friction and viscous wrench of the model (n, 6), with all that effects add beside oil and gas."""
-        return self._sum(lambda effect: effect.law not in _GAS and not LAWS[effect.law].takes_spool)
+        effects = self.states.plant.machine.effects
+        return self._of(*(e.name for e in effects if e.law not in _GAS and not LAWS[e.law].takes_spool))
 
     @property
     def dissipative_measured(self) -> Array:
@@ -87,17 +86,13 @@ class Decomposition:
         struts = self.struts if self.struts_measured is None else self.struts_measured
         return self.ledger.inertia - self._of("gravity") - self.measured - struts
 
-    def _sum(self, wanted: Callable[[Effect], bool]) -> Array:
+    def _of(self, *effects: str) -> Array:
+        """Sum of their wrenches; one that makes no force has none."""
         total = np.zeros_like(self.ledger.inertia)
-        for effect in self.states.plant.machine.effects:
-            if wanted(effect):
-                total = total + self._of(effect.name)
+        for effect in effects:
+            if effect in self.ledger.effects:
+                total += self.ledger.wrench[:, self.ledger.effect(effect)]
         return total
-
-    def _of(self, effect: str) -> Array:
-        if effect not in self.ledger.effects:
-            return np.zeros_like(self.ledger.inertia)
-        return np.asarray(self.ledger.wrench[:, self.ledger.effect(effect)])
 
 
 def inverse_dynamics(

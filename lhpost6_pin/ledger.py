@@ -97,7 +97,7 @@ def force_ledger(run: "Run | States") -> Ledger:
     plant = run.plant
     effects = plant.machine.effects
     n = len(run.time)
-    by_row = np.zeros((n, plant.rows.size, 3))
+    by_row = np.zeros((n, plant.rows.size, len(PORTS)))
     by_effect = np.zeros((n, len(effects), 6))
     turn = np.zeros((n, 3, 3))
     _forces(*stage_arguments(run, by_row, by_effect, turn))
@@ -122,7 +122,7 @@ def effect_wrenches(run: "Run | States") -> Array:
     plant = run.plant
     n = len(run.time)
     by_effect = np.zeros((n, len(plant.machine.effects), 6))
-    _forces(*stage_arguments(run, np.zeros((n, plant.rows.size, 3)), by_effect, np.zeros((n, 3, 3))))
+    _forces(*stage_arguments(run, np.zeros((n, plant.rows.size, len(PORTS))), by_effect, np.zeros((n, 3, 3))))
     return by_effect
 
 

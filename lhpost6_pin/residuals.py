@@ -36,7 +36,7 @@ from .schemes import SD, TAU, V_SEEN, S, forces_stage, port_rates, pose_stage, s
 from .signals import differentiate
 from .workspace import make_workspace
 
-__all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured"]
+__all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured", "states_of"]
 
 Array = NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def follow(
         moved, along, old = known[1]
         if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
             return known[1]
-        there = {_marched(row): old[:, _states(row)] for row in _moving(known[0])}
+        there = {_marched(row): old[:, states_of(row)] for row in _moving(known[0])}
     rows = _moving(plant)
     fresh = {key: row for row in rows if (key := _marched(row)) not in there}
     # oscillators and heat average noise, and feel what a still path lacks
@@ -150,10 +150,10 @@ def follow(
     for some, motion in zip(parts, (along, moved), strict=True):
         if some or (known is None and some is parts[0]):  # also to see that no leg is out of its stroke
             marched = march_states(plant, motion, test.dt, start, rows=np.array(some, plant.rows.dtype))
-            there |= {_marched(row): marched[:, _states(row)] for row in some}
+            there |= {_marched(row): marched[:, states_of(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))
     for row in rows:
-        z[:, _states(row)] = there[_marched(row)]
+        z[:, states_of(row)] = there[_marched(row)]
     return Path(moved, along, z)
 
 
@@ -176,7 +176,8 @@ def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
     return bool(same) and all((some[k] == others[k]).all() for k in ("law", *PORTS, "state", "input"))
 
 
-def _states(row: np.void) -> slice:
+def states_of(row: np.void) -> slice:
+    """Hidden states of a row of the effect table, which has some."""
     return slice(int(row["state"]), int(row["state"]) + _WIDTH[int(row["law"])])
 
 

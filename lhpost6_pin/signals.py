@@ -28,6 +28,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+FADE = 32
+"""Samples over which at least a reflection fades out that is made longer for a fast transform."""
+
 
 def rrmse(reference: ArrayLike, signal: ArrayLike) -> Array:
     """Relative root-mean-square error per column [1], sqrt(sum (signal - reference)² / sum reference²).
@@ -246,15 +249,23 @@ def _filtered(x: Array, dt: float, response: Callable[[Array], NDArray[Any]], ke
     """Apply a frequency response to x less its chord, continued by odd reflection; put the chord back.
 
     The chord joins the first and last value. What is left vanishes at both ends, so its odd reflection is
-    periodic with period 2 (n - 1) samples, continuous and with continuous slope: no wrap-around jump.
+    periodic, continuous and with continuous slope: no wrap-around jump. Where twice the length has large prime
+    factors, some more of the reflection, fading out, goes in between.
     """
     from scipy import fft
 
-    chord = np.linspace(x[0], x[-1], len(x))
+    n = len(x)
+    chord = np.linspace(x[0], x[-1], n)
     rest = x - chord
+    more = fft.next_fast_len(n - 1, real=True) - (n - 1)
+    if more:
+        more = fft.next_fast_len(n - 1 + FADE, real=True) - (n - 1)
+    if 0 < more < n:
+        fade = np.cos(0.5 * np.pi * np.arange(1, more + 1) / more) ** 2
+        rest = np.concatenate([rest, -rest[-2 : -2 - more : -1] * fade.reshape(-1, *[1] * (x.ndim - 1))])
     odd = np.concatenate([rest, -rest[-2:0:-1]])
     spectrum = fft.rfft(odd, axis=0) * response(fft.rfftfreq(len(odd), dt))
-    return fft.irfft(spectrum, len(odd), axis=0)[: len(x)] + chord * keep_chord
+    return fft.irfft(spectrum, len(odd), axis=0)[:n] + chord * keep_chord
 
 
 def _pair(reference: ArrayLike, signal: ArrayLike) -> tuple[Array, Array]:

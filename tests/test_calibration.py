@@ -6,20 +6,23 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, machine_knobs, with_knobs
+from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, fit, machine_knobs, with_knobs
 from lhpost6_pin.calibration.errors import corrected, sensor_unknowns
 from lhpost6_pin.calibration.knobs import Knob, plan_knobs, scatter_knobs
+from lhpost6_pin.calibration.normal import bounded_step, bounds_of
 from lhpost6_pin.calibration.override import save_override
 from lhpost6_pin.calibration.prepare import _ready
-from lhpost6_pin.calibration.problem import Comparison, Problem
+from lhpost6_pin.calibration.problem import Base, Comparison, Problem
 from lhpost6_pin.calibration.simulation import by_simulation
-from lhpost6_pin.calibration.spectra import make_whitener, spectrum_of
+from lhpost6_pin.calibration.spectra import Whitener, excess, make_whitener, mean_squares, spectrum_of, surprise
 from lhpost6_pin.campaign import Campaign, load_campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.errors import RecordError
+from lhpost6_pin.files import models_folder
 from lhpost6_pin.fusion import fuse_motion
 from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.parameters import load_parameters
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.residuals import RESIDUALS, Measured, evaluate_residuals, make_measured
 from lhpost6_pin.sensors import Sensors, add_noise, load_sensors
@@ -267,12 +270,12 @@ def test_unknowns_evaluated_together_have_the_derivatives_of_each_alone(problem)
     ]
     chosen = [problem.names.index(n) for n in names]
     free = np.isin(np.arange(len(x)), chosen)
-    (slope,) = problem.slopes(x, free, lambda share: None)
+    (slope,) = problem.slopes(Base(problem, x), free, lambda share: None)
     for i in chosen:
         step = 0.1 * problem.prior[i] * (np.arange(len(x)) == i)
         alone = (problem.whitened(x + step)[0] - problem.whitened(x)[0]) / step[i]
         # differences of residuals of order one, divided by a step: their rounding is what differs
-        assert np.allclose(slope[..., i], alone, rtol=1e-6, atol=1e-7 * np.abs(alone).max())
+        assert np.allclose(slope[i], alone, rtol=1e-6, atol=1e-7 * np.abs(alone).max())
 
 
 def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, sensors):
@@ -280,12 +283,67 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
     without = Problem(machine, tests[:1], tests[1:], sensors, COMPARISON)
     x = np.zeros(len(without.prior))
     chosen = [without.names.index(n) for n in ("gain chamber_pressure_a[H2]", "offset chamber_pressure_b[H3]")]
-    (slope,) = without.slopes(x, np.isin(np.arange(len(x)), chosen), lambda share: None)
+    (slope,) = without.slopes(Base(without, x), np.isin(np.arange(len(x)), chosen), lambda share: None)
     for i in chosen:
         step = 0.1 * without.prior[i] * (np.arange(len(x)) == i)
         alone = (without.whitened(x + step)[0] - without.whitened(x)[0]) / step[i]
         assert np.abs(alone[:, without.rows("wrench")]).max() > 0.0
-        assert np.allclose(slope[..., i], alone, rtol=1e-6, atol=1e-7 * np.abs(alone).max())  # rounding, as above
+        assert np.allclose(slope[i], alone, rtol=1e-6, atol=1e-7 * np.abs(alone).max())  # rounding, as above
+
+
+def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
+    soft = -2.0 * problem.prior * (np.array(problem.names) == "hydraulics.bulk_modulus")
+    stiff, now = (problem.noise_at(seen[1:], x)[0] for x in (np.zeros(len(soft)), soft))
+    factor = np.exp(-2.0 * soft[problem.names.index("hydraulics.bulk_modulus")])  # of power: that of L A / beta squared
+    bands = slice(2, None)  # below, other noise than that of the pressures' rates counts
+    flow, wrench = problem.rows("flow"), problem.rows("wrench")
+    assert factor > 1.1
+    # flows have noise of lengths and spools as well, which oil does not change; least of it where rates are largest
+    assert np.all(now[bands][:, flow] > stiff[bands][:, flow])
+    assert np.all(now[bands][:, flow] < (factor + 1e-6) * stiff[bands][:, flow])
+    assert np.all(now[-1][flow] > (1.0 + 0.6 * (factor - 1.0)) * stiff[-1][flow])
+    assert np.allclose(now[bands][:, wrench], stiff[bands][:, wrench], rtol=1e-9)  # rounding
+
+
+def test_whitened_bins_scale_with_the_whitener(problem):
+    scale = np.linspace(0.5, 2.0, problem.whitener.factor[..., 0].size).reshape(problem.whitener.factor.shape[:3])
+    x = np.zeros(len(problem.prior))
+    before, after = problem.whitened(x)[0], problem.scaled(scale).whitened(x)[0]
+    band = problem.whitener.band(problem.frequency[0])
+    assert np.allclose(after, before * scale[0][band], rtol=1e-9, atol=1e-12)  # rounding
+
+
+def test_the_surprise_of_what_is_left_falls_as_least_squares_over_its_power():
+    whitener = Whitener(np.array([0.0, 1.0, 2.0, 9.0]), np.zeros((1, 3, 1, 1), complex))
+    f = np.array([0.5, *np.linspace(1.0, 1.9, 5), *np.linspace(2.0, 8.0, 30)])
+    rng = np.random.default_rng(4)
+    bins = rng.normal(0.0, np.repeat([30.0, 3.0, 0.5], [1, 5, 30]))[:, None] + 0j
+    (power,) = excess(whitener, [bins], [f])
+    means, counts = mean_squares(whitener, np.abs(bins) ** 2, f)
+    step = 1e-6
+    for b in range(3):
+        more = means + step * (np.arange(3) == b)[:, None]
+        slope = float((surprise(more, counts) - surprise(means, counts))[0]) / step
+        due = counts[b] / power[np.searchsorted(f, whitener.edges[b])][0]
+        assert slope == pytest.approx(due, rel=1e-4)  # of a difference over a step
+    assert surprise(np.full((3, 1), 0.7), counts)[0] == pytest.approx(0.7 * counts.sum())  # less than noise is noise
+
+
+def test_a_step_that_goes_too_far_is_taken_back(problem, seen, monkeypatch):
+    own = load_parameters(models_folder() / "procedures" / "discovery.toml").quantities
+    numbers = calibration_numbers()
+    numbers = replace(numbers, quantities={**numbers.quantities, **own})
+    low, high = bounds_of(problem, numbers)
+
+    def too_far(*known):
+        x = known[2]
+        return np.clip(x + 20.0 * bounded_step(*known), low, high) - x
+
+    monkeypatch.setattr(fit, "bounded_step", too_far)
+    start = np.zeros(len(problem.prior))
+    found = fit.solve(problem, [problem.with_tests(seen[1:2])], numbers, start, lambda share: None, frugal=True)
+    before, after = (fit.objective(problem, problem.whitened(x), x) for x in (start, found.x))
+    assert after < before + fit.OVERSHOT
 
 
 def test_whitened_residuals_hold_as_many_columns_as_their_kinds(problem):

@@ -29,11 +29,15 @@ from .prepare import prepare_problem
 from .problem import Problem
 from .result import Calibration, Subset, calibration_numbers
 from .simulation import by_simulation
+from .spectra import mean_squares, surprise
 
-__all__ = ["Solution", "calibrate", "misfit", "solve"]
+__all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+OVERSHOT = 30.0
+"""Log-likelihood by which a step must have made things worse to be taken back: corrections for noise cost some, too."""
 
 
 def calibrate(
@@ -123,9 +127,10 @@ def solve(
     Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
     the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and
     evaluates derivatives by gains, offsets and what hardly bends the equations there alone, all others as long as steps
-    gain much; of a settled one only those that `known` lacks.
+    gain much; of a settled one only those that `known` lacks. A step that went too far is taken again, a quarter as
+    long.
     """
-    x = start.copy()
+    x, step = start.copy(), np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
     bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
@@ -133,6 +138,8 @@ def solve(
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: Bias | None = None
     normal: Normal | None = None
+    held: Normal | None = None  # that of the place from which the last step went
+    least = np.inf
     converged = False
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
     for done in range(1, rounds + 1):
@@ -149,6 +156,11 @@ def solve(
             bias = Bias(normal, replicas, x, parts, known)
         if bias is not None and done > 1:
             normal = normal.less(bias)
+        value = objective(problem, normal.rest, x)
+        if held is not None and value > least + OVERSHOT:
+            x, step, normal = x - 0.75 * step, 0.25 * step, held
+            continue
+        least, held = value, normal
         posterior = normal.posterior(problem.prior)
         step = bounded_step(normal, posterior, x, problem, numbers)
         slope = normal.whole[1] + x / problem.prior**2
@@ -160,7 +172,16 @@ def solve(
             converged = True
             break
     assert normal is not None
+    if objective(problem, problem.whitened(x), x) > least + OVERSHOT:
+        x, step = x - step, 0.0 * step
     return Solution(x, x - step, normal, before, done, converged)
+
+
+def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:
+    """Negative log-likelihood and log-prior."""
+    pairs = zip(rest, problem.frequency, strict=True)
+    likely = sum(float(surprise(*mean_squares(problem.whitener, np.abs(r) ** 2, f)).sum()) for r, f in pairs)
+    return likely + 0.5 * float(np.sum((x / problem.prior) ** 2))
 
 
 def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:

@@ -29,6 +29,9 @@ _MECHANICAL = (
     *("pad_friction", "pad_yield", "pad_shape"),
 )
 
+_ROOM = 1.001
+"""Length of a chamber over the stroke that it leaves at least."""
+
 _SCATTER: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("flow", "flow_curve", "leakage"), ("flow",)),
     **dict.fromkeys(("viscous", "seal_friction", "pad_friction"), ("wrench",)),
@@ -74,10 +77,11 @@ class Knob:
         return math.log(value / self.value) if self.relative else value - self.value
 
 
-def machine_knobs(machine: Machine) -> tuple[Knob, ...]:
+def machine_knobs(machine: Machine, travel: Mapping[str, float] | None = None) -> tuple[Knob, ...]:
     """Knobs of all numbers of a machine that state an uncertainty: platen, oil, kinds, and heights of each kind.
 
-    Numbers that a single component overrides stay with the component; other geometry is left alone.
+    Numbers that a single component overrides stay with the component; other geometry is left alone. A chamber is no
+    shorter than the `travel` [m] of its kind, how far it was seen to move either way; without that, than its stroke.
     """
     parameters = machine.parameters
     kinds = list(dict.fromkeys(c.kind for c in machine.components))
@@ -91,16 +95,16 @@ def machine_knobs(machine: Machine) -> tuple[Knob, ...]:
     for kind in kinds:
         found += _heights(machine, kind)
     free = "xyz" if machine.motion == "free" else machine.motion
-    return tuple(_with_room(k, machine) for k in found if _felt(k, free))
+    return tuple(_with_room(k, machine, travel or {}) for k in found if _felt(k, free))
 
 
-def _with_room(knob: Knob, machine: Machine) -> Knob:
-    """A chamber must hold oil at the end of the stroke."""
+def _with_room(knob: Knob, machine: Machine, travel: Mapping[str, float]) -> Knob:
+    """A chamber must hold oil where its piston has been."""
     kind, _, name = knob.name.partition(".")
     if not name.startswith("chamber_"):
         return knob
     stroke = max(a.stroke for a in machine.actuators if a.kind == kind)
-    return replace(knob, lowest=knob.coordinate(1.001 * stroke))
+    return replace(knob, lowest=min(0.0, knob.coordinate(_ROOM * travel.get(kind, stroke))))
 
 
 def _felt(knob: Knob, free: str) -> bool:
@@ -226,4 +230,11 @@ def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) ->
             shared = values.get(knob.of, machine.parameters[knob.of].value)
             assert isinstance(shared, float)
             values[knob.paths[0][0]] = shared * knob.at(float(x))
+    for path, length in list(values.items()):
+        kind, _, name = path.partition(".")
+        stroke = f"{kind}.stroke"
+        if name.startswith("chamber_") and stroke in machine.parameters and isinstance(length, float):
+            left, known = length / _ROOM, values.get(stroke, machine.parameters.number(stroke))
+            if isinstance(known, float) and left < known:  # a shorter chamber leaves less of a stroke
+                values[stroke] = left
     return values

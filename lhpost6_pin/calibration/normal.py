@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..parameters import Parameters
 from ..progress import Progress
-from .problem import Problem
-from .spectra import excess
+from .problem import Base, Problem, Slopes
+from .spectra import excess, real_bins
 
 __all__ = ["Bias", "Normal", "bounded_step", "bounds_of", "positive", "squares"]
 
@@ -30,12 +30,12 @@ class Normal:
         Derivatives by unknowns of `known` are taken from there, but for those to evaluate `again` (p,).
         """
         self.problem = problem
-        self.rest = problem.whitened(x)
-        old, place, fresh = _shared(problem, known, again)
-        self.slope = problem.slopes(x, fresh, report)
-        if known is not None:
-            for slope, before in zip(self.slope, known.slope, strict=True):
-                slope[..., place] = before[..., old]
+        base = Base(problem, x)
+        self.rest = problem.rest(base)
+        shared, fresh = _shared(problem, known, again)
+        before = [] if known is None else known.slope
+        found = problem.slopes(base, fresh, report)
+        self.slope: list[list[Complex]] = _together(found, before, shared)  # (m, c) by test and unknown
         self.power = [np.ones(r.shape) for r in self.rest]
         self.bias: Bias | None = None
 
@@ -47,6 +47,17 @@ class Normal:
             setattr(other, name, [getattr(self, name)[i] for i in places])
         return other
 
+    def scaled(self, problem: Problem, scale: Array) -> "Normal":
+        """The same of a problem whose whitened residuals are (t, b, c) times larger; what is not corrected stays so."""
+        times = [s[problem.whitener.band(f)] for s, f in zip(scale, problem.frequency, strict=True)]
+        other = copy(self)
+        other.problem = problem
+        other.rest = [r * s for r, s in zip(self.rest, times, strict=True)]
+        other.slope = [[j * s for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
+        other.bias = None if self.bias is None else self.bias.scaled(times)
+        other.__dict__.pop("whole", None)
+        return other
+
     def less(self, bias: "Bias") -> "Normal":
         """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
         self.bias = bias
@@ -55,10 +66,11 @@ class Normal:
 
     def of(self, tests: Sequence[int], columns: slice | Mask = slice(None)) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of some tests and columns."""
-        matrix, right = np.zeros(2 * (self.slope[0].shape[-1],)), np.zeros(self.slope[0].shape[-1])
+        count = len(self.slope[0])
+        matrix, right = np.zeros((count, count)), np.zeros(count)
         for t in tests:
             power = self.power[t][:, columns]
-            more, side = squares(self.slope[t][:, columns], self.rest[t][:, columns], power)
+            more, side = squares([j[:, columns] for j in self.slope[t]], self.rest[t][:, columns], power)
             matrix, right = matrix + more, right + side
             if self.bias is not None:
                 more, side = self.bias.of(t, columns, power)
@@ -98,47 +110,62 @@ class Bias:
 
         Changes of derivatives by unknowns of `known`, which is corrected, are taken from there.
         """
-        old, place, fresh = _shared(normal.problem, known)
-        self.changes: list[list[tuple[Complex, Complex]]] = []
+        shared, fresh = _shared(normal.problem, known)
+        self.rest: list[list[Complex]] = []  # by replica and test
+        self.slope: list[list[list[Complex]]] = []
         for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
-            noisy = zip(replica.whitened(x), replica.slopes(x, fresh, report), strict=True)
-            clean = zip(normal.rest, normal.slope, strict=True)
-            changes = [(r - r0, j - j0) for (r, j), (r0, j0) in zip(noisy, clean, strict=True)]
-            if known is not None and known.bias is not None:
-                for (_, change), (_, before) in zip(changes, known.bias.changes[i], strict=True):
-                    change[..., place] = before[..., old]
-            self.changes.append(changes)
+            base = Base(replica, x)
+            self.rest.append([r - r0 for r, r0 in zip(replica.rest(base), normal.rest, strict=True)])
+            noisy = zip(replica.slopes(base, fresh, report), normal.slope, strict=True)
+            changes = [{k: j - clean[k] for k, j in slopes.items()} for slopes, clean in noisy]
+            before = [] if known is None or known.bias is None else known.bias.slope[i]
+            self.slope.append(_together(changes, before, shared))
+
+    def scaled(self, times: Sequence[Array]) -> "Bias":
+        """The same where whitened bins (m, c) of each test are so many times larger."""
+        other = copy(self)
+        other.rest = [[r * s for r, s in zip(rest, times, strict=True)] for rest in self.rest]
+        other.slope = [
+            [[j * s for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
+        ]
+        return other
 
     def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
-        added = [squares(c[test][1][:, columns], c[test][0][:, columns], power) for c in self.changes]
+        pairs = zip(self.slope, self.rest, strict=True)
+        added = [squares([j[:, columns] for j in s[test]], r[test][:, columns], power) for s, r in pairs]
         matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
         return matrix, right
 
 
-def _shared(problem: Problem, known: Normal | None, again: Mask | None = None) -> tuple[list[int], list[int], Mask]:
-    """Places in `known`, and in the problem, of unknowns to take from there; and which (p,) to evaluate.
+def _shared(problem: Problem, known: Normal | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:
+    """Places in `known` by places in the problem, of unknowns to take from there; and which (p,) to evaluate.
 
     Those to evaluate again, if `again` says which; else those that `known` lacks.
     """
     names = problem.names
     place = {} if known is None else {name: i for i, name in enumerate(known.problem.names)}
     fresh = np.array([name not in place for name in names]) if again is None else again
-    taken = [i for i, name in enumerate(names) if name in place and not fresh[i]]
-    return [place[names[i]] for i in taken], taken, fresh
+    return {i: place[name] for i, name in enumerate(names) if name in place and not fresh[i]}, fresh
 
 
-def squares(slope: Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
-    """Normal matrix (p, p) and right side (p,) of bins (m, c) and their derivatives (m, c, p) over a power (m, c)."""
-    weight = np.sqrt(2.0 / power)
-    whole = (slope * weight[..., None]).reshape(-1, slope.shape[-1])
-    left = (rest * weight).ravel()
-    matrix, right = np.zeros(2 * (slope.shape[-1],)), np.zeros(slope.shape[-1])
-    for j, r in ((whole.real, left.real), (whole.imag, left.imag)):
-        part = np.ascontiguousarray(j)
-        matrix += part.T @ part
-        right += part.T @ r
-    return matrix, right
+def _together(
+    fresh: Sequence[Slopes], known: Sequence[Sequence[Complex]], shared: dict[int, int]
+) -> list[list[Complex]]:
+    """Derivatives of every test by all unknowns, in order: fresh, or from those known."""
+    found = []
+    for t, slopes in enumerate(fresh):
+        taken = {i: known[t][k] for i, k in shared.items()} if known else {}
+        both = slopes | taken
+        found.append([both[i] for i in sorted(both)])
+    return found
+
+
+def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
+    """Normal matrix (p, p) and right side (p,) of bins (m, c) and their p derivatives (m, c) over a power (m, c)."""
+    root = np.sqrt(power)
+    rows = np.stack([real_bins(j, root) for j in slope])
+    return rows @ rows.T, rows @ real_bins(rest, root)
 
 
 def positive(matrix: Array, prior: Array) -> Array:

@@ -30,7 +30,9 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     source = f"calibrated from campaign {calibration.campaign}: {', '.join(calibration.tests)}"
     entries: dict[str, Quantity] = {}
     for name, value in values.items():
-        spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
+        spread: tuple[float, ...] | float | None = None  # of a stroke that comes with a chamber
+        if name in deviations:
+            spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
         number = tuple(value) if isinstance(value, list) else value
         entries[name] = Quantity(number, machine.parameters[name].unit, "calibrated", source, spread)
     for name, quantity in machine.parameters.items():

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from ..alignment import align_record, group_delays
 from ..errors import RecordError, SimulationError
@@ -14,15 +15,18 @@ from ..machine import Machine
 from ..parameters import Parameters
 from ..plant import Plant, make_plant
 from ..pose import PlatenMotion
-from ..records import channel_name, layout_faults
+from ..records import channel_name, layout_faults, sample_interval
 from ..residuals import Measured, make_measured
 from ..sensors import Sensors, add_noise
+from ..signals import Band
 from .errors import CHANNELS
 from .knobs import Knob
 from .problem import KINDS, Comparison, Problem
 from .spectra import spectrum_of
 
 __all__ = ["Prepared", "prepare_problem"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,10 @@ class Prepared:
         count = len(self.problem.tests)
         noisy = tuple(t for i, t in enumerate(self.noisy) if i % count in places)
         return Prepared(self.problem.only(places), tuple(r.only(places) for r in self.replicas), noisy)
+
+    def scaled(self, scale: Array) -> "Prepared":
+        """The same with whitened residuals (t, b, c) times larger."""
+        return Prepared(self.problem.scaled(scale), tuple(r.scaled(scale) for r in self.replicas), self.noisy)
 
     def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Prepared":
         """The same tests and noise with another machine, or other knobs."""
@@ -145,6 +153,7 @@ def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Paramete
     Fusion is linear in its channels: a share is what doubling a channel adds. Lengths stay out: the geometry that turns
     them into a pose is to be calibrated.
     """
+    record = _slower(record, numbers.number("comparison.rate"))
     channels = [n for n in ("platen_displacement", "platen_velocity", "platen_acceleration") if n in record]
     fused = fuse_motion(plant, record, sensors)
     ready = make_measured(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
@@ -153,3 +162,14 @@ def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Paramete
         more = fuse_motion(plant, record.assign({name: 2.0 * record[name]}), sensors).motion
         share[name] = PlatenMotion(*(a - b for a, b in zip(more, fused.motion, strict=True)))
     return replace(ready, share=share)
+
+
+def _slower(record: xr.Dataset, rate: float) -> xr.Dataset:
+    """The record at a whole fraction of its rate, as near above `rate` [Hz] as can be, without what would fold."""
+    dt = sample_interval(record)
+    every = int(1.0 / (rate * dt) + 1e-6)
+    if every < 2:
+        return record
+    band = Band(high=0.4 / (every * dt), order=16)
+    timed = {name: x.copy(data=band.apply(x.values, dt)) for name, x in record.items() if "time" in x.dims}
+    return record.assign(timed).isel(time=slice(None, None, every))

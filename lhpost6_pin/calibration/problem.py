@@ -15,17 +15,19 @@ from numpy.typing import NDArray
 from ..law_table import BOUC_WEN_1D, BOUC_WEN_2D
 from ..machine import Machine
 from ..plant import Plant, make_plant
-from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow
+from ..pose import leg_displacements
+from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow, states_of
 from ..sensors import Sensors
 from .errors import corrected, sensor_unknowns
 from .knobs import Knob, machine_knobs, with_knobs
-from .spectra import make_whitener, spectrum_of
+from .spectra import make_whitener, mean_squares, spectrum_of
 
-__all__ = ["KINDS", "Base", "Comparison", "Problem", "Term"]
+__all__ = ["KINDS", "Base", "Comparison", "Problem", "Slopes", "Term"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-
+Slopes = dict[int, Complex]
+"""Derivatives (m, c) of a test's whitened bins, by the unknown's place in x."""
 
 KINDS = ("wrench", "flow", "gas", "force")
 """Kinds of residuals that are compared unless others are asked for."""
@@ -88,8 +90,8 @@ class Problem:
         told = {"supply_pressure": "supply", "spool_command": "servo"}  # by one kind of residual alone
         self.unknowns = tuple(u for u in unknowns if told.get(u.channel, kinds[0]) in kinds)
         self.free: dict[str, float] = {}  # share of the stated deviation that priors of unknowns have, but for one
-        self._turn(machine, machine_knobs(machine))
         plant = make_plant(machine)
+        self._turn(machine, machine_knobs(machine, _travel(plant, tests)))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
         noise: list[list[Complex]] = [[] for _ in tests]
@@ -141,6 +143,24 @@ class Problem:
         other.tests = tuple(tests)
         return other
 
+    def scaled(self, scale: Array) -> "Problem":
+        """The same problem, its whitened residuals in each test and band (t, b, c) times larger."""
+        other = copy(self)
+        other.whitener = self.whitener.scaled(scale)
+        return other
+
+    def noise_at(self, noisy: Sequence[Measured], x: Array) -> Array:
+        """Mean squares (t, b, c) of whitened noise with the unknowns at x; `noisy` as when the problem was made."""
+        plant, tests = self.plant_at(x), len(self.tests)
+        clean = [evaluate_residuals(plant, test, self.kinds) for test in self.tests]
+        found = np.zeros((tests, len(self.whitener.edges) - 1, sum(self.widths)))
+        for i, test in enumerate(noisy):
+            at, f = i % tests, self.frequency[i % tests]
+            bins = self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0]
+            means, _ = mean_squares(self.whitener, np.abs(self._whitened(at, bins)) ** 2, f)
+            found[at, np.unique(self.whitener.band(f))] += means * tests / len(noisy)
+        return found
+
     def only(self, places: Sequence[int]) -> "Problem":
         """The same problem with some of its tests; noise is weighed as with all."""
         other = copy(self)
@@ -159,33 +179,30 @@ class Problem:
 
     def whitened(self, x: Array) -> list[Complex]:
         """Whitened bins (m, c) of every test with the unknowns at x."""
-        plant, tests = self.plant_at(x), self._corrected(x)
-        found = []
-        for i, test in enumerate(tests):
-            bins, f = self.bins(evaluate_residuals(plant, test, self.kinds), test.dt)
-            found.append(self.whitener.apply(i, bins[..., None], f)[..., 0])
-        return found
+        return self.rest(Base(self, x))
 
-    def slopes(self, x: Array, free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Complex]:
-        """Derivatives (m, c, p) of the whitened bins of every test, by differences; zero where not free."""
+    def rest(self, base: "Base") -> list[Complex]:
+        """Whitened bins (m, c) of every test where everything has been evaluated."""
+        pairs = zip(base.residuals, base.tests, strict=True)
+        return [self._whitened(i, self.bins(r, test.dt)[0]) for i, (r, test) in enumerate(pairs)]
+
+    def _whitened(self, test: int, bins: Complex) -> Complex:
+        return np.asarray(self.whitener.apply(test, bins[..., None], self.frequency[test])[..., 0])
+
+    def slopes(self, base: "Base", free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Slopes]:
+        """Derivatives of the whitened bins of every test by the unknowns that are free, by differences from a base."""
         terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
-        out = [np.zeros((len(f), sum(self.widths), len(x)), np.complex128) for f in self.frequency]
-        if not terms:
-            return out
-        base = Base(self, x)
+        out: list[Slopes] = [{} for _ in self.tests]
         with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
-            for done, found in enumerate(parallel(delayed(self._difference)(x, base, term) for term in terms)):
-                for i, bins in found:
-                    for slope, change in zip(out, bins, strict=True):
-                        slope[:, :, i] = change
+            for done, found in enumerate(parallel(delayed(self._difference)(base, term, free) for term in terms)):
+                for i, changes in found:
+                    for slopes, change in zip(out, changes, strict=True):
+                        slopes[i] = change
                 progress((done + 1) / len(terms))
-        for i, (slope, f) in enumerate(zip(out, self.frequency, strict=True)):
-            slope[:, :, free] = self.whitener.apply(i, slope[:, :, free], f)
-            slope[:, :, ~free] = 0.0
         return out
 
-    def _difference(self, x: Array, base: "Base", term: Term) -> list[tuple[int, list[Complex]]]:
-        knobs = len(self.knobs)
+    def _difference(self, base: "Base", term: Term, free: NDArray[np.bool_]) -> list[tuple[int, list[Complex]]]:
+        x, knobs = base.x, len(self.knobs)
         step = np.where(x + self.step > self.highest, -self.step, self.step)
         more = np.zeros(len(x))
         for i, _ in term.members:
@@ -197,10 +214,13 @@ class Problem:
             changes = self.change(base, base.plant, term.residuals, tests)
         out = []
         for i, place in term.members:
+            if not free[i]:
+                continue
             rows = np.ones(sum(self.widths), bool)
             if place >= 0:
                 rows = self.rows("gas", place) if term.residuals == ("gas",) else self.rows_of_actuator(place)
-            out.append((i, [np.where(rows, c, 0.0) / step[i] for c in changes]))
+            slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
+            out.append((i, [self._whitened(t, slope) for t, slope in enumerate(slopes)]))
         return out
 
     def change(
@@ -269,17 +289,25 @@ class Base:
 
     def __init__(self, problem: Problem, x: Array) -> None:
         """Evaluate a problem's tests at x (p,)."""
-        self.plant, self.tests = problem.plant_at(x), problem._corrected(x)
+        self.x, self.plant, self.tests = x, problem.plant_at(x), problem._corrected(x)
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
+
+
+def _travel(plant: Plant, tests: Sequence[Measured]) -> dict[str, float]:
+    """How far legs of each kind move either way in any test, and a little more [m]."""
+    moved = [np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests]
+    kinds = [c.kind for c in plant.machine.components]
+    most = np.max(moved, axis=0)
+    return {kind: 1.05 * float(max(m for m, k in zip(most, kinds, strict=True) if k == kind)) for kind in kinds}
 
 
 def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
     """Hidden states (n_states,) of friction that holds a share of its force, one standard deviation either way."""
     out = np.zeros(len(plant.states))
     for row in plant.rows[np.isin(plant.rows["law"], (BOUC_WEN_1D, BOUC_WEN_2D))]:
-        both = slice(int(row["state"]), int(row["state"]) + (2 if row["law"] == BOUC_WEN_2D else 1))
+        both = states_of(row)
         out[both] = np.clip(share * rng.standard_normal(len(out[both])), -0.7, 0.7)  # within the unit disc
     return out
 

@@ -93,7 +93,7 @@ def by_simulation(
     matrix, side = np.diag(prior**-2.0), x[:knobs] / prior**2
     for t, f in enumerate(frequency):
         slope = np.stack([(m[t] - rest[t]) / h for m, h in zip(moved, step, strict=True)], axis=-1)
-        more, change = squares(whitener.apply(t, slope, f), white[t], power[t])
+        more, change = squares(np.moveaxis(whitener.apply(t, slope, f), -1, 0), white[t], power[t])
         matrix, side = matrix + more, side + change
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))

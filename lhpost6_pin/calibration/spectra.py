@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 
-__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "spectrum_of", "surprise"]
+__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "spectrum_of", "surprise"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+BELIEF = 4.0
+"""Bins that the stated power of noise counts for, where a band shows more: few bins of a band cannot tell its power."""
 
 CERTAIN = 9.0
 """Squared partial correlation times samples from which two columns of noise count as correlated; chance gives one."""
@@ -40,6 +43,13 @@ def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tu
     return out, f[inside]
 
 
+def real_bins(bins: Complex, root: Array) -> Array:
+    """Bins (m, c, ...) as real rows (2 m c, ...), over the roots of power (m, c): real parts, then imaginary ones."""
+    scaled = bins * (np.sqrt(2.0) / root).reshape(root.shape + (1,) * (bins.ndim - 2))
+    flat = scaled.reshape(-1, *bins.shape[2:])
+    return np.concatenate([flat.real, flat.imag])
+
+
 class Whitener(NamedTuple):
     """Inverse Cholesky factors (t, b, k, k) of the noise's cross-spectral matrices: by test, in bands between `edges`.
 
@@ -52,6 +62,10 @@ class Whitener(NamedTuple):
     def band(self, f: Array) -> NDArray[np.intp]:
         """Band (m,) that each frequency f (m,) is in."""
         return _band(self.edges, f)
+
+    def scaled(self, scale: Array) -> "Whitener":
+        """The same with whitened columns (t, b, k) times larger."""
+        return self._replace(factor=scale[..., None] * self.factor)
 
     def apply(self, test: int, bins: Complex, f: Array) -> Complex:
         """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
@@ -74,7 +88,8 @@ def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[
     found = []
     for bins, f in zip(whitened, frequency, strict=True):
         means, counts = mean_squares(whitener, np.abs(bins) ** 2, f)
-        found.append(np.repeat(np.maximum(1.0, means), counts, axis=0))
+        power = (BELIEF + counts[:, None] * np.maximum(1.0, means)) / (BELIEF + counts[:, None])
+        found.append(np.repeat(power, counts, axis=0))
     return found
 
 
@@ -87,9 +102,11 @@ def mean_squares(whitener: Whitener, squares: Array, f: Array) -> tuple[Array, N
 def surprise(means: Array, counts: NDArray[np.intp]) -> Array:
     """Negative log-likelihood (k,) of bins by their `mean_squares`.
 
-    What is left counts as noise of as much power as each band shows of it, or of unit power where it shows less.
+    What is left counts as noise of unit power, or, where a band shows more of it, of a power in between: the stated
+    one counts as `BELIEF` bins. Its derivative by a mean is that of least squares over the power of `excess`.
     """
-    return np.asarray(counts @ np.where(means < 1.0, means, 1.0 + np.log(np.maximum(means, 1.0))))
+    more = (BELIEF + counts[:, None] * np.maximum(means, 1.0)) / (BELIEF + counts[:, None])
+    return np.asarray(counts @ np.minimum(means, 1.0) + (BELIEF + counts) @ np.log(more))
 
 
 def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:

@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from ..calibration.normal import Normal, bounds_of, positive
 from ..calibration.problem import Problem
+from ..calibration.spectra import real_bins
 from ..parameters import Parameters
-from .screen import Background, real_bins
+from .screen import Background
 
 __all__ = ["make_background"]
 
@@ -22,7 +23,7 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
     slope, rest, root, matrix, side = [], [], [], [], []
     for t, (own, left, power) in enumerate(zip(normal.slope, normal.rest, normal.power, strict=True)):
         w = np.sqrt(power)
-        slope.append(real_bins(own, w) * prior)
+        slope.append(np.stack([real_bins(j, w) * sd for j, sd in zip(own, prior, strict=True)]).T)
         rest.append(real_bins(left, w))
         root.append(w)
         corrected, right = normal.of([t])

@@ -99,8 +99,7 @@ def discover(
     if hold_out is None and len(used) > FEWEST:
         least = _tells_least(first)
         held = [used.pop(least)]
-        rest = [i for i in range(len(names)) if i != least]
-        ready, first = ready.only(rest), first.only(rest)
+        ready, first = ready.only(used), first.only(used)
     found, standing = search(ready, first, calibration, numbers, between(report, 0.2, 0.75))
     left: tuple[Left, ...] = ()
     if found.misfit("wrench") > numbers.number("left.noise"):
@@ -108,8 +107,9 @@ def discover(
     report(0.8)
     proof = None
     if held:
-        part = between(report, 0.8, 1.0)
+        part = between(report, 0.8, 0.95)
         proof = prove(machine, found, [records[i] for i in held], sensors, phases=phases, jobs=jobs, progress=part)
+    tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
     report(1.0)
     verdict = judge(found, left, faults, calibration, numbers)
     fitted = fitted_machine(found)
@@ -123,7 +123,7 @@ def discover(
         search=found,
         left=left,
         proof=proof,
-        next_tests=next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers),
+        next_tests=tests,
         numbers=numbers,
         seed=seed,
         hashes={name: _hash(record) for name, record in zip(names, campaign.records, strict=True)},
@@ -151,10 +151,7 @@ def _tells_least(first: Normal) -> int:
     """The test without which the others tell most of the machine's parameters; what was measured in it has no say."""
     count = len(first.problem.knobs)
     prior = first.problem.prior[:count]
-    own = []
-    for slope in first.slope:
-        j = slope[..., :count].reshape(-1, count) * prior
-        own.append(2.0 * (j.conj().T @ j).real)
+    own = [first.of([t])[0][:count, :count] * np.outer(prior, prior) for t in range(len(first.rest))]
     without = [sum(own) - one + np.eye(count) for one in own]
     return int(np.argmax([np.linalg.slogdet(m)[1] for m in without]))
 

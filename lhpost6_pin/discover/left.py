@@ -63,7 +63,6 @@ def with_unnamed(machine: Machine, left: Left) -> Machine:
 
 def what_is_left(problem: Problem, base: Base, background: Background, numbers: Parameters) -> tuple[Left, ...]:
     """Free functions of every leg's position and of its speed, by falling gain."""
-    count = NODES
     seen = [_legs(base, t) for t in range(len(base.tests))]
     found = []
     for i, component in enumerate(base.plant.machine.components):
@@ -71,15 +70,15 @@ def what_is_left(problem: Problem, base: Base, background: Background, numbers: 
         for s, state in enumerate(states):
             along = [legs[s][:, i] for legs, _ in seen]
             low, high = min(x.min() for x in along), max(x.max() for x in along)
-            nodes = np.linspace(low, high, count)
+            nodes = np.linspace(low, high, NODES)
             columns = []
             for t, (test, x) in enumerate(zip(base.tests, along, strict=True)):
                 force = _hats(x, nodes)
                 wrench = -seen[t][1][:, i, :, None] * force[:, None, :]
                 columns.append(_whitened(problem, t, test, wrench))
             block = make_block(background, columns)
-            free = np.full(count, np.inf)
-            one = score(background, block, -free, free, np.full(count, numbers.number("left.spread")))
+            free = np.full(NODES, np.inf)
+            one = score(background, block, -free, free, np.full(NODES, numbers.number("left.spread")))
             found.append(Left(component.name, state, nodes, one.amplitude, one.sd, one.gain, one.held_out))
     return tuple(sorted(found, key=lambda left: -left.gain))
 

@@ -6,19 +6,17 @@ which that test would tell the two apart: its expected margin, to first order.
 """
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from ..calibration.knobs import Knob, machine_knobs
+from ..calibration.knobs import Knob
 from ..calibration.normal import Normal
 from ..calibration.prepare import prepare_problem
-from ..campaign import simulate_campaign
+from ..campaign import load_procedure, simulate_campaign, tests_of
 from ..control import ControllerSettings
 from ..errors import SimulationError
-from ..files import models_folder
 from ..machine import Machine
-from ..parameters import Parameters, load_parameters
+from ..parameters import Parameters
 from ..residuals import RESIDUALS
 from ..sensors import Sensors
 from .candidates import Candidate
@@ -37,26 +35,20 @@ class NextTest:
     test: str
     families: tuple[str, str]
     margin: float  # expected log-likelihood by which the wrong one stands behind; nan where the test cannot be run
+    told: bool  # whether that is enough
 
 
 def next_tests(
     found: Search, settings: ControllerSettings, sensors: Sensors, calibration: Parameters, numbers: Parameters
 ) -> tuple[NextTest, ...]:
     """For every added effect and each of its rivals, the menu's tests by falling margin."""
-    tests = dict.fromkeys(path.split(".")[0] for path in load_parameters(menu_file()).words if path.endswith(".motion"))
+    tests = tests_of(load_procedure(MENU))
     told: list[NextTest] = []
     for added in found.added:
-        first, *others = added.contest
-        for rival in others:
-            if rival.behind < added.apart and rival.candidate.family.named != first.candidate.family.named:
-                trials = [_trial(test, first, rival, settings, sensors, calibration, numbers) for test in tests]
-                told += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
+        for rival in added.rivals:
+            trials = [_trial(test, added.contest[0], rival, settings, sensors, calibration, numbers) for test in tests]
+            told += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
     return tuple(told)
-
-
-def menu_file() -> Path:
-    """Procedure that the tests are from."""
-    return models_folder() / "procedures" / f"{MENU}.toml"
 
 
 def _trial(
@@ -74,11 +66,12 @@ def _trial(
     try:
         run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
-        return NextTest(test, names, float("nan"))
+        return NextTest(test, names, float("nan"), told=False)
     ready = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS)
-    knobs = (*machine_knobs(ready.problem.machine), *_own_knobs(rival, numbers))
+    knobs = (*ready.problem.knobs, *_own_knobs(rival, numbers))
     problem = ready.problem.with_machine(ready.problem.machine, knobs)
-    return NextTest(test, names, _margin(Normal(problem, np.zeros(len(problem.prior)), lambda share: None)))
+    margin = _margin(Normal(problem, np.zeros(len(problem.prior)), lambda share: None))
+    return NextTest(test, names, margin, told=margin >= numbers.number("accept.apart"))
 
 
 def _own_knobs(rival: Contest, numbers: Parameters) -> tuple[Knob, ...]:
@@ -100,9 +93,7 @@ def _value(machine: Machine, candidate: Candidate, number: str) -> float:
 
 def _margin(normal: Normal) -> float:
     """Least negative log-likelihood and log-prior, to first order; noise of unit power, none in the test."""
-    prior = normal.problem.prior
-    slope = np.concatenate([j.reshape(-1, len(prior)) for j in normal.slope]) * prior
-    rest = np.concatenate([r.ravel() for r in normal.rest])
-    matrix = 2.0 * (slope.conj().T @ slope).real + np.eye(len(prior))
-    side = 2.0 * (slope.conj().T @ rest).real
-    return float(np.sum(np.abs(rest) ** 2) - 0.5 * side @ np.linalg.solve(matrix, side))
+    (matrix, side), rest = normal.whole, sum(float(np.sum(np.abs(r) ** 2)) for r in normal.rest)
+    scale = normal.problem.prior
+    scaled = matrix * np.outer(scale, scale) + np.eye(len(scale))
+    return rest - 0.5 * float(side * scale @ np.linalg.solve(scaled, side * scale))

@@ -35,9 +35,6 @@ _PARAMETER = {
 """Family of a parameter that is far off."""
 
 _SENSOR = {
-    "platen_acceleration": "accelerometer_error",
-    "platen_velocity": "accelerometer_error",
-    "platen_displacement": "length_sensor_error",
     "actuator_force": "pressure_sensor_error",
     "chamber_pressure_a": "pressure_sensor_error",
     "chamber_pressure_b": "pressure_sensor_error",
@@ -55,8 +52,8 @@ def list_releases(problem: Problem) -> tuple[Candidate, ...]:
         family = "" if knob.of else _PARAMETER.get(knob.name.split(".")[-1].split("[")[0], "")
         if family and knob.name not in problem.free:
             found.append(Candidate(find_family(family), _where(problem, knob), (), knob.name))
-    for unknown in problem.unknowns:
-        if unknown.name not in problem.free:
+    for unknown in problem.unknowns:  # those of the platen's motion were asked of each other before
+        if unknown.name not in problem.free and (unknown.kind == "delay" or unknown.channel in _SENSOR):
             found.append(Candidate(find_family(_family(unknown)), (unknown.name,), (), unknown.name))
     return tuple(found)
 

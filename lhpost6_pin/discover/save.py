@@ -24,7 +24,7 @@ def save_verdict(found: Discovery, path: Path) -> Path:
 
 def verdict_entries(found: Discovery) -> dict[str, Any]:
     """The verdict as plain entries."""
-    verdict, apart = found.verdict, found.numbers.number("accept.apart")
+    verdict = found.verdict
     closure: dict[str, Any] = {}
     for gap in found.proof.gaps if found.proof else ():
         entry = {key: round(value, 4) for key, value in asdict(gap).items() if key not in ("phase", "test")}
@@ -43,7 +43,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "unexplained": None if verdict.word != "unexplained" else _left(found),
         "not_testable": list(verdict.untestable),
         "next_test": [
-            {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.margin >= apart}
+            {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.told}
             for n in found.next_tests
         ],
         "advice": advice(found),
@@ -88,6 +88,7 @@ def _left(found: Discovery) -> dict[str, Any] | None:
     nearest = {"nearest": list(found.verdict.nearest)}
     if left is None:
         return {"where": "no single leg", "depends_on": "not known", **nearest}
+    formula = left.formula
     return {
         **nearest,
         "component": left.component,
@@ -98,5 +99,5 @@ def _left(found: Discovery) -> dict[str, Any] | None:
         "sd": left.sd.tolist(),
         "unit": "N",
         "domain": [float(left.nodes[0]), float(left.nodes[-1]), left.unit],
-        "formula": {"text": left.formula.text("N"), "share": left.formula.share},
+        "formula": {"text": formula.text("N"), "share": formula.share},
     }

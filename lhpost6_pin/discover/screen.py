@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
-__all__ = ["Background", "Block", "Score", "make_block", "real_bins", "score"]
+from ..calibration.spectra import real_bins
+
+__some_ = ["Background", "Block", "Score", "make_block", "score"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -58,13 +60,17 @@ class Background:
         return (self.inward == 0.0).astype(float)
 
     @cached_property
-    def factors(self) -> list[tuple[tuple[Array, bool], Array]]:
-        """Cholesky factor and right side with the priors of what is free: of all tests, then of all but each."""
-        found, both = [], np.outer(self.free, self.free)
+    def summed(self) -> list["_Summed"]:
+        """Its equations with the priors: of all tests, then of all but each."""
+        found, both, bound = [], np.outer(self.free, self.free), self.inward != 0.0
         for without in range(-1, len(self.matrix)):
             keep = np.arange(len(self.matrix)) != without
-            matrix = self.matrix[keep].sum(axis=0) * both + np.eye(len(self.place))
-            found.append((cho_factor(matrix), (self.side[keep].sum(axis=0) + self.place) * self.free))
+            matrix, side = self.matrix[keep].sum(axis=0), self.side[keep].sum(axis=0) + self.place
+            factor = cho_factor(matrix * both + np.eye(len(self.place)))
+            cross = matrix[:, bound] * self.free[:, None]
+            through = cho_solve(factor, cross)
+            own = matrix[np.ix_(bound, bound)] - cross.T @ through + np.eye(int(bound.sum()))
+            found.append(_Summed(keep, factor, side * self.free, side[bound], cross, through, own))
         return found
 
     @cached_property
@@ -85,13 +91,6 @@ class Background:
     def alone(self) -> Array:
         """What it changes (p,) where nothing is added."""
         return self._still[1]
-
-
-def real_bins(bins: Complex, root: Array) -> Array:
-    """Bins (m, c, ...) as real rows (2 m c, ...), over the roots of power (m, c)."""
-    scaled = bins * (np.sqrt(2.0) / root).reshape(root.shape + (1,) * (bins.ndim - 2))
-    flat = scaled.reshape(-1, *bins.shape[2:])
-    return np.concatenate([flat.real, flat.imag])
 
 
 def make_block(background: Background, columns: Sequence[Complex]) -> Block:
@@ -136,6 +135,18 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
     count = len(low)
     sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:count, :count], hermitian=True)), 0.0))
     return Score(gain, theta[:count], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta))
+
+
+class _Summed(NamedTuple):
+    """Equations of the background over some tests: of what is free, and of what is at a bound."""
+
+    keep: NDArray[np.bool_]  # (t,)
+    factor: tuple[Array, bool]  # of what is free
+    right: Array  # (p,)
+    side: Array  # (f,) of what is at a bound
+    cross: Array  # (p, f)
+    through: Array  # (p, f)
+    own: Array  # (f, f), what is free refitted
 
 
 class _Profile(NamedTuple):
@@ -187,15 +198,13 @@ class _Profile(NamedTuple):
 
 def _profile(background: Background, block: Block, spread: Array, without: int) -> _Profile:
     """Profile of all tests but one, or of all (-1)."""
-    keep = np.arange(len(block.own)) != without
-    factor, right = background.factors[without + 1]
-    bound = background.inward != 0.0
-    candidate, matrix = block.cross[keep].sum(axis=0), background.matrix[keep].sum(axis=0)[:, bound]
-    cross = np.hstack([candidate, matrix])
-    own = np.block([[block.own[keep].sum(axis=0), candidate[bound].T], [candidate[bound], matrix[bound]]])
-    held = background.side[keep].sum(axis=0)[bound] + background.place[bound]
-    side = np.concatenate([block.side[keep].sum(axis=0), held])
-    cross *= background.free[:, None]
-    through = cho_solve(factor, cross)
-    schur = own - cross.T @ through + np.diag(np.concatenate([spread**-2.0, np.ones(len(held))]))
-    return _Profile(schur, side - through.T @ right, factor, right, cross, background.inward)
+    some, bound = background.summed[without + 1], background.inward != 0.0
+    candidate = block.cross[some.keep].sum(axis=0)
+    cross = candidate * background.free[:, None]
+    through = cho_solve(some.factor, cross)
+    own = block.own[some.keep].sum(axis=0) - cross.T @ through + np.diag(spread**-2.0)
+    between = candidate[bound] - some.through.T @ cross
+    schur = np.block([[own, between.T], [between, some.own]])
+    side = np.concatenate([block.side[some.keep].sum(axis=0), some.side])
+    both, gone = np.hstack([cross, some.cross]), np.hstack([through, some.through])
+    return _Profile(schur, side - gone.T @ some.right, some.factor, some.right, both, background.inward)

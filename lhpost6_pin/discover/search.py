@@ -13,12 +13,13 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from ..calibration.fit import Solution, misfit, solve
+from ..calibration.fit import Solution, misfit, objective, solve
 from ..calibration.knobs import with_knobs
 from ..calibration.normal import Normal
 from ..calibration.prepare import Prepared
 from ..calibration.problem import Base, Problem
-from ..calibration.spectra import mean_squares, surprise
+from ..calibration.spectra import real_bins
+from ..library import Family
 from ..machine import Machine
 from ..parameters import Parameters
 from ..progress import Progress, between
@@ -27,7 +28,7 @@ from .background import make_background
 from .candidates import Candidate, list_candidates
 from .columns import columns_of
 from .releases import block_of, list_releases
-from .screen import Background, Score, make_block, real_bins, score
+from .screen import Background, Score, make_block, score
 from .weighing import Lowered, Weighing, refusal, squares_by_column
 
 __all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand"]
@@ -65,6 +66,12 @@ class Added:
     contest: tuple[Contest, ...]
     fall: Array  # (c,) of the squares of what is left, by column
     apart: float  # log-likelihood within which two families explained the campaign alike
+
+    @property
+    def rivals(self) -> tuple[Contest, ...]:
+        """Those of other families that explain the campaign alike."""
+        near = [one for one in self.contest[1:] if one.behind < self.apart]
+        return tuple(one for one in near if one.candidate.family.named != self.candidate.family.named)
 
 
 @dataclass(frozen=True)
@@ -126,7 +133,7 @@ def search(
     start = np.zeros(len(ready.problem.prior))
     share = between(progress, 0.0, 0.4)
     first = solve(ready.problem, ready.replicas, calibration, start, share, first=begin, frugal=True)
-    found = Search(ready, first, first)
+    found = _weighed_anew(Search(ready, first, first), calibration)
     most = int(numbers.number("accept.effects"))
     for k in range(most + 1):
         low, high = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
@@ -144,6 +151,19 @@ def search(
     return found, standing
 
 
+def _weighed_anew(found: Search, calibration: Parameters) -> Search:
+    """The refit with noise of the power that it has with the numbers found: soft oil makes more of it in the flows."""
+    ready, first = found.ready, found.solution
+    before, now = (ready.problem.noise_at(ready.noisy, x) for x in (np.zeros(len(first.x)), first.x))
+    scale = 1.0 / np.sqrt(np.maximum(1.0 + now - before, 0.25))  # noise has more in it than the sensors'
+    ready = ready.scaled(scale)
+    known = first.normal.scaled(ready.problem, scale)
+    solution = solve(
+        ready.problem, ready.replicas, calibration, first.x, lambda share: None, known, frugal=True, settled=True
+    )
+    return Search(ready, solution, solution)
+
+
 def stand(found: Search, calibration: Parameters) -> Standing:
     """Normal equations of the background about the solution."""
     problem, solution = found.problem, found.solution
@@ -158,7 +178,6 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
     rest = found.solution.normal.rest
     left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
-    known = {(a.candidate.components, a.candidate.family.shows_in): a.gain for a in found.added}
     weigh = Weighing(problem, background, squares_by_column(found.refit.normal.rest), numbers)
 
     def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
@@ -166,8 +185,7 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
         if one.gain >= numbers.number("accept.look"):
             less = weigh.lowered(explained(), one)
         why = refusal(one, less, numbers)
-        before = known.get((candidate.components, candidate.family.shows_in), 0.0)
-        if not why and less.gain < numbers.number("accept.again") * before:
+        if not why and less.gain < numbers.number("accept.again") * _found_there(found, candidate):
             why = "may be the form of what was found there"
         return Scored(candidate, one, less.gain, less.share, why)
 
@@ -191,6 +209,18 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
             scored += some
             progress((done + 1) / len(groups))
     return Round(tuple(sorted(scored, key=lambda one: -one.gain)), left)
+
+
+def _found_there(found: Search, candidate: Candidate) -> float:
+    """Largest gain of what was added on the same components, and shows in the same residuals or is often confused."""
+    one = candidate.family
+
+    def alike(other: Family) -> bool:
+        named = one.named in other.confused_with or other.named in one.confused_with
+        return named or bool(set(one.shows_in) & set(other.shows_in))
+
+    same = [a for a in found.added if a.candidate.components == candidate.components]
+    return max((a.gain for a in same if alike(a.candidate.family)), default=0.0)
 
 
 def _explained(background: Background, columns: Sequence[NDArray[np.complex128]], amplitude: Array) -> list[Array]:
@@ -253,7 +283,8 @@ def _best_of(
     # laws are never quite those of the table: of large gains a share decides nothing
     apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - least))
     alike = [i for i in range(len(left)) if left[i] - least < apart]
-    best = min(alike, key=lambda i: (len(rivals[i].candidate.family.shapes), left[i]))  # the simplest of them
+    # the simplest of them: what the model knows already, then what has the fewest numbers
+    best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
     contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i])) for i in order)
     refined = _refined(fitted[best], calibration, between(progress, 0.7, 1.0))
@@ -276,7 +307,8 @@ def _fit_jointly(
 ) -> Search:
     """The search with a candidate fitted together with everything, from where the linear estimate puts it.
 
-    Derivatives by everything else are those from before: enough to tell which candidate is the best.
+    Derivatives by everything else are those from before: enough to tell which candidate is the best. Where much is
+    left, it is fitted from where nothing else is off, too: what was missing may have bent everything out of reach.
     """
     problem, candidate = found.problem, one.candidate
     count, start = len(problem.knobs), found.solution.at
@@ -290,16 +322,19 @@ def _fit_jointly(
         ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
         start = np.insert(start, count, np.zeros(len(own)))
     before, replicas = found.solution.normal, ready.replicas
-    solution = solve(ready.problem, replicas, calibration, start, progress, before, frugal=True, settled=True)
-    return Search(ready, solution, found.refit, list(found.added), found.rounds)
+    fits = []
+    for place in (start, np.zeros_like(start)):
+        solution = solve(ready.problem, replicas, calibration, place, progress, before, frugal=True, settled=True)
+        fits.append(Search(ready, solution, found.refit, list(found.added), found.rounds))
+        left = [float(np.mean(np.abs(r) ** 2)) for r in fits[-1].rest]
+        if np.mean(left) < numbers.number("accept.settled"):
+            break
+    return min(fits, key=_objective)
 
 
 def _objective(found: Search) -> float:
     """Negative log-likelihood and log-prior at the solution."""
-    total = 0.5 * float(np.sum((found.solution.x / found.problem.prior) ** 2))
-    for r, f in zip(found.rest, found.problem.frequency, strict=True):
-        total += float(surprise(*mean_squares(found.problem.whitener, np.abs(r) ** 2, f)).sum())
-    return total
+    return objective(found.problem, found.rest, found.solution.x)
 
 
 def fitted_machine(found: Search) -> Machine:

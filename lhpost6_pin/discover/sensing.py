@@ -8,19 +8,16 @@ force and a pressure is left to the search.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import xarray as xr
 
+from ..alignment import align_record
 from ..consistency import SensorFinding, check_sensors
 from ..names import AXES
 from ..plant import Plant
-from ..records import sample_interval
-from ..sensors import GROUPS, Sensors
-from ..signals import align
+from ..sensors import Sensors
 
 __all__ = ["Fault", "put_right", "wrong_sensors"]
 
-_FAMILY = {"platen": "accelerometer_error", "actuator_displacement": "length_sensor_error"}
 _CHECKS = ("velocity against displacement", "acceleration against displacement", "length against platen pose")
 _SKEWED = (*_CHECKS, "force against pressures")
 
@@ -47,7 +44,7 @@ class Fault:
         """Family of the library."""
         if self.kind == "delay":
             return "channel_delay"
-        return next((f for start, f in _FAMILY.items() if self.channel.startswith(start)), "pressure_sensor_error")
+        return "length_sensor_error" if self.channel == "actuator_displacement" else "accelerometer_error"
 
 
 def wrong_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors) -> tuple[Fault, ...]:
@@ -55,7 +52,8 @@ def wrong_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors)
     findings = check_sensors(plant, records, sensors)
     late = _late(findings, sensors)
     if late:  # a large delay looks like a gain as well
-        findings = check_sensors(plant, [_on_time(r, late) for r in records], sensors)
+        behind = {f.channel: f.value for f in late}
+        findings = check_sensors(plant, [align_record(r, behind) for r in records], sensors)
     faults = [_fault(f, sensors) for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
     return (*(f for f in faults if f is not None), *late)
 
@@ -63,7 +61,6 @@ def wrong_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors)
 def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
     """The gain, offset or cross-talk that a finding is of."""
     channel, _, column = finding.channel.rstrip("]").partition("[")
-    deviation = float(np.hypot(finding.standard_error, finding.tolerance / 3.0))
     kind, error = finding.quantity, finding.estimate - finding.expected
     if kind == "gain" or kind.startswith("cross"):
         stated = sensors.gain_range.get(channel, 0.0)
@@ -71,7 +68,7 @@ def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
         stated = sensors.offset_range.get(channel, 0.0)
     else:
         return None
-    return Fault(kind, channel, column, error, finding.unit, deviation, stated)
+    return Fault(kind, channel, column, error, finding.unit, finding.deviation, stated)
 
 
 def _late(findings: Sequence[SensorFinding], sensors: Sensors) -> list[Fault]:
@@ -81,19 +78,11 @@ def _late(findings: Sequence[SensorFinding], sensors: Sensors) -> list[Fault]:
         told = [f for f in findings if f.check == check and f.quantity == "delay" and f.verdict != "untested"]
         off = [f for f in told if f.verdict == "suspicious"]
         if 2 * len(off) > len(told):
-            channel = told[0].channel.partition("[")[0]
+            group = told[0].channel.partition("[")[0]  # of one channel, all that are asked here
             middle = sorted(off, key=lambda f: f.estimate)[len(off) // 2]
-            deviation = float(np.hypot(middle.standard_error, middle.tolerance / 3.0))
-            stated = sensors.delay_range.get(next((g for g in GROUPS if channel in GROUPS[g]), channel), 0.0)
-            faults.append(Fault("delay", channel, "", middle.estimate - middle.expected, "s", deviation, stated))
+            error, stated = middle.estimate - middle.expected, sensors.delay_range.get(group, 0.0)
+            faults.append(Fault("delay", group, "", error, "s", middle.deviation, stated))
     return faults
-
-
-def _on_time(record: xr.Dataset, late: Sequence[Fault]) -> xr.Dataset:
-    """The record with late channels moved forward."""
-    dt = sample_interval(record)
-    moved = {f.channel: align(record[f.channel].values, f.value, dt) for f in late if f.channel in record}
-    return record.assign({name: record[name].copy(data=values) for name, values in moved.items()})
 
 
 def put_right(records: Sequence[xr.Dataset], faults: Sequence[Fault]) -> list[xr.Dataset]:
@@ -102,9 +91,9 @@ def put_right(records: Sequence[xr.Dataset], faults: Sequence[Fault]) -> list[xr
     for record in records:
         out = record.copy(deep=True) if faults else record
         for fault in faults:
-            if fault.channel not in out or not fault.channel.startswith("platen"):
+            if fault.kind == "delay" or fault.channel not in out or not fault.channel.startswith("platen"):
                 continue
-            values, k = out[fault.channel].values, AXES.index(fault.column) if fault.column else -1
+            values, k = out[fault.channel].values, AXES.index(fault.column)
             if fault.kind == "gain":
                 values[:, k] /= 1.0 + fault.value
             elif fault.kind.startswith("cross"):

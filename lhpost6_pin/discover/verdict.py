@@ -17,7 +17,7 @@ from ..parameters import Parameters
 from .left import Left
 from .search import Added, Search
 from .sensing import Fault
-from .weighing import excess_by_kind, squares_by_column
+from .weighing import squares_by_column
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
 
@@ -142,15 +142,13 @@ def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate
         if name == candidate.release or name.startswith(f"{candidate.name}."):
             values[name.removeprefix(f"{candidate.name}.")] = estimate(i)
     chance = float(chi2.sf(2.0 * added.gain, len(values)))
-    others = (c.candidate.family.named for c in added.contest[1:] if c.behind < added.apart)
-    rivals = tuple(dict.fromkeys(name for name in others if name != candidate.family.named))
     return Finding(
         family=candidate.family.named,
         components=candidate.components,
         parameters=values,
         gain=added.gain,
         p_value=min(1.0, chance * added.tried),
-        rivals=rivals,
+        rivals=tuple(dict.fromkeys(one.candidate.family.named for one in added.rivals)),
         form=candidate.family.name,
     )
 
@@ -183,9 +181,20 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     """Whether more is left than noise, and than the form of the effects found."""
     limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
-    first = excess_by_kind(found.problem, found.refit.normal.rest)
-    last = excess_by_kind(found.problem, found.rest)
+    first = _excess_by_kind(found.problem, found.refit.normal.rest)
+    last = _excess_by_kind(found.problem, found.rest)
     return any(found.misfit(kind) > limit and excess > rest * first[kind] for kind, excess in last.items())
+
+
+def _excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:
+    """Squares of whitened residuals beyond noise, twice, by kind; no less than a tenth of what noise has."""
+    found = {}
+    for kind in problem.kinds:
+        rows = problem.rows(kind)
+        if rows.any():
+            count = 2.0 * sum(r[:, rows].size for r in rest)
+            found[kind] = max(2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest) - count, 0.1 * count)
+    return found
 
 
 def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:

@@ -16,7 +16,7 @@ from ..calibration.spectra import mean_squares, surprise
 from ..parameters import Parameters
 from .screen import Background, Score
 
-__all__ = ["Lowered", "Weighing", "excess_by_kind", "refusal", "squares_by_column"]
+__all__ = ["Lowered", "Weighing", "refusal", "squares_by_column"]
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Weighing:
             left = (rest + slope @ change + more) ** 2
             squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
             means, counts = mean_squares(self.problem.whitener, squares, f)
-            beyond = counts @ np.log(np.maximum(means / self.doubt, 1.0))
+            beyond = surprise(np.maximum(means / self.doubt, 1.0), counts) - counts.sum()
             total += surprise(means, counts), squares.sum(axis=0), beyond
         return total, 0.5 * float(np.sum((b.place + change) ** 2))
 
@@ -65,17 +65,6 @@ def squares_by_column(rest: Sequence[NDArray[np.complex128]]) -> Array:
     return np.asarray(sum((np.abs(r) ** 2).sum(axis=0) for r in rest))
 
 
-def excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:
-    """Squares of whitened residuals beyond noise, twice, by kind; no less than a tenth of what noise has."""
-    found = {}
-    for kind in problem.kinds:
-        rows = problem.rows(kind)
-        if rows.any():
-            count = 2.0 * sum(r[:, rows].size for r in rest)
-            found[kind] = max(2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest) - count, 0.1 * count)
-    return found
-
-
 def refusal(one: Score, less: Lowered, numbers: Parameters) -> str:
     """Why a candidate may not be added."""
     if one.gain < numbers.number("accept.look"):
@@ -85,7 +74,8 @@ def refusal(one: Score, less: Lowered, numbers: Parameters) -> str:
     held = one.held_out
     if held.sum() < numbers.number("accept.held_out") * one.gain:
         return "does not hold on tests that it was not fitted on"
-    if np.mean(held > -numbers.number("accept.worse") * one.gain) < numbers.number("accept.better"):
+    better = np.mean(held > -numbers.number("accept.worse") * one.gain)
+    if better < numbers.number("accept.better") or held.min() < -numbers.number("accept.worst") * one.gain:
         return "makes tests worse that it was not fitted on"
     if less.beyond < numbers.number("accept.gain"):
         return "explains what may be noise"

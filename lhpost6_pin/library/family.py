@@ -65,13 +65,18 @@ class Family:
         return tuple(found)
 
     def groups(self, machine: "Machine") -> tuple[tuple[str, ...], ...]:
-        """Sets of components that a search tries: all but axes of the platen, all of each kind, and each alone."""
+        """Sets of components that a search tries: all but axes of the platen, all of each kind, and each alone.
+
+        What sits on level axes may swing along both.
+        """
         names = self.components(machine)
         kinds: dict[str, list[str]] = {}
         for component in machine.components:
             if component.name in names:
                 kinds.setdefault(component.kind, []).append(component.name)
         found = [tuple(name for name in names if not name.startswith("platen."))]
+        if "level axis" in self.acts_on:
+            found.append(names)
         if self.twins == "kind":
             found += [tuple(members) for members in kinds.values()]
             found += [(name,) for name in names]

@@ -110,14 +110,8 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
 
 def _next_tests(found: Discovery) -> Markup:
     """Tests simulated with the one effect and explained by the other."""
-    apart = found.numbers.number("accept.apart")
     rows = [
-        (
-            one.test,
-            " or ".join(map(title_of, one.families)),
-            _margin(one.margin),
-            "yes" if one.margin >= apart else "no",
-        )
+        (one.test, " or ".join(map(title_of, one.families)), _margin(one.margin), "yes" if one.told else "no")
         for one in found.next_tests
     ]
     header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood between them", "Tells them apart")

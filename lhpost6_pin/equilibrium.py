@@ -120,7 +120,7 @@ def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[f
 
     def flows(pressure_a: float, pressure_b: float, spool: float) -> tuple[float, float]:
         flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
-        across, _, out_a, out_b, _ = leak_flows(p, double, pressure_a, pressure_b, low)
+        across, _, out_a, out_b, _, _ = leak_flows(p, double, pressure_a, pressure_b, low)
         return flow_a - across - out_a, flow_b + across - out_b
 
     def spool_for(pressure_a: float, pressure_b: float) -> float:

@@ -36,6 +36,7 @@ __all__ = [
     "DROOP_TIME",
     "END_STOP",
     "EXTERNAL",
+    "EXTERNAL_SIDE",
     "GAS_HEAT",
     "GAS_LEAK",
     "HYDRAULIC_DOUBLE",
@@ -97,8 +98,8 @@ OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL = range
 
 # Places of numbers in the rows of actuators: some of the report's, then those of alterations.
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
-TURBULENT, EXTERNAL, NULL_LEAKAGE, NULL_WIDTH, NULL_BIAS, DEADBAND = range(12, 18)
-AIR, AIR_INDEX, VOIDS, VAPOUR, CURVE_ERROR, CURVE_SIDE, CURVE_POWER, LINE_TIME, LINE_DAMPING = range(18, 27)
+TURBULENT, EXTERNAL, EXTERNAL_SIDE, NULL_LEAKAGE, NULL_WIDTH, NULL_BIAS, DEADBAND = range(12, 19)
+AIR, AIR_INDEX, VOIDS, VAPOUR, CURVE_ERROR, CURVE_SIDE, CURVE_POWER, LINE_TIME, LINE_DAMPING = range(19, 28)
 
 # Places in the supply's numbers; a machine without alterations of it has the first two.
 SUPPLY, RETURN, DROOP, DROOP_TIME, BACK, BACK_TIME, DRAWN, RETURNED, WEIGHT = range(9)
@@ -188,7 +189,7 @@ LAWS: Mapping[str, Law] = {
     ),
     "extra_leakage": Law(-1, 1, (("leakage", "m3/s/Pa"),), alters="oil"),
     "turbulent_leakage": Law(-1, 1, (("coefficient", "m3/s/Pa^0.5"),), alters="oil"),
-    "external_leakage": Law(-1, 1, (("leakage", "m3/s/Pa"),), alters="oil"),
+    "external_leakage": Law(-1, 1, (("leakage", "m3/s/Pa"), ("side", "1")), alters="oil"),
     "null_leakage": Law(-1, 1, (("leakage", "m3/s/Pa^0.5"), ("width", "1")), alters="oil"),
     "null_bias": Law(-1, 1, (("bias", "1"),), alters="oil"),
     "deadband": Law(-1, 1, (("overlap", "1"),), alters="oil"),

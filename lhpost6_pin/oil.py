@@ -13,6 +13,7 @@ from .law_table import (
     CURVE_SIDE,
     DEADBAND,
     EXTERNAL,
+    EXTERNAL_SIDE,
     HYDRAULIC_DOUBLE,
     LINE_DAMPING,
     LINE_TIME,
@@ -97,8 +98,9 @@ def leak_flows(p, double, pressure_a, pressure_b, low):
     if p[TURBULENT] != 0.0:
         more, steeper = turbulent_leak(pressure_a - pressure_b, p[TURBULENT], p[11])
         across, slope = across + more, slope + steeper
-    out_b = p[EXTERNAL] * (pressure_b - low) if double else 0.0
-    return across, slope, p[EXTERNAL] * (pressure_a - low), out_b, p[EXTERNAL]
+    slope_a = p[EXTERNAL] * min(1.0, 1.0 + p[EXTERNAL_SIDE])
+    slope_b = p[EXTERNAL] * min(1.0, 1.0 - p[EXTERNAL_SIDE]) if double else 0.0
+    return across, slope, slope_a * (pressure_a - low), slope_b * (pressure_b - low), slope_a, slope_b
 
 
 @compiled
@@ -112,8 +114,8 @@ def net_flows(rows, i, spool, pressure_a, pressure_b, high, low, z):
         flow_a, flow_b, slope_a, slope_b = z[k], z[k + 2], 0.0, 0.0
     else:
         flow_a, flow_b, slope_a, slope_b = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
-    across, cross, out_a, out_b, slope_out = leak_flows(p, double, pressure_a, pressure_b, low)
-    return flow_a - across - out_a, flow_b + across - out_b, slope_a - slope_out, slope_b - slope_out, cross
+    across, cross, out_a, out_b, steep_a, steep_b = leak_flows(p, double, pressure_a, pressure_b, low)
+    return flow_a - across - out_a, flow_b + across - out_b, slope_a - steep_a, slope_b - steep_b, cross
 
 
 @compiled
@@ -147,7 +149,7 @@ def oil_power(row, s, z, spool, high, low):
         flow_a, flow_b = z[row.more], z[row.more + 2]
     else:
         flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
-    across, _, out_a, out_b, _ = leak_flows(p, double, pressure_a, pressure_b, low)
+    across, _, out_a, out_b, _, _ = leak_flows(p, double, pressure_a, pressure_b, low)
     h_a, h_b = _enthalpy(p, pressure_a), _enthalpy(p, pressure_b)
     stored = p[0] * (p[8] + s) * (h_a - pressure_a)
     if double:

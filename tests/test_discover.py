@@ -163,6 +163,13 @@ def test_what_is_at_its_bound_does_not_explain_what_a_candidate_does():
     assert other.gain < 0.5 * one.gain
 
 
+def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
+    for group in list_candidates(machine):
+        for knob in group[0].knobs(tuple(s.typical for s in group[0].amplitudes), 100.0, 0.5):
+            assert knob.sd > 0.0, knob.name
+            assert knob.step is None or knob.step > 0.0, knob.name
+
+
 def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_be_set_free(ready):
     released = {c.release: c.family.name for c in list_releases(ready.problem)}
     motion = {u.name for u in ready.problem.unknowns if u.channel.startswith("platen")}

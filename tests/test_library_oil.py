@@ -70,7 +70,7 @@ SINGLE = (0.5, 0.0, FLOW, 0.0, FLOW, 0.0, 1.05, 4.6e-11, 0.3, 0.0, *OIL)
 NUMBERS = {
     "extra_leakage": (3e-11,),
     "turbulent_leakage": (3e-7,),
-    "external_leakage": (5e-11,),
+    "external_leakage": (5e-11, 0.4),
     "null_leakage": (1e-6, 0.05),
     "null_bias": (0.01,),
     "deadband": (0.005,),
@@ -315,7 +315,7 @@ def test_a_supply_without_memory_gives_what_its_flow_leaves_it() -> None:
 STRONG: dict[str, dict[str, float]] = {
     "piston_leakage": {},
     "turbulent_leakage": {"coefficient": 5e-7},
-    "external_leakage": {"leakage": 5e-11},
+    "external_leakage": {"leakage": 5e-11, "side": -0.3},
     "entrained_air": {},
     "dead_volume": {},
     "valve_deadband": {},

@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 
 from ..calibration.spectra import real_bins
 
-__some_ = ["Background", "Block", "Score", "make_block", "score"]
+__all__ = ["Background", "Block", "Score", "make_block", "score"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -26,6 +26,7 @@ class Shape:
     high: float
     start: tuple[float, ...]  # values that a search tries; for the amplitude none are needed
     source: str
+    scale: float  # how far it may be from where a search starts; the typical size unless stated
 
     @property
     def amplitude(self) -> bool:
@@ -112,10 +113,11 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
             if missing := [w for w in ("unit", "typical", "low", "high", "source") if w not in entry]:
                 raise ParameterError(f"{file}: {name}.{key} lacks {', '.join(missing)}")
             typical, low, high = (float(entry[w]) for w in ("typical", "low", "high"))
+            scale = float(entry.get("scale", typical))
             start = tuple(float(x) for x in entry.get("start", ()))
             count = entry.get("count", 0)  # of a table
             for label in [f"{key}_{k + 1}" for k in range(count)] or [key]:
-                shapes.append(Shape(label, entry["unit"], typical, low, high, start, entry["source"]))
+                shapes.append(Shape(label, entry["unit"], typical, low, high, start, entry["source"], scale))
     shapes.sort(key=lambda shape: not shape.amplitude)
     return Family(
         name=name,

@@ -21,7 +21,7 @@ def _altering(law: str, *names: str) -> Callable[..., Any]:
 BUILD = {
     "piston_leakage": _altering("extra_leakage", "leakage"),
     "turbulent_leakage": _altering("turbulent_leakage", "coefficient"),
-    "external_leakage": _altering("external_leakage", "leakage"),
+    "external_leakage": _altering("external_leakage", "leakage", "side"),
     "entrained_air": _altering("entrained_air", "air", "polytropic_index"),
     "dead_volume": _altering("dead_volume", "volume"),
     "valve_deadband": _altering("deadband", "overlap"),

@@ -194,13 +194,15 @@ def test_what_flows_in_is_stored_leaks_or_is_delivered(law: str, kind: str) -> N
     assert rate == pytest.approx(inflow - dissipated - delivered, abs=5e-6 * size)
 
 
-@given(a=st.floats(-1e6, 25e6), b=st.floats(-1e6, 25e6), low=st.floats(0.0, 1e6))
-def test_every_leak_flows_down_its_pressure(a: float, b: float, low: float) -> None:
+@given(a=st.floats(-1e6, 25e6), b=st.floats(-1e6, 25e6), low=st.floats(0.0, 1e6), side=st.floats(-1.0, 1.0))
+def test_every_leak_flows_down_its_pressure(a: float, b: float, low: float, side: float) -> None:
     p = np.zeros(32)
-    p[[7, 12, 13, 11]] = 4e-11, 3e-7, 5e-11, 500.0
-    across, slope, out_a, out_b, slope_out = oil.leak_flows(p, True, a, b, low)
+    p[[7, 12, 13, 14, 11]] = 4e-11, 3e-7, 5e-11, side, 500.0
+    across, slope, out_a, out_b, slope_a, slope_b = oil.leak_flows(p, True, a, b, low)
     assert across * (a - b) >= 0.0 and slope > 0.0
-    assert out_a == pytest.approx(slope_out * (a - low)) and out_b == pytest.approx(slope_out * (b - low))
+    assert out_a == pytest.approx(slope_a * (a - low)) and out_b == pytest.approx(slope_b * (b - low))
+    assert max(slope_a, slope_b) == 5e-11 and min(slope_a, slope_b) == pytest.approx(5e-11 * (1.0 - abs(side)))
+    assert slope_a >= slope_b if side > 0.0 else slope_b >= slope_a  # side 1 is A alone, -1 is B alone
 
 
 # ---------------------------------------------------------------------------------------------- closed forms

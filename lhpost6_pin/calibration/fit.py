@@ -36,8 +36,8 @@ __all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-OVERSHOT = 30.0
-"""Log-likelihood by which a step must have made things worse to be taken back: corrections for noise cost some, too."""
+OVERSHOT = 1000.0
+"""Log-likelihood by which a step must have made things worse to be taken back: corrections for noise cost hundreds."""
 
 
 def calibrate(

@@ -105,7 +105,8 @@ def case_row(name: str, label: dict, answer: dict) -> str:
     hidden = [f"{e['family']} {' '.join(e['components'])}" for e in (*label["effects"], *label["decoys"])]
     hidden += [s["family"] for s in label["sensors"]]
     named = [f"{e['family']} {' '.join(e['components'])}" for e in answer["effects"]]
-    right = set(families(label)) == set(families(answer)) and answer["verdict"] in label["accept"]
+    wanted = set() if label["sort"] == "unknown" else set(families(label))
+    right = wanted == set(families(answer)) and answer["verdict"] in label["accept"]
     cells = (label["sort"], f"{reach(label):.1f}", ", ".join(hidden), answer["verdict"], ", ".join(named))
     return f"| {' | '.join((name if right else f'{name} (wrong)', *cells))} |"
 

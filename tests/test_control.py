@@ -405,8 +405,8 @@ def test_both_engines_agree_with_every_feature_on(plant, rest):
     assert a.trouble is None and np.abs(a.command).max() > 0.05
     for name in ("q", "v", "z", "command"):
         scale = np.maximum(np.abs(getattr(a, name)).max(axis=0), 1e-6)
-        # rounding of two rigid-body algorithms, which stiff hysteresis amplifies
-        assert (np.abs(getattr(a, name) - getattr(b, name)).max(axis=0) / scale).max() < 1e-8, name
+        # rounding of two rigid-body algorithms, amplified by stiff hysteresis: 1e-9 on one processor, 1e-8 on another
+        assert (np.abs(getattr(a, name) - getattr(b, name)).max(axis=0) / scale).max() < 1e-7, name
 
 
 def test_a_drive_of_the_wrong_width_is_refused(plant, rest, loop):

@@ -92,7 +92,7 @@ def calibrate(
         alone=np.hypot(normal.alone(problem.prior), floor),
         subsets=(*_subsets(problem, normal, found.at, floor, told_below), *([] if simulated is None else [simulated])),
         misfit_before=found.misfit_before,
-        misfit_after=misfit(problem, problem.whitened(x)),
+        misfit_after=misfit(problem, found.rest),
         rounds=found.rounds,
         converged=found.converged,
         numbers=numbers,
@@ -105,6 +105,7 @@ class Solution(NamedTuple):
     x: Array  # (p,) the unknowns
     at: Array  # (p,) where the normal equations are from
     normal: Normal
+    rest: list[Complex]  # what is left at x: whitened bins (m, c) of every test
     misfit_before: Array  # (n_tests, n_kinds), at the start
     rounds: int
     converged: bool
@@ -130,7 +131,7 @@ def solve(
     gain much; of a settled one only those that `known` lacks. A step that went too far is taken again, a quarter as
     long.
     """
-    x, step = start.copy(), np.zeros(len(start))
+    x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
     bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
@@ -138,13 +139,13 @@ def solve(
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: Bias | None = None
     normal: Normal | None = None
-    held: Normal | None = None  # that of the place from which the last step went
+    held: Normal | None = None  # that of `at`, from where the last step went
     least = np.inf
     converged = False
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
     for done in range(1, rounds + 1):
-        at = done - 1 if done == 1 else done - 1 + len(replicas)
-        share = between(progress, shares[at], shares[at + 1])
+        part = done - 1 if done == 1 else done - 1 + len(replicas)
+        share = between(progress, shares[part], shares[part + 1])
         if normal is None:
             normal = first or Normal(problem, x, share, known)
             before = misfit(problem, normal.rest)
@@ -158,9 +159,10 @@ def solve(
             normal = normal.less(bias)
         value = objective(problem, normal.rest, x)
         if held is not None and value > least + OVERSHOT:
-            x, step, normal = x - 0.75 * step, 0.25 * step, held
+            step, normal = 0.25 * step, held
+            x = at + step
             continue
-        least, held = value, normal
+        least, held, at = value, normal, x
         posterior = normal.posterior(problem.prior)
         step = bounded_step(normal, posterior, x, problem, numbers)
         slope = normal.whole[1] + x / problem.prior**2
@@ -171,10 +173,11 @@ def solve(
         if done > 1 and (still or (frugal and gain < numbers.number("fit.still"))):
             converged = True
             break
-    assert normal is not None
-    if objective(problem, problem.whitened(x), x) > least + OVERSHOT:
-        x, step = x - step, 0.0 * step
-    return Solution(x, x - step, normal, before, done, converged)
+    assert held is not None
+    rest = problem.whitened(x)
+    if objective(problem, rest, x) > least + OVERSHOT:
+        x, rest = at, held.rest
+    return Solution(x, at, held, rest, before, done, converged)
 
 
 def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:

@@ -48,15 +48,14 @@ class Normal:
         return other
 
     def scaled(self, problem: Problem, scale: Array) -> "Normal":
-        """The same of a problem whose whitened residuals are (t, b, c) times larger; what is not corrected stays so."""
+        """The same of a problem whose whitened residuals are (t, b, c) times larger, corrected as this."""
         times = [s[problem.whitener.band(f)] for s, f in zip(scale, problem.frequency, strict=True)]
         other = copy(self)
         other.problem = problem
         other.rest = [r * s for r, s in zip(self.rest, times, strict=True)]
         other.slope = [[j * s for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
-        other.bias = None if self.bias is None else self.bias.scaled(times)
         other.__dict__.pop("whole", None)
-        return other
+        return other if self.bias is None else other.less(self.bias.scaled(times))
 
     def less(self, bias: "Bias") -> "Normal":
         """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
@@ -155,8 +154,7 @@ def _together(
     """Derivatives of every test by all unknowns, in order: fresh, or from those known."""
     found = []
     for t, slopes in enumerate(fresh):
-        taken = {i: known[t][k] for i, k in shared.items()} if known else {}
-        both = slopes | taken
+        both = slopes | {i: known[t][k] for i, k in shared.items()}
         found.append([both[i] for i in sorted(both)])
     return found
 

@@ -94,11 +94,8 @@ class Problem:
         self._turn(machine, machine_knobs(machine, _travel(plant, tests)))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
-        noise: list[list[Complex]] = [[] for _ in tests]
         self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
-        for i, test in enumerate(noisy):
-            at = i % len(tests)
-            noise[at].append(self.bins(_less(evaluate_residuals(plant, test, kinds), clean[at]), test.dt)[0])
+        noise = self._noise(plant, noisy, clean)
         instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
         for found, test, base in zip(noise, tests, clean, strict=True):
             # what friction remembers is not known better than by its memory along the path as measured, and quieted;
@@ -151,14 +148,20 @@ class Problem:
 
     def noise_at(self, noisy: Sequence[Measured], x: Array) -> Array:
         """Mean squares (t, b, c) of whitened noise with the unknowns at x; `noisy` as when the problem was made."""
-        plant, tests = self.plant_at(x), len(self.tests)
-        clean = [evaluate_residuals(plant, test, self.kinds) for test in self.tests]
-        found = np.zeros((tests, len(self.whitener.edges) - 1, sum(self.widths)))
+        plant = self.plant_at(x)
+        noise = self._noise(plant, noisy, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
+        found = np.zeros((len(self.tests), len(self.whitener.edges) - 1, sum(self.widths)))
+        for t, (draws, f) in enumerate(zip(noise, self.frequency, strict=True)):
+            squares = np.mean([np.abs(self._whitened(t, bins)) ** 2 for bins in draws], axis=0)
+            found[t, np.unique(self.whitener.band(f))] = mean_squares(self.whitener, squares, f)[0]
+        return found
+
+    def _noise(self, plant: Plant, noisy: Sequence[Measured], clean: Sequence[Residuals]) -> list[list[Complex]]:
+        """Bins (m, c) by which residuals of every test differ, each time that it is seen with more noise."""
+        found: list[list[Complex]] = [[] for _ in clean]
         for i, test in enumerate(noisy):
-            at, f = i % tests, self.frequency[i % tests]
-            bins = self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0]
-            means, _ = mean_squares(self.whitener, np.abs(self._whitened(at, bins)) ** 2, f)
-            found[at, np.unique(self.whitener.band(f))] += means * tests / len(noisy)
+            at = i % len(clean)
+            found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0])
         return found
 
     def only(self, places: Sequence[int]) -> "Problem":

@@ -56,10 +56,10 @@ class Candidate:
                 paths=((f"effect.{self.name}.{s.name}", -1),),
                 unit=s.unit,
                 value=value,
-                sd=factor if relative else spread * s.typical if s.amplitude else s.scale,
+                sd=spread * s.typical if s.amplitude else factor if relative else s.scale,
                 relative=relative,
                 shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
-                step=None if relative else s.typical if s.amplitude else 0.1 * s.scale,
+                step=s.typical if s.amplitude else None,
             )
             found.append(knob.within(s.low, s.high))
         return tuple(found)

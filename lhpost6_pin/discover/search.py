@@ -7,7 +7,7 @@ parameters and sensor errors.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -113,10 +113,10 @@ class Search:
         """The problem with the effects added."""
         return self.ready.problem
 
-    @cached_property
+    @property
     def rest(self) -> list[NDArray[np.complex128]]:
         """What is left at the solution: whitened bins (m, c) of every test."""
-        return self.problem.whitened(self.solution.x)
+        return self.solution.rest
 
     def misfit(self, kind: str) -> float:
         """Mean square of what is left of one kind, over all tests alike; nan where there is none."""
@@ -131,9 +131,9 @@ def search(
     begin are its normal equations where all unknowns are zero; calibration and numbers those of `models/procedures`.
     """
     start = np.zeros(len(ready.problem.prior))
-    share = between(progress, 0.0, 0.4)
+    share = between(progress, 0.0, 0.35)
     first = solve(ready.problem, ready.replicas, calibration, start, share, first=begin, frugal=True)
-    found = _weighed_anew(Search(ready, first, first), calibration)
+    found = _weighed_anew(Search(ready, first, first), calibration, between(progress, 0.35, 0.4))
     most = int(numbers.number("accept.effects"))
     for k in range(most + 1):
         low, high = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
@@ -151,16 +151,14 @@ def search(
     return found, standing
 
 
-def _weighed_anew(found: Search, calibration: Parameters) -> Search:
+def _weighed_anew(found: Search, calibration: Parameters, progress: Progress) -> Search:
     """The refit with noise of the power that it has with the numbers found: soft oil makes more of it in the flows."""
     ready, first = found.ready, found.solution
     before, now = (ready.problem.noise_at(ready.noisy, x) for x in (np.zeros(len(first.x)), first.x))
     scale = 1.0 / np.sqrt(np.maximum(1.0 + now - before, 0.25))  # noise has more in it than the sensors'
     ready = ready.scaled(scale)
     known = first.normal.scaled(ready.problem, scale)
-    solution = solve(
-        ready.problem, ready.replicas, calibration, first.x, lambda share: None, known, frugal=True, settled=True
-    )
+    solution = solve(ready.problem, ready.replicas, calibration, first.x, progress, known, frugal=True, settled=True)
     return Search(ready, solution, solution)
 
 
@@ -323,8 +321,9 @@ def _fit_jointly(
         start = np.insert(start, count, np.zeros(len(own)))
     before, replicas = found.solution.normal, ready.replicas
     fits = []
-    for place in (start, np.zeros_like(start)):
-        solution = solve(ready.problem, replicas, calibration, place, progress, before, frugal=True, settled=True)
+    for i, place in enumerate((start, np.zeros_like(start))):
+        share = between(progress, 0.5 * i, 0.5 * (i + 1))
+        solution = solve(ready.problem, replicas, calibration, place, share, before, frugal=True, settled=True)
         fits.append(Search(ready, solution, found.refit, list(found.added), found.rounds))
         left = [float(np.mean(np.abs(r) ** 2)) for r in fits[-1].rest]
         if np.mean(left) < numbers.number("accept.settled"):

@@ -23,8 +23,8 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
     """
     ready = prepare_problem(machine, records, sensors, calibration_numbers(), seed=seed, jobs=1)
     problem = ready.problem
-    x = np.zeros(len(problem.prior))
-    base, rest = Base(problem, x), np.concatenate([r.ravel() for r in problem.whitened(x)])
+    base = Base(problem, np.zeros(len(problem.prior)))
+    rest = np.concatenate([r.ravel() for r in problem.rest(base)])
     best: dict[str, tuple[float, np.ndarray]] = {}
     for group in list_candidates(base.plant.machine):
         columns, parts = columns_of(problem, base, group)

@@ -30,6 +30,7 @@ from .law_table import (
     LINE_TIME,
     NULL_BIAS,
     NULL_LEAKAGE,
+    PLAY,
     RETURNED,
     TURBULENT,
     VOIDS,
@@ -51,6 +52,7 @@ _PLACE = {
     "cavitation": VOIDS,
     "flow_curve": CURVE_ERROR,
     "line": LINE_TIME,
+    "play": PLAY,
 }
 """Where an actuator's row keeps the numbers of a law, one behind the other."""
 
@@ -80,9 +82,9 @@ def alter_rows(rows: NDArray[np.void], effects: Sequence["Effect"], at: Mapping[
             if effect.law == "extra_leakage":
                 p[LEAKAGE] += amplitude
             elif effect.law == "dead_volume":
-                p[CHAMBER_A] += amplitude / p[AREA_A]
+                p[CHAMBER_A] += amplitude * min(1.0, 1.0 + numbers[1]) / p[AREA_A]
                 if p[AREA_B] > 0.0:
-                    p[CHAMBER_B] += amplitude / p[AREA_B]
+                    p[CHAMBER_B] += amplitude * min(1.0, 1.0 - numbers[1]) / p[AREA_B]
             else:
                 place = _PLACE[effect.law]
                 p[place] += amplitude

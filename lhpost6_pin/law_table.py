@@ -21,6 +21,7 @@ __all__ = [
     "BALL",
     "BOUC_WEN_1D",
     "BOUC_WEN_2D",
+    "BY_MEMORY",
     "BY_POSITION",
     "BY_SPEED",
     "CHAMBER_A",
@@ -53,6 +54,8 @@ __all__ = [
     "NULL_LEAKAGE",
     "NULL_WIDTH",
     "OSCILLATOR",
+    "PLAY",
+    "PLAY_FORCE",
     "PORTS",
     "RETURN",
     "RETURNED",
@@ -94,12 +97,13 @@ PORTS = ("port", "port_2", "port_3")
 # Codes of the laws that have rows, as the compiled stage reads them.
 HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS, CONSTANT = range(7)
 STRIBECK, ASYMMETRIC, WARM_UP, LOAD_FRICTION, BACKLASH, DRAG, SPRING, END_STOP = range(7, 15)
-OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL = range(15, 22)
+OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL, BY_MEMORY = range(15, 23)
 
 # Places of numbers in the rows of actuators: some of the report's, then those of alterations.
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
 TURBULENT, EXTERNAL, EXTERNAL_SIDE, NULL_LEAKAGE, NULL_WIDTH, NULL_BIAS, DEADBAND = range(12, 19)
 AIR, AIR_INDEX, VOIDS, VAPOUR, CURVE_ERROR, CURVE_SIDE, CURVE_POWER, LINE_TIME, LINE_DAMPING = range(19, 28)
+PLAY, PLAY_FORCE = 28, 29
 
 # Places in the supply's numbers; a machine without alterations of it has the first two.
 SUPPLY, RETURN, DROOP, DROOP_TIME, BACK, BACK_TIME, DRAWN, RETURNED, WEIGHT = range(9)
@@ -164,14 +168,24 @@ LAWS: Mapping[str, Law] = {
     ),
     "backlash": Law(BACKLASH, 1, (("friction", "N"), ("yield_slip", "m"), ("gap", "m")), ("offset",), True),
     "drag": Law(DRAG, 1, (("force", "N"), ("exponent", "1"))),
-    "spring": Law(SPRING, 1, (("stiffness", "N/m | N m/rad"),), stores_energy=True),
+    "spring": Law(SPRING, 2, (("stiffness", "N/m | N m/rad"), ("lever", "m")), stores_energy=True),
     "end_stop": Law(END_STOP, 1, (("force", "N"), ("start", "m"), ("exponent", "1")), stores_energy=True),
     "by_position": Law(BY_POSITION, 1, (("share", "1"), ("first", "m"), ("last", "m"), *_TABLE)),
     "by_speed": Law(BY_SPEED, 1, (("share", "1"), ("first", "m/s"), ("last", "m/s"), *_TABLE)),
+    "by_memory": Law(
+        BY_MEMORY,
+        1,
+        (("share", "1"), ("first", "m"), ("last", "m"), *_TABLE, ("memory", "s"), ("past", "1")),
+        ("past_position",),
+    ),
     "oscillator": Law(
         OSCILLATOR,
-        2,
-        (("mass", "kg"), ("circular_frequency", "rad/s"), ("damping", "1"), ("lever", "m"), ("gravity", "m/s2")),
+        3,
+        (
+            ("mass", "kg"),
+            *(("circular_frequency", "rad/s"), ("damping", "1"), ("gravity", "m/s2")),
+            *(("lever_2", "m"), ("lever_3", "m")),
+        ),
         ("stretch", "velocity"),
     ),
     "gas_leak": Law(GAS_LEAK, 1, (("rate", "1/s"), *_GAS, ("lost", "1")), ("time",), True),
@@ -196,7 +210,8 @@ LAWS: Mapping[str, Law] = {
     "entrained_air": Law(-1, 1, (("air", "1"), ("polytropic_index", "1")), alters="oil"),
     "cavitation": Law(-1, 1, (("share", "1"), ("vapour_pressure", "Pa")), alters="oil"),
     "flow_curve": Law(-1, 1, (("error", "1"), ("side", "1"), ("power", "1")), alters="oil"),
-    "dead_volume": Law(-1, 1, (("volume", "m3"),), alters="oil"),
+    "dead_volume": Law(-1, 1, (("volume", "m3"), ("side", "1")), alters="oil"),
+    "play": Law(-1, 1, (("half_play", "m"), ("closing_force", "N")), alters="oil"),
     "line": Law(
         -1, 1, (("time", "s"), ("damping", "1")), ("flow_a", "flow_rate_a", "flow_b", "flow_rate_b"), alters="oil"
     ),

@@ -20,19 +20,22 @@ from .law_table import (
     NULL_BIAS,
     NULL_LEAKAGE,
     NULL_WIDTH,
+    PLAY,
+    PLAY_FORCE,
     TURBULENT,
     VAPOUR,
     VOIDS,
 )
 from .laws.bulk import air_modulus, enthalpy_of, void_share
-from .laws.chamber import flow_enthalpy, pressure_rises
+from .laws.chamber import flow_enthalpy, piston_force, pressure_rises
 from .laws.leaks import null_leak, turbulent_leak
 from .laws.lines import line_step
 from .laws.orifice import opening, port_flow
+from .laws.play import play_energy, play_slope, play_travel
 from .laws.spool import corrected_opening, dead_zone
 
 __all__ = ["advance_line", "advance_oil", "bulk_modulus", "exchanged", "leak_flows", "net_flows", "oil_power"]
-__all__ += ["oil_rates", "start_line", "valve_flows"]
+__all__ += ["oil_rates", "rod_advance", "rod_ahead", "start_line", "valve_flows"]
 
 
 @compiled
@@ -138,6 +141,30 @@ def _enthalpy(p, pressure):
 
 
 @compiled
+def rod_ahead(p, pressure_a, pressure_b):
+    """Rod ahead of the platen [m]."""
+    if p[PLAY] == 0.0:
+        return 0.0
+    return play_travel(piston_force(pressure_a, pressure_b, p[0], p[1]), p[PLAY], p[PLAY_FORCE])
+
+
+@compiled
+def rod_advance(p, pressure_a, pressure_b, change_a, change_b):
+    """By how much more the rod gets ahead while pressures change [m]; with their rates, its rate [m/s]."""
+    if p[PLAY] == 0.0:
+        return 0.0
+    force = piston_force(pressure_a, pressure_b, p[0], p[1])
+    return play_slope(force, p[PLAY], p[PLAY_FORCE]) * piston_force(change_a, change_b, p[0], p[1])
+
+
+@compiled
+def _shared(p, pressure_a, pressure_b, change_a, change_b, fall_a, fall_b):
+    """The same where the rod's own stroke is felt: changes but for it, and falls of pressure per unit of it."""
+    ahead = rod_advance(p, pressure_a, pressure_b, change_a, change_b)
+    return ahead / (1.0 + rod_advance(p, pressure_a, pressure_b, fall_a, fall_b))
+
+
+@compiled
 def oil_power(row, s, z, spool, high, low):
     """Inflow through the valve and power lost in leaks [W], and energy stored in the chambers [J], of one row."""
     p = row.p
@@ -151,9 +178,12 @@ def oil_power(row, s, z, spool, high, low):
         flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
     across, _, out_a, out_b, _, _ = leak_flows(p, double, pressure_a, pressure_b, low)
     h_a, h_b = _enthalpy(p, pressure_a), _enthalpy(p, pressure_b)
+    s += rod_ahead(p, pressure_a, pressure_b)
     stored = p[0] * (p[8] + s) * (h_a - pressure_a)
     if double:
         stored += p[1] * (p[9] - s) * (h_b - pressure_b)
+    if p[PLAY] != 0.0:
+        stored += play_energy(piston_force(pressure_a, pressure_b, p[0], p[1]), p[PLAY], p[PLAY_FORCE])
     return h_a * flow_a + h_b * flow_b, (h_a - h_b) * across + h_a * out_a + h_b * out_b, stored
 
 
@@ -187,7 +217,8 @@ def advance_oil(rows, s, ds, dt, spool, high, low, z):
     """Advance the states of altered rows by one step in which their ports move by ds from s.
 
     The rule is `chamber.advance_double`'s; lines take half a step before it and half a step behind it. A modulus that
-    depends on the pressure is that at mid-step, found in a first pass.
+    depends on the pressure is that at mid-step, found in a first pass, and so is what play gives. A rod that runs ahead
+    of the platen by d makes pressures fall by `fall` d, and d follows from what is left of their rise.
     """
     for i in range(rows.size):
         row = rows[i]
@@ -202,26 +233,21 @@ def advance_oil(rows, s, ds, dt, spool, high, low, z):
         advance_line(rows, i, x, pressure_a, pressure_b, high, low, 0.5 * dt, z)
         flow_a, flow_b, slope_a, slope_b, cross = net_flows(rows, i, x, pressure_a, pressure_b, high, low, z)
         middle = s[row.port] + 0.5 * ds[row.port]
-        per_a = 1.0 / (p[0] * (p[8] + middle))
-        per_b = 1.0 / (p[1] * (p[9] - middle)) if double else 0.0
-        passes = 2 if p[AIR] != 0.0 or p[VOIDS] != 0.0 else 1
+        passes = 2 if p[AIR] != 0.0 or p[VOIDS] != 0.0 or p[PLAY] != 0.0 else 1
         rise_a = rise_b = 0.0
         for _ in range(passes):
-            bulk_a, left_a = bulk_modulus(p, pressure_a + 0.5 * rise_a)
-            bulk_b, left_b = bulk_modulus(p, pressure_b + 0.5 * rise_b)
-            rise_a, rise_b = pressure_rises(
-                flow_a,
-                flow_b,
-                slope_a,
-                slope_b,
-                cross,
-                ds[row.port],
-                dt,
-                p[0],
-                p[1],
-                left_a * bulk_a * per_a,
-                left_b * bulk_b * per_b,
-            )
+            half_a, half_b = pressure_a + 0.5 * rise_a, pressure_b + 0.5 * rise_b
+            bulk_a, left_a = bulk_modulus(p, half_a)
+            bulk_b, left_b = bulk_modulus(p, half_b)
+            rod = middle + rod_ahead(p, half_a, half_b)
+            per_oil_a = left_a * bulk_a / (p[0] * (p[8] + rod))
+            per_oil_b = left_b * bulk_b / (p[1] * (p[9] - rod)) if double else 0.0
+            slopes, areas = (slope_a, slope_b, cross), (p[0], p[1])
+            rise_a, rise_b = pressure_rises(flow_a, flow_b, *slopes, ds[row.port], dt, *areas, per_oil_a, per_oil_b)
+            if p[PLAY] != 0.0:
+                fall_a, fall_b = pressure_rises(0.0, 0.0, *slopes, -1.0, dt, *areas, per_oil_a, per_oil_b)
+                ahead = _shared(p, half_a, half_b, rise_a, rise_b, fall_a, fall_b)
+                rise_a, rise_b = rise_a - ahead * fall_a, rise_b - ahead * fall_b
         z[k] = pressure_a + rise_a
         if double:
             z[k + 1] = pressure_b + rise_b
@@ -243,11 +269,19 @@ def oil_rates(rows, s, sd, spool, high, low, z, zd):
         pressure_b = z[k + 1] if double else 0.0
         flow_a, flow_b, _, _, _ = net_flows(rows, i, x, pressure_a, pressure_b, high, low, z)
         bulk, left = bulk_modulus(p, pressure_a)
-        speed = sd[row.port]
-        zd[k] = left * bulk / (p[8] + s[row.port]) * (flow_a / p[0] - speed)
+        at, speed = s[row.port] + rod_ahead(p, pressure_a, pressure_b), sd[row.port]
+        fall_a, fall_b = left * bulk / (p[8] + at), 0.0
+        zd[k] = fall_a * (flow_a / p[0] - speed)
         if double:
             bulk, left = bulk_modulus(p, pressure_b)
-            zd[k + 1] = left * bulk / (p[9] - s[row.port]) * (flow_b / p[1] + speed)
+            fall_b = -left * bulk / (p[9] - at)
+            zd[k + 1] = -fall_b * (flow_b / p[1] + speed)
+        if p[PLAY] != 0.0:
+            rate_b = zd[k + 1] if double else 0.0
+            ahead = _shared(p, pressure_a, pressure_b, zd[k], rate_b, fall_a, fall_b)
+            zd[k] -= ahead * fall_a
+            if double:
+                zd[k + 1] -= ahead * fall_b
         if p[LINE_TIME] > 0.0:
             k = row.more
             flow_a, flow_b, _, _ = valve_flows(p, double, x, pressure_a, pressure_b, high, low)

@@ -8,7 +8,7 @@ from .compiled import compiled
 from .law_table import HYDRAULIC_DOUBLE
 from .laws.chamber import chamber_rate, flows_double, flows_single
 from .laws.orifice import opening
-from .oil import advance_line, bulk_modulus, net_flows, start_line
+from .oil import advance_line, bulk_modulus, net_flows, rod_advance, rod_ahead, start_line
 from .supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
 
 __all__ = ["flow_misses", "follow_supply"]
@@ -52,6 +52,9 @@ def flow_misses(k, fed, chamber, pressure, pressure_rate, spool, high, low, dt, 
             else:
                 advance_line(fed, i, x, pressure_a, pressure_b, high, low, 0.5 * dt, z)
             q_a, q_b, _, _, _ = net_flows(fed, i, x, pressure_a, pressure_b, high, low, z)
+            rate_b = pressure_rate[k, at_b] if at_b >= 0 else 0.0
+            at += rod_ahead(p, pressure_a, pressure_b)
+            speed += rod_advance(p, pressure_a, pressure_b, pressure_rate[k, at_a], rate_b)
             bulk, left = bulk_modulus(p, pressure_a)
             flow[k, at_a] = pressure_rate[k, at_a] * p[0] * (p[8] + at) / bulk - left * (q_a - p[0] * speed)
             if at_b >= 0:

@@ -5,6 +5,7 @@ from .law_table import (
     ASYMMETRIC,
     BACKLASH,
     BALL,
+    BY_MEMORY,
     BY_POSITION,
     BY_SPEED,
     CONSTANT,
@@ -36,10 +37,11 @@ from .laws.friction import (
     warm_up_force,
 )
 from .laws.gas import advance_heat, heat_rate, pressure_change, slow_heat
+from .laws.lines import filter_shares
 from .laws.oscillator import advance_oscillator, oscillator_force, oscillator_rate
 from .laws.spring import drag_force, end_stop_energy, end_stop_force, spring_energy, spring_force
 from .laws.strut import strut_energy, strut_force
-from .laws.table import table_force
+from .laws.table import remembered, table_force
 
 __all__ = ["added_power", "added_rates", "advance_added", "apply_added", "gas_log_ratio"]
 
@@ -60,6 +62,19 @@ def apply_added(rows, s, sd, z, force, port_force):
             port_force[row.port_2] += second
         if row.port_3 >= 0:
             port_force[row.port_3] += third
+
+
+@compiled
+def _stretch(row, s):
+    """Stretch of a spring on a port, and on a second one by its lever [m or rad]."""
+    return s[row.port] + (row.p[1] * s[row.port_2] if row.port_2 >= 0 else 0.0)
+
+
+@compiled
+def _foot(row, x):
+    """What the foot of a mass does by rates or steps x of its three ports, and their levers."""
+    p = row.p
+    return x[row.port] + p[4] * x[row.port_2] + p[5] * x[row.port_3]
 
 
 @compiled
@@ -93,20 +108,21 @@ def _force(row, s, sd, z):
         return p[0] * table_force(s[a], p[1], p[2], p[3 : 3 + NODES]), 0.0, 0.0
     if law == BY_SPEED:
         return p[0] * table_force(sd[a], p[1], p[2], p[3 : 3 + NODES]), 0.0, 0.0
+    if law == BY_MEMORY:
+        x = remembered(s[a], z[k], p[4 + NODES])
+        return p[0] * table_force(x, p[1], p[2], p[3 : 3 + NODES]), 0.0, 0.0
     if law == BACKLASH:
         return backlash_force(z[k], p[0], p[1], p[2]), 0.0, 0.0
     if law == DRAG:
         return drag_force(sd[a], p[0], p[1]), 0.0, 0.0
     if law == SPRING:
-        return spring_force(s[a], p[0]), 0.0, 0.0
+        f = spring_force(_stretch(row, s), p[0])
+        return f, p[1] * f, 0.0
     if law == END_STOP:
         return end_stop_force(s[a], p[0], p[1], p[2]), 0.0, 0.0
     if law == OSCILLATOR:
-        if row.port_2 < 0:
-            return -p[0] * p[4], 0.0, 0.0
-        foot = sd[a] + p[3] * sd[row.port_2]
-        f = oscillator_force(z[k], z[k + 1] - foot, p[0], p[1], p[2])
-        return f, p[3] * f, 0.0
+        f = oscillator_force(z[k], z[k + 1] - _foot(row, sd), p[0], p[1], p[2]) - p[0] * p[3]
+        return f, p[4] * f, p[5] * f
     if law == GAS_LEAK or law == GAS_HEAT:
         return strut_force(s[a], p[1], p[2], p[3], p[4]) * pressure_change(gas_log_ratio(row, z)), 0.0, 0.0
     return 0.0, 0.0, 0.0
@@ -138,8 +154,10 @@ def _rates(row, s, sd, z, zd):
         zd[k], zd[k + 1], zd[k + 2] = ball_rate(sd[a], sd[row.port_2], spin, z[k], z[k + 1], z[k + 2], p[1], p[2])
     elif law == BACKLASH:
         zd[k] = offset_rate(z[k], sd[a], p[1], p[2])
-    elif law == OSCILLATOR and row.port_2 >= 0:
-        relative = z[k + 1] - sd[a] - p[3] * sd[row.port_2]
+    elif law == BY_MEMORY:
+        zd[k] = (s[a] - z[k]) / p[3 + NODES]
+    elif law == OSCILLATOR:
+        relative = z[k + 1] - _foot(row, sd)
         zd[k] = relative
         zd[k + 1] = oscillator_rate(z[k], relative, p[1], p[2])
     elif law == GAS_LEAK:
@@ -174,9 +192,11 @@ def _advance(row, s, ds, dt, z):
         z[k], z[k + 1], z[k + 2] = advance_ball(ds[a], ds[row.port_2], spin, z[k], z[k + 1], z[k + 2], p[1], p[2])
     elif law == BACKLASH:
         z[k] = advance_offset(z[k], ds[a], p[1], p[2])
-    elif law == OSCILLATOR and row.port_2 >= 0:
-        foot = ds[a] + p[3] * ds[row.port_2]
-        z[k], z[k + 1] = advance_oscillator(z[k], z[k + 1], foot, dt, p[1], p[2])
+    elif law == BY_MEMORY:
+        stay, first, last = filter_shares(dt, p[3 + NODES])
+        z[k] = stay * z[k] + first * s[a] + last * (s[a] + ds[a])
+    elif law == OSCILLATOR:
+        z[k], z[k + 1] = advance_oscillator(z[k], z[k + 1], _foot(row, ds), dt, p[1], p[2])
     elif law == GAS_LEAK:
         z[k] += dt
     elif law == GAS_HEAT:
@@ -201,7 +221,7 @@ def added_power(row, s, z, work):
     k = row.state
     law = row.law
     if law == SPRING:
-        return 0.0, spring_energy(s[a], p[0])
+        return 0.0, spring_energy(_stretch(row, s), p[0])
     if law == END_STOP:
         return 0.0, end_stop_energy(s[a], p[0], p[1], p[2])
     if law == BACKLASH:

@@ -21,7 +21,7 @@ from lhpost6_pin.energy import row_power
 from lhpost6_pin.equilibrium import find_equilibrium, hydraulic_rows
 from lhpost6_pin.errors import ParameterError
 from lhpost6_pin.law_table import HYDRAULIC_DOUBLE, LAWS
-from lhpost6_pin.laws import bulk, chamber, leaks, lines, orifice, spool
+from lhpost6_pin.laws import bulk, chamber, leaks, lines, orifice, play, spool
 from lhpost6_pin.library import families
 from lhpost6_pin.library.oil import BUILD
 from lhpost6_pin.machine import Machine, load_machine
@@ -44,6 +44,9 @@ KERNELS = (
     Kernel(bulk.void_share, (_P, (1e4, 1e6), (0.0, 0.999))),
     Kernel(bulk.enthalpy_of, (_P, (5e8, 1.5e9), (0.0, 0.1), (1.0, 1.4), (1e4, 1e6), (0.0, 0.9), (500.0, 2e3))),
     Kernel(lines.filter_shares, ((1e-5, 1e-2), (0.0, 0.5))),
+    Kernel(play.play_slope, ((-1e6, 1e6), (0.0, 1e-3), (2e2, 5e5))),
+    Kernel(play.play_travel, ((-1e6, 1e6), (0.0, 1e-3), (2e2, 5e5))),
+    Kernel(play.play_energy, ((-1e6, 1e6), (0.0, 1e-3), (2e2, 5e5))),
     Kernel(lines.line_step, (_X, _X, _X, (1e-5, 1e-3), (1e-4, 1e-2), (0.02, 0.95))),
 )
 
@@ -60,7 +63,7 @@ def test_the_compiled_kernel_equals_its_python_original(kernel: Kernel) -> None:
 
 
 def test_every_kernel_has_a_case() -> None:
-    public = {n for module in (leaks, spool, bulk, lines) for n in module.__all__}
+    public = {n for module in (leaks, spool, bulk, lines, play) for n in module.__all__}
     assert {k.function.__name__ for k in KERNELS} == public - {"ATMOSPHERE"}
 
 
@@ -77,7 +80,8 @@ NUMBERS = {
     "entrained_air": (0.02, 1.2),
     "cavitation": (0.5, 15e6),  # far above what it is, so that the cases are in it
     "flow_curve": (0.2, 0.5, 1.0),
-    "dead_volume": (0.02,),
+    "dead_volume": (0.02, -0.3),
+    "play": (5e-4, 2e4),
     "line": (2e-3, 0.3),
     "supply_droop": (6e6, 0.02, 1.3),
     "back_pressure": (3e7, 0.03),
@@ -238,9 +242,41 @@ def test_bias_and_overlap_shift_the_flow_curve() -> None:
 
 
 def test_a_dead_volume_is_as_much_more_chamber() -> None:
-    rows = Actuator("dead_volume", "hydraulic_double", (0.02,)).rows
+    rows = Actuator("dead_volume", "hydraulic_double", (0.02, 0.0)).rows
     assert rows["p"][0, 8] == pytest.approx(0.8 + 0.02 / 0.2) and rows["p"][0, 9] == pytest.approx(0.7 + 0.02 / 0.13)
+    alone = Actuator("dead_volume", "hydraulic_double", (0.02, 1.0)).rows
+    assert alone["p"][0, 8] == rows["p"][0, 8] and alone["p"][0, 9] == 0.7
     assert rows["altered"][0] == 0  # no more work than the report's oil
+
+
+def test_a_rod_with_play_runs_ahead_by_all_of_it() -> None:
+    """From far pulled to far pushed, the slope adds up to the whole play, and the flanks' energy to the work done."""
+    assert play.play_travel(2e6, 3e-4, 5e3) - play.play_travel(-2e6, 3e-4, 5e3) == pytest.approx(6e-4, rel=1e-5)
+    force = np.linspace(-2e6, 2e6, 400_001)
+    slope = np.array([play.play_slope(f, 3e-4, 5e3) for f in force])
+    assert np.trapezoid(slope, force) == pytest.approx(6e-4, rel=1e-5)  # 1 - (f_0 / f)^2 / 2 of it, and the sum's error
+    half = force >= 0.0
+    held = np.trapezoid((force * slope)[half], force[half])
+    assert play.play_energy(2e6, 3e-4, 5e3) == pytest.approx(held, rel=1e-5)
+    assert play.play_energy(-2e6, 3e-4, 5e3) == play.play_energy(2e6, 3e-4, 5e3)
+
+
+def test_a_loose_pin_swallows_the_stroke_that_turns_the_force_round() -> None:
+    """Valve shut: the force goes from pulling to pushing over as much more stroke as the play is."""
+
+    def travel(numbers: tuple[float, ...]) -> float:
+        case = Actuator("play", "hydraulic_double", numbers)
+        z, step = case.z.copy(), -1e-7  # the rod is pushed in; chamber A's pressure rises
+        z[1] = z[0] * DOUBLE[0] / DOUBLE[1] + 1e6
+        stroke = 0.0
+        while z[0] * DOUBLE[0] - z[1] * DOUBLE[1] < 1.3e5:
+            move = np.array([step, 0.0, 0.0])
+            advance_states(case.rows, np.array([stroke, 0.0, 0.0]), move, 1e-9, np.zeros(1), case.supply, z)
+            stroke += step
+        return -stroke
+
+    # from -130 kN to 130 kN: both ends within (f_0 / f)^2 / 2 of half the play
+    assert travel((3e-4, 5e3)) - travel((1e-12, 5e3)) == pytest.approx(6e-4, rel=2e-3)
 
 
 def test_air_compresses_by_its_polytropic_law_beside_the_oil() -> None:
@@ -320,6 +356,7 @@ STRONG: dict[str, dict[str, float]] = {
     "external_leakage": {"leakage": 5e-11, "side": -0.3},
     "entrained_air": {},
     "dead_volume": {},
+    "swivel_play": {"half_play": 5e-4},
     "valve_deadband": {},
     "null_leakage": {"leakage": 2e-6},
     "spool_null_bias": {},

@@ -1,10 +1,10 @@
-"""A mass on a spring and a damper on the platen, moving along one horizontal axis: something that is not rigid.
+"""A mass on a spring and a damper on the platen, moving along one of its axes: something that is not rigid.
 
     de/dt = u,  u = V - b',  dV/dt = -w^2 e - 2 d w u,  f = m (w^2 e + 2 d w u)
 
 b' [m/s] velocity of its foot, e [m] its displacement and u [m/s] its velocity relative to the foot, V [m/s] its
 velocity in the world, m [kg], w [rad/s], d [1] share of critical damping, f [N] on the foot. No acceleration is needed.
-A row of one port only holds the mass's weight, -m g.
+Where the mass has weight, -m g acts on the foot, too; e is measured from where it hangs at rest.
 Stored energy: none is declared, all work counts as dissipated. (m V^2 / 2 + m w^2 e^2 / 2 comes back in part; the
 damper takes 2 d w m u^2.) One step is exact for a foot at constant velocity.
 """

@@ -2,8 +2,9 @@
 
     f = -f_k (1 - w) - f_k+1 w,   w and k from (x - x_0) / (x_1 - x_0) (n - 1)
 
-x [m or m/s] position or speed, x_0 and x_1 the table's ends, f [N] its n values. What a search has found and has no
-name for is such a force. No potential is declared: all work counts as dissipated, and may be negative.
+x [m or m/s] position or speed, or of a fading memory of positions, T dy/dt + y = s, what it holds, y, or by how much s
+is away from it; x_0 and x_1 the table's ends, f [N] its n values. What a search has found and has no name for is such a
+force. No potential is declared: all work counts as dissipated, and may be negative.
 """
 
 import numpy as np
@@ -11,7 +12,13 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 
-__all__ = ["table_force"]
+__all__ = ["remembered", "table_force"]
+
+
+@compiled
+def remembered(position: float, past: float, which: float) -> float:
+    """The remembered position [m] where `which` is 1, by how much the position is away from it where it is 0."""
+    return which * past + (1.0 - which) * (position - past)
 
 
 @compiled

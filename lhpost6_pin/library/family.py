@@ -49,6 +49,7 @@ class Family:
     twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
     named: str  # the family that it is a form of; usually itself
     search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
+    mimicked: bool  # whether another form of the report's own laws may pass for it
 
     def components(self, machine: "Machine") -> tuple[str, ...]:
         """Names of all components of a machine that it can act on; also ``platen``, its axes, and ``supply``."""
@@ -131,4 +132,5 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         twins=table.get("twins", "kind"),
         named=table.get("named", name),
         search=table.get("search", "named"),
+        mimicked=table.get("mimicked", False),
     )

@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, fit, machine_knobs, with_knobs
-from lhpost6_pin.calibration.errors import corrected, sensor_unknowns
+from lhpost6_pin.calibration.errors import corrected, corrected_record, sensor_unknowns
+from lhpost6_pin.calibration.fit import solve
 from lhpost6_pin.calibration.knobs import Knob, plan_knobs, scatter_knobs
 from lhpost6_pin.calibration.normal import bounded_step, bounds_of
 from lhpost6_pin.calibration.override import save_override
@@ -18,12 +19,14 @@ from lhpost6_pin.calibration.spectra import Whitener, excess, make_whitener, mea
 from lhpost6_pin.campaign import Campaign, load_campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
+from lhpost6_pin.discover.discover import discovery_numbers
 from lhpost6_pin.errors import RecordError
 from lhpost6_pin.files import models_folder
 from lhpost6_pin.fusion import fuse_motion
 from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.parameters import load_parameters
 from lhpost6_pin.plant import make_plant
+from lhpost6_pin.records import sample_interval
 from lhpost6_pin.residuals import RESIDUALS, Measured, evaluate_residuals, make_measured
 from lhpost6_pin.sensors import Sensors, add_noise, load_sensors
 from lhpost6_pin.signals import align
@@ -103,10 +106,18 @@ def test_a_twin_differs_by_a_factor_of_what_its_kind_has(machine):
     twin = next(k for k in own if k.name == "H2.flow")
     turned = with_knobs(machine, [twin, shared], np.array([0.1, -0.2]))
     flows = [a.flow / b.flow for a, b in zip(turned.actuators, machine.actuators, strict=True)]
-    assert flows[:4] == pytest.approx(np.exp([-0.2, -0.1, -0.2, -0.2]), rel=1e-12)
+    assert flows[:4] == pytest.approx([0.8, 0.8 * 1.1, 0.8, 0.8], rel=1e-12)
     assert flows[4:] == [1.0] * 6
     assert {k.name.split(".")[0] for k in own} == set(machine.actuator_names)
     assert not [k for k in scatter_knobs(turned, 0.05, 3.0) if k.name == "H2.flow"]  # it has a number of its own
+
+
+def test_what_is_positive_stays_so(machine):
+    knobs = [k for k in machine_knobs(machine) if k.form == "factor"]
+    least = with_knobs(machine, knobs, np.array([k.lowest for k in knobs]))
+    for k in knobs:
+        assert 0.0 < k.at(k.lowest) < k.value
+    assert all(a.leakage > 0.0 and a.viscous > 0.0 for a in least.actuators)
 
 
 def test_points_move_in_plan_as_mirror_images(machine):
@@ -216,6 +227,21 @@ def test_correction_undoes_gain_offset_and_delay(problem, machine, sensors):
     assert np.abs(right.spool - before.spool)[inside].max() < 0.01 * np.abs(after.spool - before.spool)[inside].max()
 
 
+def test_spools_are_late_together_and_each_by_part_of_a_sample(problem, campaign):
+    """The delay of the group and that of one spool add up, in a test and in a record."""
+    names = [u.name for u in problem.unknowns]
+    values = np.zeros(len(names))
+    values[names.index("delay spool_position")], values[names.index("delay spool_position[H2]")] = 2e-4, -1.5e-4
+    each = np.full(10, 2e-4)
+    each[1] = 0.5e-4
+    test, record = problem.tests[0], campaign.records[1]
+    right = corrected(test, problem.unknowns, values)
+    np.testing.assert_allclose(right.spool, align(test.spool, each, test.dt), rtol=0.0, atol=1e-15)  # rounding
+    spool = corrected_record(record, problem.unknowns, values)["spool_position"].values
+    due = align(record["spool_position"].values, each, sample_interval(record))
+    np.testing.assert_allclose(spool, due, rtol=0.0, atol=1e-15)
+
+
 def test_gains_of_platen_channels_take_their_share_of_the_motion(machine, sensors, campaign):
     plant = make_plant(machine)
     record = campaign.records[1].drop_vars("actuator_displacement")
@@ -294,7 +320,8 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
 def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
     soft = -2.0 * problem.prior * (np.array(problem.names) == "hydraulics.bulk_modulus")
     stiff, now = (problem.noise_at(seen[1:], x)[0] for x in (np.zeros(len(soft)), soft))
-    factor = np.exp(-2.0 * soft[problem.names.index("hydraulics.bulk_modulus")])  # of power: that of L A / beta squared
+    share = soft[problem.names.index("hydraulics.bulk_modulus")]
+    factor = (1.0 + share) ** -2  # of power: that of L A / beta squared
     bands = slice(2, None)  # below, other noise than that of the pressures' rates counts
     flow, wrench = problem.rows("flow"), problem.rows("wrench")
     assert factor > 1.1
@@ -327,6 +354,22 @@ def test_the_surprise_of_what_is_left_falls_as_least_squares_over_its_power():
         due = counts[b] / power[np.searchsorted(f, whitener.edges[b])][0]
         assert slope == pytest.approx(due, rel=1e-4)  # of a difference over a step
     assert surprise(np.full((3, 1), 0.7), counts)[0] == pytest.approx(0.7 * counts.sum())  # less than noise is noise
+
+
+def test_slopes_of_twins_keep_up_with_what_they_share(machine, sensors, seen):
+    """After a frugal search that has moved what twins share, their slopes still add up to that of it."""
+    ready = Problem(machine, seen[:1], seen[1:], sensors, COMPARISON)
+    ready = ready.with_machine(machine, (*ready.knobs, *scatter_knobs(machine, 0.05, 3.0)))
+    numbers, more = discovery_numbers()[1], [ready.with_tests(seen[1:2])]
+    found = solve(ready, more, numbers, np.zeros(len(ready.prior)), lambda share: None, frugal=True)
+    grown = dict(zip(ready.names, 1.0 + found.at, strict=True))
+    assert abs(grown["horizontal.seal_friction"] - 1.0) > 0.1  # it was turned by 0.3
+    slopes = {n: grown[n] * j for n, j in zip(ready.names, found.normal.slope[0], strict=True) if "seal_friction" in n}
+    shared = slopes["horizontal.seal_friction"]
+    each = [j for name, j in slopes.items() if name.startswith("H")]
+    # by differences; the last step is not renewed
+    assert len(each) == 4
+    assert np.abs(sum(each) - shared).max() < 0.05 * np.abs(shared).max()
 
 
 def test_a_step_that_goes_too_far_is_taken_back(problem, seen, monkeypatch):

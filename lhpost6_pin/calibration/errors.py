@@ -2,6 +2,9 @@
 
     measured(t) = (1 + gain) true(t - delay) + offset
 
+Commands are held for a sample of the controller, and valves are late by no whole number of samples: a record may show
+each spool up to half such a sample early or late, beside the delay of the group.
+
 Displacement, velocity and acceleration of the platen are fused into one motion; each channel's gain acts on its share
 in it, to first order. Their skews have been taken out; what the others are late against is the platen's motion.
 """
@@ -33,7 +36,7 @@ class SensorUnknown:
     name: str  # such as "gain actuator_force[H1]", "delay spool_position"
     kind: str
     channel: str  # a group of channels for a delay
-    column: int  # in the fields of a test that the channel is in; -1 for all of a delay's group
+    column: int  # in the fields of a test that the channel is in; -1 for the delay of a whole group
     sd: float  # of the prior, about zero
     unit: str
     alone: tuple[str, int]  # evaluated together: unknowns of one `alone[0]` act on different rows, marked by alone[1]
@@ -110,6 +113,11 @@ def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple
         sd = 2.0 * sensors.delay_sd("spool_position") if group == "spool_command" else sensors.delay_sd(group)
         if sd > 0.0 and columns[{"chamber_pressure": "chamber_pressure_a"}.get(group, group)]:
             found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
+    if sensors.delay_sd("spool_position") > 0.0:
+        held = 0.5 / sensors.rate / np.sqrt(3.0)
+        for i, label in enumerate(columns["spool_position"]):
+            name, alone = f"delay spool_position[{label}]", ("delay of a spool_position", i)
+            found.append(SensorUnknown(name, "delay", "spool_position", i, held, "s", alone))
     return tuple(found)
 
 
@@ -144,10 +152,13 @@ def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array
                     array[:, unknown.column] /= 1.0 + value
                 else:
                     array[:, unknown.column] -= value
+    late: dict[str, Array] = {}
     for unknown, value in off:
         if unknown.kind == "delay":
             for field in _DELAYED[unknown.channel]:
-                arrays[field] = align(arrays.get(field, _field(test, field)), value, test.dt)
+                _add_delay(late, field, unknown, value, _field(test, field).shape[1])
+    for field, delay in late.items():
+        arrays[field] = align(arrays.get(field, _field(test, field)), delay, test.dt)
     platen = [(u, v) for u, v in off if u.channel in test.share]
     motion, path = test.motion, test.path
     if platen:
@@ -167,11 +178,14 @@ def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], er
     out = record.copy(deep=True)
     dt = sample_interval(record)
     off = [(u, float(v)) for u, v in zip(unknowns, errors, strict=True) if v != 0.0]
+    late: dict[str, Array] = {}
     for unknown, value in off:
         if unknown.kind == "delay":
             for channel in GROUPS.get(unknown.channel, (unknown.channel,)):
                 if channel in out:
-                    out[channel].values[:] = align(out[channel].values, value, dt)
+                    _add_delay(late, channel, unknown, value, out[channel].shape[-1])
+    for channel, delay in late.items():
+        out[channel].values[:] = align(out[channel].values, delay, dt)
     for unknown, value in off:
         if unknown.kind == "delay" or unknown.channel not in out:
             continue
@@ -183,6 +197,12 @@ def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], er
         else:
             column -= value
     return out
+
+
+def _add_delay(late: dict[str, Array], field: str, unknown: SensorUnknown, value: float, columns: int) -> None:
+    """Add a delay to those (columns,) of a field."""
+    delay = late.setdefault(field, np.zeros(columns))
+    delay[unknown.column if unknown.column >= 0 else slice(None)] += value
 
 
 def _field(test: Measured, field: str) -> Array:

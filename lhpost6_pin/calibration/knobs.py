@@ -1,13 +1,14 @@
 """Knobs: the coordinates in which a machine is calibrated, each with its prior.
 
 A knob turns one number of the machine file, or several together where only their sum means anything (the heights of a
-kind's platen points). It is worth a coordinate: the logarithm of a factor for what is positive, a shift for the rest;
-zero is the machine as given, and its prior is normal with the stated standard deviation.
+kind's platen points). It is worth a coordinate: the share by which what is positive grows, a shift for the rest; zero
+is the machine as given, and its prior is normal with the stated standard deviation.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,9 @@ _MECHANICAL = (
     *("pad_friction", "pad_yield", "pad_shape"),
 )
 
+_LEAST = 0.05
+"""Of its nominal value, what is positive has at least."""
+
 _ROOM = 1.001
 """Length of a chamber over the stroke that it leaves at least."""
 
@@ -47,8 +51,8 @@ class Knob:
     paths: tuple[tuple[str, int], ...]  # what it turns: path in the machine file, and component of a vector or -1
     unit: str
     value: float  # nominal, in `unit`
-    sd: float  # of the coordinate: relative where `relative`, else in `unit`
-    relative: bool  # coordinate ln(value / nominal), else value - nominal
+    sd: float  # of the coordinate: in `unit` for a shift, else relative
+    form: Literal["shift", "factor", "log"]  # coordinate value - nominal, value / nominal - 1, or ln(value / nominal)
     shows_in: tuple[str, ...]  # residuals that can tell of it
     lowest: float = -math.inf  # coordinate below which no machine can be built
     highest: float = math.inf
@@ -59,22 +63,26 @@ class Knob:
 
     @property
     def bends(self) -> bool:
-        """Whether the equations bend with it within its range: forces by twins' factors and shifts in plan do not."""
-        return not (self.of and self.place < 0) and not self.mirrored
+        """Whether the equations bend with it within its range: shifts in plan do not."""
+        return not self.mirrored
 
     def at(self, coordinate: float) -> float:
         """Value in `unit` at a coordinate."""
-        return self.value * math.exp(coordinate) if self.relative else self.value + coordinate
+        if self.form == "shift":
+            return self.value + coordinate
+        return self.value * (1.0 + coordinate if self.form == "factor" else math.exp(coordinate))
 
     def within(self, low: float, high: float) -> "Knob":
         """The same knob with its values between low and high, where its coordinate can say so."""
-        bounds = (-math.inf if self.relative and v <= 0.0 else self.coordinate(v) for v in (low, high))
+        bounds = (-math.inf if self.form == "log" and v <= 0.0 else self.coordinate(v) for v in (low, high))
         lowest, highest = bounds
         return replace(self, lowest=lowest, highest=highest)
 
     def coordinate(self, value: float) -> float:
         """Coordinate of a value in `unit`."""
-        return math.log(value / self.value) if self.relative else value - self.value
+        if self.form == "shift":
+            return value - self.value
+        return value / self.value - 1.0 if self.form == "factor" else math.log(value / self.value)
 
 
 def machine_knobs(machine: Machine, travel: Mapping[str, float] | None = None) -> tuple[Knob, ...]:
@@ -104,7 +112,7 @@ def _with_room(knob: Knob, machine: Machine, travel: Mapping[str, float]) -> Kno
     if not name.startswith("chamber_"):
         return knob
     stroke = max(a.stroke for a in machine.actuators if a.kind == kind)
-    return replace(knob, lowest=min(0.0, knob.coordinate(_ROOM * travel.get(kind, stroke))))
+    return replace(knob, lowest=max(knob.lowest, min(0.0, knob.coordinate(_ROOM * travel.get(kind, stroke)))))
 
 
 def _felt(knob: Knob, free: str) -> bool:
@@ -128,10 +136,12 @@ def _knobs_of(path: str, name: str, quantity: Quantity) -> list[Knob]:
         if sd <= 0.0:
             continue
         vector = isinstance(quantity.value, tuple)
-        relative = value > 0.0 and name != "centre_of_gravity"
         label = f"{path}[{'xyz'[i]}]" if vector else path
         at = ((path, i if vector else -1),)
-        found.append(Knob(label, at, quantity.unit, value, sd / value if relative else sd, relative, shows_in))
+        if value > 0.0 and name != "centre_of_gravity":
+            found.append(Knob(label, at, quantity.unit, value, sd / value, "factor", shows_in, lowest=_LEAST - 1.0))
+        else:
+            found.append(Knob(label, at, quantity.unit, value, sd, "shift", shows_in))
     return found
 
 
@@ -151,7 +161,7 @@ def _heights(machine: Machine, kind: str) -> list[Knob]:
         if sd is None:
             continue
         name = f"{kind}.{end.split('_')[0]}_height"
-        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, False, _GEOMETRY))
+        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, "shift", _GEOMETRY))
     return found
 
 
@@ -182,7 +192,7 @@ def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
                     continue
                 value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
                 name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
-                found.append(Knob(name, paths, "m", value, sd, False, _GEOMETRY, mirrored=True))
+                found.append(Knob(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=True))
     return tuple(found)
 
 
@@ -201,7 +211,9 @@ def scatter_knobs(machine: Machine, share: float, reach: float) -> tuple[Knob, .
             if kind not in known or own in known or not known[kind].value or kinds.count(component.kind) == 1:
                 continue
             most, place = share * reach, i if shows_in == ("flow",) else -1
-            found.append(Knob(own, ((own, -1),), "1", 1.0, share, True, shows_in, -most, most, of=kind, place=place))
+            found.append(
+                Knob(own, ((own, -1),), "1", 1.0, share, "factor", shows_in, -most, most, of=kind, place=place)
+            )
     return tuple(found)
 
 

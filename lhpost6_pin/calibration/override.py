@@ -22,7 +22,7 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     values = knob_changes(machine, calibration.knobs, calibration.estimate[:count])
     deviations: dict[str, list[float]] = {}
     for i, knob in enumerate(calibration.knobs):
-        sd = float(calibration.sd[i]) * (abs(knob.at(calibration.estimate[i])) if knob.relative else 1.0)
+        sd = float(calibration.sd[i]) * (1.0 if knob.form == "shift" else knob.value)
         for name, component in knob.paths:
             stated = machine.parameters[name].sd
             known = stated if isinstance(stated, tuple) else (stated or 0.0,)

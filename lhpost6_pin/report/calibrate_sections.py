@@ -211,7 +211,6 @@ def _unit(calibration: Calibration, i: int) -> str:
 def change_of(calibration: Calibration, i: int) -> str:
     """How far knob i is from nominal, signed: relative, or in its unit."""
     knob, coordinate = calibration.knobs[i], float(calibration.estimate[i])
-    if knob.relative:
-        share = float(np.expm1(coordinate))
-        return f"{'+' * (share > 0)}{percent(share)}"
+    if knob.form == "factor":
+        return f"{'+' * (coordinate > 0)}{percent(coordinate)}"
     return f"{'+' * (coordinate > 0)}{number(coordinate)}\N{NO-BREAK SPACE}{knob.unit}"

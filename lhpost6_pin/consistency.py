@@ -159,7 +159,7 @@ def _finding(
     tolerance: float,
     buried: bool = False,
 ) -> SensorFinding:
-    level = quantity in ("offset", "residual")  # which noise does not hide
+    level = quantity in ("offset", "drift", "residual")  # which noise does not hide
     verdict: Literal["ok", "suspicious", "untested"] = "ok"
     if not level and (buried or error > tolerance):
         verdict = "untested"

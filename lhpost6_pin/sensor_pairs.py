@@ -182,7 +182,7 @@ def _geometry(view: _View, pose: Array) -> list[Array]:
 
 
 def _lengths(view: _View) -> Iterator[Comparison]:
-    """actuator_displacement against that of the measured platen pose."""
+    """actuator_displacement against that of the measured platen pose; it may drift by its noise within a record."""
     if not view.has("actuator_displacement", "platen_displacement"):
         return
     plant = view.plant
@@ -198,10 +198,12 @@ def _lengths(view: _View) -> Iterator[Comparison]:
         view.sd, ("actuator_displacement", "platen_displacement")
     )
     one = np.ones(len(slow))
+    time = view.step * view.dt * (np.arange(len(slow), dtype=np.float64) - 0.5 * (len(slow) - 1))
     for i, name in enumerate(plant.machine.actuator_names):
         terms = [Term("gain", "1", 1.0, due[:, i], noise[0][i]), _delay_term(rate[:, i], noise[1][i])]
-        terms.append(_offset_term(len(slow)))
+        terms += [_offset_term(len(slow)), Term("drift", "m/s", 0.0, time, 0.0, beside=True)]
         errors = [gain_l * due[:, i], offset_l * one, delay_l * rate[:, i], delay_x * rate[:, i]]
+        errors.append(np.sqrt(variance[i]) * time / max(time[-1] - time[0], view.dt))
         errors += [jacobian[i, k] * (gain_x * slow[:, k] + offset_x) for k in range(6)]
         errors += [change[:, i] for change in geometry]
         channel = f"actuator_displacement[{name}]"

@@ -12,6 +12,7 @@ from lhpost6_pin.calibration import calibration_numbers
 from lhpost6_pin.calibration.errors import corrected_record
 from lhpost6_pin.calibration.prepare import Prepared, prepare_problem
 from lhpost6_pin.calibration.problem import Base
+from lhpost6_pin.calibration.spectra import real_bins
 from lhpost6_pin.campaign import Campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
@@ -21,8 +22,9 @@ from lhpost6_pin.discover.columns import columns_of
 from lhpost6_pin.discover.left import _hats
 from lhpost6_pin.discover.next_test import _trial
 from lhpost6_pin.discover.releases import block_of, list_releases
-from lhpost6_pin.discover.screen import Background, Block, score
-from lhpost6_pin.discover.search import Contest
+from lhpost6_pin.discover.screen import Background, Block, Score, less_noise, make_block, score
+from lhpost6_pin.discover.search import Contest, Scored, _by_rank
+from lhpost6_pin.discover.weighing import Lowered, refusal
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.files import models_folder
 from lhpost6_pin.library import families, find_family
@@ -163,6 +165,96 @@ def test_what_is_at_its_bound_does_not_explain_what_a_candidate_does():
     assert other.gain < 0.5 * one.gain
 
 
+def test_noise_in_a_candidate_s_column_is_taken_off_its_equations():
+    """Over many draws of noise in slopes, column and rest, the corrected equations are those without noise."""
+    rng = np.random.default_rng(5)
+    m, c, p, draws = 40, 2, 3, 400
+
+    def bins(*shape: int) -> np.ndarray:
+        return rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+    slope, column, rest, root = bins(m, c, p), bins(m, c, 1), bins(m, c), np.ones((m, c))
+    mixed = rng.normal(size=(3, p + 2))  # one noise is in all of them, as a pressure's is
+
+    def noise() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        drawn = 0.3 * bins(m, c, 3) @ mixed
+        return drawn[..., :p], drawn[..., p : p + 1], drawn[..., -1]
+
+    def real(x: np.ndarray) -> np.ndarray:
+        return real_bins(x, root)
+
+    def seen() -> tuple[Block, Block]:
+        """Equations as measured, and corrected by two replicas, which are what was measured with more noise."""
+        (s, k, r), more = (x + y for x, y in zip((slope, column, rest), noise(), strict=True)), [noise(), noise()]
+        changes = [([real(a)], [real(d)]) for a, _, d in more]
+        background = Background(
+            [real(s)], [real(r)], [root], np.zeros((1, p, p)), np.zeros((1, p)), np.zeros(p), np.zeros(p), changes
+        )
+        block = make_block(background, [k])
+        return block, less_noise(background, block, [k], [[k + b] for _, b, _ in more])
+
+    plain, mended = [], []
+    for _ in range(draws):
+        for found, one in zip((plain, mended), seen(), strict=True):
+            found.append(np.concatenate([one.cross.ravel(), one.own.ravel(), one.side.ravel()]))
+    exact = np.concatenate(
+        [(real(slope).T @ real(column)).ravel(), (real(column).T @ real(column)).ravel(), real(column).T @ real(rest)]
+    )
+    sd = np.std(mended, axis=0) / np.sqrt(draws)
+    assert np.all(np.abs(np.mean(mended, axis=0) - exact) < 4.0 * sd)  # five means, four deviations each
+    assert np.abs((np.mean(plain, axis=0) - exact) / sd).max() > 20.0  # without it they are far off
+
+
+def test_a_column_of_nothing_but_noise_keeps_half_of_its_square():
+    root = np.ones((3, 1))
+    background = Background(
+        [np.zeros((6, 1))], [np.zeros(6)], [root], np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1),
+        [([np.zeros((6, 1))], [np.zeros(6)])],
+    )  # fmt: skip
+    column = np.ones((3, 1, 1), complex)
+    block = make_block(background, [column])
+    assert less_noise(background, block, [column], [[3.0 * column]]).own[0, 0, 0] == 0.5 * block.own[0, 0, 0]
+
+
+def scored(family: str, components: tuple[str, ...], gain: float) -> Scored:
+    """A candidate with a gain."""
+    one = Score(gain, np.zeros(1), np.ones(1), np.zeros(1), np.zeros(1))
+    return Scored(candidate(family, *components), one, gain, 0.5, "")
+
+
+def test_more_components_come_first_only_if_they_gain_more():
+    one, pair, other = ("H1",), ("H1", "H2"), ("H1", "H2", "H3")
+    found = [
+        scored("local_viscous", pair, 100.0),
+        scored("local_viscous", one, 98.0),
+        scored("local_viscous", other, 60.0),
+        scored("piston_leakage", other, 99.0),
+        scored("piston_leakage", one, 90.0),
+    ]
+    order = [(s.candidate.family.name, len(s.candidate.components)) for s in _by_rank(found, 3.0)]
+    wanted = [("local_viscous", 1), ("local_viscous", 2), ("piston_leakage", 3), ("piston_leakage", 1)]
+    assert order == [*wanted, ("local_viscous", 3)]
+
+
+def test_families_that_friction_of_another_form_passes_for_must_gain_more():
+    numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
+    one = Score(40.0, np.zeros(1), np.ones(1), np.full(3, 10.0), np.zeros(1))
+    clear, doubtful = Lowered(80.0, 80.0, 0.5, 0.5), Lowered(80.0, 10.0, 0.5, 0.5)
+    weak = Lowered(30.0, 30.0, 0.5, 0.5)
+    spring, rubs = find_family("stray_spring"), find_family("stribeck_friction")
+    assert (spring.mimicked, rubs.mimicked) == (False, True)
+    assert [refusal(spring, one, less, numbers) for less in (clear, doubtful, weak)] == ["", "", ""]
+    assert [refusal(rubs, one, less, numbers) for less in (clear, doubtful, weak)] == [
+        "",
+        "explains what may be noise",
+        "does not lower what is left",
+    ]
+    by_chance = replace(one, held_out=np.array([30.0, 20.0, -7.0]))
+    against = replace(one, held_out=np.array([40.0, 20.0, -17.0]))
+    assert refusal(spring, by_chance, clear, numbers) == ""
+    assert refusal(spring, against, clear, numbers) == "makes tests worse that it was not fitted on"
+
+
 def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
     for group in list_candidates(machine):
         for knob in group[0].knobs(tuple(s.typical for s in group[0].amplitudes), 100.0, 0.5):
@@ -172,7 +264,8 @@ def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
 
 def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_be_set_free(ready):
     released = {c.release: c.family.name for c in list_releases(ready.problem)}
-    motion = {u.name for u in ready.problem.unknowns if u.channel.startswith("platen")}
+    held = {u.name for u in ready.problem.unknowns if u.kind == "delay" and u.column >= 0}  # less than a sample
+    motion = held | {u.name for u in ready.problem.unknowns if u.channel.startswith("platen")}
     assert {u.name for u in ready.problem.unknowns} - motion <= set(released)
     assert motion and not motion & set(released)  # those are asked of each other
     assert released["gain actuator_force[H2]"] == "pressure_sensor_error"

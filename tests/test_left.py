@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.discover.formula import sparse_formula
-from lhpost6_pin.discover.left import Left, with_unnamed
+from lhpost6_pin.discover.left import Left, _state, with_unnamed
+from lhpost6_pin.effects import Effect, effect_table
 from lhpost6_pin.law_table import NODES
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.machine_toml import save_machine_toml
+from lhpost6_pin.stage_added import advance_added, apply_added
 
 X = np.linspace(-0.2, 0.3, NODES)
 
@@ -39,9 +41,12 @@ def test_noise_has_no_formula_to_speak_of() -> None:
     assert len(found.terms) <= 2
 
 
-@pytest.mark.parametrize("state", ["position", "velocity"])
-def test_a_function_without_a_name_goes_into_the_machine_switched_off(state, tmp_path) -> None:
-    left = Left("H3", state, X, 1e3 * np.arange(NODES), np.full(NODES, 10.0), 500.0, np.full(3, 100.0))
+@pytest.mark.parametrize(
+    ("state", "memory"), [("position", 0.0), ("velocity", 0.0), ("recent travel", 2.0), ("past position", 8.0)]
+)
+def test_a_function_without_a_name_goes_into_the_machine_switched_off(state, memory, tmp_path) -> None:
+    sd, held = np.full(NODES, 10.0), np.full(3, 100.0)
+    left = Left(("H3",), state, memory, X, 1e3 * np.arange(NODES), sd, 500.0, 400.0, held)
     machine = with_unnamed(load_machine(), left)
     (effect,) = machine.added_effects
     assert effect.params[0][0] == 0.0
@@ -51,3 +56,21 @@ def test_a_function_without_a_name_goes_into_the_machine_switched_off(state, tmp
     assert effect.ports == ("H3",)
     # a table's force is against its values: what was found acts as it is
     assert effect.params[0][:5] == pytest.approx((1.0, X[0], X[-1], 0.0, -1e3))
+    assert effect.params[0][3 + NODES :] == ((memory, float(state == "past position")) if memory else ())
+
+
+def test_what_is_remembered_is_the_law_s_hidden_state() -> None:
+    """A filter over a whole test against the law's own steps."""
+    dt, memory = 1 / 256, 0.5
+    x = 0.1 * np.sin(np.linspace(0.0, 9.0, 700))[:, None] * [1.0, -0.3]
+    past = _state("past position", memory, x, x, dt)
+    table = (1.0, -1.0, 1.0, *np.linspace(-1.0, 1.0, NODES), memory, 1.0)  # the force is the state, reversed
+    rows = effect_table([Effect("a", "by_memory", ("leg",), (table,), "test")], ("leg",))
+    z = np.zeros(1)
+    for k in range(len(x)):
+        force, port_force = np.zeros((1, 3)), np.zeros(1)
+        apply_added(rows, x[k, :1], np.zeros(1), z, force, port_force)
+        assert force[0, 0] == pytest.approx(-past[k, 0], abs=1e-12)  # rounding
+        if k + 1 < len(x):
+            advance_added(rows, x[k, :1], x[k + 1, :1] - x[k, :1], dt, z)
+    np.testing.assert_array_equal(_state("recent travel", memory, x, x, dt), x - past)

@@ -76,3 +76,18 @@ def test_a_late_group_of_channels_is_named(plant: Plant, campaign) -> None:
     (fault,) = wrong_sensors(plant, late, SENSORS)
     assert (fault.name, fault.family) == ("delay platen_acceleration", "channel_delay")
     assert fault.value == pytest.approx(3e-3, abs=3e-4)  # what calibration leaves open
+
+
+def test_a_length_that_drifts_within_tests_is_a_fault_of_its_own(plant: Plant, campaign) -> None:
+    """Ten times as far as its noise within a record: no gain or offset of a sensor does that."""
+    rate = 2e-4 / float(campaign[0]["time"][-1])
+
+    def warmed(values: np.ndarray) -> np.ndarray:
+        values[:, 2] += np.linspace(0.0, 2e-4, len(values))
+        return values
+
+    faults = {f.name: f for f in wrong_sensors(plant, changed(campaign, "actuator_displacement", warmed), SENSORS)}
+    found = faults["drift actuator_displacement[H3]"]
+    assert (found.family, found.stated) == ("length_sensor_error", 0.0)
+    assert found.value == pytest.approx(rate, rel=0.15)  # noise of a record of some seconds
+    assert not [name for name in faults if name.startswith("drift") and "H3" not in name]

@@ -29,7 +29,15 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
         corrected, right = normal.of([t])
         matrix.append(positive(corrected * np.outer(prior, prior), np.ones(len(prior))))
         side.append(right * prior)
+    noise = []
+    if normal.bias is not None:
+        for slopes, rests in zip(normal.bias.slope, normal.bias.rest, strict=True):
+            changes = [
+                np.stack([real_bins(j, w) * sd for j, sd in zip(own, prior, strict=True)]).T
+                for own, w in zip(slopes, root, strict=True)
+            ]
+            noise.append((changes, [real_bins(r, w) for r, w in zip(rests, root, strict=True)]))
     low, high = bounds_of(problem, numbers)
     near = 1e-3 * prior
     inward = (x <= low + near).astype(float) - (x >= high - near)
-    return Background(slope, rest, root, np.array(matrix), np.array(side), x / prior, inward)
+    return Background(slope, rest, root, np.array(matrix), np.array(side), x / prior, inward, noise)

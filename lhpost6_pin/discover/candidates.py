@@ -57,7 +57,7 @@ class Candidate:
                 unit=s.unit,
                 value=value,
                 sd=spread * s.typical if s.amplitude else factor if relative else s.scale,
-                relative=relative,
+                form="log" if relative else "shift",
                 shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
                 step=s.typical if s.amplitude else None,
             )

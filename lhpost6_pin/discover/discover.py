@@ -26,11 +26,11 @@ from .candidates import with_background, with_other_form, with_warm_oil
 from .left import Left, what_is_left, with_unnamed
 from .next_test import NextTest, next_tests
 from .proof import Proof, prove
-from .search import Search, fitted_machine, search
+from .search import Search, fitted_machine, refitted_machine, search, stand_before, weighing
 from .sensing import put_right, wrong_sensors
 from .verdict import Verdict, judge
 
-__all__ = ["Discovery", "discover"]
+__all__ = ["Discovery", "discover", "discovery_numbers"]
 
 FEWEST = 3  # tests that are searched; with more, one is held out
 
@@ -75,10 +75,7 @@ def discover(
     search; and what `calibrate` raises.
     """
     report = progress or (lambda share: None)
-    numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
-    common = calibration_numbers()
-    own = {path: quantity for path, quantity in numbers.items() if path.startswith("fit.")}
-    calibration = replace(common, quantities={**common.quantities, **own})
+    numbers, calibration = discovery_numbers()
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     faults = wrong_sensors(make_plant(machine), campaign.records, sensors)
     records = put_right(campaign.records, faults)
@@ -103,16 +100,23 @@ def discover(
     found, standing = search(ready, first, calibration, numbers, between(report, 0.2, 0.75))
     left: tuple[Left, ...] = ()
     if found.misfit("wrench") > numbers.number("left.noise"):
-        left = what_is_left(found.problem, standing.base, standing.background, numbers)
+        left = what_is_left(standing.base, weighing(found, standing, numbers), numbers)
+    instead: tuple[Left, ...] = ()
+    if any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added):
+        before = stand_before(found, calibration)
+        instead = what_is_left(before.base, weighing(found, before, numbers), numbers)
     report(0.8)
     proof = None
     if held:
         part = between(report, 0.8, 0.95)
         proof = prove(machine, found, [records[i] for i in held], sensors, phases=phases, jobs=jobs, progress=part)
-    tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
+    verdict = judge(found, left, instead, faults, calibration, numbers)
+    tests: tuple[NextTest, ...] = ()
+    if verdict.word == "ambiguous":
+        tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
     report(1.0)
-    verdict = judge(found, left, faults, calibration, numbers)
-    fitted = fitted_machine(found)
+    alone = any(verdict.left is one for one in instead)  # in place of the effects, not beside them
+    fitted = refitted_machine(found) if alone else fitted_machine(found)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
@@ -128,6 +132,13 @@ def discover(
         seed=seed,
         hashes={name: _hash(record) for name, record in zip(names, campaign.records, strict=True)},
     )
+
+
+def discovery_numbers() -> tuple[Parameters, Parameters]:
+    """Those of a search, and those of a calibration with what a search has otherwise: `models/procedures`."""
+    numbers, common = load_parameters(models_folder() / "procedures" / "discovery.toml"), calibration_numbers()
+    own = {path: quantity for path, quantity in numbers.items() if path.startswith("fit.")}
+    return numbers, replace(common, quantities={**common.quantities, **own})
 
 
 def _others(machine: Machine, numbers: Parameters) -> tuple[Machine, ...]:

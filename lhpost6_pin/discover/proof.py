@@ -13,12 +13,11 @@ import numpy as np
 import xarray as xr
 
 from ..calibration.errors import corrected_record
-from ..calibration.knobs import with_knobs
 from ..campaign import Campaign
 from ..machine import Machine
 from ..sensors import Sensors
 from ..validation import PHASES, Phase, Validation, validate
-from .search import Search, fitted_machine
+from .search import Search, fitted_machine, refitted_machine
 
 __all__ = ["FLOOR", "Gap", "Proof", "prove"]
 
@@ -72,7 +71,7 @@ def prove(
     """Validate the three models on held-out records; `machine` is the one delivered."""
     first = found.refit.normal.problem
     knobs = len(first.knobs)
-    before = with_knobs(first.machine, first.knobs, found.refit.x[:knobs])
+    before = refitted_machine(found)
     after = fitted_machine(found)
     errors = found.refit.x[knobs:], found.solution.x[len(found.problem.knobs) :]
     models = (

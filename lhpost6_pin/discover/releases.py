@@ -53,7 +53,9 @@ def list_releases(problem: Problem) -> tuple[Candidate, ...]:
         if family and knob.name not in problem.free:
             found.append(Candidate(find_family(family), _where(problem, knob), (), knob.name))
     for unknown in problem.unknowns:  # those of the platen's motion were asked of each other before
-        if unknown.name not in problem.free and (unknown.kind == "delay" or unknown.channel in _SENSOR):
+        if unknown.name in problem.free or (unknown.kind == "delay" and unknown.column >= 0):
+            continue
+        if unknown.kind == "delay" or unknown.channel in _SENSOR:
             found.append(Candidate(find_family(_family(unknown)), (unknown.name,), (), unknown.name))
     return tuple(found)
 

@@ -87,12 +87,14 @@ def _left(found: Discovery) -> dict[str, Any] | None:
     left = found.verdict.left
     nearest = {"nearest": list(found.verdict.nearest)}
     if left is None:
-        return {"where": "no single leg", "depends_on": "not known", **nearest}
+        return {"where": "no single leg or kind", "depends_on": "not known", **nearest}
     formula = left.formula
     return {
         **nearest,
-        "component": left.component,
+        "component": left.components[0] if len(left.components) == 1 else None,
+        "components": list(left.components),
         "depends_on": left.state,
+        "memory": left.memory or None,
         "gain": left.gain,
         "nodes": left.nodes.tolist(),
         "value": left.value.tolist(),

@@ -17,10 +17,11 @@ from scipy.optimize import lsq_linear
 
 from ..calibration.spectra import real_bins
 
-__all__ = ["Background", "Block", "Score", "make_block", "score"]
+__all__ = ["Background", "Block", "Score", "less_noise", "make_block", "score"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Columns = Sequence[Complex]
 
 WORTH = 0.5
 """Log-likelihood below which it is not worth while to see what else moves."""
@@ -53,6 +54,7 @@ class Background:
     side: Array  # (t, p)
     place: Array  # (p,) where the background stands, in units of the priors
     inward: Array  # (p,) zero; at its lowest +1, at its highest -1: what may move that way alone
+    noise: Sequence[tuple[Sequence[Array], Sequence[Array]]] = ()  # by replica, test: changes of slope, of rest
 
     @property
     def free(self) -> Array:
@@ -102,6 +104,24 @@ def make_block(background: Background, columns: Sequence[Complex]) -> Block:
         own.append(c.T @ c)
         side.append(c.T @ rest)
     return Block(np.array(cross), np.array(own), np.array(side))
+
+
+def less_noise(background: Background, block: Block, columns: Sequence[Complex], noisy: Sequence[Columns]) -> Block:
+    """The block without what noise adds to it: columns of the replicas differ by what noise makes of a candidate.
+
+    Where noise is most of a column, as much of it is taken off as leaves half of its square.
+    """
+    cross, own, side = block.cross.copy(), block.own.copy(), block.side.copy()
+    for t, (column, root) in enumerate(zip(columns, background.root, strict=True)):
+        changes = [real_bins(seen[t] - column, root) for seen in noisy]
+        added = sum(c.T @ c for c in changes) / len(noisy)
+        most = np.max(np.diag(added) / np.maximum(np.diag(own[t]), 1e-300))
+        share = min(1.0, 0.5 / max(most, 1e-300)) / len(noisy)
+        own[t] -= share * len(noisy) * added
+        for change, (slopes, rests) in zip(changes, background.noise, strict=True):
+            cross[t] -= share * slopes[t].T @ change
+            side[t] -= share * change.T @ rests[t]
+    return Block(cross, own, side)
 
 
 @dataclass(frozen=True)
@@ -176,7 +196,9 @@ class _Profile(NamedTuple):
         value, vector = np.linalg.eigh(self.schur * np.outer(scale, scale))
         root = np.sqrt(np.maximum(value, 1e-9))
         wanted = -(vector.T @ (self.side * scale)) / root
-        return np.asarray(lsq_linear(root[:, None] * vector.T, wanted, bounds=(least, most)).x * scale)
+        # by active sets: few numbers, of which some tell nothing
+        found = lsq_linear(root[:, None] * vector.T, wanted, bounds=(least, most), method="bvls")
+        return np.asarray(found.x * scale)
 
     def gain(self, theta: Array) -> float:
         """What theta gains over none."""

@@ -28,10 +28,22 @@ from .background import make_background
 from .candidates import Candidate, list_candidates
 from .columns import columns_of
 from .releases import block_of, list_releases
-from .screen import Background, Score, make_block, score
-from .weighing import Lowered, Weighing, refusal, squares_by_column
+from .screen import Background, Block, Score, less_noise, make_block, score
+from .weighing import Lowered, Weighing, gate, refusal, squares_by_column
 
-__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand"]
+__all__ = [
+    "Added",
+    "Contest",
+    "Round",
+    "Scored",
+    "Search",
+    "Standing",
+    "fitted_machine",
+    "search",
+    "stand",
+    "stand_before",
+]
+__all__ += ["refitted_machine", "weighing"]
 
 Array = NDArray[np.float64]
 
@@ -96,6 +108,7 @@ class Standing:
 
     base: Base
     background: Background
+    replicas: tuple[tuple[Problem, Base], ...]  # the same with more noise
 
 
 @dataclass
@@ -166,7 +179,20 @@ def stand(found: Search, calibration: Parameters) -> Standing:
     """Normal equations of the background about the solution."""
     problem, solution = found.problem, found.solution
     background = make_background(problem, solution.normal, solution.at, calibration)
-    return Standing(Base(problem, solution.at), background)
+    replicas = tuple((one, Base(one, solution.at)) for one in found.ready.replicas)
+    return Standing(Base(problem, solution.at), background, replicas)
+
+
+def stand_before(found: Search, calibration: Parameters) -> Standing:
+    """The same about the refit, where no effect had been added."""
+    problem, refit = found.refit.normal.problem, found.refit
+    return Standing(Base(problem, refit.at), make_background(problem, refit.normal, refit.at, calibration), ())
+
+
+def weighing(found: Search, standing: Standing, numbers: Parameters) -> Weighing:
+    """What weighs candidates there."""
+    first = squares_by_column(found.refit.normal.rest)
+    return Weighing(found.refit.normal.problem, standing.background, first, numbers)
 
 
 def screen(found: Search, standing: Standing, numbers: Parameters, progress: Progress) -> Round:
@@ -176,13 +202,13 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
     rest = found.solution.normal.rest
     left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
-    weigh = Weighing(problem, background, squares_by_column(found.refit.normal.rest), numbers)
+    weigh = weighing(found, standing, numbers)
 
     def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
         less = Lowered(one.gain, 0.0, 0.0, 0.0)
         if one.gain >= numbers.number("accept.look"):
             less = weigh.lowered(explained(), one)
-        why = refusal(one, less, numbers)
+        why = refusal(candidate.family, one, less, numbers)
         if not why and less.gain < numbers.number("accept.again") * _found_there(found, candidate):
             why = "may be the form of what was found there"
         return Scored(candidate, one, less.gain, less.share, why)
@@ -190,9 +216,17 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
     def of_group(group: Sequence[Candidate]) -> list[Scored]:
         columns, parts = columns_of(problem, base, group)
         block = make_block(background, columns)
+
+        def scores(block: Block) -> list[Score]:
+            pairs = zip(group, parts, strict=True)
+            return [score(background, block.select(q), *_bounds(c), _spread(c, numbers)) for c, q in pairs]
+
+        found = scores(block)
+        if max(one.gain for one in found) >= numbers.number("accept.look"):
+            noisy = [columns_of(again, there, group)[0] for again, there in standing.replicas]
+            found = scores(less_noise(background, block, columns, noisy))
         scored = []
-        for candidate, part in zip(group, parts, strict=True):
-            one = score(background, block.select(part), *_bounds(candidate), _spread(candidate, numbers))
+        for candidate, part, one in zip(group, parts, found, strict=True):
             scored.append(judged(candidate, one, partial(_explained, background, columns, part @ one.amplitude)))
         return scored
 
@@ -206,7 +240,22 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
         for done, some in enumerate(parallel(delayed(of_group)(g) for g in groups)):
             scored += some
             progress((done + 1) / len(groups))
-    return Round(tuple(sorted(scored, key=lambda one: -one.gain)), left)
+    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), left)
+
+
+def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
+    """By falling gain; but of one family, fewer components come before more that gain less than `simpler` over them."""
+    found = sorted(scored, key=lambda one: -one.gain)
+    most: dict[str, float] = {}
+    for one in found:
+        most.setdefault(one.candidate.family.name, one.gain)
+
+    def rank(one: Scored) -> tuple[float, int, float]:
+        best = most[one.candidate.family.name]
+        near = one.gain > best - simpler
+        return -best if near else -one.gain, len(one.candidate.components) if near else 0, -one.gain
+
+    return sorted(found, key=rank)
 
 
 def _found_there(found: Search, candidate: Candidate) -> float:
@@ -275,12 +324,13 @@ def _best_of(
         share = between(progress, 0.7 * i / len(rivals), 0.7 * (i + 1) / len(rivals))
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
     before, *left = (_objective(one) for one in (found, *fitted))
-    least = min(left)
-    if before - least < numbers.number("accept.gain"):
+    passed = [i for i, one in enumerate(rivals) if before - left[i] >= gate(one.candidate.family, numbers)]
+    if not passed:
         return None
+    least = min(left[i] for i in passed)
     # laws are never quite those of the table: of large gains a share decides nothing
     apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - least))
-    alike = [i for i in range(len(left)) if left[i] - least < apart]
+    alike = [i for i in passed if left[i] - least < apart]
     # the simplest of them: what the model knows already, then what has the fewest numbers
     best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
@@ -334,6 +384,12 @@ def _fit_jointly(
 def _objective(found: Search) -> float:
     """Negative log-likelihood and log-prior at the solution."""
     return objective(found.problem, found.rest, found.solution.x)
+
+
+def refitted_machine(found: Search) -> Machine:
+    """The machine without any effect, all numbers as the refit found them."""
+    problem = found.refit.normal.problem
+    return with_knobs(problem.machine, problem.knobs, found.refit.x[: len(problem.knobs)])
 
 
 def fitted_machine(found: Search) -> Machine:

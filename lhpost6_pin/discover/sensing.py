@@ -26,7 +26,7 @@ _SKEWED = (*_CHECKS, "force against pressures")
 class Fault:
     """A sensor that is off beyond its stated range: measured = (1 + gain) true + cross-talk + offset, and late."""
 
-    kind: str  # "gain", "offset", "delay", or "cross x": of the acceleration along x
+    kind: str  # "gain", "offset", "drift", "delay", or "cross x": of the acceleration along x
     channel: str
     column: str  # label within the channel; empty: all of it
     value: float
@@ -64,6 +64,8 @@ def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
     kind, error = finding.quantity, finding.estimate - finding.expected
     if kind == "gain" or kind.startswith("cross"):
         stated = sensors.gain_range.get(channel, 0.0)
+    elif kind == "drift":
+        stated = 0.0
     elif kind == "offset" and not channel.startswith("platen"):
         stated = sensors.offset_range.get(channel, 0.0)
     else:

@@ -72,11 +72,17 @@ class Verdict:
 
 
 def judge(
-    found: Search, left: Sequence[Left], faults: Sequence[Fault], calibration: Parameters, numbers: Parameters
+    found: Search,
+    left: Sequence[Left],
+    instead: Sequence[Left],
+    faults: Sequence[Fault],
+    calibration: Parameters,
+    numbers: Parameters,
 ) -> Verdict:
     """The verdict on a search.
 
-    left are free functions fitted to what is left, by falling gain; faults are of sensors that were put right before.
+    left are free functions fitted to what is left, instead those fitted in place of all effects, both by falling gain;
+    faults are of sensors that were put right before.
     """
     problem, x, added = found.problem, found.solution.x, [a.candidate for a in found.added]
     count = len(problem.knobs)
@@ -111,9 +117,16 @@ def judge(
         material = abs(x[i]) > calibration.number("report.material") * problem.stated[i]
         if sure and material and not own[i] and knob.name not in problem.free:
             changed[knob.name] = estimate(i)
-    free = _first(left, numbers)
-    doubted = {one.candidate.name for one in kept if _leaves_much(one, found, numbers)}
-    unnamed = free is not None or bool(doubted) or _more_than_noise(found, numbers)
+    free, doubted = _first(left, numbers), {one.candidate.name for one in kept if _leaves_much(one, found, numbers)}
+    forces = {one.candidate.name: one.gain for one in kept if "wrench" in one.candidate.family.shows_in}
+    better = _first(instead, numbers)
+    if forces and better is not None and better.gain > numbers.number("left.better") * sum(forces.values()):
+        free, doubted = better, doubted | set(forces)
+    elif free is not None:
+        wrench = [one for one in kept if one.candidate.name in forces]
+        doubted |= {one.candidate.name for one in wrench if _outweighed(one, free, numbers)}
+    drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
+    unnamed = free is not None or bool(doubted) or drifting or _more_than_noise(found, numbers)
     nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
     effects = [e for e, one in zip(effects, kept, strict=True) if one.candidate.name not in doubted]
     hidden, told = _untestable(found, numbers)
@@ -181,19 +194,20 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     """Whether more is left than noise, and than the form of the effects found."""
     limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
-    first = _excess_by_kind(found.problem, found.refit.normal.rest)
-    last = _excess_by_kind(found.problem, found.rest)
+    doubt = numbers.number("accept.doubt")
+    first, last = (_excess_by_kind(found.problem, rest, doubt) for rest in (found.refit.normal.rest, found.rest))
     return any(found.misfit(kind) > limit and excess > rest * first[kind] for kind, excess in last.items())
 
 
-def _excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]]) -> dict[str, float]:
-    """Squares of whitened residuals beyond noise, twice, by kind; no less than a tenth of what noise has."""
+def _excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]], doubt: float) -> dict[str, float]:
+    """Squares of whitened residuals beyond what may be noise, twice, by kind; no less than a tenth of noise."""
     found = {}
     for kind in problem.kinds:
         rows = problem.rows(kind)
         if rows.any():
             count = 2.0 * sum(r[:, rows].size for r in rest)
-            found[kind] = max(2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest) - count, 0.1 * count)
+            squares = 2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest)
+            found[kind] = max(squares - doubt * count, 0.1 * count)
     return found
 
 
@@ -202,15 +216,21 @@ def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:
     limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
     where = added.fall > 0.1 * added.fall.max()
     left = squares_by_column(found.rest)[where]
-    bins = sum(len(r) for r in found.rest)
-    excess = left.sum() - bins * left.size
-    return bool(left.sum() > limit * bins * left.size and excess > rest * added.fall[where].sum())
+    noise = float(sum(len(r) for r in found.rest) * left.size)
+    excess = left.sum() - numbers.number("accept.doubt") * noise
+    return bool(left.sum() > limit * noise and excess > rest * added.fall[where].sum())
+
+
+def _outweighed(one: Added, free: Left, numbers: Parameters) -> bool:
+    """Whether what has no name explains more than this name, or much of it where it acts: then it is part of that."""
+    there = bool(set(one.candidate.components) & set(free.components))
+    return free.gain > (numbers.number("accept.again") if there else 1.0) * one.gain
 
 
 def _first(left: Sequence[Left], numbers: Parameters) -> Left | None:
-    """The free function that gains most, if it gains enough on tests that it was not fitted on."""
-    share = numbers.number("accept.held_out")
-    return next((o for o in left if o.gain > numbers.number("left.gain") and o.held_out.sum() > share * o.gain), None)
+    """The free function that gains most, if it gains enough, beyond doubt and on tests that it was not fitted on."""
+    share, least = numbers.number("accept.held_out"), numbers.number("left.gain")
+    return next((o for o in left if min(o.gain, o.beyond) > least and o.held_out.sum() > share * least), None)
 
 
 def _word(

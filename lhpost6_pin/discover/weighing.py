@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from ..calibration.problem import Problem
 from ..calibration.spectra import mean_squares, surprise
+from ..library import Family
 from ..parameters import Parameters
 from .screen import Background, Score
 
-__all__ = ["Lowered", "Weighing", "refusal", "squares_by_column"]
+__all__ = ["Lowered", "Weighing", "gate", "refusal", "squares_by_column"]
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ class Lowered(NamedTuple):
 
     gain: float  # of log-likelihood and log-prior
     beyond: float  # of log-likelihood, by what even `doubt` times the stated noise would not have
-    share: float  # of what is so far beyond noise in the column where it explains most of that
+    share: float  # of what is so far beyond noise in the column where it explains most of that; one where little is
     of_first: float  # in the column where this is most: of the squares that were there before any effect was added
 
 
@@ -37,6 +38,7 @@ class Weighing:
         """`first` (c,) are the squares before any effect was added."""
         self.problem, self.background, self.first = problem, background, first
         self.doubt, self.least = numbers.number("accept.doubt"), 0.5 * numbers.number("accept.gain")
+        self.much = numbers.number("accept.gain")
         self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
 
     def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float]:
@@ -56,7 +58,7 @@ class Weighing:
         fall, squares, beyond = before - after
         most = int(np.argmax(beyond))
         of_first = float(np.max(squares[fall > self.least] / self.first[fall > self.least], initial=0.0))
-        share = float(beyond[most] / max(before[2, most], 1e-9))
+        share = float(beyond[most] / before[2, most]) if before[2, most] > self.much else 1.0
         return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
 
 
@@ -65,19 +67,26 @@ def squares_by_column(rest: Sequence[NDArray[np.complex128]]) -> Array:
     return np.asarray(sum((np.abs(r) ** 2).sum(axis=0) for r in rest))
 
 
-def refusal(one: Score, less: Lowered, numbers: Parameters) -> str:
+def gate(family: Family, numbers: Parameters) -> float:
+    """Least gain of log-likelihood for a candidate of a family."""
+    return numbers.number("accept.mimicked" if family.mimicked else "accept.gain")
+
+
+def refusal(family: Family, one: Score, less: Lowered, numbers: Parameters) -> str:
     """Why a candidate may not be added."""
     if one.gain < numbers.number("accept.look"):
         return "gains too little"
-    if less.gain < numbers.number("accept.gain"):  # the noise in derivatives is all it has
+    if less.gain < gate(family, numbers):  # the noise in derivatives is all it has
         return "does not lower what is left"
     held = one.held_out
     if held.sum() < numbers.number("accept.held_out") * one.gain:
         return "does not hold on tests that it was not fitted on"
-    better = np.mean(held > -numbers.number("accept.worse") * one.gain)
-    if better < numbers.number("accept.better") or held.min() < -numbers.number("accept.worst") * one.gain:
+    chance = numbers.number("accept.chance")
+    better = np.mean(held > -max(chance, numbers.number("accept.worse") * one.gain))
+    worst = -max(2.0 * chance, numbers.number("accept.worst") * one.gain)
+    if better < numbers.number("accept.better") or held.min() < worst:
         return "makes tests worse that it was not fitted on"
-    if less.beyond < numbers.number("accept.gain"):
+    if family.mimicked and less.beyond < gate(family, numbers):
         return "explains what may be noise"
     if less.share < numbers.number("accept.closure"):
         return "explains too little of what is more than noise"

@@ -23,8 +23,11 @@ def said(found: Discovery) -> str:
     if verdict.word == "ambiguous":
         rivals = " and ".join(" or ".join(map(title_of, (e.family, *e.rivals))) for e in verdict.effects if e.rivals)
         return f"{effects}; the campaign cannot tell {rivals}."
-    left = verdict.left
-    place = "more than noise is left" if left is None else f"something acts on {left.component}, by its {left.state}"
+    left, place = verdict.left, "more than noise is left"
+    if left is not None:
+        place = f"something acts on {where(left.components)}, by {left.words}"
+    elif drifting := [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]:
+        place = f"{', '.join(drifting)} drift against the platen's pose within tests"
     near = f" Nearest comes {' and '.join(map(title_of, verdict.nearest))}." if verdict.nearest else ""
     return f"{effects + '; beyond that ' if effects else ''}{place}, and the library has no name for it.{near}"
 

@@ -152,8 +152,8 @@ def gap_figure(found: Discovery) -> Figure:
 
 def left_figure(left: Left) -> Figure:
     """Return a free function of a leg's state with two deviations on either side."""
-    title = {"position": "Elongation [m]", "velocity": "Rate of elongation [m/s]"}[left.state]
-    layout = stacked_layout([f"Force along {left.component} [kN]"], title, row_height=240)
+    title = "Rate of elongation [m/s]" if left.state == "velocity" else f"Elongation: {left.words} [m]"
+    layout = stacked_layout([f"Force along {where(left.components)} [kN]"], title, row_height=240)
     nodes, value, sd = left.nodes.tolist(), left.value / 1e3, left.sd / 1e3
     band = [*(value + 2 * sd).tolist(), *(value - 2 * sd)[::-1].tolist()]
     traces = [
@@ -177,7 +177,7 @@ def left_figure(left: Left) -> Figure:
             "name": "force",
         },
     ]
-    words = f"A force along {left.component} as a free function of its {left.state}, fitted to what is left."
+    words = f"A force along {where(left.components)} as a free function of {left.words}, fitted to what is left."
     return Figure("left", "What has no name", words, traces, layout, layout["height"])
 
 

@@ -3,6 +3,8 @@
 import math
 from pathlib import Path
 
+import numpy as np
+
 from ..discover import Discovery
 from ..discover.save import advice
 from ..discover.words import said, title_of, where
@@ -99,7 +101,7 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
     if verdict.left is not None:
         blocks.append(figure(left_figure(verdict.left)))
     elif verdict.word == "unexplained":
-        blocks.append(paragraph("More than noise is left, and no single leg's position or speed explains it."))
+        blocks.append(paragraph("More than noise is left, and no leg's position or speed, now or lately, explains it."))
     if verdict.nearest:
         near = " and ".join(map(title_of, verdict.nearest))
         blocks.append(
@@ -196,7 +198,10 @@ def _assumptions(found: Discovery) -> list[Markup]:
         "A parameter beyond three stated deviations counts as an effect of its family; within them, as calibration.",
         "Candidates are ranked to first order; the best are fitted in full with everything else.",
     ]
-    rows = [(path, f"{q.value:g}", q.evidence, q.source) for path, q in found.numbers.items()]
+    rows = [
+        (path, ", ".join(f"{x:g}" for x in np.atleast_1d(q.value)), q.evidence, q.source)
+        for path, q in found.numbers.items()
+    ]
     if hidden := found.verdict.untestable:
         lines.append(f"This campaign is no test of {', '.join(hidden)}: their typical sizes do not stand clear of it.")
     return [bullet_list(lines), table("Numbers used", ("Number", "Value", "Evidence", "Source"), rows)]

@@ -12,7 +12,7 @@ from typing import Any
 
 from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
 from .effects import Effect, standard_effects
-from .errors import ParameterError, RecordError
+from .errors import ParameterError, RecordError, UnknownNameError
 from .law_table import LAWS
 from .library import effect_entry, make_named_effect
 from .parameters import Parameters, load_parameters, override_parameters
@@ -110,6 +110,14 @@ class Machine:
         entry = effect_entry(effect, components, values)
         parameters = replace(self.parameters, effects={**self.parameters.effects, label: entry})
         return build_machine(parameters, self.own_effects, self.specimen)
+
+    def without_effect(self, name: str) -> "Machine":
+        """Return a copy without an effect of the library by its name; raises UnknownNameError."""
+        entries = dict(self.parameters.effects)
+        if name not in entries:
+            raise UnknownNameError("effect of this machine", name, list(entries))
+        del entries[name]
+        return build_machine(replace(self.parameters, effects=entries), self.own_effects, self.specimen)
 
     def with_valves(self, count: int) -> "Machine":
         """Return a copy with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""

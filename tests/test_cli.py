@@ -201,7 +201,7 @@ def test_check_names_channel_and_sample_of_a_broken_record_and_exits_1(lhpost6, 
 
 
 def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6, tmp_path):
-    assert "196 numbers, 0 suspicious" in lhpost6("check", PRACTICE).words
+    assert "206 numbers, 0 suspicious" in lhpost6("check", PRACTICE).words
     record = load_record(PRACTICE)
     record["actuator_displacement"][:, 0] *= 1.05  # ten times the calibration range
     save_record(record, tmp_path / "campaign" / "long.nc")

@@ -19,11 +19,12 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.discover import Discovery, discover, verdict_entries
 from lhpost6_pin.discover.candidates import Candidate, list_candidates, with_background, with_other_form
 from lhpost6_pin.discover.columns import columns_of
+from lhpost6_pin.discover.discover import discovery_numbers
 from lhpost6_pin.discover.left import _hats
 from lhpost6_pin.discover.next_test import _trial
 from lhpost6_pin.discover.releases import block_of, list_releases
 from lhpost6_pin.discover.screen import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discover.search import Contest, Scored, _by_rank
+from lhpost6_pin.discover.search import Contest, Scored, _by_rank, _fit_jointly, _objective, _pruned, _without
 from lhpost6_pin.discover.weighing import Lowered, refusal
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.files import models_folder
@@ -341,6 +342,31 @@ def test_what_was_hidden_is_named_and_measured(found):
     # hidden 9 kN and 0.04 m/s; intervals know of sensor noise alone, not of friction along a quieted path
     assert effect.parameters["friction"].value == pytest.approx(9e3, rel=0.1)
     assert effect.parameters["speed"].value == pytest.approx(0.04, rel=0.15)
+
+
+def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
+    numbers, calibration = discovery_numbers()
+    search = found.search
+    helper = scored("asymmetric_friction", ("V1",), 50.0)
+    both = _fit_jointly(search, helper, calibration, numbers, lambda share: None)
+    both.added.insert(0, replace(search.added[0], candidate=helper.candidate))
+    assert len(both.problem.machine.parameters.effects) == 1 + len(search.problem.machine.parameters.effects)
+    left = _pruned(both, calibration, numbers)
+    assert [one.candidate.family.name for one in left.added] == ["stribeck_friction"]
+    assert set(left.problem.names) == set(search.problem.names)
+    # the same place but for the last step of a search that ends where little is gained
+    assert abs(_objective(left) - _objective(search)) < 3.0
+    alone = replace(search, added=[search.added[0], replace(search.added[0], candidate=helper.candidate)])
+    assert _without(alone, search.added[0].candidate, calibration).added == [alone.added[1]]
+
+
+def test_an_effect_taken_out_leaves_the_machine_as_it_was(machine):
+    more = machine.with_effect("local_viscous", ("H1",), name="a").with_effect("local_viscous", ("H2",), name="b")
+    less = more.without_effect("a")
+    assert [e.name for e in less.added_effects] == ["b"]
+    assert less.without_effect("b").parameters == machine.parameters
+    with pytest.raises(UnknownNameError, match="no effect of this machine named 'c'"):
+        more.without_effect("c")
 
 
 def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_noise(found):

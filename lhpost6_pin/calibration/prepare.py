@@ -57,6 +57,11 @@ class Prepared:
         replicas = tuple(r.with_free(name, share) for r in self.replicas)
         return Prepared(self.problem.with_free(name, share), replicas, self.noisy)
 
+    def without_free(self, name: str) -> "Prepared":
+        """The same with an unknown's prior as stated again."""
+        replicas = tuple(r.without_free(name) for r in self.replicas)
+        return Prepared(self.problem.without_free(name), replicas, self.noisy)
+
 
 def prepare_problem(
     machine: Machine,

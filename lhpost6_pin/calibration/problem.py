@@ -134,6 +134,13 @@ class Problem:
         other._turn(self.machine, self.knobs)
         return other
 
+    def without_free(self, name: str) -> "Problem":
+        """The same with an unknown's prior as stated again."""
+        other = copy(self)
+        other.free = {free: share for free, share in self.free.items() if free != name}
+        other._turn(self.machine, self.knobs)
+        return other
+
     def with_tests(self, tests: Sequence[Measured]) -> "Problem":
         """The same problem, weighed by the same noise, with the same tests seen another time."""
         other = copy(self)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..calibration.fit import Solution, misfit, objective, solve
 from ..calibration.knobs import with_knobs
-from ..calibration.normal import Normal
+from ..calibration.normal import Normal, bounds_of
 from ..calibration.prepare import Prepared
 from ..calibration.problem import Base, Problem
 from ..calibration.spectra import real_bins
@@ -74,6 +74,7 @@ class Added:
 
     candidate: Candidate
     gain: float  # of log-likelihood and log-prior, of the joint fit
+    round: int  # of the search, from 0
     tried: int  # candidates in that round
     contest: tuple[Contest, ...]
     fall: Array  # (c,) of the squares of what is left, by column
@@ -160,8 +161,41 @@ def search(
         if more is None:
             break
         found = more
+    if len(found.added) > 1:
+        fewer = _pruned(found, calibration, numbers)
+        found, standing = fewer, standing if fewer is found else stand(fewer, calibration)
     progress(1.0)
     return found, standing
+
+
+def _pruned(found: Search, calibration: Parameters, numbers: Parameters) -> Search:
+    """The search without what it can do without, now that more has been added: helpers of what was found later."""
+    for one in found.added[:-1]:
+        less = _without(found, one.candidate, calibration)
+        if _objective(less) - _objective(found) < gate(one.candidate.family, numbers):
+            return _pruned(_refined(less, calibration, lambda share: None), calibration, numbers)
+    return found
+
+
+def _without(found: Search, candidate: Candidate, calibration: Parameters) -> Search:
+    """The search without one of its effects, everything else refitted."""
+    problem = found.problem
+    if candidate.release:
+        ready = found.ready.without_free(candidate.release)
+    else:
+        knobs = tuple(k for k in problem.knobs if not k.name.startswith(f"{candidate.name}."))
+        ready = found.ready.with_machine(problem.machine.without_effect(candidate.name), knobs)
+    place = dict(zip(problem.names, found.solution.x, strict=True))
+    start = np.array([place[name] for name in ready.problem.names])
+    low, high = bounds_of(ready.problem, calibration)
+    solution = solve(
+        *(ready.problem, ready.replicas, calibration, np.clip(start, low, high), lambda share: None),
+        found.solution.normal,
+        frugal=True,
+        settled=True,
+    )
+    kept = [one for one in found.added if one.candidate.name != candidate.name]
+    return Search(ready, solution, found.refit, kept, found.rounds)
 
 
 def _weighed_anew(found: Search, calibration: Parameters, progress: Progress) -> Search:
@@ -337,8 +371,8 @@ def _best_of(
     contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i])) for i in order)
     refined = _refined(fitted[best], calibration, between(progress, 0.7, 1.0))
     first, last = (squares_by_column(one.rest) for one in (found, refined))
-    tried = len(found.rounds[-1].scored)
-    added = Added(rivals[best].candidate, before - left[best], tried, contest, first - last, apart)
+    place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
+    added = Added(rivals[best].candidate, before - left[best], place, tried, contest, first - last, apart)
     refined.added.append(added)
     return refined
 

@@ -166,8 +166,7 @@ def _considered(found: Discovery) -> list[Markup]:
         ]
         header = ("Family", "On", "Gain", "On tests not fitted", "Of the gap", "Added?")
         blocks.append(details(f"Round {k}: all families", table("Best candidate of each family", header, rows)))
-        if k <= len(found.search.added):
-            contest = found.search.added[k - 1].contest
+        for contest in (a.contest for a in found.search.added if a.round == k - 1):
             tried = [(c.candidate.family.name, where(c.candidate.components), number(c.behind)) for c in contest]
             blocks.append(table("Fitted in full, by log-likelihood behind the best", ("Family", "On", "Behind"), tried))
     return blocks

@@ -25,6 +25,7 @@ from .law_table import (
     DROOP,
     DROOP_TIME,
     EXTERNAL,
+    FEED_INERTANCE,
     LAWS,
     LEAKAGE,
     LINE_TIME,
@@ -53,6 +54,7 @@ _PLACE = {
     "flow_curve": CURVE_ERROR,
     "line": LINE_TIME,
     "play": PLAY,
+    "supply_line": FEED_INERTANCE,
 }
 """Where an actuator's row keeps the numbers of a law, one behind the other."""
 
@@ -91,7 +93,7 @@ def alter_rows(rows: NDArray[np.void], effects: Sequence["Effect"], at: Mapping[
                 p[place + 1 : place + len(numbers)] = numbers[1:]
                 row["altered"] = 1
                 if law.states:
-                    row["more"] = first
+                    row["feed" if effect.law == "supply_line" else "more"] = first
 
 
 def supply_numbers(effects: Sequence["Effect"], states: Sequence[str]) -> tuple[float, ...]:

@@ -117,7 +117,7 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
     number = {name: i for i, name in enumerate(ports)}
     acting = [e for e in effects if not LAWS[e.law].alters]
     rows = np.zeros(sum(len(e.ports) for e in acting), ROW)
-    for column in (*PORTS, "link", "more"):
+    for column in (*PORTS, "link", "more", "feed"):
         rows[column] = -1
     base: dict[int, int] = {}  # row of the actuator or strut on a port
     i = state = 0

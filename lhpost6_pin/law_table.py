@@ -38,6 +38,9 @@ __all__ = [
     "END_STOP",
     "EXTERNAL",
     "EXTERNAL_SIDE",
+    "FEED_DAMPING",
+    "FEED_FREQUENCY",
+    "FEED_INERTANCE",
     "GAS_HEAT",
     "GAS_LEAK",
     "HYDRAULIC_DOUBLE",
@@ -72,7 +75,7 @@ __all__ = [
     "Law",
 ]
 
-MAX_PARAMS = 32
+MAX_PARAMS = 36
 
 ROW = np.dtype(
     [
@@ -85,7 +88,8 @@ ROW = np.dtype(
         ("input", np.int64),  # number of the spool that feeds it, -1 without
         ("link", np.int64),  # number of the first hidden state of the actuator on the same leg or pad, -1 without
         ("altered", np.int64),  # 1 where alterations have changed more than the report's numbers
-        ("more", np.int64),  # number of the first hidden state that alterations have given it, -1 without
+        ("more", np.int64),  # number of the first hidden state of its lines behind the valve, -1 without
+        ("feed", np.int64),  # the same of its line before the valve
         ("p", np.float64, MAX_PARAMS),  # the law's numbers, in the law's order; behind them those of alterations
     ]
 )
@@ -103,7 +107,7 @@ OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL, BY_MEM
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
 TURBULENT, EXTERNAL, EXTERNAL_SIDE, NULL_LEAKAGE, NULL_WIDTH, NULL_BIAS, DEADBAND = range(12, 19)
 AIR, AIR_INDEX, VOIDS, VAPOUR, CURVE_ERROR, CURVE_SIDE, CURVE_POWER, LINE_TIME, LINE_DAMPING = range(19, 28)
-PLAY, PLAY_FORCE = 28, 29
+PLAY, PLAY_FORCE, FEED_INERTANCE, FEED_FREQUENCY, FEED_DAMPING = range(28, 33)
 
 # Places in the supply's numbers; a machine without alterations of it has the first two.
 SUPPLY, RETURN, DROOP, DROOP_TIME, BACK, BACK_TIME, DRAWN, RETURNED, WEIGHT = range(9)
@@ -214,6 +218,13 @@ LAWS: Mapping[str, Law] = {
     "play": Law(-1, 1, (("half_play", "m"), ("closing_force", "N")), alters="oil"),
     "line": Law(
         -1, 1, (("time", "s"), ("damping", "1")), ("flow_a", "flow_rate_a", "flow_b", "flow_rate_b"), alters="oil"
+    ),
+    "supply_line": Law(
+        -1,
+        1,
+        (("inertance", "Pa s2/m3"), ("frequency", "Hz"), ("damping", "1")),
+        ("line_pressure", "line_flow"),
+        alters="oil",
     ),
     "supply_droop": Law(
         -1, 1, (("droop", "Pa s/m3"), ("time", "s"), ("weight", "1")), ("drawn_flow",), alters="supply"

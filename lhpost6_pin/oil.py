@@ -4,6 +4,8 @@ The report's actuators keep the shorter way through `stage`; where none of these
 p is a row's numbers, double whether it has a chamber B (else P_B = 0), high and low supply and return pressure [Pa].
 """
 
+import math
+
 from .compiled import compiled
 from .law_table import (
     AIR,
@@ -14,6 +16,9 @@ from .law_table import (
     DEADBAND,
     EXTERNAL,
     EXTERNAL_SIDE,
+    FEED_DAMPING,
+    FEED_FREQUENCY,
+    FEED_INERTANCE,
     HYDRAULIC_DOUBLE,
     LINE_DAMPING,
     LINE_TIME,
@@ -34,7 +39,16 @@ from .laws.orifice import opening, port_flow
 from .laws.play import play_energy, play_slope, play_travel
 from .laws.spool import corrected_opening, dead_zone
 
-__all__ = ["advance_line", "advance_oil", "bulk_modulus", "exchanged", "leak_flows", "net_flows", "oil_power"]
+__all__ = [
+    "advance_line",
+    "advance_oil",
+    "at_valve",
+    "bulk_modulus",
+    "exchanged",
+    "leak_flows",
+    "net_flows",
+    "oil_power",
+]
 __all__ += ["oil_rates", "rod_advance", "rod_ahead", "start_line", "valve_flows"]
 
 
@@ -94,6 +108,12 @@ def exchanged(p, double, spool, pressure_a, pressure_b, high, low):
 
 
 @compiled
+def at_valve(row, z, high):
+    """Supply pressure at a row's valve [Pa], behind its line."""
+    return high + z[row.feed] if row.feed >= 0 else high
+
+
+@compiled
 def leak_flows(p, double, pressure_a, pressure_b, low):
     """Leaks [m3/s]: across the piston with its slope [m3/s/Pa], and out of chambers A and B with theirs."""
     across = p[7] * (pressure_a - pressure_b)
@@ -116,7 +136,8 @@ def net_flows(rows, i, spool, pressure_a, pressure_b, high, low, z):
         k = row.more
         flow_a, flow_b, slope_a, slope_b = z[k], z[k + 2], 0.0, 0.0
     else:
-        flow_a, flow_b, slope_a, slope_b = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
+        fed = at_valve(row, z, high)
+        flow_a, flow_b, slope_a, slope_b = valve_flows(p, double, spool, pressure_a, pressure_b, fed, low)
     across, cross, out_a, out_b, steep_a, steep_b = leak_flows(p, double, pressure_a, pressure_b, low)
     return flow_a - across - out_a, flow_b + across - out_b, slope_a - steep_a, slope_b - steep_b, cross
 
@@ -175,7 +196,8 @@ def oil_power(row, s, z, spool, high, low):
     if p[LINE_TIME] > 0.0:
         flow_a, flow_b = z[row.more], z[row.more + 2]
     else:
-        flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
+        fed = at_valve(row, z, high)
+        flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, fed, low)
     across, _, out_a, out_b, _, _ = leak_flows(p, double, pressure_a, pressure_b, low)
     h_a, h_b = _enthalpy(p, pressure_a), _enthalpy(p, pressure_b)
     s += rod_ahead(p, pressure_a, pressure_b)
@@ -189,13 +211,24 @@ def oil_power(row, s, z, spool, high, low):
 
 @compiled
 def advance_line(rows, i, spool, pressure_a, pressure_b, high, low, dt, z):
-    """Advance the lines of row i, if it has any, by dt [s] at these pressures."""
+    """Advance the lines of row i, if it has any, by dt [s] at these pressures: before the valve, then behind it.
+
+    Before it, what oscillates is the pressure, and by how much more flows in than the valve takes.
+    """
     row = rows[i]
     p = row.p
+    double = row.law == HYDRAULIC_DOUBLE
+    if row.feed >= 0:
+        k = row.feed
+        taken, _, _, _ = exchanged(p, double, spool, pressure_a, pressure_b, high + z[k], low)
+        turn = 2.0 * math.pi * p[FEED_FREQUENCY]
+        impedance = turn * p[FEED_INERTANCE]
+        z[k], more = line_step(z[k], impedance * (z[k + 1] - taken), 0.0, dt, 1.0 / turn, p[FEED_DAMPING])
+        z[k + 1] = taken + more / impedance
     if p[LINE_TIME] <= 0.0:
         return
     k = row.more
-    flow_a, flow_b, _, _ = valve_flows(p, row.law == HYDRAULIC_DOUBLE, spool, pressure_a, pressure_b, high, low)
+    flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, at_valve(row, z, high), low)
     z[k], z[k + 1] = line_step(z[k], z[k + 1], flow_a, dt, p[LINE_TIME], p[LINE_DAMPING])
     z[k + 2], z[k + 3] = line_step(z[k + 2], z[k + 3], flow_b, dt, p[LINE_TIME], p[LINE_DAMPING])
 
@@ -205,6 +238,10 @@ def start_line(rows, i, spool, pressure_a, pressure_b, high, low, z):
     """Put the lines of row i, if it has any, at rest in what flows through them."""
     row = rows[i]
     p = row.p
+    if row.feed >= 0:
+        double = row.law == HYDRAULIC_DOUBLE
+        z[row.feed] = 0.0
+        z[row.feed + 1], _, _, _ = exchanged(p, double, spool, pressure_a, pressure_b, high, low)
     if p[LINE_TIME] <= 0.0:
         return
     k = row.more
@@ -282,9 +319,17 @@ def oil_rates(rows, s, sd, spool, high, low, z, zd):
             zd[k] -= ahead * fall_a
             if double:
                 zd[k + 1] -= ahead * fall_b
+        if row.feed >= 0:
+            k = row.feed
+            taken, _, _, _ = exchanged(p, double, x, pressure_a, pressure_b, high + z[k], low)
+            turn = 2.0 * math.pi * p[FEED_FREQUENCY]
+            impedance = turn * p[FEED_INERTANCE]
+            zd[k] = turn * impedance * (z[k + 1] - taken)
+            zd[k + 1] = -z[k] / p[FEED_INERTANCE] - 2.0 * p[FEED_DAMPING] * turn * (z[k + 1] - taken)
         if p[LINE_TIME] > 0.0:
             k = row.more
-            flow_a, flow_b, _, _ = valve_flows(p, double, x, pressure_a, pressure_b, high, low)
+            fed = at_valve(row, z, high)
+            flow_a, flow_b, _, _ = valve_flows(p, double, x, pressure_a, pressure_b, fed, low)
             zd[k], zd[k + 2] = z[k + 1] / p[LINE_TIME], z[k + 3] / p[LINE_TIME]
             zd[k + 1] = (flow_a - z[k] - 2.0 * p[LINE_DAMPING] * z[k + 1]) / p[LINE_TIME]
             zd[k + 3] = (flow_b - z[k + 2] - 2.0 * p[LINE_DAMPING] * z[k + 3]) / p[LINE_TIME]

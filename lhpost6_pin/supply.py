@@ -21,7 +21,7 @@ from .law_table import (
     WEIGHT,
 )
 from .laws.lines import filter_shares
-from .oil import exchanged
+from .oil import at_valve, exchanged
 
 __all__ = ["close_supply", "flows_exchanged", "open_supply", "shared_states", "steady_supply", "supply_pressures"]
 __all__ += ["supply_rates"]
@@ -65,7 +65,8 @@ def flows_exchanged(rows, spool, supply, z):
         double = row.law == HYDRAULIC_DOUBLE
         k = row.state
         pressure_b = z[k + 1] if double else 0.0
-        out, back, slope_out, slope_back = exchanged(row.p, double, spool[row.input], z[k], pressure_b, high, low)
+        fed = at_valve(row, z, high)
+        out, back, slope_out, slope_back = exchanged(row.p, double, spool[row.input], z[k], pressure_b, fed, low)
         weight = supply[WEIGHT] if double else 1.0
         drawn += weight * out
         returned += back

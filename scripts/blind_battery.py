@@ -1,10 +1,12 @@
 """A blind battery: cases of another simulator with sealed labels, searched, then unsealed and scored.
 
-    python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast] [--jobs 2] [--out FOLDER] [--baselines] [--dask]
-                                    [--publish]
+    python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast | --brief] [--jobs 2] [--out FOLDER] [--baselines]
+                                    [--dask] [--publish] [--check]
 
 Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
-searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests.
+searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests,
+--brief shorter ones of four. --check exits with 1 where a campaign that lacks nothing got a name, or too few a right
+one: a smoke test, as continuous integration runs it.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the same cases. --dask runs the cases
 on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes. --publish writes the scores
 to scripts/battery/results.md, too.
@@ -12,6 +14,7 @@ to scripts/battery/results.md, too.
 
 import argparse
 import json
+import sys
 import time
 import tomllib
 from contextlib import nullcontext
@@ -33,6 +36,9 @@ from lhpost6_pin.sensors import load_sensors
 
 RESULTS = Path(__file__).parent / "battery" / "results.md"
 """The latest published scores."""
+
+LEAST = 0.4
+"""Share of right names below which something is broken; brief campaigns do not show all that is hidden."""
 
 
 def make(case, folder: Path) -> dict:
@@ -111,11 +117,23 @@ def case_row(name: str, label: dict, answer: dict) -> str:
     return f"| {' | '.join((name if right else f'{name} (wrong)', *cells))} |"
 
 
+def wrong(folder: Path, labels: dict[str, dict]) -> str:
+    """What is wrong with a battery that should have been easy; empty if nothing is."""
+    lost = [n for n in labels if not (folder / n / "verdict.json").exists()]
+    if lost:
+        return f"no verdict on {', '.join(lost)}"
+    answers = {n: json.loads((folder / n / "verdict.json").read_text(encoding="utf-8")) for n in labels}
+    found = score([(label, answers[n]) for n, label in labels.items()])
+    first = found["family first"]
+    if found["false name on nulls"].hits:
+        return f"names on campaigns that lack nothing: {found['false name on nulls'].text}"
+    return f"too few right names: {first.text}" if first.hits < LEAST * first.of else ""
+
+
 def described(asked: argparse.Namespace) -> str:
     """What was run: the command, the version, the day."""
-    command = (
-        f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{' --fast' if asked.fast else ''}"
-    )
+    length = f" --{asked.campaign}" if asked.campaign != "full" else ""
+    command = f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{length}"
     today = datetime.now(UTC).date().isoformat()
     return f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."
 
@@ -125,7 +143,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--fast", action="store_true")
+    for length in ("fast", "brief"):
+        parser.add_argument(f"--{length}", dest="campaign", action="store_const", const=length, default="full")
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out") / "battery")
     parser.add_argument("--baselines", action="store_true")
@@ -134,7 +154,7 @@ def main() -> None:
     asked = parser.parse_args()
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
-    cases = draw_cases(asked.cases, asked.seed, asked.fast)
+    cases = draw_cases(asked.cases, asked.seed, asked.campaign)
     cluster = nullcontext()
     if asked.dask:
         from dask.distributed import Client, LocalCluster
@@ -148,13 +168,16 @@ def main() -> None:
             Parallel(return_as="generator_unordered")(delayed(search)(c.id, folder, asked.baselines) for c in cases), 1
         ):
             print(f"searched {done} of {len(cases)}", flush=True)
-    text = report(folder, unseal(folder))
+    labels = unseal(folder)
+    text = report(folder, labels)
     with write_whole(folder / "scores.md") as beside:
         beside.write_text(text, encoding="utf-8")
     print(text)
     if asked.publish:
         with write_whole(RESULTS) as beside:
             beside.write_text(f"# What the blind battery last said\n\n{described(asked)}\n\n{text}", encoding="utf-8")
+    if asked.check and (why := wrong(folder, labels)):
+        sys.exit(why)
 
 
 if __name__ == "__main__":

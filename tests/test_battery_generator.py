@@ -125,14 +125,14 @@ def test_motions_start_and_end_at_rest_and_stay_within_the_stroke(name):
 
 
 def test_the_same_seed_draws_the_same_cases_in_the_stated_mix():
-    first, second = cases.draw_cases(100, 7, fast=True), cases.draw_cases(100, 7, fast=True)
+    first, second = cases.draw_cases(100, 7, campaign="fast"), cases.draw_cases(100, 7, campaign="fast")
     assert [case.label for case in first] == [case.label for case in second]
     assert len({case.id for case in first}) == 100
     sorts = [case.label["sort"] for case in first]
     assert {sort: sorts.count(sort) for sort in set(sorts)} == cases.numbers()["mix"]
     families = {effect.family for case in first if case.label["sort"] == "one" for effect in case.effects}
     assert len(families) == 31  # one of each before any comes again
-    assert {case.id for case in first}.isdisjoint(case.id for case in cases.draw_cases(20, 8, fast=True))
+    assert {case.id for case in first}.isdisjoint(case.id for case in cases.draw_cases(20, 8, campaign="fast"))
 
 
 def test_bold_parameters_are_three_deviations_off_and_others_within_the_clip():
@@ -168,7 +168,7 @@ def test_a_delayed_channel_shows_late_and_a_gain_shows_as_a_gain():
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    case = cases.draw_case("one", ("local_viscous",), seed=21, fast=True, strength=3.0, variant=0)
+    case = cases.draw_case("one", ("local_viscous",), seed=21, campaign="fast", strength=3.0, variant=0)
     return case, generate.write_case(case, tmp_path_factory.mktemp("battery"))
 
 
@@ -235,7 +235,7 @@ def test_half_the_step_gives_the_same_motion(written, monkeypatch):
 
 
 def test_a_label_touched_after_sealing_is_found_out(tmp_path):
-    labels = [case.label for case in cases.draw_cases(6, 9, fast=True)]
+    labels = [case.label for case in cases.draw_cases(6, 9, campaign="fast")]
     generate.seal(labels, tmp_path)
     assert generate.unseal(tmp_path) == {label["id"]: label for label in labels}
     path = tmp_path / "sealed" / "labels.json"

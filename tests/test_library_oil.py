@@ -83,6 +83,7 @@ NUMBERS = {
     "dead_volume": (0.02, -0.3),
     "play": (5e-4, 2e4),
     "line": (2e-3, 0.3),
+    "supply_line": (2e6, 25.0, 0.1),
     "supply_droop": (6e6, 0.02, 1.3),
     "back_pressure": (3e7, 0.03),
 }
@@ -200,7 +201,7 @@ def test_what_flows_in_is_stored_leaks_or_is_delivered(law: str, kind: str) -> N
 
 @given(a=st.floats(-1e6, 25e6), b=st.floats(-1e6, 25e6), low=st.floats(0.0, 1e6), side=st.floats(-1.0, 1.0))
 def test_every_leak_flows_down_its_pressure(a: float, b: float, low: float, side: float) -> None:
-    p = np.zeros(32)
+    p = np.zeros(36)
     p[[7, 12, 13, 14, 11]] = 4e-11, 3e-7, 5e-11, side, 500.0
     across, slope, out_a, out_b, slope_a, slope_b = oil.leak_flows(p, True, a, b, low)
     assert across * (a - b) >= 0.0 and slope > 0.0
@@ -365,6 +366,7 @@ STRONG: dict[str, dict[str, float]] = {
     "flow_curve_error": {},
     "cavitation": {"share": 0.9, "vapour_pressure": 1e6},
     "line_dynamics": {},
+    "supply_line": {"inertance": 2e6},
 }
 """Families that chambers feel, strong enough to show in a third of a second."""
 

@@ -35,6 +35,7 @@ __all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
 
 OVERSHOT = 1000.0
 """Log-likelihood by which a step must have made things worse to be taken back: corrections for noise cost hundreds."""
@@ -122,20 +123,21 @@ def solve(
     first: Normal | None = None,
     frugal: bool = False,
     settled: bool = False,
+    near: Mask | None = None,
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on.
 
     Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
     the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and
     evaluates derivatives by gains, offsets and what hardly bends the equations there alone, all others as long as steps
-    gain much; of a settled one only those that `known` lacks. A step that went too far is taken again, a quarter as
-    long.
+    gain much; of a settled one only those that `known` lacks, and those that are `near` (p,) to them. A step that went
+    too far is taken again, a quarter as long.
     """
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
     bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
-    again = bent if frugal and not settled else fresh
+    again = bent if frugal and not settled else fresh if near is None else fresh | near
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: Bias | None = None
     normal: Normal | None = None

@@ -403,16 +403,24 @@ def _fit_jointly(
         own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
         ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
         start = np.insert(start, count, np.zeros(len(own)))
-    before, replicas = found.solution.normal, ready.replicas
+    before, replicas, near = found.solution.normal, ready.replicas, _near(ready.problem, candidate)
     fits = []
     for i, place in enumerate((start, np.zeros_like(start))):
         share = between(progress, 0.5 * i, 0.5 * (i + 1))
-        solution = solve(ready.problem, replicas, calibration, place, share, before, frugal=True, settled=True)
+        solution = solve(
+            *(ready.problem, replicas, calibration, place, share, before), frugal=True, settled=True, near=near
+        )
         fits.append(Search(ready, solution, found.refit, list(found.added), found.rounds))
         left = [float(np.mean(np.abs(r) ** 2)) for r in fits[-1].rest]
         if np.mean(left) < numbers.number("accept.settled"):
             break
     return min(fits, key=_objective)
+
+
+def _near(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
+    """Unknowns (p,) whose derivatives change much with an effect: of oil and valves, those of oil and valves."""
+    knobs = [k.shows_in == ("flow",) for k in problem.knobs]
+    return np.array([*knobs, *(u.alone[1] >= 0 for u in problem.unknowns)]) & ("flow" in candidate.family.shows_in)
 
 
 def _objective(found: Search) -> float:

@@ -126,6 +126,8 @@ def judge(
         wrench = [one for one in kept if one.candidate.name in forces]
         doubted |= {one.candidate.name for one in wrench if _outweighed(one, free, numbers)}
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
+    if free is not None and any(_its_form(free, one, numbers) for one in kept if one.candidate.name not in doubted):
+        free = None
     unnamed = free is not None or bool(doubted) or drifting or _more_than_noise(found, numbers)
     nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
     effects = [e for e, one in zip(effects, kept, strict=True) if one.candidate.name not in doubted]
@@ -219,6 +221,12 @@ def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:
     noise = float(sum(len(r) for r in found.rest) * left.size)
     excess = left.sum() - numbers.number("accept.doubt") * noise
     return bool(left.sum() > limit * noise and excess > rest * added.fall[where].sum())
+
+
+def _its_form(free: Left, one: Added, numbers: Parameters) -> bool:
+    """Whether what has no name is so little of an effect found there that it is the form of that."""
+    there = set(free.components) <= set(one.candidate.components)
+    return there and free.gain < numbers.number("verdict.rest") * one.gain
 
 
 def _outweighed(one: Added, free: Left, numbers: Parameters) -> bool:

@@ -34,5 +34,6 @@ BUILD = {
     "return_back_pressure": _altering("back_pressure", "rise", "time"),
     "flow_curve_error": _altering("flow_curve", "error", "side", "power"),
     "cavitation": _altering("cavitation", "share", "vapour_pressure"),
+    "supply_line": _altering("supply_line", "inertance", "frequency", "damping"),
     "line_dynamics": _altering("line", "time", "damping"),
 }

@@ -54,8 +54,8 @@ def model() -> dict[str, dict]:
     return load_model(Path(__file__).parents[2] / "models" / "lhpost6.toml")
 
 
-def draw_cases(count: int, seed: int, fast: bool = False) -> list[Case]:
-    """`count` cases in the battery's mix, in random order; the same for the same count, seed and `fast`."""
+def draw_cases(count: int, seed: int, campaign: str = "full") -> list[Case]:
+    """`count` cases in the battery's mix, in random order; the same for the same count, seed and campaign."""
     root = np.random.SeedSequence(seed)
     random = np.random.default_rng(root)
     mix = numbers()["mix"]
@@ -68,7 +68,7 @@ def draw_cases(count: int, seed: int, fast: bool = False) -> list[Case]:
     decks = {name: _Deck(list(numbers()[group]), random) for name, group in piles.items()}
     hidden = [_deal(sort, decks) for sort in sorts]
     each = zip(sorts, hidden, root.spawn(count), strict=True)
-    return [draw_case(sort, families, seed=own, fast=fast) for sort, families, own in each]
+    return [draw_case(sort, families, seed=own, campaign=campaign) for sort, families, own in each]
 
 
 class _Deck:
@@ -100,7 +100,7 @@ def draw_case(
     families: tuple[str, ...] = (),
     *,
     seed: int | np.random.SeedSequence,
-    fast: bool = False,
+    campaign: str = "full",
     strength: float | None = None,
     variant: int | None = None,
 ) -> Case:
@@ -110,7 +110,7 @@ def draw_case(
     bold = sort == "null" and random.random() < numbers()["parameters"]["bold_share"]
     values, moved = draw_parameters(random, bold)
     scatter = {name: random.normal(1.0, numbers()["scatter"]["sd"], 13) for name in numbers()["scatter"]["fields"]}
-    campaign = "fast" if fast else "full"
+    stretch = numbers()["campaign"][campaign]["stretch"]
     effects: list[Effect] = []
     faults: tuple[Fault, ...] = ()
     decoy = sort in ("absorbable", "unexcited")
@@ -138,7 +138,6 @@ def draw_case(
         "campaign": campaign,
     }
     plan = numbers()["campaign"][campaign]
-    stretch = numbers()["campaign"]["fast" if fast else campaign]["stretch"]
     settings = [_stretched(numbers()["test"][t["motion"]], stretch) for t in plan["tests"]]
     order = np.linspace(-0.5, 0.5, len(settings))
     tests = tuple(

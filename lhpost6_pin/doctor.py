@@ -7,7 +7,7 @@ from importlib import metadata, util
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from . import __version__
 from .compiled import cache_folder
@@ -29,7 +29,8 @@ _OPTIONAL = {
 def print_doctor() -> None:
     """Print versions, whether compiled code is kept between runs and how long loading it takes, optional parts."""
     console = Console()
-    table = Table("part", "state", title=f"lhpost6_pin {__version__}, Python {platform.python_version()}")
+    state = Column("state", overflow="fold")  # a path is of no use cut off
+    table = Table("part", state, title=f"lhpost6_pin {__version__}, Python {platform.python_version()}")
     for name in _REQUIRED:
         try:
             table.add_row(name, metadata.version(name))

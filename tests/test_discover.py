@@ -20,11 +20,12 @@ from lhpost6_pin.discover import Discovery, discover, verdict_entries
 from lhpost6_pin.discover.candidates import Candidate, list_candidates, with_background, with_other_form
 from lhpost6_pin.discover.columns import columns_of
 from lhpost6_pin.discover.discover import discovery_numbers
-from lhpost6_pin.discover.left import _hats
+from lhpost6_pin.discover.left import Left, _hats
 from lhpost6_pin.discover.next_test import _trial
 from lhpost6_pin.discover.releases import block_of, list_releases
 from lhpost6_pin.discover.screen import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discover.search import Contest, Scored, _by_rank, _fit_jointly, _objective, _pruned, _without
+from lhpost6_pin.discover.search import Added, Contest, Scored, _by_rank, _fit_jointly, _objective, _pruned, _without
+from lhpost6_pin.discover.verdict import without_name
 from lhpost6_pin.discover.weighing import Lowered, refusal
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.files import models_folder
@@ -342,6 +343,33 @@ def test_what_was_hidden_is_named_and_measured(found):
     # hidden 9 kN and 0.04 m/s; intervals know of sensor noise alone, not of friction along a quieted path
     assert effect.parameters["friction"].value == pytest.approx(9e3, rel=0.1)
     assert effect.parameters["speed"].value == pytest.approx(0.04, rel=0.15)
+
+
+def test_a_free_function_takes_the_place_of_names_it_beats_and_is_the_form_of_those_that_beat_it():
+    numbers = discovery_numbers()[0]
+
+    def added(family: str, components: tuple[str, ...], gain: float) -> Added:
+        return Added(candidate(family, *components), gain, 0, 10, (), np.zeros(1), 10.0)
+
+    def free(gain: float, *components: str, beyond: float = 1e3) -> Left:
+        none = np.zeros(2)
+        return Left(components, "position", 0.0, none, none, none, gain, beyond, np.full(3, 100.0))
+
+    spring, leak = added("stray_spring", ("H1",), 400.0), added("piston_leakage", ("H1",), 400.0)
+    names = {one.candidate.family.name: one.candidate.name for one in (spring, leak)}
+
+    def told(left: list[Left], instead: list[Left]) -> tuple[float, set[str]]:
+        function, doubted = without_name([spring, leak], left, instead, numbers)
+        return (0.0 if function is None else function.gain), doubted
+
+    assert told([], [free(500.0, "H1")]) == (0.0, set())  # a little better than the name: no wonder, of 24 values
+    assert told([], [free(600.0, "H1")]) == (600.0, {names["stray_spring"]})  # a force says nothing of a leak
+    assert told([free(100.0, "H2")], []) == (100.0, set())  # beside it, and elsewhere
+    assert told([free(500.0, "H2")], []) == (500.0, {names["stray_spring"]})
+    assert told([free(100.0, "H1")], []) == (100.0, {names["stray_spring"]})  # much, where the name acts
+    assert told([free(70.0, "H2", beyond=10.0)], []) == (0.0, set())  # may be noise
+    spring = added("stray_spring", ("H1",), 4000.0)
+    assert told([free(100.0, "H1")], []) == (0.0, set())  # the form of what was found there
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):

@@ -19,7 +19,7 @@ from .search import Added, Search
 from .sensing import Fault
 from .weighing import squares_by_column
 
-__all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge"]
+__all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge", "without_name"]
 
 Array = NDArray[np.float64]
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
@@ -117,17 +117,9 @@ def judge(
         material = abs(x[i]) > calibration.number("report.material") * problem.stated[i]
         if sure and material and not own[i] and knob.name not in problem.free:
             changed[knob.name] = estimate(i)
-    free, doubted = _first(left, numbers), {one.candidate.name for one in kept if _leaves_much(one, found, numbers)}
-    forces = {one.candidate.name: one.gain for one in kept if "wrench" in one.candidate.family.shows_in}
-    better = _first(instead, numbers)
-    if forces and better is not None and better.gain > numbers.number("left.better") * sum(forces.values()):
-        free, doubted = better, doubted | set(forces)
-    elif free is not None:
-        wrench = [one for one in kept if one.candidate.name in forces]
-        doubted |= {one.candidate.name for one in wrench if _outweighed(one, free, numbers)}
+    free, doubted = without_name(kept, left, instead, numbers)
+    doubted |= {one.candidate.name for one in kept if _leaves_much(one, found, numbers)}
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
-    if free is not None and any(_its_form(free, one, numbers) for one in kept if one.candidate.name not in doubted):
-        free = None
     unnamed = free is not None or bool(doubted) or drifting or _more_than_noise(found, numbers)
     nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
     effects = [e for e, one in zip(effects, kept, strict=True) if one.candidate.name not in doubted]
@@ -221,6 +213,23 @@ def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:
     noise = float(sum(len(r) for r in found.rest) * left.size)
     excess = left.sum() - numbers.number("accept.doubt") * noise
     return bool(left.sum() > limit * noise and excess > rest * added.fall[where].sum())
+
+
+def without_name(
+    kept: Sequence[Added], left: Sequence[Left], instead: Sequence[Left], numbers: Parameters
+) -> tuple[Left | None, set[str]]:
+    """What has no name, and the effects that are therefore no right names.
+
+    A free function that explains far more than all forces that were added takes their place; one that is left beside
+    them doubts those that it outweighs, but where it is little of an effect found there it is only the form of that.
+    """
+    forces = [one for one in kept if "wrench" in one.candidate.family.shows_in]
+    better, free = _first(instead, numbers), _first(left, numbers)
+    if forces and better is not None and better.gain > numbers.number("left.better") * sum(one.gain for one in forces):
+        return better, {one.candidate.name for one in forces}
+    if free is None or any(_its_form(free, one, numbers) for one in forces):
+        return None, set()
+    return free, {one.candidate.name for one in forces if _outweighed(one, free, numbers)}
 
 
 def _its_form(free: Left, one: Added, numbers: Parameters) -> bool:

@@ -58,7 +58,8 @@ def search(name: str, folder: Path, with_baselines: bool) -> None:
     hold_out = tomllib.loads((home / "campaign.toml").read_text(encoding="utf-8"))["hold_out"]
     begin = time.perf_counter()
     try:
-        found = discover(machine, campaign, sensors, hold_out=hold_out, phases=(1, 2), jobs=1)
+        with parallel_config("threading", n_jobs=1):  # one case a worker, of whatever kind
+            found = discover(machine, campaign, sensors, hold_out=hold_out, phases=(1, 2), jobs=1)
     except LhpostError as error:
         (home / "error.txt").write_text(str(error), encoding="utf-8")
         return

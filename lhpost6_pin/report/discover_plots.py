@@ -91,7 +91,7 @@ def _short(value: float) -> str:
     return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
 
 
-def gain_figure(one: Round, number: int, least: float) -> Figure:
+def gain_figure(one: Round, number: int, least: float, mimicked: float) -> Figure:
     """Return the best candidate of each family in one round: what it gains, and what is refused."""
     best = list(one.best.values())
     shown = [s for s in best if s.gain > 1.0][:SHOWN] or best[:3]
@@ -117,7 +117,8 @@ def gain_figure(one: Round, number: int, least: float) -> Figure:
     layout = _bars(names, "Gain of log-likelihood", 26 * max(len(names), 3), 250, least)
     words = (
         "The best candidate of each family, everything known refitted beside it. "
-        f"The dashed line is the least gain, {least:g}."
+        f"The dashed line is the least gain, {least:g}; families that another form of the report's laws may pass for "
+        f"need {mimicked:g}."
     )
     return Figure(f"gains-{number}", f"Round {number}: what could explain it", words, traces, layout, layout["height"])
 

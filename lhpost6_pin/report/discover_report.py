@@ -149,10 +149,10 @@ def _proof_blocks(found: Discovery) -> list[Markup]:
 
 
 def _considered(found: Discovery) -> list[Markup]:
-    least = found.numbers.number("accept.gain")
+    gates = [found.numbers.number(f"accept.{gate}") for gate in ("gain", "mimicked")]
     blocks: list[Markup] = []
     for k, one in enumerate(found.search.rounds, start=1):
-        blocks.append(figure(gain_figure(one, k, least)))
+        blocks.append(figure(gain_figure(one, k, *gates)))
         rows = [
             (
                 s.candidate.family.name,

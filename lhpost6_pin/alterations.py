@@ -37,6 +37,7 @@ from .law_table import (
     VOIDS,
     WEIGHT,
 )
+from .laws.chamber import side_shares
 
 if TYPE_CHECKING:
     from .effects import Effect
@@ -84,9 +85,10 @@ def alter_rows(rows: NDArray[np.void], effects: Sequence["Effect"], at: Mapping[
             if effect.law == "extra_leakage":
                 p[LEAKAGE] += amplitude
             elif effect.law == "dead_volume":
-                p[CHAMBER_A] += amplitude * min(1.0, 1.0 + numbers[1]) / p[AREA_A]
+                share_a, share_b = side_shares(numbers[1])
+                p[CHAMBER_A] += amplitude * share_a / p[AREA_A]
                 if p[AREA_B] > 0.0:
-                    p[CHAMBER_B] += amplitude * min(1.0, 1.0 - numbers[1]) / p[AREA_B]
+                    p[CHAMBER_B] += amplitude * share_b / p[AREA_B]
             else:
                 place = _PLACE[effect.law]
                 p[place] += amplitude

@@ -32,7 +32,7 @@ from .law_table import (
     VOIDS,
 )
 from .laws.bulk import air_modulus, enthalpy_of, void_share
-from .laws.chamber import flow_enthalpy, piston_force, pressure_rises
+from .laws.chamber import flow_enthalpy, piston_force, pressure_rises, side_shares
 from .laws.leaks import null_leak, turbulent_leak
 from .laws.lines import line_step
 from .laws.orifice import opening, port_flow
@@ -121,8 +121,9 @@ def leak_flows(p, double, pressure_a, pressure_b, low):
     if p[TURBULENT] != 0.0:
         more, steeper = turbulent_leak(pressure_a - pressure_b, p[TURBULENT], p[11])
         across, slope = across + more, slope + steeper
-    slope_a = p[EXTERNAL] * min(1.0, 1.0 + p[EXTERNAL_SIDE])
-    slope_b = p[EXTERNAL] * min(1.0, 1.0 - p[EXTERNAL_SIDE]) if double else 0.0
+    share_a, share_b = side_shares(p[EXTERNAL_SIDE])
+    slope_a = p[EXTERNAL] * share_a
+    slope_b = p[EXTERNAL] * share_b if double else 0.0
     return across, slope, slope_a * (pressure_a - low), slope_b * (pressure_b - low), slope_a, slope_b
 
 
@@ -210,6 +211,13 @@ def oil_power(row, s, z, spool, high, low):
 
 
 @compiled
+def _feed(p):
+    """Circular frequency [rad/s] of the line before the valve, and its impedance there [Pa s/m3]."""
+    turn = 2.0 * math.pi * p[FEED_FREQUENCY]
+    return turn, turn * p[FEED_INERTANCE]
+
+
+@compiled
 def advance_line(rows, i, spool, pressure_a, pressure_b, high, low, dt, z):
     """Advance the lines of row i, if it has any, by dt [s] at these pressures: before the valve, then behind it.
 
@@ -221,8 +229,7 @@ def advance_line(rows, i, spool, pressure_a, pressure_b, high, low, dt, z):
     if row.feed >= 0:
         k = row.feed
         taken, _, _, _ = exchanged(p, double, spool, pressure_a, pressure_b, high + z[k], low)
-        turn = 2.0 * math.pi * p[FEED_FREQUENCY]
-        impedance = turn * p[FEED_INERTANCE]
+        turn, impedance = _feed(p)
         z[k], more = line_step(z[k], impedance * (z[k + 1] - taken), 0.0, dt, 1.0 / turn, p[FEED_DAMPING])
         z[k + 1] = taken + more / impedance
     if p[LINE_TIME] <= 0.0:
@@ -238,14 +245,14 @@ def start_line(rows, i, spool, pressure_a, pressure_b, high, low, z):
     """Put the lines of row i, if it has any, at rest in what flows through them."""
     row = rows[i]
     p = row.p
+    double = row.law == HYDRAULIC_DOUBLE
     if row.feed >= 0:
-        double = row.law == HYDRAULIC_DOUBLE
         z[row.feed] = 0.0
         z[row.feed + 1], _, _, _ = exchanged(p, double, spool, pressure_a, pressure_b, high, low)
     if p[LINE_TIME] <= 0.0:
         return
     k = row.more
-    z[k], z[k + 2], _, _ = valve_flows(p, row.law == HYDRAULIC_DOUBLE, spool, pressure_a, pressure_b, high, low)
+    z[k], z[k + 2], _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
     z[k + 1] = z[k + 3] = 0.0
 
 
@@ -322,8 +329,7 @@ def oil_rates(rows, s, sd, spool, high, low, z, zd):
         if row.feed >= 0:
             k = row.feed
             taken, _, _, _ = exchanged(p, double, x, pressure_a, pressure_b, high + z[k], low)
-            turn = 2.0 * math.pi * p[FEED_FREQUENCY]
-            impedance = turn * p[FEED_INERTANCE]
+            turn, impedance = _feed(p)
             zd[k] = turn * impedance * (z[k + 1] - taken)
             zd[k + 1] = -z[k] / p[FEED_INERTANCE] - 2.0 * p[FEED_DAMPING] * turn * (z[k + 1] - taken)
         if p[LINE_TIME] > 0.0:

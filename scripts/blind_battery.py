@@ -6,7 +6,7 @@
 Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
 searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests,
 --brief shorter ones of four. --check exits with 1 where a campaign that lacks nothing got a name, or too few a right
-one: a smoke test, as continuous integration runs it.
+one: a smoke test.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the same cases. --dask runs the cases
 on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes. --publish writes the scores
 to scripts/battery/results.md, too.
@@ -73,11 +73,15 @@ def search(name: str, folder: Path, with_baselines: bool) -> None:
     save_verdict(found, home / "verdict.json")
 
 
-def report(folder: Path, labels: dict[str, dict]) -> str:
+def answers(folder: Path, labels: dict[str, dict]) -> dict[str, tuple[dict, dict]]:
+    """Label and verdict of all cases that have one."""
+    files = {name: folder / name / "verdict.json" for name in labels}
+    return {n: (labels[n], json.loads(f.read_text(encoding="utf-8"))) for n, f in files.items() if f.exists()}
+
+
+def report(folder: Path, labels: dict[str, dict], answered: dict[str, tuple[dict, dict]]) -> str:
     """Scores of all cases with a verdict, as Markdown; then every case, the wrong ones marked."""
-    names = [n for n in labels if (folder / n / "verdict.json").exists()]
-    answers = [json.loads((folder / n / "verdict.json").read_text(encoding="utf-8")) for n in names]
-    pairs = [(labels[n], answer) for n, answer in zip(names, answers, strict=True)]
+    names, pairs = list(answered), list(answered.values())
     lines = [f"{len(pairs)} of {len(labels)} cases searched", "", "| metric | value |", "|---|---|"]
     for metric, value in score(pairs).items():
         lines.append(f"| {metric} | {value.text if isinstance(value, Share) else f'{value:.2f}'} |")
@@ -118,16 +122,14 @@ def case_row(name: str, label: dict, answer: dict) -> str:
     return f"| {' | '.join((name if right else f'{name} (wrong)', *cells))} |"
 
 
-def wrong(folder: Path, labels: dict[str, dict]) -> str:
+def wrong(labels: dict[str, dict], answered: dict[str, tuple[dict, dict]]) -> str:
     """What is wrong with a battery that should have been easy; empty if nothing is."""
-    lost = [n for n in labels if not (folder / n / "verdict.json").exists()]
-    if lost:
+    if lost := [name for name in labels if name not in answered]:
         return f"no verdict on {', '.join(lost)}"
-    answers = {n: json.loads((folder / n / "verdict.json").read_text(encoding="utf-8")) for n in labels}
-    found = score([(label, answers[n]) for n, label in labels.items()])
-    first = found["family first"]
-    if found["false name on nulls"].hits:
-        return f"names on campaigns that lack nothing: {found['false name on nulls'].text}"
+    found = score(list(answered.values()))
+    false, first = found["false name on nulls"], found["family first"]
+    if false.hits:
+        return f"names on campaigns that lack nothing: {false.text}"
     return f"too few right names: {first.text}" if first.hits < LEAST * first.of else ""
 
 
@@ -170,14 +172,15 @@ def main() -> None:
         ):
             print(f"searched {done} of {len(cases)}", flush=True)
     labels = unseal(folder)
-    text = report(folder, labels)
+    answered = answers(folder, labels)
+    text = report(folder, labels, answered)
     with write_whole(folder / "scores.md") as beside:
         beside.write_text(text, encoding="utf-8")
     print(text)
     if asked.publish:
         with write_whole(RESULTS) as beside:
             beside.write_text(f"# What the blind battery last said\n\n{described(asked)}\n\n{text}", encoding="utf-8")
-    if asked.check and (why := wrong(folder, labels)):
+    if asked.check and (why := wrong(labels, answered)):
         sys.exit(why)
 
 

@@ -88,6 +88,7 @@ KERNELS = {
         Kernel(orifice.port_flow, (_OPEN, _K, _K, _HIGH, _LOW, _PRESSURE, _ROOT)),
         Kernel(orifice.spool_for_opening, (_OPEN, (0.5, 2.0))),
         Kernel(chamber.chamber_rate, ((-0.5, 0.5), _AREA, (-2, 2), _LENGTH, _BULK)),
+        Kernel(chamber.side_shares, ((-1.0, 1.0),)),
         Kernel(chamber.piston_force, (_PRESSURE, _PRESSURE, _AREA, _AREA)),
         Kernel(chamber.flow_enthalpy, (_PRESSURE, _BULK)),
         Kernel(chamber.chamber_energy, ((1e5, 22e6), _AREA, _LENGTH, _BULK)),

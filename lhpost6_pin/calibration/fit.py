@@ -123,7 +123,7 @@ def solve(
     first: Normal | None = None,
     frugal: bool = False,
     settled: bool = False,
-    near: Mask | None = None,
+    near: Mask | bool = False,
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on.
 
@@ -137,7 +137,7 @@ def solve(
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
     bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
-    again = bent if frugal and not settled else fresh if near is None else fresh | near
+    again = bent if frugal and not settled else fresh | near
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: Bias | None = None
     normal: Normal | None = None

@@ -45,22 +45,22 @@ class Prepared:
 
     def scaled(self, scale: Array) -> "Prepared":
         """The same with whitened residuals (t, b, c) times larger."""
-        return Prepared(self.problem.scaled(scale), tuple(r.scaled(scale) for r in self.replicas), self.noisy)
+        return self._each(lambda problem: problem.scaled(scale))
 
     def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Prepared":
         """The same tests and noise with another machine, or other knobs."""
-        replicas = tuple(r.with_machine(machine, knobs) for r in self.replicas)
-        return Prepared(self.problem.with_machine(machine, knobs), replicas, self.noisy)
+        return self._each(lambda problem: problem.with_machine(machine, knobs))
 
     def with_free(self, name: str, share: float) -> "Prepared":
         """The same with one more unknown free of its prior."""
-        replicas = tuple(r.with_free(name, share) for r in self.replicas)
-        return Prepared(self.problem.with_free(name, share), replicas, self.noisy)
+        return self._each(lambda problem: problem.with_free(name, share))
 
     def without_free(self, name: str) -> "Prepared":
         """The same with an unknown's prior as stated again."""
-        replicas = tuple(r.without_free(name) for r in self.replicas)
-        return Prepared(self.problem.without_free(name), replicas, self.noisy)
+        return self._each(lambda problem: problem.without_free(name))
+
+    def _each(self, change: Callable[[Problem], Problem]) -> "Prepared":
+        return Prepared(change(self.problem), tuple(map(change, self.replicas)), self.noisy)
 
 
 def prepare_problem(

@@ -1,5 +1,7 @@
 """The background of a search: what is refitted in every comparison, at its joint solution."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,10 +22,15 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
     What is at its bound there, as `numbers` of the fit set it, goes no further: beyond it something else is wrong.
     """
     prior = problem.prior
+
+    def rows(slopes: Sequence[NDArray[np.complex128]], root: Array) -> Array:
+        """Real rows (n, p) of derivatives (m, c), in units of the priors."""
+        return np.stack([real_bins(j, root) * sd for j, sd in zip(slopes, prior, strict=True)]).T
+
     slope, rest, root, matrix, side = [], [], [], [], []
     for t, (own, left, power) in enumerate(zip(normal.slope, normal.rest, normal.power, strict=True)):
         w = np.sqrt(power)
-        slope.append(np.stack([real_bins(j, w) * sd for j, sd in zip(own, prior, strict=True)]).T)
+        slope.append(rows(own, w))
         rest.append(real_bins(left, w))
         root.append(w)
         corrected, right = normal.of([t])
@@ -32,10 +39,7 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
     noise = []
     if normal.bias is not None:
         for slopes, rests in zip(normal.bias.slope, normal.bias.rest, strict=True):
-            changes = [
-                np.stack([real_bins(j, w) * sd for j, sd in zip(own, prior, strict=True)]).T
-                for own, w in zip(slopes, root, strict=True)
-            ]
+            changes = [rows(own, w) for own, w in zip(slopes, root, strict=True)]
             noise.append((changes, [real_bins(r, w) for r, w in zip(rests, root, strict=True)]))
     low, high = bounds_of(problem, numbers)
     near = 1e-3 * prior

@@ -26,7 +26,7 @@ from .candidates import with_background, with_other_form, with_warm_oil
 from .left import Left, what_is_left, with_unnamed
 from .next_test import NextTest, next_tests
 from .proof import Proof, prove
-from .search import Search, fitted_machine, refitted_machine, search, stand_before, weighing
+from .search import Search, fitted_machine, search, stand, weighing
 from .sensing import put_right, wrong_sensors
 from .verdict import Verdict, judge
 
@@ -103,7 +103,7 @@ def discover(
         left = what_is_left(standing.base, weighing(found, standing, numbers), numbers)
     instead: tuple[Left, ...] = ()
     if any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added):
-        before = stand_before(found, calibration)
+        before = stand(found.refit, calibration)
         instead = what_is_left(before.base, weighing(found, before, numbers), numbers)
     report(0.8)
     proof = None
@@ -116,7 +116,7 @@ def discover(
         tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
     report(1.0)
     alone = any(verdict.left is one for one in instead)  # in place of the effects, not beside them
-    fitted = refitted_machine(found) if alone else fitted_machine(found)
+    fitted = fitted_machine(found.refit if alone else found.solution)
     return Discovery(
         campaign=campaign.name,
         machine=machine,

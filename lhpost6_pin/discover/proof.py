@@ -17,7 +17,7 @@ from ..campaign import Campaign
 from ..machine import Machine
 from ..sensors import Sensors
 from ..validation import PHASES, Phase, Validation, validate
-from .search import Search, fitted_machine, refitted_machine
+from .search import Search, fitted_machine
 
 __all__ = ["FLOOR", "Gap", "Proof", "prove"]
 
@@ -71,8 +71,7 @@ def prove(
     """Validate the three models on held-out records; `machine` is the one delivered."""
     first = found.refit.normal.problem
     knobs = len(first.knobs)
-    before = refitted_machine(found)
-    after = fitted_machine(found)
+    before, after = fitted_machine(found.refit), fitted_machine(found.solution)
     errors = found.refit.x[knobs:], found.solution.x[len(found.problem.knobs) :]
     models = (
         (machine, list(records)),

@@ -31,19 +31,7 @@ from .releases import block_of, list_releases
 from .screen import Background, Block, Score, less_noise, make_block, score
 from .weighing import Lowered, Weighing, gate, refusal, squares_by_column
 
-__all__ = [
-    "Added",
-    "Contest",
-    "Round",
-    "Scored",
-    "Search",
-    "Standing",
-    "fitted_machine",
-    "search",
-    "stand",
-    "stand_before",
-]
-__all__ += ["refitted_machine", "weighing"]
+__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand", "weighing"]
 
 Array = NDArray[np.float64]
 
@@ -151,7 +139,7 @@ def search(
     most = int(numbers.number("accept.effects"))
     for k in range(most + 1):
         low, high = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
-        standing = stand(found, calibration)
+        standing = stand(found.solution, calibration, found.ready.replicas)
         one = screen(found, standing, numbers, between(progress, low, 0.5 * (low + high)))
         found.rounds.append(one)
         passed = [s for s in one.scored if not s.refused]
@@ -163,7 +151,7 @@ def search(
         found = more
     if len(found.added) > 1:
         fewer = _pruned(found, calibration, numbers)
-        found, standing = fewer, standing if fewer is found else stand(fewer, calibration)
+        found, standing = fewer, standing if fewer is found else stand(fewer.solution, calibration)
     progress(1.0)
     return found, standing
 
@@ -209,18 +197,11 @@ def _weighed_anew(found: Search, calibration: Parameters, progress: Progress) ->
     return Search(ready, solution, solution)
 
 
-def stand(found: Search, calibration: Parameters) -> Standing:
-    """Normal equations of the background about the solution."""
-    problem, solution = found.problem, found.solution
-    background = make_background(problem, solution.normal, solution.at, calibration)
-    replicas = tuple((one, Base(one, solution.at)) for one in found.ready.replicas)
-    return Standing(Base(problem, solution.at), background, replicas)
-
-
-def stand_before(found: Search, calibration: Parameters) -> Standing:
-    """The same about the refit, where no effect had been added."""
-    problem, refit = found.refit.normal.problem, found.refit
-    return Standing(Base(problem, refit.at), make_background(problem, refit.normal, refit.at, calibration), ())
+def stand(solution: Solution, calibration: Parameters, replicas: Sequence[Problem] = ()) -> Standing:
+    """Normal equations of the background about a solution, with replicas of its problem where candidates are asked."""
+    problem, at = solution.normal.problem, solution.at
+    background = make_background(problem, solution.normal, at, calibration)
+    return Standing(Base(problem, at), background, tuple((one, Base(one, at)) for one in replicas))
 
 
 def weighing(found: Search, standing: Standing, numbers: Parameters) -> Weighing:
@@ -368,7 +349,9 @@ def _best_of(
     # the simplest of them: what the model knows already, then what has the fewest numbers
     best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
-    contest = tuple(Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i])) for i in order)
+    contest = tuple(
+        Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i].solution)) for i in order
+    )
     refined = _refined(fitted[best], calibration, between(progress, 0.7, 1.0))
     first, last = (squares_by_column(one.rest) for one in (found, refined))
     place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
@@ -428,13 +411,7 @@ def _objective(found: Search) -> float:
     return objective(found.problem, found.rest, found.solution.x)
 
 
-def refitted_machine(found: Search) -> Machine:
-    """The machine without any effect, all numbers as the refit found them."""
-    problem = found.refit.normal.problem
-    return with_knobs(problem.machine, problem.knobs, found.refit.x[: len(problem.knobs)])
-
-
-def fitted_machine(found: Search) -> Machine:
-    """The machine with its effects, all numbers as fitted."""
-    problem = found.problem
-    return with_knobs(problem.machine, problem.knobs, found.solution.x[: len(problem.knobs)])
+def fitted_machine(solution: Solution) -> Machine:
+    """The machine of a solution, all numbers as fitted: with its effects, or as refitted without any."""
+    problem = solution.normal.problem
+    return with_knobs(problem.machine, problem.knobs, solution.x[: len(problem.knobs)])

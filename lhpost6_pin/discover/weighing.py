@@ -37,8 +37,7 @@ class Weighing:
     def __init__(self, problem: Problem, background: Background, first: Array, numbers: Parameters) -> None:
         """`first` (c,) are the squares before any effect was added."""
         self.problem, self.background, self.first = problem, background, first
-        self.doubt, self.least = numbers.number("accept.doubt"), 0.5 * numbers.number("accept.gain")
-        self.much = numbers.number("accept.gain")
+        self.doubt, self.much = numbers.number("accept.doubt"), numbers.number("accept.gain")
         self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
 
     def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float]:
@@ -57,7 +56,8 @@ class Weighing:
         (before, prior), (after, then) = self.before, self._left(one.change, explained)
         fall, squares, beyond = before - after
         most = int(np.argmax(beyond))
-        of_first = float(np.max(squares[fall > self.least] / self.first[fall > self.least], initial=0.0))
+        falls = fall > 0.5 * self.much
+        of_first = float(np.max(squares[falls] / self.first[falls], initial=0.0))
         share = float(beyond[most] / before[2, most]) if before[2, most] > self.much else 1.0
         return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
 

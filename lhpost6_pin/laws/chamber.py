@@ -25,6 +25,7 @@ __all__ = [
     "flows_single",
     "piston_force",
     "pressure_rises",
+    "side_shares",
 ]
 
 
@@ -94,6 +95,12 @@ def flows_single(
     """
     flow, slope = port_flow(opened, k_pa, k_at, supply, back, pressure_a, linear_below)
     return flow - leakage * pressure_a, slope
+
+
+@compiled
+def side_shares(side: float) -> tuple[float, float]:
+    """Shares of chambers A and B in what has a side: 0 is both in full, 1 is A alone, -1 is B alone."""
+    return min(1.0, 1.0 + side), min(1.0, 1.0 - side)
 
 
 @compiled_inline

@@ -10,6 +10,7 @@ Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); the curve's 
 import math
 
 from ..compiled import compiled
+from .chamber import side_shares
 
 __all__ = ["corrected_opening", "dead_zone"]
 
@@ -23,5 +24,5 @@ def dead_zone(x: float, overlap: float) -> float:
 @compiled
 def corrected_opening(opened: float, error: float, side: float, power: float) -> float:
     """Signed opening with the flow curve's error; side 1: supply to A only, -1: A to return only, 0: both."""
-    share = min(1.0, 1.0 + side) if opened >= 0.0 else min(1.0, 1.0 - side)
-    return opened * (1.0 + error * share * abs(opened) ** power)
+    to_a, to_b = side_shares(side)
+    return opened * (1.0 + error * (to_a if opened >= 0.0 else to_b) * abs(opened) ** power)

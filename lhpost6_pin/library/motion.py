@@ -20,19 +20,19 @@ def _spring(machine: "Machine", components: Sequence[str], values: Values) -> An
 
 
 def _mounted_spring(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    ports, levers = _at((0.0, 0.0, values["height"]), components)
-    return "spring", [port.rpartition(" ")[0] for port in ports], [(values["stiffness"], tilt) for tilt, _ in levers]
+    tilts = [_turns(axis, (0.0, 0.0, values["height"]))[0] for axis in components]
+    ports = [f"{axis} {turn}" for axis, (turn, _) in zip(components, tilts, strict=True)]
+    return "spring", ports, [(values["stiffness"], lever) for _, lever in tilts]
 
 
-def _at(place: Place, axes: Sequence[str]) -> tuple[list[str], list[tuple[float, float]]]:
-    """Ports of what moves along axes of the platen at a place from C (x, y, z), and levers of two turns each."""
+def _turns(axis: str, place: Place) -> tuple[tuple[str, float], tuple[str, float]]:
+    """The two turns of the platen that move a place (x, y, z from C) along an axis, with their levers."""
     x, y, z = place
-    turns = {
-        "platen.x": ("platen.pitch platen.yaw", (z, -y)),
-        "platen.y": ("platen.roll platen.yaw", (-z, x)),
-        "platen.z": ("platen.roll platen.pitch", (y, -x)),
-    }
-    return [f"{axis} {turns[axis][0]}" for axis in axes], [turns[axis][1] for axis in axes]
+    return {
+        "platen.x": (("platen.pitch", z), ("platen.yaw", -y)),
+        "platen.y": (("platen.roll", -z), ("platen.yaw", x)),
+        "platen.z": (("platen.roll", y), ("platen.pitch", -x)),
+    }[axis]
 
 
 def _end_stop(machine: "Machine", components: Sequence[str], values: Values) -> Any:
@@ -81,30 +81,26 @@ def _heat(machine: "Machine", components: Sequence[str], values: Values) -> Any:
     return "gas_heat", components, _gas(machine, components, values["share"], values["time_constant"])
 
 
-def _oscillator(axes: Sequence[str], values: Values) -> tuple[list[str], list[tuple[float, ...]]]:
-    """Ports and numbers of a mass that moves along axes of the platen, somewhere on it."""
-    mass, tuned = values["mass"], (2.0 * math.pi * values["frequency"], values["damping"])
-    ports, levers = _at((values["x"], values["y"], values["height"]), axes)
-    return ports, [(mass, *tuned, 0.0, *both) for both in levers]
+def _sprung(axis: str, values: Values, mass: float, frequency: float, gravity: float) -> tuple[str, tuple[float, ...]]:
+    """Port and numbers of a mass that moves along one axis of the platen, somewhere on it."""
+    (one, lever), (other, more) = _turns(axis, (values["x"], values["y"], values["height"]))
+    return f"{axis} {one} {other}", (mass, 2.0 * math.pi * frequency, values["damping"], gravity, lever, more)
+
+
+def _swaying(axes: Sequence[str], values: Values, upright_mass: float, gravity: float) -> Any:
+    """A mass that sways along level axes, and upright where it is stiffer; with weight where there is gravity."""
+    frequency = values["frequency"]
+    rows = [_sprung(axis, values, values["mass"], frequency, 0.0) for axis in axes]
+    rows.append(_sprung("platen.z", values, upright_mass, values["upright"] * frequency, gravity))
+    return "oscillator", [port for port, _ in rows], [numbers for _, numbers in rows]
 
 
 def _flexibility(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    ports, rows = _oscillator(components, values)
-    more, (upright,) = _upright(values, values["upright_share"] * values["mass"], 0.0)
-    return "oscillator", ports + more, [*rows, upright]
+    return _swaying(components, values, values["upright_share"] * values["mass"], 0.0)
 
 
 def _resonance(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    ports, rows = _oscillator(components, values)
-    more, (upright,) = _upright(values, values["mass"], machine.platen.gravity)
-    return "oscillator", ports + more, [*rows, upright]
-
-
-def _upright(values: Values, mass: float, gravity: float) -> tuple[list[str], list[tuple[float, ...]]]:
-    """The same upright, where it is stiffer; with weight where there is gravity."""
-    stiff = {**values, "mass": mass, "frequency": values["upright"] * values["frequency"]}
-    ports, ((mass, frequency, damping, _, *levers),) = _oscillator(["platen.z"], stiff)
-    return ports, [(mass, frequency, damping, gravity, *levers)]
+    return _swaying(components, values, values["mass"], machine.platen.gravity)
 
 
 def _mass(machine: "Machine", components: Sequence[str], values: Values) -> Any:

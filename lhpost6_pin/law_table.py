@@ -30,6 +30,7 @@ __all__ = [
     "CURVE_ERROR",
     "CURVE_POWER",
     "CURVE_SIDE",
+    "DAHL_INSTEAD",
     "DEADBAND",
     "DRAG",
     "DRAWN",
@@ -101,7 +102,7 @@ PORTS = ("port", "port_2", "port_3")
 # Codes of the laws that have rows, as the compiled stage reads them.
 HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, BOUC_WEN_1D, BOUC_WEN_2D, VISCOUS, CONSTANT = range(7)
 STRIBECK, ASYMMETRIC, WARM_UP, LOAD_FRICTION, BACKLASH, DRAG, SPRING, END_STOP = range(7, 15)
-OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL, BY_MEMORY = range(15, 23)
+OSCILLATOR, GAS_LEAK, GAS_HEAT, BALL, BY_POSITION, BY_SPEED, SMOOTH_BALL, BY_MEMORY, DAHL_INSTEAD = range(15, 24)
 
 # Places of numbers in the rows of actuators: some of the report's, then those of alterations.
 AREA_A, AREA_B, LEAKAGE, CHAMBER_A, CHAMBER_B = 0, 1, 7, 8, 9
@@ -159,6 +160,7 @@ LAWS: Mapping[str, Law] = {
     "constant": Law(CONSTANT, 1, (("force", "N | N m"),)),
     "stribeck": Law(STRIBECK, 1, (*_FRICTION, ("speed", "m/s")), ("z",)),
     "asymmetric": Law(ASYMMETRIC, 1, _FRICTION, ("z",)),
+    "dahl_instead": Law(DAHL_INSTEAD, 2, (*_FRICTION, ("dahl_yield", "m")), ("z_x", "z_y", "d_x", "d_y")),
     "ball": Law(BALL, 3, (("moment", "N m"), ("yield_turn", "rad"), ("shape", "1")), ("z_1", "z_2", "z_3")),
     "smooth_ball": Law(SMOOTH_BALL, 3, (("moment", "N m"), ("slow", "rad/s"))),
     "warm_up": Law(

@@ -9,6 +9,7 @@ from .law_table import (
     BY_POSITION,
     BY_SPEED,
     CONSTANT,
+    DAHL_INSTEAD,
     DRAG,
     END_STOP,
     GAS_HEAT,
@@ -28,6 +29,7 @@ from .laws.bouc_wen import advance as bouc_wen_advance
 from .laws.bouc_wen import advance_1d as bouc_wen_advance_1d
 from .laws.bouc_wen import friction_force
 from .laws.bouc_wen import rate as bouc_wen_rate
+from .laws.dahl import advance_dahl, dahl_rate
 from .laws.friction import (
     advance_mean_speed,
     asymmetric_force,
@@ -97,6 +99,8 @@ def _force(row, s, sd, z):
         if p[4] > 0.0:
             load -= z[row.link + 1] * p[4]
         return load_force(p[0], load, z[k]), load_force(p[0], load, z[k + 1]), 0.0
+    if law == DAHL_INSTEAD:
+        return friction_force(p[0], z[k + 2] - z[k]), friction_force(p[0], z[k + 3] - z[k + 1]), 0.0
     if law == BALL:
         return friction_force(p[0], z[k]), friction_force(p[0], z[k + 1]), friction_force(p[0], z[k + 2])
     if law == SMOOTH_BALL:
@@ -146,9 +150,11 @@ def _rates(row, s, sd, z, zd):
         zd[k], _ = bouc_wen_rate(sd[a], 0.0, z[k], 0.0, p[1], p[2])
         if law == WARM_UP:
             zd[k + 1] = mean_speed_rate(z[k + 1], sd[a], p[3])
-    elif law == LOAD_FRICTION:
+    elif law == LOAD_FRICTION or law == DAHL_INSTEAD:
         across = sd[row.port_2] if row.port_2 >= 0 else 0.0
         zd[k], zd[k + 1] = bouc_wen_rate(sd[a], across, z[k], z[k + 1], p[1], p[2])
+        if law == DAHL_INSTEAD:
+            zd[k + 2], zd[k + 3] = dahl_rate(sd[a], across, z[k + 2], z[k + 3], p[3])
     elif law == BALL:
         spin = sd[row.port_3] if row.port_3 >= 0 else 0.0
         zd[k], zd[k + 1], zd[k + 2] = ball_rate(sd[a], sd[row.port_2], spin, z[k], z[k + 1], z[k + 2], p[1], p[2])
@@ -184,9 +190,11 @@ def _advance(row, s, ds, dt, z):
         z[k] = bouc_wen_advance_1d(ds[a], z[k], p[1], p[2])
         if law == WARM_UP:
             z[k + 1] = advance_mean_speed(z[k + 1], ds[a], dt, p[3])
-    elif law == LOAD_FRICTION:
+    elif law == LOAD_FRICTION or law == DAHL_INSTEAD:
         across = ds[row.port_2] if row.port_2 >= 0 else 0.0
         z[k], z[k + 1] = bouc_wen_advance(ds[a], across, z[k], z[k + 1], p[1], p[2])
+        if law == DAHL_INSTEAD:
+            z[k + 2], z[k + 3] = advance_dahl(ds[a], across, z[k + 2], z[k + 3], p[3])
     elif law == BALL:
         spin = ds[row.port_3] if row.port_3 >= 0 else 0.0
         z[k], z[k + 1], z[k + 2] = advance_ball(ds[a], ds[row.port_2], spin, z[k], z[k + 1], z[k + 2], p[1], p[2])

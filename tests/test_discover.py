@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import joblib
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -22,11 +23,23 @@ from lhpost6_pin.discover.columns import columns_of
 from lhpost6_pin.discover.discover import discovery_numbers
 from lhpost6_pin.discover.left import Left, _hats
 from lhpost6_pin.discover.next_test import _trial
+from lhpost6_pin.discover.pairs import score_pairs
 from lhpost6_pin.discover.releases import block_of, list_releases
+from lhpost6_pin.discover.resume import make_bookmark
 from lhpost6_pin.discover.screen import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discover.search import Added, Contest, Scored, _by_rank, _fit_jointly, _objective, _pruned, _without
+from lhpost6_pin.discover.search import (
+    Added,
+    Contest,
+    Scored,
+    _by_rank,
+    _fit_jointly,
+    _objective,
+    _pruned,
+    _without,
+    stand,
+)
 from lhpost6_pin.discover.verdict import without_name
-from lhpost6_pin.discover.weighing import Lowered, refusal
+from lhpost6_pin.discover.weighing import Lowered, Weighing, refusal, squares_by_column
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.files import models_folder
 from lhpost6_pin.library import families, find_family
@@ -245,16 +258,40 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     weak = Lowered(30.0, 30.0, 0.5, 0.5)
     spring, rubs = find_family("stray_spring"), find_family("stribeck_friction")
     assert (spring.mimicked, rubs.mimicked) == (False, True)
-    assert [refusal(spring, one, less, numbers) for less in (clear, doubtful, weak)] == ["", "", ""]
-    assert [refusal(rubs, one, less, numbers) for less in (clear, doubtful, weak)] == [
+    assert [refusal([spring], one, less, numbers) for less in (clear, doubtful, weak)] == ["", "", ""]
+    assert [refusal([rubs], one, less, numbers) for less in (clear, doubtful, weak)] == [
         "",
         "explains what may be noise",
         "does not lower what is left",
     ]
     by_chance = replace(one, held_out=np.array([30.0, 20.0, -7.0]))
     against = replace(one, held_out=np.array([40.0, 20.0, -17.0]))
-    assert refusal(spring, by_chance, clear, numbers) == ""
-    assert refusal(spring, against, clear, numbers) == "makes tests worse that it was not fitted on"
+    assert refusal([spring], by_chance, clear, numbers) == ""
+    assert refusal([spring], against, clear, numbers) == "makes tests worse that it was not fitted on"
+
+
+def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
+    """Columns of two effects laid into what is left: with a third one, only these two go together."""
+    search, (numbers, calibration) = found.search, discovery_numbers()
+    standing = stand(search.solution, calibration)
+    problem, base, background = search.problem, standing.base, standing.background
+    hidden = [candidate("stray_spring", "platen.x"), candidate("asymmetric_friction", "V1")]
+    size = [np.array([2e6]), np.array([2e4])]
+    laid = [np.zeros(len(rest)) for rest in background.rest]
+    for one, amplitude in zip(hidden, size, strict=True):
+        columns, (part,) = columns_of(problem, base, [one])
+        for t, (c, root) in enumerate(zip(columns, background.root, strict=True)):
+            laid[t] -= real_bins(c, root) @ part @ amplitude
+    rest = [r + more for r, more in zip(background.rest, laid, strict=True)]
+    side = background.side + np.array([s.T @ more for s, more in zip(background.slope, laid, strict=True)])
+    more = replace(background, rest=rest, side=side)
+    weigh = Weighing(problem, more, squares_by_column(search.refit.normal.rest), numbers)
+    candidates = [candidate("valve_deadband", "H1"), *hidden]
+    pairs = score_pairs(problem, base, (), weigh, candidates, numbers)
+    assert [p.places for p in pairs if not p.refused] == [(1, 2)]
+    assert pairs[0].places == (1, 2)
+    np.testing.assert_allclose(np.concatenate(pairs[0].amplitudes), [2e6, 2e4], rtol=0.1)  # noise and the refit
+    assert "one of them explains as much" in {p.refused for p in pairs[1:]}
 
 
 def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
@@ -369,7 +406,9 @@ def test_a_free_function_takes_the_place_of_names_it_beats_and_is_the_form_of_th
     assert told([free(100.0, "H1")], []) == (100.0, {names["stray_spring"]})  # much, where the name acts
     assert told([free(70.0, "H2", beyond=10.0)], []) == (0.0, set())  # may be noise
     spring = added("stray_spring", ("H1",), 4000.0)
-    assert told([free(100.0, "H1")], []) == (0.0, set())  # the form of what was found there
+    assert told([free(200.0, "H1")], []) == (0.0, set())  # the form of what was found there
+    assert told([free(100.0, "H2")], []) == (0.0, set())  # and what that leaves elsewhere
+    assert told([free(200.0, "H2")], []) == (200.0, set())
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
@@ -427,6 +466,38 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
     column = clean["chamber_pressure_b"].values[:, 1]
     np.testing.assert_allclose(1.01 * (column + 2e4), record["chamber_pressure_b"].values[:, 1], rtol=1e-12)
     np.testing.assert_array_equal(clean["chamber_pressure_a"], record["chamber_pressure_a"])
+
+
+def test_an_interrupted_search_goes_on_to_the_same_verdict(machine, sensors, rubbing, found, tmp_path):
+    """Interrupted while it looks for a second effect; a search of anything else does not go on from there."""
+
+    def interrupt(share: float) -> None:
+        if share > 0.48:
+            raise KeyboardInterrupt
+
+    asked = {"hold_out": ["TZ"], "phases": (1,), "unfinished": tmp_path}
+    with pytest.raises(KeyboardInterrupt):
+        discover(machine, rubbing, sensors, **asked, jobs=1, progress=interrupt)
+    (kept,) = tmp_path.iterdir()
+    assert [a.candidate.family.name for a in joblib.load(kept).search.added] == ["stribeck_friction"]
+    shares: list[float] = []
+    again = discover(machine, rubbing, sensors, **asked, progress=shares.append)
+    assert verdict_entries(again) == verdict_entries(found)
+    assert min(shares) >= 0.4  # neither prepared nor refitted again
+    assert not any(tmp_path.iterdir())
+    hashes = {"TX": "a"}
+    names = {
+        make_bookmark(tmp_path, *inputs).path
+        for inputs in (
+            (machine, sensors, hashes, None, 0),
+            (machine.with_params({"hydraulics.bulk_modulus": 1e9}), sensors, hashes, None, 0),
+            (machine, replace(sensors, bits=12), hashes, None, 0),
+            (machine, sensors, {"TX": "b"}, None, 0),
+            (machine, sensors, hashes, ["TX"], 0),
+            (machine, sensors, hashes, None, 1),
+        )
+    }
+    assert len(names) == 6
 
 
 def test_tests_that_are_not_there_cannot_be_held_out(machine, sensors, rubbing):

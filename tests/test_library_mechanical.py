@@ -23,7 +23,7 @@ from lhpost6_pin.errors import ParameterError
 from lhpost6_pin.inverse_dynamics import inverse_dynamics
 from lhpost6_pin.law_table import LAWS, NODES
 from lhpost6_pin.law_table import PORTS as ROW_PORTS
-from lhpost6_pin.laws import backlash, ball, bouc_wen, friction, gas, oscillator, spring, strut, table
+from lhpost6_pin.laws import backlash, ball, bouc_wen, dahl, friction, gas, oscillator, spring, strut, table
 from lhpost6_pin.ledger import force_ledger
 from lhpost6_pin.library import families, find_family
 from lhpost6_pin.machine import Machine, load_machine
@@ -47,6 +47,7 @@ CASES = {
     for case in (
         _case("stribeck", "leg", (9e3, 2e-4, 0.1, 0.02), (0.3,)),
         _case("asymmetric", "leg", (9e3, 2e-4, 0.1), (0.3,)),
+        _case("dahl_instead", "pad", (9e3, 2e-4, 0.1, 3e-4), (0.3, -0.4, 0.1, 0.5)),
         _case("ball", "pad.x pad.y leg", (9e3, 2e-4, 0.1), (0.3, -0.4, 0.2)),
         _case("smooth_ball", "pad.x pad.y leg", (9e3, 0.01)),
         _case("warm_up", "leg", (9e3, 2e-4, 0.1, 0.3), (0.3, 0.01)),
@@ -74,6 +75,8 @@ KERNELS = {
         Kernel(friction.warm_up_force, ((0, 2e4), (0, 1), _Z)),
         Kernel(friction.mean_speed_rate, ((0, 1), (-1, 1), (0.1, 10))),
         Kernel(friction.advance_mean_speed, ((0, 1), _SLIP, _DT, (0.1, 10))),
+        Kernel(dahl.dahl_rate, ((-1, 1),) * 2 + ((-0.7, 0.7),) * 2 + ((1e-4, 1e-3),)),
+        Kernel(dahl.advance_dahl, (_SLIP,) * 2 + ((-0.7, 0.7),) * 2 + ((1e-4, 1e-3),)),
         Kernel(ball.ball_rate, ((-1, 1),) * 3 + ((-0.5, 0.5),) * 3 + ((1e-4, 1e-3), (0, 0.5))),
         Kernel(ball.advance_ball, (_SLIP,) * 3 + ((-0.5, 0.5),) * 3 + ((1e-4, 1e-3), (0, 0.5))),
         Kernel(ball.smooth_share, ((-1, 1),) * 3 + ((1e-3, 0.1),)),
@@ -123,7 +126,7 @@ def march(case: Case, duration: float, steps: int) -> np.ndarray:
 def test_every_law_of_these_families_has_a_case_and_every_kernel_its_arguments() -> None:
     added = {name for name, law in LAWS.items() if law.code > LAWS["constant"].code}
     assert set(CASES) == added - {"load_friction"}
-    public = {n for module in (friction, ball, backlash, spring, oscillator, gas) for n in module.__all__}
+    public = {n for module in (friction, dahl, ball, backlash, spring, oscillator, gas) for n in module.__all__}
     assert set(KERNELS) == public
 
 
@@ -224,6 +227,26 @@ def test_a_ball_turned_about_one_axis_is_as_an_ode_solver_says(turn: list[float]
     found = ball.advance_ball(*turn, *z, 2e-4, 0.1)
     np.testing.assert_allclose(found, exact, atol=1e-7)  # the solver's, where H has its kink
     assert np.linalg.norm(found) <= 1.0 + 1e-12
+
+
+@given(*(st.floats(-1e-3, 1e-3),) * 2, *(st.floats(-0.7, 0.7),) * 2)
+def test_dahl_s_state_is_as_an_ode_solver_says(dx: float, dy: float, d_x: float, d_y: float) -> None:
+    """And stays in the unit disc."""
+    exact = solve_ivp(
+        lambda _, d: dahl.dahl_rate(dx, dy, *d, 2e-4), (0, 1), (d_x, d_y), method="DOP853", rtol=1e-11, atol=1e-13
+    ).y[:, -1]
+    found = dahl.advance_dahl(dx, dy, d_x, d_y, 2e-4)
+    np.testing.assert_allclose(found, exact, atol=1e-9)  # the solver's
+    assert np.linalg.norm(found) <= 1.0 + 1e-12
+
+
+def test_friction_of_another_form_in_full_is_dahl_s_alone() -> None:
+    """The report's and what takes its place add up to -F d."""
+    instead, z = CASES["dahl_instead"], march(CASES["dahl_instead"], 0.3, 600)[-1]
+    rubs = _case("bouc_wen_2d", "pad", instead.effect.params[0][:3], tuple(z[:2]))
+    s, sd = Motion().s(0.3), Motion().sd(0.3)
+    both = port_forces(instead, s, sd, z) + port_forces(rubs, s, sd, z[:2])
+    np.testing.assert_allclose(both[1:], -9e3 * z[2:], rtol=1e-12)
 
 
 def test_a_ball_about_one_axis_is_a_seal_and_slides_as_coulomb_says() -> None:

@@ -29,7 +29,10 @@ def discover(
     seed: Annotated[int, typer.Option(help="Of the simulated sensor noise.")] = 0,
     jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
 ) -> None:
-    """Find the effect that the model lacks, name it, add it, prove it; leaves verdict.json, model.toml, report.html."""
+    """Find the effect that the model lacks, name it, add it, prove it; leaves verdict.json, model.toml, report.html.
+
+    Interrupted, the same command goes on where the search stood.
+    """
     from ..campaign import load_campaign
     from ..discover import discover as search
     from ..discover import save_verdict
@@ -44,7 +47,7 @@ def discover(
     held = None if hold_out is None else [] if hold_out == ["none"] else hold_out
     folder = folder_for(out, f"{tests.name}_discovery")
     with progress_bar(f"searching {tests.name} for what {table.name} lacks") as progress:
-        found = search(table, tests, known, hold_out=held, seed=seed, jobs=jobs, progress=progress)
+        found = search(table, tests, known, hold_out=held, seed=seed, jobs=jobs, unfinished=folder, progress=progress)
     command = repeating_command()
     paths = [save_verdict(found, folder / "verdict.json")]
     title = f"{table.name} with what was found in campaign {tests.name}; {command}"

@@ -3,12 +3,18 @@
 from dataclasses import dataclass, replace
 from itertools import product
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..calibration import Knob
 from ..library import Family, Shape, families
 from ..machine import Machine
+from ..parameters import Parameters
 from ..residuals import RESIDUALS
 
 __all__ = ["Candidate", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,9 +36,23 @@ class Candidate:
         """Numbers with which the effect vanishes."""
         return tuple(s for s in self.family.shapes if s.amplitude)
 
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest amplitudes (q,)."""
+        shapes = self.amplitudes
+        return np.array([s.low for s in shapes]), np.array([s.high for s in shapes])
+
+    def spread(self, numbers: Parameters) -> Array:
+        """Prior deviations (q,) of amplitudes; `numbers` are those of `models/procedures/discovery.toml`."""
+        return numbers.number("fit.spread") * np.array([s.typical for s in self.amplitudes])
+
     def at(self, components: tuple[str, ...]) -> "Candidate":
         """The same on other components."""
         return replace(self, components=components)
+
+    def of_one_form(self, other: "Candidate") -> bool:
+        """Whether only their shapes differ."""
+        return replace(self, shape=()) == replace(other, shape=())
 
     def on(self, machine: Machine, amplitudes: tuple[float, ...]) -> Machine:
         """The machine with this effect, amplitudes in the order of `amplitudes`."""

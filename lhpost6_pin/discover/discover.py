@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -26,7 +27,8 @@ from .candidates import with_background, with_other_form, with_warm_oil
 from .left import Left, what_is_left, with_unnamed
 from .next_test import NextTest, next_tests
 from .proof import Proof, prove
-from .search import Search, fitted_machine, search, stand, weighing
+from .resume import Place, make_bookmark
+from .search import Search, fitted_machine, refit, search, stand, weighing
 from .sensing import put_right, wrong_sensors
 from .verdict import Verdict, judge
 
@@ -63,13 +65,15 @@ def discover(
     phases: Sequence[int] = (1, 2, 3),
     seed: int = 0,
     jobs: int = -1,
+    unfinished: Path | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
     """Find what a machine's model lacks to explain a campaign.
 
     hold_out are tests that are not searched but prove what was found; None: with more than three tests, the one that
     tells least of the machine. phases are those of a validation that the proof goes through. Deterministic for a seed
-    (of the simulated noise), whatever the number of `jobs` (threads; -1: one a core).
+    (of the simulated noise), whatever the number of `jobs` (threads; -1: one a core). In the folder `unfinished` the
+    search keeps what it has until it has ended; a search with the same inputs goes on from there, to the same verdict.
 
     Raises UnknownNameError for a test that the campaign has not; RecordError where fewer than one test is left to
     search; and what `calibrate` raises.
@@ -79,25 +83,21 @@ def discover(
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     faults = wrong_sensors(make_plant(machine), campaign.records, sensors)
     records = put_right(campaign.records, faults)
-    others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
-    ready = prepare_problem(
-        machine, records, sensors, calibration, kinds=RESIDUALS, others=others, preload=preload, seed=seed, jobs=jobs
-    )
-    machine = ready.problem.machine
-    knobs = (*ready.problem.knobs, *plan_knobs(machine))
-    twins = scatter_knobs(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
-    whole, forms = with_background(machine, numbers.number("scatter.spread"))
-    ready = ready.with_machine(whole, (*knobs, *twins, *forms))
-    report(0.1)
+    hashes = {name: _hash(record) for name, record in zip(names, campaign.records, strict=True)}
     held = _asked_for(names, hold_out)
+    bookmark = make_bookmark(unfinished, machine, sensors, hashes, hold_out, seed)
+    place = bookmark.read()
+    if place is None:
+        begin = between(report, 0.0, 0.4)
+        place = _begin(machine, records, sensors, held, more=hold_out is None, seed=seed, jobs=jobs, progress=begin)
+        bookmark.write(place)
+    machine, held = place.machine, place.held
     used = [i for i in range(len(names)) if i not in held]
-    ready = ready.only(used)
-    first = Normal(ready.problem, np.zeros(len(ready.problem.prior)), between(report, 0.1, 0.2))
-    if hold_out is None and len(used) > FEWEST:
-        least = _tells_least(first)
-        held = [used.pop(least)]
-        ready, first = ready.only(used), first.only(used)
-    found, standing = search(ready, first, calibration, numbers, between(report, 0.2, 0.75))
+
+    def keep(found: Search) -> None:
+        bookmark.write(place._replace(search=found))
+
+    found, standing = search(place.search, calibration, numbers, keep, between(report, 0.4, 0.75))
     left: tuple[Left, ...] = ()
     if found.misfit("wrench") > numbers.number("left.noise"):
         left = what_is_left(standing.base, weighing(found, standing, numbers), numbers)
@@ -114,6 +114,7 @@ def discover(
     tests: tuple[NextTest, ...] = ()
     if verdict.word == "ambiguous":
         tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
+    bookmark.remove()
     report(1.0)
     alone = any(verdict.left is one for one in instead)  # in place of the effects, not beside them
     fitted = fitted_machine(found.refit if alone else found.solution)
@@ -130,8 +131,41 @@ def discover(
         next_tests=tests,
         numbers=numbers,
         seed=seed,
-        hashes={name: _hash(record) for name, record in zip(names, campaign.records, strict=True)},
+        hashes=hashes,
     )
+
+
+def _begin(
+    machine: Machine,
+    records: Sequence[xr.Dataset],
+    sensors: Sensors,
+    held: tuple[int, ...],
+    *,
+    more: bool,
+    seed: int,
+    jobs: int,
+    progress: Progress,
+) -> Place:
+    """Prepare the tests that are not held out and refit what is known; `more`: hold out the one that tells least."""
+    numbers, calibration = discovery_numbers()
+    others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
+    ready = prepare_problem(
+        machine, records, sensors, calibration, kinds=RESIDUALS, others=others, preload=preload, seed=seed, jobs=jobs
+    )
+    machine = ready.problem.machine
+    knobs = (*ready.problem.knobs, *plan_knobs(machine))
+    twins = scatter_knobs(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
+    whole, forms = with_background(machine, numbers.number("scatter.spread"))
+    ready = ready.with_machine(whole, (*knobs, *twins, *forms))
+    progress(0.25)
+    used = [i for i in range(len(records)) if i not in held]
+    ready = ready.only(used)
+    first = Normal(ready.problem, np.zeros(len(ready.problem.prior)), between(progress, 0.25, 0.5))
+    if more and len(used) > FEWEST:
+        least = _tells_least(first)
+        held = (used.pop(least),)
+        ready, first = ready.only(used), first.only(used)
+    return Place(machine, held, refit(ready, first, calibration, between(progress, 0.5, 1.0)))
 
 
 def discovery_numbers() -> tuple[Parameters, Parameters]:
@@ -147,12 +181,12 @@ def _others(machine: Machine, numbers: Parameters) -> tuple[Machine, ...]:
     return with_other_form(machine, form), with_warm_oil(machine, drift)
 
 
-def _asked_for(names: Sequence[str], wanted: Sequence[str] | None) -> list[int]:
+def _asked_for(names: Sequence[str], wanted: Sequence[str] | None) -> tuple[int, ...]:
     """Places of the tests that are to be held out."""
     for name in wanted or ():
         if name not in names:
             raise UnknownNameError("test of the campaign", name, list(names))
-    held = [i for i, name in enumerate(names) if name in (wanted or ())]
+    held = tuple(i for i, name in enumerate(names) if name in (wanted or ()))
     if len(held) == len(names):
         raise RecordError("all tests are held out: leave at least one to search")
     return held

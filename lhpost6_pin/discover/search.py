@@ -6,7 +6,7 @@ parameters and sensor errors.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -27,11 +27,24 @@ from ..residuals import RESIDUALS
 from .background import make_background
 from .candidates import Candidate, list_candidates
 from .columns import columns_of
+from .pairs import score_pairs
 from .releases import block_of, list_releases
 from .screen import Background, Block, Score, less_noise, make_block, score
 from .weighing import Lowered, Weighing, gate, refusal, squares_by_column
 
-__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine", "search", "stand", "weighing"]
+__all__ = [
+    "Added",
+    "Contest",
+    "Round",
+    "Scored",
+    "Search",
+    "Standing",
+    "fitted_machine",
+    "refit",
+    "search",
+    "stand",
+    "weighing",
+]
 
 Array = NDArray[np.float64]
 
@@ -125,30 +138,38 @@ class Search:
         return float(np.mean(misfit(self.problem, self.rest)[:, RESIDUALS.index(kind)]))
 
 
-def search(
-    ready: Prepared, begin: Normal, calibration: Parameters, numbers: Parameters, progress: Progress
-) -> tuple[Search, Standing]:
-    """Search the library for what the machine of a prepared campaign lacks; also what is needed to go on from there.
+def refit(ready: Prepared, begin: Normal, calibration: Parameters, progress: Progress) -> Search:
+    """Where a search begins: known parameters and sensor errors fitted to a prepared campaign, without any effect.
 
-    begin are its normal equations where all unknowns are zero; calibration and numbers those of `models/procedures`.
+    begin are its normal equations where all unknowns are zero; calibration are numbers of `models/procedures`.
     """
     start = np.zeros(len(ready.problem.prior))
-    share = between(progress, 0.0, 0.35)
+    share = between(progress, 0.0, 0.85)
     first = solve(ready.problem, ready.replicas, calibration, start, share, first=begin, frugal=True)
-    found = _weighed_anew(Search(ready, first, first), calibration, between(progress, 0.35, 0.4))
+    return _weighed_anew(Search(ready, first, first), calibration, between(progress, 0.85, 1.0))
+
+
+def search(
+    found: Search, calibration: Parameters, numbers: Parameters, keep: Callable[[Search], None], progress: Progress
+) -> tuple[Search, Standing]:
+    """Search the library for what the machine lacks, from a refit or from where an earlier search was interrupted.
+
+    Returns also what is needed to go on from there; calibration and numbers are those of `models/procedures`. keep is
+    called with the search each time that it has come further.
+    """
     most = int(numbers.number("accept.effects"))
-    for k in range(most + 1):
-        low, high = (0.4 + 0.6 * i / (most + 1) for i in (k, k + 1))
+    for k in range(len(found.rounds), most + 1):
+        low, high = (i / (most + 1) for i in (k, k + 1))
         standing = stand(found.solution, calibration, found.ready.replicas)
         one = screen(found, standing, numbers, between(progress, low, 0.5 * (low + high)))
         found.rounds.append(one)
-        passed = [s for s in one.scored if not s.refused]
-        if not passed or k == most:
+        if k == most:
             break
-        more = _add(found, passed, calibration, numbers, between(progress, 0.5 * (low + high), high))
+        more = _further(found, standing, calibration, numbers, between(progress, 0.5 * (low + high), high))
         if more is None:
             break
         found = more
+        keep(found)
     if len(found.added) > 1:
         fewer = _pruned(found, calibration, numbers)
         found, standing = fewer, standing if fewer is found else stand(fewer.solution, calibration)
@@ -223,7 +244,7 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
         less = Lowered(one.gain, 0.0, 0.0, 0.0)
         if one.gain >= numbers.number("accept.look"):
             less = weigh.lowered(explained(), one)
-        why = refusal(candidate.family, one, less, numbers)
+        why = refusal([candidate.family], one, less, numbers)
         if not why and less.gain < numbers.number("accept.again") * _found_there(found, candidate):
             why = "may be the form of what was found there"
         return Scored(candidate, one, less.gain, less.share, why)
@@ -234,7 +255,7 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
 
         def scores(block: Block) -> list[Score]:
             pairs = zip(group, parts, strict=True)
-            return [score(background, block.select(q), *_bounds(c), _spread(c, numbers)) for c, q in pairs]
+            return [score(background, block.select(q), *c.bounds, c.spread(numbers)) for c, q in pairs]
 
         found = scores(block)
         if max(one.gain for one in found) >= numbers.number("accept.look"):
@@ -295,14 +316,53 @@ def _of_unknown(background: Background, place: int, amplitude: Array) -> list[Ar
     return [slope[:, place] * amplitude for slope in background.slope]
 
 
-def _bounds(candidate: Candidate) -> tuple[Array, Array]:
-    shapes = candidate.amplitudes
-    return np.array([s.low for s in shapes]), np.array([s.high for s in shapes])
+def _further(
+    found: Search, standing: Standing, calibration: Parameters, numbers: Parameters, progress: Progress
+) -> Search | None:
+    """The search with one more effect, or with two where no one does as well; None if nothing is to be added."""
+    scored = found.rounds[-1].scored
+    passed = [one for one in scored if not one.refused]
+    more = _add(found, passed, calibration, numbers, between(progress, 0.0, 0.7)) if passed else None
+    best: dict[str, Scored] = {}
+    for one in scored:
+        if one.score.gain >= numbers.number("accept.look") and not one.candidate.release:
+            best.setdefault(one.candidate.family.named, one)
+    few = list(best.values())[: int(numbers.number("accept.paired"))]
+    if len(few) < 2 or len(found.added) + 2 > numbers.number("accept.effects"):
+        return more
+    weigh = weighing(found, standing, numbers)
+    candidates = [one.candidate for one in few]
+    pairs = score_pairs(found.problem, standing.base, standing.replicas, weigh, candidates, numbers)
+    first = pairs[0]
+    stands_in = more is None or more.added[-1].candidate.family.named not in {
+        candidates[i].family.named for i in first.places
+    }
+    if first.refused or not stands_in:
+        return more
+    two = [
+        replace(few[i], score=replace(few[i].score, amplitude=a))
+        for i, a in zip(first.places, first.amplitudes, strict=True)
+    ]
+    return _better(found, more, two, calibration, numbers, between(progress, 0.7, 1.0))
 
 
-def _spread(candidate: Candidate, numbers: Parameters) -> Array:
-    """Prior deviations of amplitudes."""
-    return numbers.number("fit.spread") * np.array([s.typical for s in candidate.amplitudes])
+def _better(
+    found: Search,
+    more: Search | None,
+    two: Sequence[Scored],
+    calibration: Parameters,
+    numbers: Parameters,
+    progress: Progress,
+) -> Search | None:
+    """The search with one more effect, or with two others if all of them earn their place."""
+    both: Search | None = found
+    for i, one in enumerate(two):
+        share = between(progress, 0.5 * i, 0.5 * (i + 1))
+        both = _best_of(both, [one], calibration, numbers, share, least=-np.inf) if both else None
+    gates = [gate(one.candidate.family, numbers) for one in two]
+    if both is None or _objective(found) - _objective(both) < sum(gates):
+        return more
+    return both if more is None or _objective(more) - _objective(both) >= max(gates) else more
 
 
 def _add(
@@ -331,21 +391,27 @@ def _add(
 
 
 def _best_of(
-    found: Search, rivals: Sequence[Scored], calibration: Parameters, numbers: Parameters, progress: Progress
+    found: Search,
+    rivals: Sequence[Scored],
+    calibration: Parameters,
+    numbers: Parameters,
+    progress: Progress,
+    least: float | None = None,
 ) -> Search | None:
-    """The search with the best of these candidates, all fitted in full; None if none lowers what is left."""
+    """The search with the best of these candidates, all fitted in full; None if none gains `least`, or its gate."""
     fitted = []
     for i, rival in enumerate(rivals):
         share = between(progress, 0.7 * i / len(rivals), 0.7 * (i + 1) / len(rivals))
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
     before, *left = (_objective(one) for one in (found, *fitted))
-    passed = [i for i, one in enumerate(rivals) if before - left[i] >= gate(one.candidate.family, numbers)]
+    gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
+    passed = [i for i, needed in enumerate(gates) if before - left[i] >= needed]
     if not passed:
         return None
-    least = min(left[i] for i in passed)
+    lowest = min(left[i] for i in passed)
     # laws are never quite those of the table: of large gains a share decides nothing
-    apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - least))
-    alike = [i for i in passed if left[i] - least < apart]
+    apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - lowest))
+    alike = [i for i in passed if left[i] - lowest < apart]
     # the simplest of them: what the model knows already, then what has the fewest numbers
     best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
@@ -372,8 +438,29 @@ def _fit_jointly(
 ) -> Search:
     """The search with a candidate fitted together with everything, from where the linear estimate puts it.
 
-    Derivatives by everything else are those from before: enough to tell which candidate is the best. Where much is
-    left, it is fitted from where nothing else is off, too: what was missing may have bent everything out of reach.
+    Where much is left, it is fitted from where nothing else is off, too: what was missing may have bent everything out
+    of reach; and from other shapes that explain nearly as much.
+    """
+    same = [s for s in found.rounds[-1].scored if s.candidate.of_one_form(one.candidate) and s is not one]
+    near = numbers.number("accept.near") * one.gain
+    others = [s for s in same if s.gain >= near][: int(numbers.number("accept.shapes"))]
+    starts = [(one, False), (one, True), *((other, False) for other in others)]
+    fits: list[Search] = []
+    for i, (start, afresh) in enumerate(starts):
+        share = between(progress, i / len(starts), (i + 1) / len(starts))
+        fits.append(_fit_from(found, start, calibration, numbers, share, afresh=afresh))
+        left = [float(np.mean(np.abs(r) ** 2)) for r in fits[-1].rest]
+        if np.mean(left) < numbers.number("accept.settled"):
+            break
+    return min(fits, key=_objective)
+
+
+def _fit_from(
+    found: Search, one: Scored, calibration: Parameters, numbers: Parameters, progress: Progress, *, afresh: bool
+) -> Search:
+    """The search with a candidate fitted together with everything, which begins where it is, or afresh.
+
+    Derivatives by everything else are those from before: enough to tell which candidate is the best.
     """
     problem, candidate = found.problem, one.candidate
     count, start = len(problem.knobs), found.solution.at
@@ -381,23 +468,19 @@ def _fit_jointly(
         sort = "known" if problem.names.index(candidate.release) < count else "sensor"
         ready = found.ready.with_free(candidate.release, numbers.number(f"fit.{sort}_free"))
     else:
-        low, high = _bounds(candidate)
+        low, high = candidate.bounds
         amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
         own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
         ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
         start = np.insert(start, count, np.zeros(len(own)))
-    before, replicas, near = found.solution.normal, ready.replicas, _near(ready.problem, candidate)
-    fits = []
-    for i, place in enumerate((start, np.zeros_like(start))):
-        share = between(progress, 0.5 * i, 0.5 * (i + 1))
-        solution = solve(
-            *(ready.problem, replicas, calibration, place, share, before), frugal=True, settled=True, near=near
-        )
-        fits.append(Search(ready, solution, found.refit, list(found.added), found.rounds))
-        left = [float(np.mean(np.abs(r) ** 2)) for r in fits[-1].rest]
-        if np.mean(left) < numbers.number("accept.settled"):
-            break
-    return min(fits, key=_objective)
+    solution = solve(
+        *(ready.problem, ready.replicas, calibration, np.zeros_like(start) if afresh else start, progress),
+        found.solution.normal,
+        frugal=True,
+        settled=True,
+        near=_near(ready.problem, candidate),
+    )
+    return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 
 def _near(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:

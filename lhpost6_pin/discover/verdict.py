@@ -233,9 +233,9 @@ def without_name(
 
 
 def _its_form(free: Left, one: Added, numbers: Parameters) -> bool:
-    """Whether what has no name is so little of an effect found there that it is the form of that."""
+    """Whether what has no name is so little of an effect found, there or elsewhere, that it is the form of that."""
     there = set(free.components) <= set(one.candidate.components)
-    return there and free.gain < numbers.number("verdict.rest") * one.gain
+    return free.gain < numbers.number("verdict.rest" if there else "verdict.elsewhere") * one.gain
 
 
 def _outweighed(one: Added, free: Left, numbers: Parameters) -> bool:

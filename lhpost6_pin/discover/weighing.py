@@ -27,7 +27,7 @@ class Lowered(NamedTuple):
 
     gain: float  # of log-likelihood and log-prior
     beyond: float  # of log-likelihood, by what even `doubt` times the stated noise would not have
-    share: float  # of what is so far beyond noise in the column where it explains most of that; one where little is
+    share: float  # of what is so far beyond noise in a column's means, or in what moves in it, where most is explained
     of_first: float  # in the column where this is most: of the squares that were there before any effect was added
 
 
@@ -40,25 +40,33 @@ class Weighing:
         self.doubt, self.much = numbers.number("accept.doubt"), numbers.number("accept.gain")
         self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
 
-    def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, float]:
-        """Negative log-likelihood, squares, and log-likelihood of what is no noise (3, c); that of the prior."""
-        b, total = self.background, np.zeros((3, self.first.size))
+    def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, Array, float]:
+        """What is left by a change (p,) of the background and what is explained (n,) of every test.
+
+        Negative log-likelihood and squares (2, c); log-likelihood of what is no noise, of means and of what moves
+        (2, c); that of the prior.
+        """
+        b, whole, beyond = self.background, np.zeros((2, self.first.size)), np.zeros((2, self.first.size))
         for slope, rest, root, more, f in zip(b.slope, b.rest, b.root, explained, self.problem.frequency, strict=True):
             left = (rest + slope @ change + more) ** 2
             squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
             means, counts = mean_squares(self.problem.whitener, squares, f)
-            beyond = surprise(np.maximum(means / self.doubt, 1.0), counts) - counts.sum()
-            total += surprise(means, counts), squares.sum(axis=0), beyond
-        return total, 0.5 * float(np.sum((b.place + change) ** 2))
+            whole += surprise(means, counts), squares.sum(axis=0)
+            more_than_noise = np.maximum(means / self.doubt, 1.0)
+            first = int(f[0] == 0.0)  # the band of the means alone
+            for k, part in enumerate((slice(0, first), slice(first, None))):
+                beyond[k] += surprise(more_than_noise[part], counts[part]) - counts[part].sum()
+        return whole, beyond, 0.5 * float(np.sum((b.place + change) ** 2))
 
     def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
         """How a candidate lowers what is left, explained (n,) of every test."""
-        (before, prior), (after, then) = self.before, self._left(one.change, explained)
-        fall, squares, beyond = before - after
-        most = int(np.argmax(beyond))
+        (before, doubted, prior), (after, still, then) = self.before, self._left(one.change, explained)
+        fall, squares = before - after
         falls = fall > 0.5 * self.much
         of_first = float(np.max(squares[falls] / self.first[falls], initial=0.0))
-        share = float(beyond[most] / before[2, most]) if before[2, most] > self.much else 1.0
+        beyond = doubted - still
+        most = np.unravel_index(np.argmax(beyond), beyond.shape)
+        share = float(beyond[most] / doubted[most]) if doubted[most] > self.much else 1.0
         return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
 
 
@@ -72,11 +80,11 @@ def gate(family: Family, numbers: Parameters) -> float:
     return numbers.number("accept.mimicked" if family.mimicked else "accept.gain")
 
 
-def refusal(family: Family, one: Score, less: Lowered, numbers: Parameters) -> str:
-    """Why a candidate may not be added."""
+def refusal(families: Sequence[Family], one: Score, less: Lowered, numbers: Parameters) -> str:
+    """Why a candidate, or several together, may not be added; empty if they may be."""
     if one.gain < numbers.number("accept.look"):
         return "gains too little"
-    if less.gain < gate(family, numbers):  # the noise in derivatives is all it has
+    if less.gain < sum(gate(family, numbers) for family in families):  # the noise in derivatives is all it has
         return "does not lower what is left"
     held = one.held_out
     if held.sum() < numbers.number("accept.held_out") * one.gain:
@@ -86,7 +94,7 @@ def refusal(family: Family, one: Score, less: Lowered, numbers: Parameters) -> s
     worst = -max(2.0 * chance, numbers.number("accept.worst") * one.gain)
     if better < numbers.number("accept.better") or held.min() < worst:
         return "makes tests worse that it was not fitted on"
-    if family.mimicked and less.beyond < gate(family, numbers):
+    if less.beyond < sum(gate(family, numbers) for family in families if family.mimicked):
         return "explains what may be noise"
     if less.share < numbers.number("accept.closure"):
         return "explains too little of what is more than noise"

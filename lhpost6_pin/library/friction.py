@@ -82,25 +82,18 @@ def _swivel_ends(components: Sequence[str]) -> list[str]:
 
 
 def _presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    known = _each(machine, components)
-    return "bouc_wen_1d", *_two_steps(components, [(c.seal_friction, *_seal(c)) for c in known], values)
+    rubs = [(c.seal_friction, *_seal(c)) for c in _each(machine, components)]
+    return "dahl_instead", [f"{name} -" for name in components], _of_another_form(rubs, values)
 
 
 def _bearing_presliding(machine: "Machine", components: Sequence[str], values: Values) -> Any:
-    known = _each(machine, components)
-    return "bouc_wen_2d", *_two_steps(components, [(c.pad_friction, c.pad_yield, c.pad_shape) for c in known], values)
+    rubs = [(c.pad_friction, c.pad_yield, c.pad_shape) for c in _each(machine, components)]
+    return "dahl_instead", components, _of_another_form(rubs, values)
 
 
-def _two_steps(
-    components: Sequence[str], rubs: Sequence[tuple[float, float, float]], values: Values
-) -> tuple[Any, Any]:
-    """Ports and numbers of friction (force, yield, shape) of which a share yields at another slip."""
-    ports, rows = [], []
-    for name, (friction, yielding, shape) in zip(components, rubs, strict=True):
-        force = values["share"] * friction
-        ports += [name, name]
-        rows += [(force, values["ratio"] * yielding, shape), (-force, yielding, shape)]
-    return ports, rows
+def _of_another_form(rubs: Sequence[tuple[float, float, float]], values: Values) -> list[tuple[float, ...]]:
+    """Numbers of friction (force, yield, shape) of which a share is of Dahl's form."""
+    return [(values["share"] * force, slip, shape, values["ratio"] * slip) for force, slip, shape in rubs]
 
 
 def _viscous(machine: "Machine", components: Sequence[str], values: Values) -> Any:

@@ -145,14 +145,17 @@ def draw_case(
         for t, s, o in zip(plan["tests"], settings, order, strict=True)
     )
     drift = numbers()["oil_drift"]
+    oil = {name: float(random.normal(0.0, drift[name])) for name in ("bulk", "viscous")}
+    instruments = draw_instruments(numbers()["sensors"], random, faults)
+    values["friction"] = {"exponent": float(random.uniform(*numbers()["friction"]["exponent"]))}
     return Case(
         id=name,
         label=label,
         values=values,
         scatter=scatter,
-        oil={name: float(random.normal(0.0, drift[name])) for name in ("bulk", "viscous")},
+        oil=oil,
         effects=tuple(effects),
-        instruments=draw_instruments(numbers()["sensors"], random, faults),
+        instruments=instruments,
         tests=tests,
         hold_out=tuple(plan["hold_out"]),
     )

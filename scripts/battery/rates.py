@@ -137,7 +137,7 @@ def rates(t, y, command, surge, legs, platen, inverse, dy, shown):
         # friction and the rest along the leg
         heat = y[HEAT + i]
         plateau = seal_plateau(leg, piston_rate, pull, heat)
-        dy[SEAL + i] = bristle(y[SEAL + i], piston_rate, leg.seal_yield)
+        dy[SEAL + i] = bristle(y[SEAL + i], piston_rate, leg.seal_yield, leg.seal_exponent)
         if leg.warm_fraction != 0.0:
             dy[HEAT + i] = plateau * abs(piston_rate) / leg.warm_energy - heat / leg.warm_time
         if leg.memory != 0.0:

@@ -21,7 +21,8 @@ KINDS = ("horizontal", "vertical", "hold_down")
 POSITIONS = ("px", "py", "pz", "ax", "ay", "az")
 BASE_FIELDS = (
     *("area_a", "area_b", "flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "valve_delay"),
-    *("seal", "seal_yield", "viscous", "pad", "pad_yield", "gas_area", "gas_pressure", "gas_length", "gas_index"),
+    *("seal", "seal_yield", "seal_exponent", "viscous", "pad", "pad_yield"),
+    *("gas_area", "gas_pressure", "gas_length", "gas_index"),
 )
 PLATEN_BASE = (
     *("mass_x", "mass_y", "mass_z", "inertia_x", "inertia_y", "inertia_z", "cog_x", "cog_y", "cog_z", "plane"),
@@ -69,6 +70,7 @@ def make_table(values: dict[str, dict[str, np.ndarray]], yield_factor: float) ->
         leg["ax"], leg["ay"], leg["az"] = own["base_point"]
         for key in BASE_FIELDS:
             leg[key] = kind.get({"seal": "seal_friction", "pad": "pad_friction"}.get(key, key), 0.0)
+        leg["seal_exponent"] = values.get("friction", {}).get("exponent", 1.0)
         leg["seal_yield"] *= yield_factor
         leg["pad_yield"] *= yield_factor
         if leg["kind"] == 2:
@@ -175,6 +177,6 @@ def valve(leg, x, pa, pb, supply, back, rated):
 
 
 @njit(cache=True)
-def bristle(z, v, span):
+def bristle(z, v, span, exponent):
     """Dahl's friction: a bristle bends with the motion and slips at one [1/s]."""
-    return (v - abs(v) * z) / span
+    return v / span * max(1.0 - math.copysign(z, v * z), 0.0) ** exponent

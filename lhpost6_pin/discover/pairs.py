@@ -1,0 +1,87 @@
+"""Pairs of candidates: what two effects explain together, where one by one they would not be found.
+
+A search adds one effect after the other. Two of which each explains too little of what both have left pass only
+together; and one of a wrong form may stand in for two, so that neither is added after it.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration.problem import Base, Problem
+from ..calibration.spectra import real_bins
+from ..parameters import Parameters
+from .candidates import Candidate
+from .columns import Columns, columns_of
+from .screen import less_noise, make_block, score
+from .weighing import Weighing, gate, refusal
+
+__all__ = ["Pair", "score_pairs"]
+
+Array = NDArray[np.float64]
+
+
+class Pair(NamedTuple):
+    """Two candidates together."""
+
+    places: tuple[int, int]  # among the candidates
+    gain: float  # of log-likelihood, with what is left weighed anew
+    amplitudes: tuple[Array, Array]
+    refused: str  # why they may not be added; empty if they may be
+
+
+def score_pairs(
+    problem: Problem,
+    base: Base,
+    replicas: Sequence[tuple[Problem, Base]],
+    weigh: Weighing,
+    candidates: Sequence[Candidate],
+    numbers: Parameters,
+) -> list[Pair]:
+    """All pairs of candidates, by falling gain; replicas are the problem and its base with more noise."""
+    background = weigh.background
+    ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
+    columns = _side_by_side(problem, base, candidates)
+    noisy = [_side_by_side(again, there, candidates) for again, there in replicas]
+    block = make_block(background, columns)
+    if noisy:
+        block = less_noise(background, block, columns, noisy)
+    low, high = (np.concatenate(x) for x in zip(*(c.bounds for c in candidates), strict=True))
+    spread = np.concatenate([c.spread(numbers) for c in candidates])
+
+    def together(*places: int) -> NDArray[np.intp]:
+        return np.concatenate([np.arange(ends[i], ends[i + 1]) for i in places])
+
+    whole = np.eye(ends[-1])
+    alone = [score(background, block.select(whole[:, k]), low[k], high[k], spread[k]).gain
+             for k in map(together, range(len(candidates)))]  # fmt: skip
+    found = []
+    for i, j in combinations(range(len(candidates)), 2):
+        k = together(i, j)
+        one = score(background, block.select(whole[:, k]), low[k], high[k], spread[k])
+        explained = [
+            real_bins(c[..., k], root) @ one.amplitude for c, root in zip(columns, background.root, strict=True)
+        ]
+        less = weigh.lowered(explained, one)
+        families = candidates[i].family, candidates[j].family
+        why = refusal(families, one, less, numbers)
+        needed = all(
+            one.gain - other >= gate(family, numbers)
+            for family, other in zip(families, (alone[j], alone[i]), strict=True)
+        )
+        count = len(candidates[i].amplitudes)
+        amplitudes = one.amplitude[:count], one.amplitude[count:]
+        found.append(Pair((i, j), less.gain, amplitudes, why if needed else "one of them explains as much"))
+    return sorted(found, key=lambda pair: -pair.gain)
+
+
+def _side_by_side(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> Columns:
+    """Columns (m, c, k) of every test, those of all candidates' amplitudes."""
+    each = []
+    for candidate in candidates:
+        columns, (part,) = columns_of(problem, base, [candidate])
+        each.append([c @ part for c in columns])
+    return [np.concatenate(bins, axis=-1) for bins in zip(*each, strict=True)]

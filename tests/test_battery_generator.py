@@ -106,7 +106,7 @@ def test_every_effect_acts_on_a_lively_table(group, name, variant):
         assert not all(np.array_equal(b, a) for b, a in zip(before, after, strict=True))
 
 
-@pytest.mark.parametrize(("exponent", "least"), [(0.7, 1e-12), (1.0, 1e-6), (1.4, 1e-2)])
+@pytest.mark.parametrize(("exponent", "least"), [(0.7, 1e-6), (1.0, 1e-6), (1.4, 1e-2)])
 def test_friction_saturates_at_its_plateau_and_turns_with_the_motion(exponent, least):
     z = 0.0
     for _ in range(2000):

@@ -440,7 +440,7 @@ def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_n
     """A vertical triangle hardly moves the horizontal seals."""
     assert (found.used, found.held_out) == (("TX", "TY", "WN"), ("TZ",))
     (gap,) = found.proof.gaps
-    assert gap.after == pytest.approx(gap.refitted, rel=0.05)  # parameters that share the search's noise
+    assert gap.after == pytest.approx(gap.refitted, rel=0.08)  # parameters that share the search's noise
     assert gap.after < 1.2  # one is noise alone; friction at rest adds some
 
 
@@ -521,7 +521,7 @@ def test_the_next_test_tells_apart_what_it_excites(machine, sensors):
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     settings = load_controller("lhpost6")
     itself, other = (
-        _trial("SMALL_X", one, r, settings, sensors, calibration_numbers(), numbers).margin for r in (one, rival)
+        _trial(one, r, settings, sensors, calibration_numbers(), numbers, "SMALL_X").margin for r in (one, rival)
     )
     # itself: what half a step of the simulation leaves; twice the least difference that decides
     assert other > 2.0 * numbers.number("accept.apart") + itself

@@ -6,8 +6,10 @@ which that test would tell the two apart: its expected margin, to first order.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from ..calibration.knobs import Knob
 from ..calibration.normal import Normal
@@ -46,19 +48,20 @@ def next_tests(
     told: list[NextTest] = []
     for added in found.added:
         for rival in added.rivals:
-            trials = [_trial(test, added.contest[0], rival, settings, sensors, calibration, numbers) for test in tests]
+            trial = partial(_trial, added.contest[0], rival, settings, sensors, calibration, numbers)
+            trials = Parallel(n_jobs=found.problem.jobs, prefer="threads")(delayed(trial)(test) for test in tests)
             told += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
     return tuple(told)
 
 
 def _trial(
-    test: str,
     one: Contest,
     rival: Contest,
     settings: ControllerSettings,
     sensors: Sensors,
     calibration: Parameters,
     numbers: Parameters,
+    test: str,
 ) -> NextTest:
     """Run a test on the machine with the one effect, and explain it by that with the other."""
     names = one.candidate.family.named, rival.candidate.family.named
@@ -67,7 +70,7 @@ def _trial(
         run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
         return NextTest(test, names, float("nan"), told=False)
-    ready = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS)
+    ready = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1)
     knobs = (*ready.problem.knobs, *_own_knobs(rival, numbers))
     problem = ready.problem.with_machine(ready.problem.machine, knobs)
     margin = _margin(Normal(problem, np.zeros(len(problem.prior)), lambda share: None))

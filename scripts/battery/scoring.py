@@ -63,6 +63,10 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         named = {e["family"]: set(e["components"]) for e in answer["effects"]}
         return all(named[e["family"]] == set(e["components"]) for e in label["effects"] if e["family"] in named)
 
+    def only_what_is_there(label: Label, answer: Answer) -> bool:
+        """What no test was meant to move may be told from its traces all the same."""
+        return set(families(answer)) <= {decoy["family"] for decoy in label["decoys"]}
+
     closures = [
         gap["closure"]
         for label, answer in cases
@@ -84,7 +88,7 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         "components right where named": share(known, right_components),
         "none of the above, named": share(sort("unknown"), lambda _, a: bool(a["effects"])),
         "none of the above, flagged": share(sort("unknown"), lambda _, a: a["verdict"] == "unexplained"),
-        "unexcited, nothing named": share(sort("unexcited"), lambda _, a: not a["effects"]),
+        "unexcited, nothing else named": share(sort("unexcited"), only_what_is_there),
         "false among all names": Share(false, sum(len(families(answer)) for _, answer in named)),
         "median closure on held-out tests": sorted(closures)[len(closures) // 2] if closures else math.nan,
         "held-out tests that got worse": Share(sum(c < -0.02 for c in closures), len(closures)),

@@ -102,7 +102,8 @@ def discover(
     if found.misfit("wrench") > numbers.number("left.noise"):
         left = what_is_left(standing.base, weighing(found, standing, numbers), numbers)
     instead: tuple[Left, ...] = ()
-    if any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added):
+    forces = any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added)
+    if forces and found.misfit("wrench") > numbers.number("accept.settled"):  # else no function could do better by far
         before = stand(found.refit, calibration)
         instead = what_is_left(before.base, weighing(found, before, numbers), numbers)
     report(0.8)

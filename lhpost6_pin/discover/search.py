@@ -323,12 +323,11 @@ def _further(
     scored = found.rounds[-1].scored
     passed = [one for one in scored if not one.refused]
     more = _add(found, passed, calibration, numbers, between(progress, 0.0, 0.7)) if passed else None
-    best: dict[str, Scored] = {}
-    for one in scored:
-        if one.score.gain >= numbers.number("accept.look") and not one.candidate.release:
-            best.setdefault(one.candidate.family.named, one)
-    few = list(best.values())[: int(numbers.number("accept.paired"))]
-    if len(few) < 2 or len(found.added) + 2 > numbers.number("accept.effects"):
+    few = _strongest(scored, numbers)
+    beyond = sorted((one.gain - gate(one.candidate.family, numbers) for one in few), reverse=True)
+    hopeless = len(few) < 2 or beyond[0] + beyond[1] < 0.0
+    full = len(found.added) + 2 > numbers.number("accept.effects")
+    if hopeless or full or (more is not None and _settled(more, numbers)):
         return more
     weigh = weighing(found, standing, numbers)
     candidates = [one.candidate for one in few]
@@ -344,6 +343,21 @@ def _further(
         for i, a in zip(first.places, first.amplitudes, strict=True)
     ]
     return _better(found, more, two, calibration, numbers, between(progress, 0.7, 1.0))
+
+
+def _strongest(scored: Sequence[Scored], numbers: Parameters) -> list[Scored]:
+    """The best candidate of each family, of the families that gain most."""
+    best: dict[str, Scored] = {}
+    for one in scored:
+        if one.score.gain >= numbers.number("accept.look") and not one.candidate.release:
+            best.setdefault(one.candidate.family.named, one)
+    return list(best.values())[: int(numbers.number("accept.paired"))]
+
+
+def _settled(found: Search, numbers: Parameters) -> bool:
+    """Whether no more is left than a good fit leaves."""
+    left = [float(np.mean(np.abs(r) ** 2)) for r in found.rest]
+    return float(np.mean(left)) < numbers.number("accept.settled")
 
 
 def _better(
@@ -449,8 +463,7 @@ def _fit_jointly(
     for i, (start, afresh) in enumerate(starts):
         share = between(progress, i / len(starts), (i + 1) / len(starts))
         fits.append(_fit_from(found, start, calibration, numbers, share, afresh=afresh))
-        left = [float(np.mean(np.abs(r) ** 2)) for r in fits[-1].rest]
-        if np.mean(left) < numbers.number("accept.settled"):
+        if _settled(fits[-1], numbers):
             break
     return min(fits, key=_objective)
 

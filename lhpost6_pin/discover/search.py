@@ -372,11 +372,23 @@ def _better(
     both: Search | None = found
     for i, one in enumerate(two):
         share = between(progress, 0.5 * i, 0.5 * (i + 1))
-        both = _best_of(both, [one], calibration, numbers, share, least=-np.inf) if both else None
+        rivals = [one, *_in_its_place(found, one, numbers)]
+        both = _best_of(both, rivals, calibration, numbers, share, least=-np.inf) if both else None
     gates = [gate(one.candidate.family, numbers) for one in two]
     if both is None or _objective(found) - _objective(both) < sum(gates):
         return more
     return both if more is None or _objective(more) - _objective(both) >= max(gates) else more
+
+
+def _in_its_place(found: Search, one: Scored, numbers: Parameters) -> list[Scored]:
+    """The best of other families on the same components that come near a candidate."""
+    near = numbers.number("accept.near") * one.gain
+    firsts: dict[str, Scored] = {}
+    for other in found.rounds[-1].scored:
+        there = other.candidate.components == one.candidate.components and not other.candidate.release
+        if there and other.gain >= near and other.candidate.family.name != one.candidate.family.name:
+            firsts.setdefault(other.candidate.family.name, other)
+    return list(firsts.values())[: int(numbers.number("accept.rivals")) - 1]
 
 
 def _add(

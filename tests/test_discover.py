@@ -18,6 +18,7 @@ from lhpost6_pin.campaign import Campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.discover import Discovery, discover, verdict_entries
+from lhpost6_pin.discover.adding import _fit_jointly
 from lhpost6_pin.discover.candidates import Candidate, list_candidates, with_background, with_other_form
 from lhpost6_pin.discover.columns import columns_of
 from lhpost6_pin.discover.discover import discovery_numbers
@@ -26,18 +27,10 @@ from lhpost6_pin.discover.next_test import _trial
 from lhpost6_pin.discover.pairs import score_pairs
 from lhpost6_pin.discover.releases import block_of, list_releases
 from lhpost6_pin.discover.resume import make_bookmark
-from lhpost6_pin.discover.screen import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discover.search import (
-    Added,
-    Contest,
-    Scored,
-    _by_rank,
-    _fit_jointly,
-    _objective,
-    _pruned,
-    _without,
-    stand,
-)
+from lhpost6_pin.discover.scores import Background, Block, Score, less_noise, make_block, score
+from lhpost6_pin.discover.screening import _by_rank, stand
+from lhpost6_pin.discover.search import _pruned, _without
+from lhpost6_pin.discover.state import Added, Contest, Scored
 from lhpost6_pin.discover.verdict import without_name
 from lhpost6_pin.discover.weighing import Lowered, Weighing, refusal, squares_by_column
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
@@ -422,7 +415,7 @@ def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
     assert [one.candidate.family.name for one in left.added] == ["stribeck_friction"]
     assert set(left.problem.names) == set(search.problem.names)
     # the same place but for the last step of a search that ends where little is gained
-    assert abs(_objective(left) - _objective(search)) < 3.0
+    assert abs(left.objective - search.objective) < 3.0
     alone = replace(search, added=[search.added[0], replace(search.added[0], candidate=helper.candidate)])
     assert _without(alone, search.added[0].candidate, calibration).added == [alone.added[1]]
 

@@ -9,7 +9,7 @@ from ..calibration.normal import Normal, bounds_of, positive
 from ..calibration.problem import Problem
 from ..calibration.spectra import real_bins
 from ..parameters import Parameters
-from .screen import Background
+from .scores import Background
 
 __all__ = ["make_background"]
 

@@ -28,8 +28,10 @@ from .left import Left, what_is_left, with_unnamed
 from .next_test import NextTest, next_tests
 from .proof import Proof, prove
 from .resume import Place, make_bookmark
-from .search import Search, fitted_machine, refit, search, stand, weighing
+from .screening import stand, weighing
+from .search import refit, search
 from .sensing import put_right, wrong_sensors
+from .state import Search, fitted_machine
 from .verdict import Verdict, judge
 
 __all__ = ["Discovery", "discover", "discovery_numbers"]

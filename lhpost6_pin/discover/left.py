@@ -23,7 +23,7 @@ from ..parameters import Parameters
 from ..pose import leg_displacements
 from ..residuals import Measured
 from .formula import Formula, sparse_formula
-from .screen import make_block, score
+from .scores import make_block, score
 from .weighing import Weighing
 
 __all__ = ["Left", "what_is_left", "with_unnamed"]

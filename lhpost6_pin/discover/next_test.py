@@ -22,7 +22,7 @@ from ..parameters import Parameters
 from ..residuals import RESIDUALS
 from ..sensors import Sensors
 from .candidates import Candidate
-from .search import Contest, Search
+from .state import Contest, Search
 
 __all__ = ["NextTest", "next_tests"]
 

@@ -16,7 +16,7 @@ from ..calibration.spectra import real_bins
 from ..parameters import Parameters
 from .candidates import Candidate
 from .columns import Columns, columns_of
-from .screen import less_noise, make_block, score
+from .scores import less_noise, make_block, score
 from .weighing import Weighing, gate, refusal
 
 __all__ = ["Pair", "score_pairs"]

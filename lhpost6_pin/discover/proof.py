@@ -17,7 +17,7 @@ from ..campaign import Campaign
 from ..machine import Machine
 from ..sensors import Sensors
 from ..validation import PHASES, Phase, Validation, validate
-from .search import Search, fitted_machine
+from .state import Search, fitted_machine
 
 __all__ = ["FLOOR", "Gap", "Proof", "prove"]
 

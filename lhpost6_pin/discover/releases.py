@@ -13,7 +13,7 @@ from ..calibration.errors import SensorUnknown
 from ..calibration.problem import Problem
 from ..library import find_family
 from .candidates import Candidate
-from .screen import Background, Block
+from .scores import Background, Block
 
 __all__ = ["block_of", "list_releases"]
 

@@ -14,7 +14,7 @@ from ..files import write_whole
 from ..machine import Machine
 from ..machine_toml import machine_toml
 from ..sensors import Sensors
-from .search import Search
+from .state import Search
 
 __all__ = ["Bookmark", "Place", "make_bookmark"]
 

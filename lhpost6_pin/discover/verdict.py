@@ -15,8 +15,8 @@ from scipy.stats import chi2, norm
 from ..calibration.problem import Problem
 from ..parameters import Parameters
 from .left import Left
-from .search import Added, Search
 from .sensing import Fault
+from .state import Added, Search
 from .weighing import squares_by_column
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge", "without_name"]

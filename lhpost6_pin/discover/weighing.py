@@ -15,7 +15,7 @@ from ..calibration.problem import Problem
 from ..calibration.spectra import mean_squares, surprise
 from ..library import Family
 from ..parameters import Parameters
-from .screen import Background, Score
+from .scores import Background, Score
 
 __all__ = ["Lowered", "Weighing", "gate", "refusal", "squares_by_column"]
 

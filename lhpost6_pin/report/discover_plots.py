@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..discover import Discovery
 from ..discover.left import Left
 from ..discover.proof import FLOOR
-from ..discover.search import Round
+from ..discover.state import Round
 from ..discover.words import where
 from ..names import AXES
 from .layout import stacked_layout

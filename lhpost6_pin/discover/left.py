@@ -93,6 +93,8 @@ def what_is_left(base: Base, weigh: Weighing, numbers: Parameters) -> tuple[Left
         for state, memory in _states(numbers):
             along = [_state(state, memory, *legs, test.dt) for (legs, _), test in zip(seen, base.tests, strict=True)]
             low, high = (f([f(x[:, members]) for x in along]) for f in (np.min, np.max))
+            if state != "velocity" and high - low < numbers.number("left.travel"):
+                continue
             nodes = np.linspace(low, high, NODES)
             each = []
             for i in members:

@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from .compiled import compiled
 from .equilibrium import hydraulic_rows
-from .errors import RecordError, SimulationError
+from .errors import SimulationError
 from .law_table import LAWS, LOAD_FRICTION
 from .ledger import Ledger, States, add_at_c, force_ledger
 from .plant import Plant
-from .platen_steps import platen_difference
+from .port_path import PortPath, ports_along
 from .pose import PlantMotion, PlatenMotion, plant_motion
-from .schemes import DS, FORCE, SD, S, port_rates, pose_stage, set_twist
+from .schemes import pose_stage
 from .stage import advance_states
 from .workspace import make_workspace
 
@@ -120,7 +120,8 @@ def inverse_dynamics(
     t = np.asarray(time, float)
     dt = float(t[-1] - t[0]) / (len(t) - 1)
     moved = plant_motion(plant, motion)
-    z = march_states(plant, moved if path is None else plant_motion(plant, motion._replace(displacement=path)), dt)
+    along = moved if path is None else plant_motion(plant, motion._replace(displacement=path))
+    z = march_states(plant, ports_along(plant, along), dt)
     v = seen_velocity(moved, dt) if model_step else moved.v
     states = States(plant, t, moved.q, v, moved.a, z)
     measured = [np.asarray(actuator_force, float)]
@@ -167,60 +168,36 @@ def seen_velocity(motion: PlantMotion, dt: float) -> Array:
 
 def march_states(
     plant: Plant,
-    motion: PlantMotion,
+    ports: PortPath,
     dt: float,
     start: Array | None = None,
     *,
     spool: Array | None = None,
     rows: NDArray[np.void] | None = None,
 ) -> Array:
-    """Hidden states (n, n_states) along a motion, from `start` (n_states,) or all zero, one step a sample.
+    """Hidden states (n, n_states) along a path of the ports, from `start` (n_states,) or all zero, one step a sample.
 
     Friction states only, or those of some rows of the plant's alone; with spool (n - 1 or more, n_actuators), the mean
-    over each step, chamber pressures as well. Raises RecordError naming the sample where a leg is out of its stroke.
+    over each step, chamber pressures as well.
     """
     moved = plant.rows if rows is None else rows
     if spool is None:
         moved = moved[moved["input"] < 0]
         spool = np.zeros((1, plant.spools))
-    z = np.zeros((len(motion.q), len(plant.states)))
+    z = np.zeros((len(ports.s), len(plant.states)))
     if start is not None:
         z[0] = start
-    ws = make_workspace(plant, plant.zero_state())
-    held = np.ascontiguousarray(spool, float)
-    table = np.ascontiguousarray(moved)
-    arrays = plant.axes, plant.legs, plant.body, table, ws.frame, ws.port, ws.JB, dt, held, plant.supply, z
-    sample, status = _march(np.ascontiguousarray(motion.q), *arrays)
-    if status:
-        names = (*plant.machine.actuator_names, *plant.machine.strut_names)
-        what = f"{names[status - 1]} is out of its stroke" if status > 0 else "the motion is not finite"
-        raise RecordError(f"platen_displacement at sample {sample}: {what}; check its channels, units and offsets")
+    _march(np.ascontiguousarray(moved), ports.s, ports.slip, dt, np.ascontiguousarray(spool, float), plant.supply, z)
     return z
 
 
 @compiled
-def _march(q, axes, legs, body, rows, frame, port, JB, dt, spool, supply, z):
-    """Fill z from its first row; returns (sample, status) of the first pose that cannot be, or (n, 0)."""
-    step = np.zeros(axes.size)
-    status = pose_stage(q[0], axes, legs, body, frame, port, JB)
-    if status != 0:
-        return 0, status
+def _march(rows, s, slip, dt, spool, supply, z):
+    """Fill z from its first row."""
     last = spool.shape[0] - 1
-    for k in range(1, q.shape[0]):
-        platen_difference(q[k - 1], q[k], axes, step)
-        set_twist(step, axes, frame)
-        port_rates(JB[0], frame, port[DS])
-        start = port[FORCE]
-        start[:] = port[S]
-        status = pose_stage(q[k], axes, legs, body, frame, port, JB)
-        if status != 0:
-            return k, status
-        port_rates(JB[0], frame, port[SD])
-        for i in range(start.size):
-            port[DS, i] = 0.5 * (port[DS, i] + port[SD, i])
+    for k in range(1, s.shape[0]):
         z[k] = z[k - 1]
-        advance_states(rows, start, port[DS], dt, spool[min(k - 1, last)], supply, z[k])
-    return q.shape[0], 0
+        advance_states(rows, s[k - 1], slip[k], dt, spool[min(k - 1, last)], supply, z[k])
 
 
 def leg_wrenches(plant: Plant, q: Array, force: Array) -> Array:

@@ -27,7 +27,7 @@ from .workspace import make_workspace
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Ledger", "States", "add_at_c", "effect_wrenches", "force_ledger", "number_of", "stage_arguments"]
+__all__ = ["Ledger", "States", "add_at_c", "force_ledger", "number_of", "stage_arguments"]
 
 Array = NDArray[np.float64]
 
@@ -115,15 +115,6 @@ def force_ledger(run: "Run | States") -> Ledger:
     rows = [f"{names[plant.rows[i]['effect']]}.{plant.ports[plant.rows[i][PORTS[k]]]}" for i, k in used]
     force = by_row[:, [i for i, _ in used], [k for _, k in used]]
     return Ledger(run.time, tuple(rows), force, tuple(names), wrench, inertia)
-
-
-def effect_wrenches(run: "Run | States") -> Array:
-    """Wrench (n, n_effects, 6) of every effect on the platen at C in {c} [N, N m], in the order of the machine's."""
-    plant = run.plant
-    n = len(run.time)
-    by_effect = np.zeros((n, len(plant.machine.effects), 6))
-    _forces(*stage_arguments(run, np.zeros((n, plant.rows.size, len(PORTS))), by_effect, np.zeros((n, 3, 3))))
-    return by_effect
 
 
 def number_of(kind: str, name: str, valid: Sequence[str]) -> int:

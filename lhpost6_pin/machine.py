@@ -15,7 +15,7 @@ from .effects import Effect, standard_effects
 from .errors import ParameterError, RecordError, UnknownNameError
 from .law_table import LAWS
 from .library import effect_entry, make_named_effect
-from .parameters import Parameters, load_parameters, override_parameters
+from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 
@@ -107,9 +107,7 @@ class Machine:
             raise ParameterError(f"an effect named {label!r} is in this machine already; give it another name")
         if isinstance(effect, Effect):
             return replace(self, own_effects=(*self.own_effects, effect))
-        entry = effect_entry(effect, components, values)
-        parameters = replace(self.parameters, effects={**self.parameters.effects, label: entry})
-        return build_machine(parameters, self.own_effects, self.specimen)
+        return self._with_effects({**self.parameters.effects, label: effect_entry(effect, components, values)})
 
     def without_effect(self, name: str) -> "Machine":
         """Return a copy without an effect of the library by its name; raises UnknownNameError."""
@@ -117,7 +115,12 @@ class Machine:
         if name not in entries:
             raise UnknownNameError("effect of this machine", name, list(entries))
         del entries[name]
-        return build_machine(replace(self.parameters, effects=entries), self.own_effects, self.specimen)
+        return self._with_effects(entries)
+
+    def _with_effects(self, entries: Mapping[str, EffectEntry]) -> "Machine":
+        machine = replace(self, parameters=replace(self.parameters, effects=entries))
+        _ = machine.added_effects  # raises for an effect that cannot be
+        return machine
 
     def with_valves(self, count: int) -> "Machine":
         """Return a copy with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""

@@ -4,6 +4,8 @@ Pressures and spools are measured; what else the oil remembers, flow through lin
 them by the simulation's kernels.
 """
 
+import numpy as np
+
 from .compiled import compiled
 from .law_table import HYDRAULIC_DOUBLE
 from .laws.chamber import chamber_rate, flows_double, flows_single
@@ -11,11 +13,26 @@ from .laws.orifice import opening
 from .oil import advance_line, bulk_modulus, net_flows, rod_advance, rod_ahead, start_line
 from .supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
 
-__all__ = ["flow_misses", "follow_supply"]
+__all__ = ["oil_misses"]
 
 
 @compiled
-def follow_supply(k, fed, chamber, pressure, spool, supply, dt, z, last):
+def oil_misses(rows, chamber, pressure, pressure_rate, spool, supply, s, rate, states, dt, drooped, flow):
+    """Fill drooped (n,), the supply's pressure [Pa], and flow (n, n_chambers) [m3/s], which may have no columns.
+
+    rows are the actuators', chamber (n_actuators, 2) their columns of pressure (n, n_chambers); s and rate (n, n_ports)
+    the path of the ports, states the number of the plant's hidden states.
+    """
+    z, last = np.zeros(states), np.zeros(4)
+    for k in range(s.shape[0]):
+        high, low = _follow_supply(k, rows, chamber, pressure, spool, supply, dt, z, last)
+        drooped[k] = high
+        if flow.shape[1] > 0:
+            _flow_misses(k, rows, chamber, pressure, pressure_rate, spool, high, low, dt, s[k], rate[k], z, flow)
+
+
+@compiled
+def _follow_supply(k, fed, chamber, pressure, spool, supply, dt, z, last):
     """Put the oil of sample k into z (n_states,), pressures as measured; returns supply and return pressure [Pa].
 
     fed are the actuators' rows, chamber (n_actuators, 2) their columns of pressure (n, n_chambers); last (4,) keeps
@@ -36,7 +53,7 @@ def follow_supply(k, fed, chamber, pressure, spool, supply, dt, z, last):
 
 
 @compiled
-def flow_misses(k, fed, chamber, pressure, pressure_rate, spool, high, low, dt, s, sd, z, flow):
+def _flow_misses(k, fed, chamber, pressure, pressure_rate, spool, high, low, dt, s, sd, z, flow):
     """Fill row k of flow (n, n_chambers) from the oil in z: V / beta dP/dt + A dL/dt - Q, per chamber [m3/s]."""
     for i in range(fed.size):
         row = fed[i]

@@ -20,21 +20,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .alignment import due_spools, gas_pressure, oil_force
-from .compiled import compiled
-from .engine_fused import inertia_table, platen_acceleration
 from .equilibrium import hydraulic_rows
 from .gas import gas_ratio
 from .inverse_dynamics import march_states, with_loads
 from .law_table import GAS_HEAT, LAWS, OSCILLATOR, PORTS
-from .ledger import add_at_c
-from .oil_residuals import flow_misses, follow_supply
+from .oil_residuals import oil_misses
 from .plant import Plant
-from .pose import PlantMotion, PlatenMotion, plant_motion
+from .port_path import PortPath, ports_along
+from .pose import PlatenMotion, plant_motion
 from .records import require, sample_interval
-from .rigid_body import platen_inertia
-from .schemes import SD, TAU, V_SEEN, S, forces_stage, port_rates, pose_stage, set_twist
 from .signals import differentiate
-from .workspace import make_workspace
+from .wrench_residuals import missed_wrench, needed_wrench, weigh_alike
 
 __all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured", "states_of"]
 
@@ -115,10 +111,11 @@ def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, pa
 
 
 class Path(NamedTuple):
-    """A test's motion in a plant's coordinates, and the friction states that it leaves behind."""
+    """A test's motion in a plant's coordinates and ports, and the friction states that it leaves behind."""
 
-    motion: PlantMotion
-    along: PlantMotion  # what friction follows
+    ports: PortPath
+    along: PortPath  # what friction follows
+    needed: Array  # (n, 6) wrench at B in platen axes that the platen's inertia and weight ask for, on its free axes
     z: Array  # (n, n_states)
 
 
@@ -130,31 +127,41 @@ def follow(
     What does not differ from the `known` path of the same motion, of another plant, is taken from there. start
     (n_states,) is what friction remembers from before the test, if not nothing.
     """
+    there: dict[tuple[object, ...], Array] = {}
+    before: dict[tuple[object, ...], slice] = {}
     if known is None or _geometry(known[0]) != _geometry(plant):
-        moved = PlantMotion(*(np.ascontiguousarray(x) for x in plant_motion(plant, test.motion)))
-        along = moved
+        moved = plant_motion(plant, test.motion)
+        along = ports = ports_along(plant, moved)
         if test.path is not None:
-            along = plant_motion(plant, test.motion._replace(displacement=test.path))
-        there = {}
+            along = ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
+        needed = needed_wrench(plant, moved, ports.turn)
     else:
-        moved, along, old = known[1]
+        ports, along, needed, old = known[1]
+        if not weigh_alike(known[0], plant):
+            needed = needed_wrench(plant, plant_motion(plant, test.motion), ports.turn)
         if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
-            return known[1]
-        there = {_marched(row): old[:, states_of(row)] for row in _moving(known[0])}
+            return Path(ports, along, needed, old)
+        before = {_marched(row): states_of(row) for row in _moving(known[0])}
+        there = {key: old[:, place] for key, place in before.items()}
     rows = _moving(plant)
     fresh = {key: row for row in rows if (key := _marched(row)) not in there}
     # oscillators and heat average noise, and feel what a still path lacks
     parts: tuple[list[np.void], list[np.void]] = [], []
     for row in fresh.values():
         parts[test.path is not None and int(row["law"]) in (OSCILLATOR, GAS_HEAT)].append(row)
-    for some, motion in zip(parts, (along, moved), strict=True):
-        if some or (known is None and some is parts[0]):  # also to see that no leg is out of its stroke
-            marched = march_states(plant, motion, test.dt, start, rows=np.array(some, plant.rows.dtype))
+    for some, way in zip(parts, (along, ports), strict=True):
+        if some:
+            marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
             there |= {_marched(row): marched[:, states_of(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))
-    for row in rows:
+    moved_on = [row for row in rows if before.get(_marched(row)) != states_of(row)]
+    if before:
+        still = min([z.shape[1], old.shape[1], *(int(row["state"]) for row in moved_on)])
+        z[:, :still] = old[:, :still]  # most rows keep their places
+        moved_on = [row for row in rows if row["state"] >= still]
+    for row in moved_on:
         z[:, states_of(row)] = there[_marched(row)]
-    return Path(moved, along, z)
+    return Path(ports, along, needed, z)
 
 
 _WIDTH = {law.code: len(law.states) for law in LAWS.values() if law.code >= 0}
@@ -182,10 +189,9 @@ def states_of(row: np.void) -> slice:
 
 
 def _geometry(plant: Plant) -> bytes:
-    """What the motion of a plant's ports depends on."""
-    legs = plant.legs.copy()
-    legs["normal_thrust"] = 0.0
-    return plant.body.tobytes() + legs.tobytes()
+    """What the motion of a plant's ports and their force columns depend on, and which they are."""
+    body = np.append(plant.body["rho_c"], plant.body["plane"]).tobytes()
+    return body + plant.legs.tobytes() + " ".join(plant.ports).encode()
 
 
 def evaluate_residuals(
@@ -196,86 +202,40 @@ def evaluate_residuals(
     path is that of `follow`, if it is known. Raises RecordError naming the sample where a leg is out of its stroke.
     """
     n, machine = test.samples, plant.machine
-    moved, _, z = path or follow(plant, test)
-    fed = hydraulic_rows(plant)
-    double = np.array([name in machine.double_acting for name in machine.actuator_names])
+    path = path or follow(plant, test)
     force = test.actuator_force
     if test.pressure is not None:
         oil = oil_force(machine, test.pressure[:, : plant.spools], test.pressure[:, plant.spools :])
         force = oil if force is None else force
-    fed_known = test.pressure is not None and test.spool is not None
-    wants_flow = "flow" in only and fed_known
-    wants_supply = "supply" in only and fed_known and test.supply_pressure is not None
-    wants_wrench = "wrench" in only and force is not None
-    wrench = np.zeros((n, 6 if wants_wrench else 0))
-    flow = np.zeros((n, plant.spools + int(double.sum()) if wants_flow else 0))
-    length = np.zeros((n, plant.legs.size))
-    if wants_wrench and force is not None:
-        z = with_loads(plant, z, force)
-    rest = plant.rows[plant.rows["input"] < 0]
-    ws = make_workspace(plant, plant.zero_state())
-    _, mass = platen_inertia(plant.model, machine)
-    none = np.zeros((1, plant.spools))
-    chamber = np.full((plant.spools, 2), -1)
-    chamber[:, 0] = np.arange(plant.spools)
-    chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
-    pressures = (test.pressure, test.pressure_rate, test.spool) if fed_known else (none, none, none)
-    drooped = np.zeros(n if wants_flow or wants_supply else 0)
-    _residuals(
-        *moved,
-        z,
-        force if wants_wrench else none,
-        *pressures,
-        *(plant.axes, plant.legs, plant.body, plant.rows[fed], rest, np.array(plant.model.damping), plant.supply),
-        *(inertia_table(plant), mass, chamber),
-        *(ws.frame, ws.port, ws.JB, ws.force, ws.motion, wrench, flow, length, drooped, test.dt),
-    )
+    wrench = np.zeros((n, 0))
+    if "wrench" in only and force is not None:
+        wrench = missed_wrench(plant, path.ports, path.needed, with_loads(plant, path.z, force), force)
+    flow, supplied = _of_oil(plant, test, path, only)
     gas = np.zeros((n, 0))
     if "gas" in only and test.strut_pressure is not None:
-        gas = np.log(test.strut_pressure / gas_pressure(machine, length[:, plant.spools :]) / gas_ratio(plant, z))
-    told = np.zeros((n, 0))
+        length = path.ports.s[:, plant.spools : plant.legs.size]
+        gas = np.log(test.strut_pressure / gas_pressure(machine, length) / gas_ratio(plant, path.z))
+    told, servo = np.zeros((n, 0)), np.zeros((n, 0))
     if "force" in only and test.pressure is not None and test.actuator_force is not None:
         told = test.actuator_force - oil
-    servo, supplied = np.zeros((n, 0)), np.zeros((n, 0))
     if "servo" in only and test.spool is not None and test.spool_command is not None:
         servo = test.spool - due_spools(plant, test.spool_command, test.dt)
-    if wants_supply and test.supply_pressure is not None:
-        supplied = test.supply_pressure - drooped[:, None]
     return Residuals(wrench, flow, gas, told, servo, supplied)
 
 
-@compiled
-def _residuals(
-    q, v, a, z, measured, pressure, pressure_rate, spool, axes, legs, body, fed, rest, damping, supply, inertia, mass,
-    chamber, frame, port, JB, force, motion, wrench, flow, length, drooped, dt,
-):  # fmt: skip
-    work = np.zeros((2, 6))
-    miss = np.zeros(axes.size)
-    left = np.zeros(6)
-    oil, last = np.zeros(z.shape[1]), np.zeros(4)
-    high, low = supply[0], supply[1]
-    for k in range(q.shape[0]):
-        motion[V_SEEN] = v[k]
-        pose_stage(q[k], axes, legs, body, frame, port, JB)
-        length[k] = port[S, : legs.size]
-        if wrench.shape[1] == 0:
-            set_twist(v[k], axes, frame)
-            port_rates(JB[0], frame, port[SD])
-        else:
-            forces_stage(axes, legs, body, rest, damping, frame, port, JB, z[k], force, motion)
-            for i in range(measured.shape[1]):
-                for j in range(axes.size):
-                    motion[TAU, j] += JB[1, i, axes[j]] * measured[k, i]
-            platen_acceleration(inertia, axes, frame, motion[TAU], work, miss)
-            for j in range(axes.size):
-                miss[j] = a[k, j] - miss[j]
-            left[:] = 0.0
-            for i in range(axes.size):
-                for j in range(axes.size):
-                    left[axes[i]] += mass[axes[i], axes[j]] * miss[j]
-            add_at_c(1.0, left.reshape(1, 6), 0, body[0].rho_c, frame, wrench[k])
-        if drooped.size > 0:
-            high, low = follow_supply(k, fed, chamber, pressure, spool, supply, dt, oil, last)
-            drooped[k] = high
-        if flow.shape[1] > 0:
-            flow_misses(k, fed, chamber, pressure, pressure_rate, spool, high, low, dt, port[S], port[SD], oil, flow)
+def _of_oil(plant: Plant, test: Measured, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
+    """Residuals `flow` and `supply`."""
+    n, double = test.samples, np.isin(plant.machine.actuator_names, plant.machine.double_acting)
+    supply = test.supply_pressure if "supply" in only else None
+    none = np.zeros((n, 0))
+    if test.pressure is None or test.spool is None or ("flow" not in only and supply is None):
+        return none, none
+    flow = np.zeros((n, plant.spools + int(double.sum()))) if "flow" in only else none
+    chamber = np.full((plant.spools, 2), -1)
+    chamber[:, 0] = np.arange(plant.spools)
+    chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
+    drooped, rows = np.zeros(n), plant.rows[hydraulic_rows(plant)]
+    measured = test.pressure, test.pressure_rate, test.spool
+    states = len(plant.states)
+    oil_misses(rows, chamber, *measured, plant.supply, path.ports.s, path.ports.rate, states, test.dt, drooped, flow)
+    return flow, none if supply is None else supply - drooped[:, None]

@@ -1,6 +1,6 @@
 """Laws beyond the report, as the stage calls them where a table has any: forces, rates and steps of hidden states."""
 
-from .compiled import compiled
+from .compiled import compiled, compiled_inline
 from .law_table import (
     ASYMMETRIC,
     BACKLASH,
@@ -79,7 +79,7 @@ def _foot(row, x):
     return x[row.port] + p[4] * x[row.port_2] + p[5] * x[row.port_3]
 
 
-@compiled
+@compiled_inline
 def _force(row, s, sd, z):
     """Force of a row on its port, its second and its third [N or N m]."""
     p = row.p
@@ -192,7 +192,10 @@ def _advance(row, s, ds, dt, z):
             z[k + 1] = advance_mean_speed(z[k + 1], ds[a], dt, p[3])
     elif law == LOAD_FRICTION or law == DAHL_INSTEAD:
         across = ds[row.port_2] if row.port_2 >= 0 else 0.0
-        z[k], z[k + 1] = bouc_wen_advance(ds[a], across, z[k], z[k + 1], p[1], p[2])
+        if row.port_2 < 0:
+            z[k] = bouc_wen_advance_1d(ds[a], z[k], p[1], p[2])
+        else:
+            z[k], z[k + 1] = bouc_wen_advance(ds[a], across, z[k], z[k + 1], p[1], p[2])
         if law == DAHL_INSTEAD:
             z[k + 2], z[k + 3] = advance_dahl(ds[a], across, z[k + 2], z[k + 3], p[3])
     elif law == BALL:

@@ -30,7 +30,7 @@ from lhpost6_pin.discover.resume import make_bookmark
 from lhpost6_pin.discover.scores import Background, Block, Score, less_noise, make_block, score
 from lhpost6_pin.discover.screening import _by_rank, stand
 from lhpost6_pin.discover.search import _pruned, _without
-from lhpost6_pin.discover.state import Added, Contest, Scored
+from lhpost6_pin.discover.state import Added, Contest, Scored, Standing
 from lhpost6_pin.discover.verdict import without_name
 from lhpost6_pin.discover.weighing import Lowered, Weighing, refusal, squares_by_column
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
@@ -280,7 +280,7 @@ def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     more = replace(background, rest=rest, side=side)
     weigh = Weighing(problem, more, squares_by_column(search.refit.normal.rest), numbers)
     candidates = [candidate("valve_deadband", "H1"), *hidden]
-    pairs = score_pairs(problem, base, (), weigh, candidates, numbers)
+    pairs = score_pairs(problem, Standing(base, more, ()), weigh, candidates, numbers)
     assert [p.places for p in pairs if not p.refused] == [(1, 2)]
     assert pairs[0].places == (1, 2)
     np.testing.assert_allclose(np.concatenate(pairs[0].amplitudes), [2e6, 2e4], rtol=0.1)  # noise and the refit

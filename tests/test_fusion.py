@@ -9,6 +9,7 @@ from lhpost6_pin.errors import RecordError
 from lhpost6_pin.fusion import fuse_motion, kinematic_jacobian
 from lhpost6_pin.inverse_dynamics import march_states
 from lhpost6_pin.kinematics import pose_jacobian
+from lhpost6_pin.port_path import ports_along
 from lhpost6_pin.pose import PlatenMotion, plant_motion
 from lhpost6_pin.records import make_record
 from lhpost6_pin.sensors import add_noise, load_sensors
@@ -127,7 +128,7 @@ def test_friction_keeps_its_memory_of_a_motion_through_a_rest(plant) -> None:
 
     def memory(displacement) -> np.ndarray:
         path = plant_motion(plant, motion._replace(displacement=displacement))
-        return march_states(plant, path, 1 / RATE)[-1, seals]
+        return march_states(plant, ports_along(plant, path), 1 / RATE)[-1, seals]
 
     left = memory(motion.displacement)
     assert np.abs(left).min() > 0.9  # 1 mm is five times the seals' yield displacement

@@ -9,6 +9,7 @@ from lhpost6_pin.errors import RecordError, SimulationError
 from lhpost6_pin.inverse_dynamics import Decomposition, inverse_dynamics, leg_wrenches, march_states
 from lhpost6_pin.ledger import force_ledger
 from lhpost6_pin.plant import make_plant
+from lhpost6_pin.port_path import ports_along
 from lhpost6_pin.pose import PlatenMotion, plant_motion
 from lhpost6_pin.residuals import Measured, evaluate_residuals
 from lhpost6_pin.simulate import Run
@@ -53,7 +54,8 @@ def test_without_the_velocity_that_forces_saw_the_rest_is_of_second_order(run: R
 
 def test_marched_friction_is_that_of_the_run(run: Run) -> None:
     columns = friction_columns(run)
-    z = march_states(run.plant, plant_motion(run.plant, motion_of(run)), 1.0 / RATE, start=run.z[0])
+    ports = ports_along(run.plant, plant_motion(run.plant, motion_of(run)))
+    z = march_states(run.plant, ports, 1.0 / RATE, start=run.z[0])
     assert np.abs(run.z[:, columns]).max() > 0.5  # pads and seals slide
     # lengths of 5 m round to 1e-15 m, 5e-12 of the seals' yield of 0.2 mm
     assert np.abs(z[:, columns] - run.z[:, columns]).max() < 2e-11

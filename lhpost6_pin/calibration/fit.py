@@ -130,8 +130,8 @@ def solve(
     Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
     the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and
     evaluates derivatives by gains, offsets and what hardly bends the equations there alone, all others as long as steps
-    gain much; of a settled one only those that `known` lacks, and those that are `near` (p,) to them. A step that went
-    too far is taken again, a quarter as long.
+    gain much, or with `known` there alone; a settled one only those that `known` lacks, and those that are `near` (p,)
+    to them. A step that went too far is taken again, a quarter as long.
     """
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
@@ -149,15 +149,16 @@ def solve(
         part = done - 1 if done == 1 else done - 1 + len(replicas)
         share = between(progress, shares[part], shares[part + 1])
         if normal is None:
-            normal = first or Normal(problem, x, share, known)
+            normal = first or Normal(problem, x, share, known, None if settled else fresh | again)
             before = misfit(problem, normal.rest)
         else:
-            renewed = not frugal or (gain > numbers.number("fit.renew") and done <= int(numbers.number("fit.renewals")))
+            much = gain > numbers.number("fit.renew") and done <= int(numbers.number("fit.renewals"))
+            renewed = not frugal or (much and (settled or known is None))
             normal = Normal(problem, x, share, normal, again if renewed else np.zeros_like(again))
         if done == (1 if frugal else 2):  # near enough to the end, and the same from there on
             parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
             bias = Bias(normal, replicas, x, parts, known)
-        if bias is not None and done > 1:
+        if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
         value = objective(problem, normal.rest, x)
         if held is not None and value > least + OVERSHOT:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..parameters import Parameters
 from ..progress import Progress
 from .problem import Base, Problem, Slopes
-from .spectra import excess, real_bins
+from .spectra import excess, real_bins, real_rows
 
 __all__ = ["Bias", "Normal", "bounded_step", "bounds_of", "positive", "squares"]
 
@@ -162,7 +162,7 @@ def _together(
 def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
     """Normal matrix (p, p) and right side (p,) of bins (m, c) and their p derivatives (m, c) over a power (m, c)."""
     root = np.sqrt(power)
-    rows = np.stack([real_bins(j, root) for j in slope])
+    rows = real_rows(slope, root)
     return rows @ rows.T, rows @ real_bins(rest, root)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 
-__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "spectrum_of", "surprise"]
+__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "real_rows", "spectrum_of", "surprise"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -48,6 +48,15 @@ def real_bins(bins: Complex, root: Array) -> Array:
     scaled = bins * (np.sqrt(2.0) / root).reshape(root.shape + (1,) * (bins.ndim - 2))
     flat = scaled.reshape(-1, *bins.shape[2:])
     return np.concatenate([flat.real, flat.imag])
+
+
+def real_rows(slopes: Sequence[Complex] | Complex, root: Array) -> Array:
+    """`real_bins` of several arrays of bins (m, c), one a row (p, 2 m c)."""
+    rows = np.empty((len(slopes), 2, *root.shape))
+    for row, bins in zip(rows, slopes, strict=True):
+        row[0], row[1] = bins.real, bins.imag
+        row *= np.sqrt(2.0) / root
+    return rows.reshape(len(slopes), -1)
 
 
 class Whitener(NamedTuple):

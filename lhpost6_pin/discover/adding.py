@@ -16,7 +16,7 @@ from ..progress import Progress, between
 from .candidates import Candidate
 from .pairs import score_pairs
 from .screening import weighing
-from .state import Added, Contest, Scored, Search, Standing, fitted_machine
+from .state import Added, Contest, Scored, Search, Standing, firsts, fitted_machine
 from .weighing import gate, squares_by_column
 
 __all__ = ["further", "refined"]
@@ -37,7 +37,7 @@ def further(
         return more
     weigh = weighing(found, standing, numbers)
     candidates = [one.candidate for one in few]
-    pairs = score_pairs(found.problem, standing.base, standing.replicas, weigh, candidates, numbers)
+    pairs = score_pairs(found.problem, standing, weigh, candidates, numbers)
     first = pairs[0]
     stands_in = more is None or more.added[-1].candidate.family.named not in {
         candidates[i].family.named for i in first.places
@@ -53,11 +53,9 @@ def further(
 
 def _strongest(scored: Sequence[Scored], numbers: Parameters) -> list[Scored]:
     """The best candidate of each family, of the families that gain most."""
-    best: dict[str, Scored] = {}
-    for one in scored:
-        if one.score.gain >= numbers.number("accept.look") and not one.candidate.release:
-            best.setdefault(one.candidate.family.named, one)
-    return list(best.values())[: int(numbers.number("accept.paired"))]
+    look = numbers.number("accept.look")
+    some = [one for one in scored if one.score.gain >= look and not one.candidate.release]
+    return firsts(some, named=True)[: int(numbers.number("accept.paired"))]
 
 
 def _better(
@@ -84,12 +82,10 @@ def _in_its_place(found: Search, one: Scored, numbers: Parameters) -> list[Score
     """The best of other families on the same components that come near a candidate, but for what was added."""
     near = numbers.number("accept.near") * one.gain
     taken = {one.candidate.family.name, *(a.candidate.family.name for a in found.added)}
-    firsts: dict[str, Scored] = {}
-    for other in found.rounds[-1].scored:
-        there = other.candidate.components == one.candidate.components and not other.candidate.release
-        if there and other.gain >= near and other.candidate.family.name not in taken:
-            firsts.setdefault(other.candidate.family.name, other)
-    return list(firsts.values())[: int(numbers.number("accept.rivals")) - 1]
+    some = [o for o in found.rounds[-1].scored if o.gain >= near and not o.candidate.release]
+    there = firsts([o for o in some if o.candidate.components == one.candidate.components])
+    rivals = [o for o in there if o.candidate.family.name not in taken]
+    return rivals[: int(numbers.number("accept.rivals")) - 1]
 
 
 def _add(
@@ -100,10 +96,7 @@ def _add(
     Of those that explain the campaign alike the simplest counts. Where none of them lowers what is left when it is
     fitted in full, those next in gain are tried; None if none of these does either.
     """
-    firsts: dict[str, Scored] = {}
-    for one in passed:
-        firsts.setdefault(one.candidate.family.name, one)
-    waiting = list(firsts.values())
+    waiting = firsts(passed)
     most, batches = int(numbers.number("accept.rivals")), int(numbers.number("accept.batches"))
     for batch in range(batches):
         near = numbers.number("accept.near") * waiting[0].gain if waiting else 0.0

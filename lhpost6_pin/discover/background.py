@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..calibration.normal import Normal, bounds_of, positive
 from ..calibration.problem import Problem
-from ..calibration.spectra import real_bins
+from ..calibration.spectra import real_bins, real_rows
 from ..parameters import Parameters
 from .scores import Background
 
@@ -25,7 +25,7 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
 
     def rows(slopes: Sequence[NDArray[np.complex128]], root: Array) -> Array:
         """Real rows (n, p) of derivatives (m, c), in units of the priors."""
-        return np.stack([real_bins(j, root) * sd for j, sd in zip(slopes, prior, strict=True)]).T
+        return (real_rows(slopes, root) * prior[:, None]).T
 
     slope, rest, root, matrix, side = [], [], [], [], []
     for t, (own, left, power) in enumerate(zip(normal.slope, normal.rest, normal.power, strict=True)):

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from ..calibration.problem import Base, Problem
 from ..inverse_dynamics import with_loads
 from ..law_table import LAWS
-from ..ledger import States, effect_wrenches
 from ..machine import Machine
 from ..plant import make_plant
 from ..residuals import RESIDUALS, Residuals, follow
+from ..wrench_residuals import row_wrenches
 from .candidates import Candidate
 
-__all__ = ["Columns", "columns_of"]
+__all__ = ["Columns", "columns_of", "side_by_side"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,14 +39,15 @@ def columns_of(problem: Problem, base: Base, candidates: Sequence[Candidate]) ->
     elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].alters == "oil":
         columns = _by_oil(problem, base, first.at(tuple(alone)))
     else:
-        columns = _stack([_by_difference(problem, base, c) for c in candidates])
+        columns = side_by_side([_by_difference(problem, base, c) for c in candidates])
         ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
         whole = np.eye(ends[-1])
         return columns, [whole[:, a:b] for a, b in pairwise(ends)]
     return columns, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
 
 
-def _stack(parts: Sequence[Columns]) -> Columns:
+def side_by_side(parts: Sequence[Columns]) -> Columns:
+    """Columns (m, c, k) of every test, all that these have."""
     return [np.concatenate(bins, axis=-1) for bins in zip(*parts, strict=True)]
 
 
@@ -69,16 +70,16 @@ def _by_force(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> 
     for candidate in candidates:
         machine = candidate.on(machine, (size,))
     plant = make_plant(machine)
+    rows = plant.rows[plant.rows["effect"] >= known]
     found: Columns = []
     for test, there in zip(base.tests, base.paths, strict=True):
         path = follow(plant, test, (base.plant, there))
         z = path.z if test.actuator_force is None else with_loads(plant, path.z, test.actuator_force)
-        wrench = effect_wrenches(States(plant, test.dt * np.arange(test.samples, dtype=float), *path.motion, z))[
-            :, known:
-        ]
+        wrench = row_wrenches(plant, path.ports, z, rows)
         changes = []
         for i in range(len(candidates)):
-            change = Residuals(-wrench[:, i] / size, *(np.zeros((test.samples, 0)) for _ in RESIDUALS[1:]))
+            own = wrench[:, rows["effect"] == known + i].sum(axis=1)
+            change = Residuals(-own / size, *(np.zeros((test.samples, 0)) for _ in RESIDUALS[1:]))
             changes.append(problem.bins(change, test.dt)[0])
         found.append(np.stack(changes, axis=-1))
     return _whitened(problem, found)

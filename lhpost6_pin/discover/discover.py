@@ -12,7 +12,7 @@ import xarray as xr
 from ..calibration import calibration_numbers
 from ..calibration.knobs import plan_knobs, scatter_knobs
 from ..calibration.normal import Normal
-from ..calibration.prepare import prepare_problem
+from ..calibration.prepare import Prepared, prepare_problem
 from ..campaign import Campaign
 from ..control import load_controller
 from ..errors import RecordError, UnknownNameError
@@ -90,8 +90,9 @@ def discover(
     bookmark = make_bookmark(unfinished, machine, sensors, hashes, hold_out, seed)
     place = bookmark.read()
     if place is None:
-        begin = between(report, 0.0, 0.4)
-        place = _begin(machine, records, sensors, held, more=hold_out is None, seed=seed, jobs=jobs, progress=begin)
+        ready = _prepared(machine, records, sensors, numbers, calibration, seed, jobs)
+        report(0.1)
+        place = _begin(ready, held, numbers, calibration, more=hold_out is None, progress=between(report, 0.1, 0.4))
         bookmark.write(place)
     machine, held = place.machine, place.held
     used = [i for i in range(len(names)) if i not in held]
@@ -138,37 +139,45 @@ def discover(
     )
 
 
-def _begin(
+def _prepared(
     machine: Machine,
     records: Sequence[xr.Dataset],
     sensors: Sensors,
-    held: tuple[int, ...],
-    *,
-    more: bool,
+    numbers: Parameters,
+    calibration: Parameters,
     seed: int,
     jobs: int,
-    progress: Progress,
-) -> Place:
-    """Prepare the tests that are not held out and refit what is known; `more`: hold out the one that tells least."""
-    numbers, calibration = discovery_numbers()
+) -> Prepared:
+    """All tests made ready, friction of another form and warmer oil counted as noise."""
     others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
-    ready = prepare_problem(
+    return prepare_problem(
         machine, records, sensors, calibration, kinds=RESIDUALS, others=others, preload=preload, seed=seed, jobs=jobs
     )
+
+
+def _begin(
+    ready: Prepared,
+    held: tuple[int, ...],
+    numbers: Parameters,
+    calibration: Parameters,
+    *,
+    more: bool,
+    progress: Progress,
+) -> Place:
+    """Refit what is known to the tests that are not held out; `more`: hold out the one that tells least, too."""
     machine = ready.problem.machine
     knobs = (*ready.problem.knobs, *plan_knobs(machine))
     twins = scatter_knobs(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
     whole, forms = with_background(machine, numbers.number("scatter.spread"))
     ready = ready.with_machine(whole, (*knobs, *twins, *forms))
-    progress(0.25)
-    used = [i for i in range(len(records)) if i not in held]
+    used = [i for i in range(len(ready.problem.tests)) if i not in held]
     ready = ready.only(used)
-    first = Normal(ready.problem, np.zeros(len(ready.problem.prior)), between(progress, 0.25, 0.5))
+    first = Normal(ready.problem, np.zeros(len(ready.problem.prior)), between(progress, 0.0, 0.3))
     if more and len(used) > FEWEST:
         least = _tells_least(first)
         held = (used.pop(least),)
         ready, first = ready.only(used), first.only(used)
-    return Place(machine, held, refit(ready, first, calibration, between(progress, 0.5, 1.0)))
+    return Place(machine, held, refit(ready, first, calibration, between(progress, 0.3, 1.0)))
 
 
 def discovery_numbers() -> tuple[Parameters, Parameters]:

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.problem import Base, Problem
-from ..calibration.spectra import real_bins, spectrum_of
+from ..calibration.spectra import spectrum_of
 from ..inverse_dynamics import leg_wrenches
 from ..law_table import NODES
 from ..laws.lines import filter_shares
 from ..machine import Machine
 from ..parameters import Parameters
-from ..pose import leg_displacements
+from ..pose import leg_displacements, plant_motion
 from ..residuals import Measured
 from .formula import Formula, sparse_formula
 from .scores import make_block, score
@@ -123,8 +123,7 @@ def _fitted(
     background, free = weigh.background, np.full(NODES, np.inf)
     spread = np.full(NODES, numbers.number("left.spread"))
     one = score(background, make_block(background, columns), -free, free, spread)
-    explained = [real_bins(c, root) @ one.amplitude for c, root in zip(columns, background.root, strict=True)]
-    less = weigh.lowered(explained, one)
+    less = weigh.lowered(background.explained(columns, one.amplitude), one)
     return Left(components, state, memory, nodes, one.amplitude, one.sd, less.gain, less.beyond, one.held_out)
 
 
@@ -155,7 +154,7 @@ def _legs(base: Base, t: int) -> tuple[tuple[Array, Array], Array]:
     """Elongations and their rates (n, legs) and wrenches of unit forces (n, legs, 6) of a test."""
     motion = base.tests[t].motion
     moved = leg_displacements(base.plant, motion.displacement, motion.velocity)
-    return moved, leg_wrenches(base.plant, base.paths[t].motion.q, np.ones_like(moved[0]))
+    return moved, leg_wrenches(base.plant, plant_motion(base.plant, motion).q, np.ones_like(moved[0]))
 
 
 def _hats(x: Array, nodes: Array) -> Array:

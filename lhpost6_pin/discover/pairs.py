@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.problem import Base, Problem
-from ..calibration.spectra import real_bins
 from ..parameters import Parameters
 from .candidates import Candidate
-from .columns import Columns, columns_of
+from .columns import Columns, columns_of, side_by_side
 from .scores import less_noise, make_block, score
+from .state import Standing
 from .weighing import Weighing, gate, refusal
 
 __all__ = ["Pair", "score_pairs"]
@@ -34,18 +34,13 @@ class Pair(NamedTuple):
 
 
 def score_pairs(
-    problem: Problem,
-    base: Base,
-    replicas: Sequence[tuple[Problem, Base]],
-    weigh: Weighing,
-    candidates: Sequence[Candidate],
-    numbers: Parameters,
+    problem: Problem, standing: Standing, weigh: Weighing, candidates: Sequence[Candidate], numbers: Parameters
 ) -> list[Pair]:
-    """All pairs of candidates, by falling gain; replicas are the problem and its base with more noise."""
-    background = weigh.background
+    """All pairs of candidates where a search of the problem stands, by falling gain."""
+    background = standing.background
     ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
-    columns = _side_by_side(problem, base, candidates)
-    noisy = [_side_by_side(again, there, candidates) for again, there in replicas]
+    columns = _all_columns(problem, standing.base, candidates)
+    noisy = [_all_columns(again, there, candidates) for again, there in standing.replicas]
     block = make_block(background, columns)
     if noisy:
         block = less_noise(background, block, columns, noisy)
@@ -62,10 +57,7 @@ def score_pairs(
     for i, j in combinations(range(len(candidates)), 2):
         k = together(i, j)
         one = score(background, block.select(whole[:, k]), low[k], high[k], spread[k])
-        explained = [
-            real_bins(c[..., k], root) @ one.amplitude for c, root in zip(columns, background.root, strict=True)
-        ]
-        less = weigh.lowered(explained, one)
+        less = weigh.lowered(background.explained([c[..., k] for c in columns], one.amplitude), one)
         families = candidates[i].family, candidates[j].family
         why = refusal(families, one, less, numbers)
         needed = all(
@@ -78,10 +70,10 @@ def score_pairs(
     return sorted(found, key=lambda pair: -pair.gain)
 
 
-def _side_by_side(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> Columns:
+def _all_columns(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> Columns:
     """Columns (m, c, k) of every test, those of all candidates' amplitudes."""
     each = []
     for candidate in candidates:
         columns, (part,) = columns_of(problem, base, [candidate])
         each.append([c @ part for c in columns])
-    return [np.concatenate(bins, axis=-1) for bins in zip(*each, strict=True)]
+    return side_by_side(each)

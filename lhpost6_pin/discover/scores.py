@@ -84,6 +84,10 @@ class Background:
         gains = np.array([one.gain(theta) for one, theta in zip(profiles, best, strict=True)])
         return gains, profiles[0].change(best[0])
 
+    def explained(self, columns: Columns, amplitude: Array) -> list[Array]:
+        """Real bins (n,) of every test that columns (m, c, k) explain with amplitudes (k,)."""
+        return [real_bins(c, root) @ amplitude for c, root in zip(columns, self.root, strict=True)]
+
     @property
     def gains(self) -> Array:
         """Log-likelihood that what is at a bound gains by itself, of all tests and of all but each (1 + t,)."""

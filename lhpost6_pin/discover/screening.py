@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from ..calibration.fit import Solution
 from ..calibration.problem import Base, Problem
-from ..calibration.spectra import real_bins
 from ..library import Family
 from ..parameters import Parameters
 from ..progress import Progress
 from .background import make_background
 from .candidates import Candidate, list_candidates
-from .columns import columns_of
+from .columns import Columns, columns_of, side_by_side
 from .releases import block_of, list_releases
 from .scores import Background, Block, Score, less_noise, make_block, score
 from .state import Round, Scored, Search, Standing
@@ -24,6 +23,9 @@ from .weighing import Lowered, Weighing, refusal, squares_by_column
 __all__ = ["screen", "stand", "weighing"]
 
 Array = NDArray[np.float64]
+
+BATCH = 8
+"""Groups of candidates that are weighed at once."""
 
 
 def stand(solution: Solution, calibration: Parameters, replicas: Sequence[Problem] = ()) -> Standing:
@@ -57,10 +59,7 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
             why = "may be the form of what was found there"
         return Scored(candidate, one, less.gain, less.share, why)
 
-    def of_group(group: Sequence[Candidate]) -> list[Scored]:
-        columns, parts = columns_of(problem, base, group)
-        block = make_block(background, columns)
-
+    def of_group(group: Sequence[Candidate], columns: Columns, parts: Sequence[Array], block: Block) -> list[Scored]:
         def scores(block: Block) -> list[Score]:
             pairs = zip(group, parts, strict=True)
             return [score(background, block.select(q), *c.bounds, c.spread(numbers)) for c, q in pairs]
@@ -71,8 +70,20 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
             found = scores(less_noise(background, block, columns, noisy))
         scored = []
         for candidate, part, one in zip(group, parts, found, strict=True):
-            scored.append(judged(candidate, one, partial(_explained, background, columns, part @ one.amplitude)))
+            scored.append(judged(candidate, one, partial(background.explained, columns, part @ one.amplitude)))
         return scored
+
+    def of_batch(groups: Sequence[Sequence[Candidate]]) -> list[Scored]:
+        """Several groups with one pass through the background, which is what takes time."""
+        each = [columns_of(problem, base, group) for group in groups]
+        block = make_block(background, side_by_side([columns for columns, _ in each]))
+        ends = np.cumsum([0, *(columns[0].shape[-1] for columns, _ in each)])
+        own = [block.select(part) for part in np.split(np.eye(ends[-1]), ends[1:-1], axis=1)]
+        return [
+            one
+            for group, (columns, parts), b in zip(groups, each, own, strict=True)
+            for one in of_group(group, columns, parts, b)
+        ]
 
     scored: list[Scored] = []
     for candidate in list_releases(problem):
@@ -81,9 +92,10 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
         one = score(background, block_of(background, place), -free, free, np.full(1, numbers.number("fit.sensor_free")))
         scored.append(judged(candidate, one, partial(_of_unknown, background, place, one.amplitude)))
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
-        for done, some in enumerate(parallel(delayed(of_group)(g) for g in groups)):
+        batches = [groups[i : i + BATCH] for i in range(0, len(groups), BATCH)]
+        for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
             scored += some
-            progress((done + 1) / len(groups))
+            progress((done + 1) / len(batches))
     return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), left)
 
 
@@ -112,11 +124,6 @@ def _found_there(found: Search, candidate: Candidate) -> float:
 
     same = [a for a in found.added if a.candidate.components == candidate.components]
     return max((a.gain for a in same if alike(a.candidate.family)), default=0.0)
-
-
-def _explained(background: Background, columns: Sequence[NDArray[np.complex128]], amplitude: Array) -> list[Array]:
-    """Real bins (n,) of every test that columns (m, c, k) explain."""
-    return [real_bins(c, root) @ amplitude for c, root in zip(columns, background.root, strict=True)]
 
 
 def _of_unknown(background: Background, place: int, amplitude: Array) -> list[Array]:

@@ -1,8 +1,8 @@
 """The search: refit, screen the library, add what passes, refit everything jointly, and again.
 
 A candidate passes if it gains enough, on tests that it was not fitted on, too, and explains enough of what is more than
-noise. Among those that pass, the one with the largest gain is added and its numbers are fitted together with all known
-parameters and sensor errors.
+noise. Of those that pass the one is added, or the two at once, that explain most when their numbers are fitted together
+with all known parameters and sensor errors.
 """
 
 from collections.abc import Callable

@@ -1,5 +1,6 @@
 """What a search knows: candidates as scored, rounds of screening, effects added, and where it stands."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..residuals import RESIDUALS
 from .candidates import Candidate
 from .scores import Background, Score
 
-__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "fitted_machine"]
+__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "firsts", "fitted_machine"]
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,15 @@ class Scored:
     gain: float  # of log-likelihood, with what is left weighed anew; without that where the linear gain is too little
     closure: float  # share of what is more than noise where it explains most
     refused: str  # why it is not added; empty if it may be
+
+
+def firsts(scored: Sequence[Scored], *, named: bool = False) -> list[Scored]:
+    """The first of each entry of the library, or of each name that a verdict gives."""
+    found: dict[str, Scored] = {}
+    for one in scored:
+        family = one.candidate.family
+        found.setdefault(family.named if named else family.name, one)
+    return list(found.values())
 
 
 @dataclass(frozen=True)
@@ -68,10 +78,7 @@ class Round:
     @property
     def best(self) -> dict[str, Scored]:
         """The best candidate of each family, by falling gain."""
-        found: dict[str, Scored] = {}
-        for one in self.scored:
-            found.setdefault(one.candidate.family.named, one)
-        return found
+        return {one.candidate.family.named: one for one in firsts(self.scored, named=True)}
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ def main() -> int:
         "lint": ["ruff", "check", "."],
         "format": ["ruff", "format", "--check", "."],
         "types": ["mypy"],
-        "tests": ["pytest", "-n", "auto", *slow],
+        "tests": ["pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder", *slow],
     }
     failed = []
     for name, command in checks.items():

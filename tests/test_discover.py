@@ -1,7 +1,9 @@
 """The search for missing effects: its columns are derivatives, its gains are gains, its verdicts are true."""
 
 import json
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import joblib
 import numpy as np
@@ -33,6 +35,7 @@ from lhpost6_pin.discover.search import _pruned, _without
 from lhpost6_pin.discover.state import Added, Contest, Scored, Standing
 from lhpost6_pin.discover.verdict import without_name
 from lhpost6_pin.discover.weighing import Lowered, Weighing, refusal, squares_by_column
+from lhpost6_pin.discover.where import gap_map, worst_spots
 from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.files import models_folder
 from lhpost6_pin.library import families, find_family
@@ -75,10 +78,29 @@ def ready(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Prepared:
     return prepare_problem(machine, rubbing.records[1:3], sensors, calibration_numbers())
 
 
+ASKED = {"hold_out": ["TZ"], "phases": (1,)}
+
+
 @pytest.fixture(scope="module")
-def found(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Discovery:
-    """What is found in it, with one test held out."""
-    return discover(machine, rubbing, sensors, hold_out=["TZ"], phases=(1,))
+def bookmarked(
+    machine: Machine, sensors: Sensors, rubbing: Campaign, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Discovery, Path]:
+    """What is found in it, with one test held out; and what the search had kept while it looked for a second effect."""
+    folder, kept = tmp_path_factory.mktemp("search"), tmp_path_factory.mktemp("kept")
+
+    def copy(share: float) -> None:
+        if share > 0.48 and not any(kept.iterdir()):
+            shutil.copytree(folder, kept, dirs_exist_ok=True)
+
+    found = discover(machine, rubbing, sensors, **ASKED, unfinished=folder, progress=copy)
+    assert not any(folder.iterdir())
+    return found, kept
+
+
+@pytest.fixture(scope="module")
+def found(bookmarked: tuple[Discovery, Path]) -> Discovery:
+    """What is found in it."""
+    return bookmarked[0]
 
 
 def candidate(family: str, *components: str, **shape: float) -> Candidate:
@@ -287,6 +309,21 @@ def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     assert "one of them explains as much" in {p.refused for p in pairs[1:]}
 
 
+def test_what_is_left_is_said_to_be_where_it_is(ready):
+    problem, random = ready.problem, np.random.default_rng(4)
+    shapes = [(len(f), sum(problem.widths)) for f in problem.frequency]
+    rest = [random.normal(size=(*s, 2)) @ [1.0, 1.0j] / np.sqrt(2.0) for s in shapes]
+    column = int(np.flatnonzero(problem.rows("flow", 2))[0])
+    low, high = problem.whitener.edges[2], problem.whitener.edges[4]
+    for r, f in zip(rest, problem.frequency, strict=True):
+        r[(f >= low) & (f < high), column] *= 4.0
+    (worst,) = worst_spots(problem, rest)
+    assert (worst.kind, worst.label, worst.band) == ("flow", "H3 A", (low, high))
+    assert worst.misfit == pytest.approx(16.0, rel=0.5)  # few bins
+    spots = [spot for row in gap_map(problem, rest) for spot in row if spot != worst]
+    assert np.nanmean([spot.misfit for spot in spots]) == pytest.approx(1.0, abs=0.05)
+
+
 def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
     for group in list_candidates(machine):
         for knob in group[0].knobs(tuple(s.typical for s in group[0].amplitudes), 100.0, 0.5):
@@ -461,23 +498,18 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
     np.testing.assert_array_equal(clean["chamber_pressure_a"], record["chamber_pressure_a"])
 
 
-def test_an_interrupted_search_goes_on_to_the_same_verdict(machine, sensors, rubbing, found, tmp_path):
-    """Interrupted while it looks for a second effect; a search of anything else does not go on from there."""
-
-    def interrupt(share: float) -> None:
-        if share > 0.48:
-            raise KeyboardInterrupt
-
-    asked = {"hold_out": ["TZ"], "phases": (1,), "unfinished": tmp_path}
-    with pytest.raises(KeyboardInterrupt):
-        discover(machine, rubbing, sensors, **asked, jobs=1, progress=interrupt)
-    (kept,) = tmp_path.iterdir()
+def test_a_search_goes_on_from_what_it_had_kept_to_the_same_verdict(machine, sensors, rubbing, bookmarked):
+    found, folder = bookmarked
+    (kept,) = folder.iterdir()
     assert [a.candidate.family.name for a in joblib.load(kept).search.added] == ["stribeck_friction"]
     shares: list[float] = []
-    again = discover(machine, rubbing, sensors, **asked, progress=shares.append)
+    again = discover(machine, rubbing, sensors, **ASKED, unfinished=folder, progress=shares.append)
     assert verdict_entries(again) == verdict_entries(found)
     assert min(shares) >= 0.4  # neither prepared nor refitted again
-    assert not any(tmp_path.iterdir())
+    assert not any(folder.iterdir())
+
+
+def test_a_search_of_anything_else_does_not_go_on_from_there(machine, sensors, tmp_path):
     hashes = {"TX": "a"}
     names = {
         make_bookmark(tmp_path, *inputs).path

@@ -152,8 +152,11 @@ def solve(
             normal = first or Normal(problem, x, share, known, None if settled else fresh | again)
             before = misfit(problem, normal.rest)
         else:
-            much = gain > numbers.number("fit.renew") and done <= int(numbers.number("fit.renewals"))
-            renewed = not frugal or (much and (settled or known is None))
+            renewed = not frugal or (
+                (settled or known is None)
+                and gain > numbers.number("fit.renew")
+                and done <= int(numbers.number("fit.renewals"))
+            )
             normal = Normal(problem, x, share, normal, again if renewed else np.zeros_like(again))
         if done == (1 if frugal else 2):  # near enough to the end, and the same from there on
             parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]

@@ -85,12 +85,18 @@ def _interval(value: Estimate) -> dict[str, Any]:
 
 def _left(found: Discovery) -> dict[str, Any] | None:
     left = found.verdict.left
-    nearest = {"nearest": list(found.verdict.nearest)}
+    known = {
+        "nearest": list(found.verdict.nearest),
+        "where": [
+            {"residual": s.kind, "column": s.label, "band": list(s.band), "misfit": round(s.misfit, 2)}
+            for s in found.verdict.where
+        ],
+    }
     if left is None:
-        return {"where": "no single leg or kind", "depends_on": "not known", **nearest}
+        return {**known, "component": None, "depends_on": "not known"}
     formula = left.formula
     return {
-        **nearest,
+        **known,
         "component": left.components[0] if len(left.components) == 1 else None,
         "components": list(left.components),
         "depends_on": left.state,

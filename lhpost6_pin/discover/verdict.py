@@ -18,6 +18,7 @@ from .left import Left
 from .sensing import Fault
 from .state import Added, Search
 from .weighing import squares_by_column
+from .where import Spot, worst_spots
 
 __all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge", "without_name"]
 
@@ -69,6 +70,7 @@ class Verdict:
     left: Left | None  # what has no name
     untestable: tuple[str, ...]  # families that this campaign could not show, of typical size
     nearest: tuple[str, ...] = ()  # families in the model that come nearest to what has no name
+    where: tuple[Spot, ...] = ()  # where most of what has no name is, by falling share
 
 
 def judge(
@@ -127,7 +129,8 @@ def judge(
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + told)
     named = _merged(effects)
     word = _word(named, changed, sensors, unnamed, blind)
-    return Verdict(word, named, changed, sensors, free, hidden, nearest)
+    spots = tuple(worst_spots(problem, found.rest)) if word == "unexplained" else ()
+    return Verdict(word, named, changed, sensors, free, hidden, nearest, spots)
 
 
 def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], int]:

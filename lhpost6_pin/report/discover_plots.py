@@ -11,8 +11,8 @@ from ..discover import Discovery
 from ..discover.left import Left
 from ..discover.proof import FLOOR
 from ..discover.state import Round
+from ..discover.where import gap_map
 from ..discover.words import where
-from ..names import AXES
 from .layout import stacked_layout
 from .page import Figure, Markup, paragraph, table, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
@@ -43,14 +43,7 @@ _KINDS = {
 def map_blocks(found: Discovery) -> list[Markup]:
     """Return, for each kind of residual, the misfit of every column in every band, before and after."""
     problem = found.search.problem
-    before, after = found.search.refit.normal.rest, found.search.rest
-    machine = problem.machine
-    chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
-    labels = {"wrench": AXES, "flow": chambers, "gas": machine.strut_names, "force": machine.actuator_names}
-    labels |= {"servo": machine.actuator_names, "supply": ("supply",)}
-    edges = problem.whitener.edges
-    groups = [(0, 2), (2, 4), (4, 6), (6, len(edges) - 1)]
-    heads = [f"{edges[a]:g}–{edges[b]:g} Hz" for a, b in groups]
+    before, after = (gap_map(problem, rest) for rest in (found.search.refit.normal.rest, found.search.rest))
     blocks = [
         paragraph(
             "Mean square of the whitened residuals, known parameters and sensor errors refitted: one is sensor noise "
@@ -58,23 +51,15 @@ def map_blocks(found: Discovery) -> list[Markup]:
         )
     ]
     for kind, words in _KINDS.items():
-        columns = np.flatnonzero(problem.rows(kind))
-        rows = []
-        for label, column in zip(labels[kind], columns.tolist(), strict=False):
-            cells = []
-            for a, b in groups:
-                pair = [_mean(rest, problem, column, edges[a], edges[b]) for rest in (before, after)]
-                cells.append(_cell(*pair))
-            rows.append((label, *cells))
-        if rows:
+        pairs = [(old, new) for old, new in zip(before, after, strict=True) if old[0].kind == kind]
+        if pairs:
+            heads = [f"{low:g}–{high:g} Hz" for low, high in (spot.band for spot in pairs[0][0])]
+            rows = [
+                (old[0].label, *(_cell(a.misfit, b.misfit) for a, b in zip(old, new, strict=True)))
+                for old, new in pairs
+            ]
             blocks.append(table(words, ("", *heads), rows))
     return blocks
-
-
-def _mean(rest: Sequence[NDArray[np.complex128]], problem: Any, column: int, low: float, high: float) -> float:
-    parts = [np.abs(r[(f >= low) & (f < high), column]) ** 2 for r, f in zip(rest, problem.frequency, strict=True)]
-    values = np.concatenate(parts)
-    return float(values.mean()) if values.size else float("nan")
 
 
 def _cell(before: float, after: float) -> Markup:

@@ -102,6 +102,8 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         blocks.append(figure(left_figure(verdict.left)))
     elif verdict.word == "unexplained":
         blocks.append(paragraph("More than noise is left, and no leg's position or speed, now or lately, explains it."))
+    if verdict.where:
+        blocks.append(paragraph(f"Most of what is left is in: {'; '.join(s.words for s in verdict.where)}."))
     if verdict.nearest:
         near = " and ".join(map(title_of, verdict.nearest))
         blocks.append(

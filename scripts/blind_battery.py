@@ -5,8 +5,8 @@
 
 Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
 searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests,
---brief shorter ones of four. --check exits with 1 where a campaign that lacks nothing got a name, or too few a right
-one: a smoke test.
+--brief shorter ones of four, proven by inverse dynamics alone. --check exits with 1 where a campaign that lacks nothing
+got a name, or too few a right one: a smoke test, which `scripts/checks.py` runs.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the same cases. --dask runs the cases
 on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes. --publish writes the scores
 to scripts/battery/results.md, too.
@@ -48,7 +48,7 @@ def make(case, folder: Path) -> dict:
     return measured_label(case)
 
 
-def search(name: str, folder: Path, with_baselines: bool) -> None:
+def search(name: str, folder: Path, phases: tuple[int, ...], with_baselines: bool) -> None:
     """Search one case, unless that was done; leaves verdict.json in its folder, or error.txt."""
     home = folder / name
     if (home / "verdict.json").exists():
@@ -59,7 +59,7 @@ def search(name: str, folder: Path, with_baselines: bool) -> None:
     begin = time.perf_counter()
     try:
         with parallel_config("threading", n_jobs=1):  # one case a worker, of whatever kind
-            found = discover(machine, campaign, sensors, hold_out=hold_out, phases=(1, 2), jobs=1)
+            found = discover(machine, campaign, sensors, hold_out=hold_out, phases=phases, jobs=1)
     except LhpostError as error:
         (home / "error.txt").write_text(str(error), encoding="utf-8")
         return
@@ -160,6 +160,7 @@ def main() -> None:
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
     cases = draw_cases(asked.cases, asked.seed, asked.campaign)
+    phases = (1,) if asked.campaign == "brief" else (1, 2)
     cluster = nullcontext()
     if asked.dask:
         from dask.distributed import Client, LocalCluster
@@ -169,9 +170,8 @@ def main() -> None:
         if not (folder / "seals.txt").exists():
             seal(Parallel()(delayed(make)(case, folder) for case in cases), folder)
             print(f"{len(cases)} labels sealed in {folder / 'seals.txt'}", flush=True)
-        for done, _ in enumerate(
-            Parallel(return_as="generator_unordered")(delayed(search)(c.id, folder, asked.baselines) for c in cases), 1
-        ):
+        searches = (delayed(search)(case.id, folder, phases, asked.baselines) for case in cases)
+        for done, _ in enumerate(Parallel(return_as="generator_unordered")(searches), 1):
             print(f"searched {done} of {len(cases)}", flush=True)
     labels = unseal(folder)
     answered = answers(folder, labels)

@@ -1,33 +1,41 @@
-"""All checks of the project: lint, format, types, tests. Exit code 0 only if all pass.
+"""All checks of the project: lint, format, types, tests, a blind battery. Exit code 0 only if all pass.
 
     python scripts/checks.py [--slow]
 
---slow runs the long studies that the ordinary run leaves out.
+--slow runs the long studies that the ordinary run leaves out. The battery is of twenty brief cases, made anew.
 """
 
+import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parent.parent
 
 
 def main() -> int:
     """Run every check, even after one has failed, and say which failed."""
-    slow = ["-m", "slow"] if "--slow" in sys.argv[1:] else []
+    slow = "--slow" in sys.argv[1:]
+    tests = ["-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
     checks = {
-        "lint": ["ruff", "check", "."],
-        "format": ["ruff", "format", "--check", "."],
-        "types": ["mypy"],
-        "tests": ["pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder", *slow],
+        "lint": ["-m", "ruff", "check", "."],
+        "format": ["-m", "ruff", "format", "--check", "."],
+        "types": ["-m", "mypy"],
+        "tests": [*tests, "-m", "slow"] if slow else tests,
     }
-    failed = []
-    for name, command in checks.items():
-        print(f"== {name}: {' '.join(command)}", flush=True)
-        if subprocess.run([sys.executable, "-m", *command], cwd=ROOT, check=False).returncode:
-            failed.append(name)
+    with TemporaryDirectory() as folder:
+        if not slow:
+            cases = ["--cases", "20", "--brief", "--seed", "903", "--jobs", str(os.cpu_count() or 1)]
+            checks["battery"] = ["scripts/blind_battery.py", *cases, "--check", "--out", folder]
+        failed = [name for name, command in checks.items() if not _passes(name, command)]
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed", flush=True)
     return 1 if failed else 0
+
+
+def _passes(name: str, command: list[str]) -> bool:
+    print(f"== {name}: {' '.join(command)}", flush=True)
+    return subprocess.run([sys.executable, *command], cwd=ROOT, check=False).returncode == 0
 
 
 if __name__ == "__main__":

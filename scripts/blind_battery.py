@@ -23,7 +23,7 @@ from pathlib import Path
 
 from battery.generate import draw_cases, seal, unseal, write_case
 from battery.reach import measured_label
-from battery.scoring import Share, families, reach, score
+from battery.scoring import Share, families, named_what_is_there, reach, score, strength_curve
 from joblib import Parallel, delayed, parallel_config
 
 from lhpost6_pin import __version__
@@ -89,6 +89,8 @@ def report(folder: Path, labels: dict[str, dict], answered: dict[str, tuple[dict
     files = [folder / n / "seconds.txt" for n in names]
     if seconds := sorted(float(f.read_text(encoding="utf-8")) for f in files if f.exists()):
         lines.append(f"| seconds a case, median | {seconds[len(seconds) // 2]:.0f} |")
+    lines += ["", "| gap of an effect over the floor | its family is named |", "|---|---|"]
+    lines += [f"| {words} | {share.text} |" for words, share in strength_curve(pairs).items() if share.of]
     lines += ["", "| case | sort | gap | hidden | verdict | named |", "|---|---|---|---|---|---|"]
     lines += sorted(case_row(n, *pair) for n, pair in zip(names, pairs, strict=True))
     for n in labels:
@@ -118,8 +120,8 @@ def case_row(name: str, label: dict, answer: dict) -> str:
     named = [f"{e['family']} {' '.join(e['components'])}" for e in answer["effects"]]
     wanted = set() if label["sort"] == "unknown" else set(families(label))
     right = wanted == set(families(answer)) and answer["verdict"] in label["accept"]
-    if label["sort"] == "unexcited":  # its traces may tell it all the same
-        right |= set(families(answer)) == {e["family"] for e in label["decoys"]}
+    if label["sort"] == "unexcited" and families(answer):
+        right = named_what_is_there(label, answer)
     cells = (label["sort"], f"{reach(label):.1f}", ", ".join(hidden), answer["verdict"], ", ".join(named))
     return f"| {' | '.join((name if right else f'{name} (wrong)', *cells))} |"
 

@@ -11,7 +11,7 @@ from lhpost6_pin.records import load_record
 
 SCRIPTS = str(Path(__file__).parents[1] / "scripts")
 sys.path.insert(0, SCRIPTS)
-from battery import cases, generate, hidden, motions, rates, reach, sensors, simulate, table  # noqa: E402
+from battery import cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table  # noqa: E402
 
 sys.path.remove(SCRIPTS)
 
@@ -245,3 +245,36 @@ def test_a_label_touched_after_sealing_is_found_out(tmp_path):
     path.write_text(json.dumps(salted))
     with pytest.raises(ValueError, match=labels[2]["id"]):
         generate.unseal(tmp_path)
+
+
+def told(verdict: str, *names: str) -> dict:
+    return {"verdict": verdict, "effects": [{"family": n, "components": []} for n in names], "closure": {}}
+
+
+def labelled(sort: str, accept: str, *effects: tuple[str, float], decoys: tuple[str, ...] = ()) -> dict:
+    hidden = [{"family": n, "components": [], "gap": gap, "offset": 0.0} for n, gap in effects]
+    return {"sort": sort, "accept": [accept], "effects": hidden, "decoys": [{"family": n} for n in decoys]}
+
+
+def test_scores_count_what_was_named_and_what_was_not():
+    pairs = [
+        (labelled("null", "none"), told("none")),
+        (labelled("null", "none"), told("named", "backlash")),
+        (labelled("one", "named", ("backlash", 3.0)), told("named", "backlash")),
+        (labelled("two", "named", ("backlash", 20.0), ("quadratic_drag", 0.7)), told("named", "backlash")),
+        (labelled("one", "named", ("valve_deadband", 0.6)), told("none")),  # below the floor: not asked for
+        (labelled("unexcited", "none", decoys=("backlash",)), told("named", "backlash")),
+        (labelled("unknown", "unexplained"), told("unexplained")),
+    ]
+    found = scoring.score(pairs)
+    assert found["false name on nulls"] == (1, 2)
+    assert (found["family first"], found["exact set, one effect"], found["exact set, two effects"]) == (
+        (2, 2),
+        (1, 1),
+        (0, 1),
+    )
+    assert found["unexcited, nothing else named"] == (1, 1)
+    assert (found["none of the above, named"], found["none of the above, flagged"]) == ((0, 1), (1, 1))
+    curve = {words: share for words, share in scoring.strength_curve(pairs).items() if share.of}
+    assert curve == {"0.5 to 1": (0, 2), "2 to 4": (1, 1), "10 to 100": (1, 1)}
+    assert scoring.wilson(5, 10) == pytest.approx((0.2366, 0.7634), abs=1e-4)  # a worked value of Wilson's score

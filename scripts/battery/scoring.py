@@ -2,12 +2,17 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
-__all__ = ["Share", "score", "wilson"]
+__all__ = ["Share", "families", "named_what_is_there", "reach", "score", "strength_curve", "wilson"]
 
 Label = Mapping[str, Any]
 Answer = Mapping[str, Any]  # a verdict.json
+
+
+STRENGTHS = (0.0, 0.5, 1.0, 2.0, 4.0, 10.0, 100.0, math.inf)
+"""Edges of the strength curve: gap over the floor."""
 
 
 class Share(NamedTuple):
@@ -43,6 +48,28 @@ def reach(label: Label) -> float:
     return max((max(e["gap"], e["offset"]) for e in label["effects"]), default=0.0)
 
 
+def named_what_is_there(label: Label, answer: Answer) -> bool:
+    """Whether all that was named is hidden in a case: what no test was meant to move may be told from its traces."""
+    hidden = (*label["effects"], *label["decoys"]) if label["sort"] == "unexcited" else label["effects"]
+    return set(families(answer)) <= {effect["family"] for effect in hidden}
+
+
+def strength_curve(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
+    """How many of the known effects were named, alone or beside others, by the gap of each over the floor."""
+    hidden = [
+        (max(effect["gap"], effect["offset"]), effect["family"] in families(answer))
+        for label, answer in cases
+        if label["sort"] in ("one", "two", "three")
+        for effect in label["effects"]
+    ]
+    curve = {}
+    for low, high in pairwise(STRENGTHS):
+        hits = [hit for gap, hit in hidden if low <= gap < high]
+        words = f"{low:g} to {high:g}" if math.isfinite(high) else f"above {low:g}"
+        curve[words] = Share(sum(hits), len(hits))
+    return curve
+
+
 def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
     """Metrics by name; cases pair labels with verdicts."""
 
@@ -62,10 +89,6 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
     def right_components(label: Label, answer: Answer) -> bool:
         named = {e["family"]: set(e["components"]) for e in answer["effects"]}
         return all(named[e["family"]] == set(e["components"]) for e in label["effects"] if e["family"] in named)
-
-    def only_what_is_there(label: Label, answer: Answer) -> bool:
-        """What no test was meant to move may be told from its traces all the same."""
-        return set(families(answer)) <= {decoy["family"] for decoy in label["decoys"]}
 
     closures = [
         gap["closure"]
@@ -88,7 +111,7 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         "components right where named": share(known, right_components),
         "none of the above, named": share(sort("unknown"), lambda _, a: bool(a["effects"])),
         "none of the above, flagged": share(sort("unknown"), lambda _, a: a["verdict"] == "unexplained"),
-        "unexcited, nothing else named": share(sort("unexcited"), only_what_is_there),
+        "unexcited, nothing else named": share(sort("unexcited"), named_what_is_there),
         "false among all names": Share(false, sum(len(families(answer)) for _, answer in named)),
         "median closure on held-out tests": sorted(closures)[len(closures) // 2] if closures else math.nan,
         "held-out tests that got worse": Share(sum(c < -0.02 for c in closures), len(closures)),

@@ -49,7 +49,7 @@ __all__ = [
     "net_flows",
     "oil_power",
 ]
-__all__ += ["oil_rates", "rod_advance", "rod_ahead", "start_line", "valve_flows"]
+__all__ += ["oil_rates", "rod_advance", "rod_ahead", "rods_ahead", "start_line", "valve_flows"]
 
 
 @compiled
@@ -168,6 +168,16 @@ def rod_ahead(p, pressure_a, pressure_b):
     if p[PLAY] == 0.0:
         return 0.0
     return play_travel(piston_force(pressure_a, pressure_b, p[0], p[1]), p[PLAY], p[PLAY_FORCE])
+
+
+@compiled
+def rods_ahead(rows, z, ahead):
+    """Fill ahead (n, n_actuators) [m] from hidden states z (n, n_states); rows are the actuators'."""
+    for k in range(z.shape[0]):
+        for i in range(rows.size):
+            row = rows[i]
+            pressure_b = z[k, row.state + 1] if row.law == HYDRAULIC_DOUBLE else 0.0
+            ahead[k, i] = rod_ahead(row.p, z[k, row.state], pressure_b)
 
 
 @compiled

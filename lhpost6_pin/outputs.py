@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .equilibrium import hydraulic_rows
 from .gas import gas_ratio
 from .laws.strut import gas_pressure
+from .oil import rods_ahead
 from .pose import PlatenMotion, leg_displacements, platen_motion
 from .records import make_record
 from .simulate import Run
@@ -32,6 +33,8 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     legs, _ = leg_displacements(plant, motion.displacement)
     rows = plant.rows[hydraulic_rows(plant)]
     states = rows["state"]
+    ahead = np.zeros((len(run.z), plant.spools))
+    rods_ahead(rows, run.z, ahead)  # a stroke is measured between barrel and rod
     double = np.array([name in machine.double_acting for name in machine.actuator_names])
     pressure_a = run.z[:, states]
     pressure_b = run.z[:, states[double] + 1]
@@ -41,7 +44,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         "platen_displacement": motion.displacement,
         "platen_velocity": motion.velocity,
         "platen_acceleration": motion.acceleration,
-        "actuator_displacement": legs[:, : plant.spools],
+        "actuator_displacement": legs[:, : plant.spools] + ahead,
         "actuator_force": force,
         "chamber_pressure_a": pressure_a,
         "spool_position": run.spool,

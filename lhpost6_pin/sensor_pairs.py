@@ -21,7 +21,7 @@ from .records import sample_interval
 from .sensors import Sensors, spectrum
 from .signals import Band, differentiate
 
-__all__ = ["Comparison", "Term", "comparisons"]
+__all__ = ["Comparison", "Term", "comparisons", "loose_lengths"]
 
 Array = NDArray[np.float64]
 
@@ -107,6 +107,25 @@ def comparisons(plant: Plant, record: xr.Dataset, sensors: Sensors) -> Iterator[
     view = _View(plant, record, sensors)
     for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools):
         yield from compare(view)
+
+
+def loose_lengths(
+    plant: Plant, record: xr.Dataset, sensors: Sensors, closing: float
+) -> Iterator[tuple[str, Comparison, Array]]:
+    """Lengths of double-acting actuators against the platen's pose, each with the side (n,) that a loose pin bears on.
+
+    The side, -1 to 1, is by the measured force, of which `closing` [N] presses most of the play out (`laws.play`).
+    """
+    view = _View(plant, record, sensors)
+    if not view.has("actuator_force"):
+        return
+    force = view.values("actuator_force")
+    side = view.signal(force / np.sqrt(force**2 + closing**2))
+    names = plant.machine.actuator_names
+    for comparison in _lengths(view):
+        name = comparison.channel.rstrip("]").partition("[")[2]
+        if name in plant.machine.double_acting:
+            yield name, comparison, side[:, names.index(name)]
 
 
 def _compared(

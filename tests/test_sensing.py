@@ -1,11 +1,18 @@
 """Sensors that other sensors contradict: each kind of fault is found, named and put right; good ones are left alone."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray as xr
 from sensor_cases import measured
 
+from lhpost6_pin.campaign import simulate_campaign
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.discover.discover import discovery_numbers
+from lhpost6_pin.discover.lost_motion import LostMotion, _groups, lost_motion
 from lhpost6_pin.discover.sensing import put_right, wrong_sensors
+from lhpost6_pin.machine import load_machine
 from lhpost6_pin.plant import Plant
 from lhpost6_pin.sensors import add_noise, load_sensors
 from lhpost6_pin.signals import align
@@ -91,3 +98,29 @@ def test_a_length_that_drifts_within_tests_is_a_fault_of_its_own(plant: Plant, c
     assert (found.family, found.stated) == ("length_sensor_error", 0.0)
     assert found.value == pytest.approx(rate, rel=0.15)  # noise of a record of some seconds
     assert not [name for name in faults if name.startswith("drift") and "H3" not in name]
+
+
+def test_the_play_of_a_pin_shows_in_its_length_and_nowhere_else(plant: Plant, campaign) -> None:
+    numbers, _ = discovery_numbers()
+    assert lost_motion(plant, campaign, SENSORS, numbers) == ()
+    machine = load_machine().with_effect("swivel_play", ("H3",), half_play=5e-5, closing_force=3e3)
+    loose = simulate_campaign(machine, load_controller("lhpost6"), SENSORS, seed=3, tests=("TX", "WN")).records
+    (found,) = lost_motion(plant, loose, SENSORS, numbers)
+    assert found.component == "H3"
+    assert found.half_play == pytest.approx(5e-5, rel=0.2)  # skews of force and length blunt the turn: `lengths.form`
+    assert found.gain > 100.0
+    assert not any(f.kind == "offset" for f in wrong_sensors(plant, loose, SENSORS, ["H3"]))
+
+
+def test_play_is_one_effect_where_all_pins_have_about_as_much() -> None:
+    names = ("H1", "H2", "H3", "H4")
+    search = SimpleNamespace(problem=SimpleNamespace(machine=SimpleNamespace(double_acting=names)))
+
+    def grouped(**sizes: float) -> list[list[str]]:
+        lost = [LostMotion(name, size, 1e-6) for name, size in sizes.items()]
+        return [[one.component for one in group] for group in _groups(lost, search)]
+
+    assert grouped(H1=5e-5, H2=6e-5, H3=7e-5, H4=8e-5) == [list(names)]
+    assert grouped(H1=5e-5, H2=6e-5, H3=7e-5, H4=2e-4) == [[name] for name in names]
+    assert grouped(H2=5e-5, H3=5e-5) == [["H2"], ["H3"]]
+    assert grouped() == []

@@ -125,7 +125,9 @@ def solve(
     settled: bool = False,
     near: Mask | bool = False,
 ) -> Solution:
-    """Search from `start` (p,) by Gauss-Newton steps; noise in the derivatives is corrected for from the second on.
+    """Search from `start` (p,) by Gauss-Newton steps.
+
+    Noise in the derivatives is corrected for from the second on, where they are `known` from the first.
 
     Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
     the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and

@@ -25,6 +25,7 @@ from ..residuals import RESIDUALS
 from ..sensors import Sensors
 from .candidates import with_background, with_other_form, with_warm_oil
 from .left import Left, what_is_left, with_unnamed
+from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .proof import Proof, prove
 from .resume import Place, make_bookmark
@@ -83,7 +84,9 @@ def discover(
     report = progress or (lambda share: None)
     numbers, calibration = discovery_numbers()
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
-    faults = wrong_sensors(make_plant(machine), campaign.records, sensors)
+    plant = make_plant(machine)
+    lost = lost_motion(plant, campaign.records, sensors, numbers)
+    faults = wrong_sensors(plant, campaign.records, sensors, [one.component for one in lost])
     records = put_right(campaign.records, faults)
     hashes = {name: _hash(record) for name, record in zip(names, campaign.records, strict=True)}
     held = _asked_for(names, hold_out)
@@ -92,7 +95,9 @@ def discover(
     if place is None:
         ready = _prepared(machine, records, sensors, numbers, calibration, seed, jobs)
         report(0.1)
-        place = _begin(ready, held, numbers, calibration, more=hold_out is None, progress=between(report, 0.1, 0.4))
+        place = _begin(ready, held, numbers, calibration, more=hold_out is None, progress=between(report, 0.1, 0.38))
+        begun = with_lost_motion(place.search, lost, calibration, numbers, between(report, 0.38, 0.4))
+        place = place._replace(search=begun)
         bookmark.write(place)
     machine, held = place.machine, place.held
     used = [i for i in range(len(names)) if i not in held]

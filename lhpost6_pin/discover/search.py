@@ -66,7 +66,7 @@ def _pruned(found: Search, calibration: Parameters, numbers: Parameters) -> Sear
     """The search without what it can do without, now that more has been added: helpers of what was found later."""
     for one in found.added[:-1]:
         less = _without(found, one.candidate, calibration)
-        if less.objective - found.objective < gate(one.candidate.family, numbers):
+        if less.objective - found.objective + one.told < gate(one.candidate.family, numbers):
             return _pruned(refined(less, calibration, lambda share: None), calibration, numbers)
     return found
 

@@ -47,14 +47,21 @@ class Fault:
         return "length_sensor_error" if self.channel == "actuator_displacement" else "accelerometer_error"
 
 
-def wrong_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors) -> tuple[Fault, ...]:
-    """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does."""
+def wrong_sensors(
+    plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors, loose: Sequence[str] = ()
+) -> tuple[Fault, ...]:
+    """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does.
+
+    Play of actuators that are `loose` shifts the means of their lengths, by how long a rod bears on either side.
+    """
     findings = check_sensors(plant, records, sensors)
     late = _late(findings, sensors)
     if late:  # a large delay looks like a gain as well
         behind = {f.channel: f.value for f in late}
         findings = check_sensors(plant, [align_record(r, behind) for r in records], sensors)
-    faults = [_fault(f, sensors) for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
+    shifted = {f"actuator_displacement[{name}]" for name in loose}
+    wrong = [f for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
+    faults = [_fault(f, sensors) for f in wrong if f.quantity != "offset" or f.channel not in shifted]
     return (*(f for f in faults if f is not None), *late)
 
 

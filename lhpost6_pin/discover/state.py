@@ -60,6 +60,7 @@ class Added:
     contest: tuple[Contest, ...]
     fall: Array  # (c,) of the squares of what is left, by column
     apart: float  # log-likelihood within which two families explained the campaign alike
+    told: float = 0.0  # log-likelihood of what is not in the search's residuals: lengths
 
     @property
     def rivals(self) -> tuple[Contest, ...]:

@@ -91,6 +91,9 @@ def judge(
     own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.knobs])
     floor = calibration.number("fit.floor") * problem.stated
     floor[:count][own] = 0.0  # their priors are flat
+    for i, knob in enumerate(problem.knobs):
+        if knob.name.startswith(tuple(f"{a.candidate.name}." for a in found.added if a.told)):
+            floor[i] = numbers.number("lengths.form") * (knob.value if knob.form == "shift" else 1.0)
     covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
     sd = np.sqrt(np.diag(covariance) + floor**2)
     reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
@@ -120,7 +123,7 @@ def judge(
         if sure and material and not own[i] and knob.name not in problem.free:
             changed[knob.name] = estimate(i)
     free, doubted = without_name(kept, left, instead, numbers)
-    doubted |= {one.candidate.name for one in kept if _leaves_much(one, found, numbers)}
+    doubted |= {one.candidate.name for one in kept if not one.told and _leaves_much(one, found, numbers)}
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
     unnamed = free is not None or bool(doubted) or drifting or _more_than_noise(found, numbers)
     nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
@@ -190,28 +193,38 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
 
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     """Whether more is left than noise, and than the form of the effects found."""
-    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
+    limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
     doubt = numbers.number("accept.doubt")
-    first, last = (_excess_by_kind(found.problem, rest, doubt) for rest in (found.refit.normal.rest, found.rest))
-    return any(found.misfit(kind) > limit and excess > rest * first[kind] for kind, excess in last.items())
+    for kind in found.problem.kinds:
+        rows = found.problem.rows(kind) & ~_hammered(found)
+        if not rows.any():
+            continue
+        first, last = ([r[:, rows] for r in rest] for rest in (found.refit.normal.rest, found.rest))
+        misfit = float(np.mean([np.mean(np.abs(r) ** 2) for r in last]))
+        if misfit > limit and _excess(last, doubt) > share * _excess(first, doubt):
+            return True
+    return False
 
 
-def _excess_by_kind(problem: Problem, rest: Sequence[NDArray[np.complex128]], doubt: float) -> dict[str, float]:
-    """Squares of whitened residuals beyond what may be noise, twice, by kind; no less than a tenth of noise."""
-    found = {}
-    for kind in problem.kinds:
-        rows = problem.rows(kind)
-        if rows.any():
-            count = 2.0 * sum(r[:, rows].size for r in rest)
-            squares = 2.0 * sum(float(np.sum(np.abs(r[:, rows]) ** 2)) for r in rest)
-            found[kind] = max(squares - doubt * count, 0.1 * count)
-    return found
+def _hammered(found: Search) -> NDArray[np.bool_]:
+    """Columns (c,) of actuators with play that the lengths tell: their pins hammer faster than records show."""
+    names, columns = found.problem.machine.actuator_names, np.zeros(sum(found.problem.widths), bool)
+    for one in found.added:
+        for name in one.candidate.components if one.told else ():
+            columns |= found.problem.rows_of_actuator(names.index(name))
+    return columns
+
+
+def _excess(rest: Sequence[NDArray[np.complex128]], doubt: float) -> float:
+    """Squares of whitened residuals beyond what may be noise; no less than a tenth of noise."""
+    count = sum(r.size for r in rest)
+    return max(sum(float(np.sum(np.abs(r) ** 2)) for r in rest) - doubt * count, 0.1 * count)
 
 
 def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:
     """Whether much is left of what an effect should have explained, where it explained most of it: a wrong name."""
     limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
-    where = added.fall > 0.1 * added.fall.max()
+    where = (added.fall > 0.1 * added.fall.max()) & ~_hammered(found)
     left = squares_by_column(found.rest)[where]
     noise = float(sum(len(r) for r in found.rest) * left.size)
     excess = left.sum() - numbers.number("accept.doubt") * noise

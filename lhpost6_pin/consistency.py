@@ -22,7 +22,7 @@ from .records import LAYOUT, require
 from .sensor_pairs import Comparison, Term, comparisons
 from .sensors import Sensors
 
-__all__ = ["SensorFinding", "check_sensors"]
+__all__ = ["SensorFinding", "check_sensors", "scaled_inverse"]
 
 Array = NDArray[np.float64]
 
@@ -123,8 +123,7 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterato
     xx, xy, xe, ee = (np.asarray(x) for x in (s.xx, s.xy, s.xe, s.ee))
     unit = LAYOUT[channel.split("[")[0]].units.split(", ")
     unit_y = unit[-1] if channel.endswith(("[roll]", "[pitch]", "[yaw]")) else unit[0]
-    scale = 1 / np.sqrt(np.maximum(np.diag(xx), 1e-300))  # for a well-conditioned inverse
-    inverse = scale[:, None] * np.linalg.pinv(scale[:, None] * (xx - np.diag(s.noise)) * scale) * scale
+    inverse = scaled_inverse(xx - np.diag(s.noise), np.diag(xx))
     theta, moved = inverse @ xy, inverse @ xe
     square = (s.yy - 2 * theta @ xy + theta @ xx @ theta) / s.samples
     noise = (s.variance + float(theta**2 @ np.asarray(s.noise))) / s.samples
@@ -146,6 +145,12 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterato
     rms, floor = np.sqrt(max(square, 0.0)), np.sqrt(noise)
     range_ = np.sqrt(doubt * noise + CONFIDENCE**2 * allowed) - floor
     yield _finding(check, channel, "residual", unit_y, rms, floor / np.sqrt(2 * s.independent), floor, range_)
+
+
+def scaled_inverse(matrix: Array, squares: Array) -> Array:
+    """Pseudoinverse of a normal matrix (p, p), its columns scaled by the roots of `squares` (p,) for its condition."""
+    scale = 1 / np.sqrt(np.maximum(squares, 1e-300))
+    return np.asarray(scale[:, None] * np.linalg.pinv(scale[:, None] * matrix * scale) * scale)
 
 
 def _finding(

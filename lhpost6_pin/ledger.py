@@ -27,7 +27,7 @@ from .workspace import make_workspace
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Ledger", "States", "add_at_c", "force_ledger", "number_of", "stage_arguments"]
+__all__ = ["Ledger", "States", "add_at_c", "add_row_at_c", "force_ledger", "number_of", "stage_arguments"]
 
 Array = NDArray[np.float64]
 
@@ -145,12 +145,7 @@ def _forces(q, v, z, axes, legs, body, rows, damping, frame, port, JB, force, mo
         by_row[k] = force
         turn[k] = frame[:3]
         for i in range(rows.size):
-            out = by_effect[k, rows[i].effect]
-            add_at_c(force[i, 0], B, rows[i].port, rho, frame, out)
-            if rows[i].port_2 >= 0:
-                add_at_c(force[i, 1], B, rows[i].port_2, rho, frame, out)
-            if rows[i].port_3 >= 0:
-                add_at_c(force[i, 2], B, rows[i].port_3, rho, frame, out)
+            add_row_at_c(force[i], B, rows[i], rho, frame, by_effect[k, rows[i].effect])
 
 
 @compiled_inline
@@ -164,6 +159,16 @@ def add_at_c(force, B, port, rho, frame, out):
     for j in range(3):
         out[j] += force * (frame[j, 0] * b0 + frame[j, 1] * b1 + frame[j, 2] * b2)
         out[3 + j] += force * (frame[j, 0] * mx + frame[j, 1] * my + frame[j, 2] * mz)
+
+
+@compiled_inline
+def add_row_at_c(force, B, row, rho, frame, out):
+    """Add the wrench at C in {c} of a row's forces (3,) on its ports to out (6,), as `add_at_c` does."""
+    add_at_c(force[0], B, row.port, rho, frame, out)
+    if row.port_2 >= 0:
+        add_at_c(force[1], B, row.port_2, rho, frame, out)
+    if row.port_3 >= 0:
+        add_at_c(force[2], B, row.port_3, rho, frame, out)
 
 
 def _rigid_wrenches(run: "Run | States") -> tuple[Array, Array]:

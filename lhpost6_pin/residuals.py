@@ -143,8 +143,8 @@ def follow(
             return Path(ports, along, needed, old)
         before = {_marched(row): states_of(row) for row in _moving(known[0])}
         there = {key: old[:, place] for key, place in before.items()}
-    rows = _moving(plant)
-    fresh = {key: row for row in rows if (key := _marched(row)) not in there}
+    rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
+    fresh = {key: row for key, _, row in rows if key not in there}
     # oscillators and heat average noise, and feel what a still path lacks
     parts: tuple[list[np.void], list[np.void]] = [], []
     for row in fresh.values():
@@ -154,13 +154,13 @@ def follow(
             marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
             there |= {_marched(row): marched[:, states_of(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))
-    moved_on = [row for row in rows if before.get(_marched(row)) != states_of(row)]
+    still = 0  # states before it are those of the known path, in the same places: most of them
     if before:
-        still = min([z.shape[1], old.shape[1], *(int(row["state"]) for row in moved_on)])
-        z[:, :still] = old[:, :still]  # most rows keep their places
-        moved_on = [row for row in rows if row["state"] >= still]
-    for row in moved_on:
-        z[:, states_of(row)] = there[_marched(row)]
+        still = min([z.shape[1], old.shape[1], *(at.start for key, at, _ in rows if before.get(key) != at)])
+        z[:, :still] = old[:, :still]
+    for key, at, _ in rows:
+        if at.start >= still:
+            z[:, at] = there[key]
     return Path(ports, along, needed, z)
 
 

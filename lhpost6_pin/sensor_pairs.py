@@ -121,11 +121,8 @@ def loose_lengths(
         return
     force = view.values("actuator_force")
     side = view.signal(force / np.sqrt(force**2 + closing**2))
-    names = plant.machine.actuator_names
-    for comparison in _lengths(view):
-        name = comparison.channel.rstrip("]").partition("[")[2]
-        if name in plant.machine.double_acting:
-            yield name, comparison, side[:, names.index(name)]
+    each = zip(plant.machine.actuator_names, _lengths(view), side.T, strict=False)  # no lengths: none
+    yield from (one for one in each if one[0] in plant.machine.double_acting)
 
 
 def _compared(

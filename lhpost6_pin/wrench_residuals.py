@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .compiled import compiled
 from .engine_fused import inertia_table, platen_acceleration
 from .law_table import PORTS
-from .ledger import add_at_c
+from .ledger import add_at_c, add_row_at_c
 from .plant import Plant
 from .port_path import PortPath
 from .pose import PlantMotion
@@ -104,8 +104,4 @@ def _row_wrenches(rows, body, s, rate, column, turn, z, out):
         apply_forces(rows, s[k], rate[k], z[k], force, port_force)
         frame[:3] = turn[k]
         for i in range(rows.size):
-            add_at_c(force[i, 0], column[k], rows[i].port, rho, frame, out[k, i])
-            if rows[i].port_2 >= 0:
-                add_at_c(force[i, 1], column[k], rows[i].port_2, rho, frame, out[k, i])
-            if rows[i].port_3 >= 0:
-                add_at_c(force[i, 2], column[k], rows[i].port_3, rho, frame, out[k, i])
+            add_row_at_c(force[i], column[k], rows[i], rho, frame, out[k, i])

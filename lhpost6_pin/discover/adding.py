@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..calibration.fit import solve
+from ..calibration.knobs import Knob
+from ..calibration.prepare import Prepared
 from ..calibration.problem import Problem
 from ..parameters import Parameters
 from ..progress import Progress, between
@@ -19,7 +21,9 @@ from .screening import weighing
 from .state import Added, Contest, Scored, Search, Standing, firsts, fitted_machine
 from .weighing import gate, squares_by_column
 
-__all__ = ["further", "refined"]
+__all__ = ["further", "joined", "refined"]
+
+Array = NDArray[np.float64]
 
 
 def further(
@@ -190,8 +194,7 @@ def _fit_from(
         low, high = candidate.bounds
         amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
         own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
-        ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
-        start = np.insert(start, count, np.zeros(len(own)))
+        ready, start = joined(found, candidate, amplitudes, own, start)
     solution = solve(
         *(ready.problem, ready.replicas, calibration, np.zeros_like(start) if afresh else start, progress),
         found.solution.normal,
@@ -200,6 +203,15 @@ def _fit_from(
         near=_near(ready.problem, candidate),
     )
     return Search(ready, solution, found.refit, list(found.added), found.rounds)
+
+
+def joined(
+    found: Search, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[Knob], x: Array
+) -> tuple[Prepared, Array]:
+    """The search's tests with a candidate in the machine and its unknowns in the fit; and its place x with theirs."""
+    problem = found.problem
+    ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
+    return ready, np.insert(x, len(problem.knobs), np.zeros(len(own)))
 
 
 def _near(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:

@@ -14,12 +14,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..calibration.fit import solve
+from ..consistency import scaled_inverse
 from ..library import find_family
 from ..parameters import Parameters
 from ..plant import Plant
 from ..progress import Progress, between
 from ..sensor_pairs import Comparison, loose_lengths
 from ..sensors import Sensors
+from .adding import joined
 from .candidates import Candidate
 from .state import Added, Contest, Search, fitted_machine
 from .weighing import squares_by_column
@@ -75,8 +77,7 @@ def _play(parts: Sequence[tuple[Comparison, Array]]) -> tuple[float, float]:
     variance = stated
     for _ in range(_REWEIGHED):
         matrix = x.T @ x / (variance * thinned) + np.diag(prior)
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-        inverse = scale[:, None] * np.linalg.pinv(scale[:, None] * matrix * scale) * scale
+        inverse = scaled_inverse(matrix, np.diag(matrix))
         theta = inverse @ (x.T @ y) / (variance * thinned)
         variance = max(stated, float(np.mean((y - x @ theta) ** 2)))
     return float(theta[0]), float(np.sqrt(inverse[0, 0]))
@@ -93,15 +94,14 @@ def with_lost_motion(
     """The search with the play that the lengths tell; alike where all that may have it do."""
     groups = _groups(lost, found)
     for i, group in enumerate(groups):
-        found = _with_play(
-            found, group, calibration, numbers, between(progress, i / len(groups), (i + 1) / len(groups))
-        )
+        share = between(progress, i / len(groups), (i + 1) / len(groups))
+        found = _with_play(found, group, calibration, numbers, share)
     progress(1.0)
     return found
 
 
 def _groups(lost: Sequence[LostMotion], found: Search) -> list[tuple[LostMotion, ...]]:
-    """All together if all double-acting actuators have play, within their deviations or a half of each other."""
+    """All together if all double-acting actuators have play, none twice as much as another."""
     if {one.component for one in lost} == set(found.problem.machine.double_acting):
         sizes = np.array([one.half_play for one in lost])
         if len(sizes) > 1 and sizes.max() < 2.0 * sizes.min():
@@ -112,8 +112,7 @@ def _groups(lost: Sequence[LostMotion], found: Search) -> list[tuple[LostMotion,
 def _with_play(
     found: Search, group: Sequence[LostMotion], calibration: Parameters, numbers: Parameters, progress: Progress
 ) -> Search:
-    family, problem = find_family("swivel_play"), found.problem
-    candidate = Candidate(family, tuple(one.component for one in group), _shape())
+    candidate = Candidate(find_family("swivel_play"), tuple(one.component for one in group), _shape())
     weight = np.array([one.deviation**-2.0 for one in group])
     size = float(weight @ [one.half_play for one in group] / weight.sum())
     sd = float(weight.sum() ** -0.5)  # no wider: oil that a pin hammers tells of play, but wrongly
@@ -121,13 +120,12 @@ def _with_play(
         replace(knob, sd=sd) if knob.name.endswith(".half_play") else knob
         for knob in candidate.knobs((size,), numbers.number("fit.spread"), numbers.number("fit.factor"))
     )
-    ready = found.ready.with_machine(candidate.on(problem.machine, (size,)), (*problem.knobs, *own))
-    start = np.insert(found.solution.x, len(problem.knobs), np.zeros(len(own)))
+    ready, start = joined(found, candidate, (size,), own, found.solution.x)
     solution = solve(ready.problem, ready.replicas, calibration, start, progress, found.solution.normal, frugal=True)
     more = Search(ready, solution, found.refit, list(found.added), found.rounds)
     told = sum(one.gain for one in group)
     contest = (Contest(candidate, 0.0, fitted_machine(solution)),)
     fall = squares_by_column(found.rest) - squares_by_column(more.rest)
-    tried = len(problem.machine.double_acting)
+    tried = len(found.problem.machine.double_acting)
     more.added.append(Added(candidate, told + found.objective - more.objective, 0, tried, contest, fall, 0.0, told))
     return more

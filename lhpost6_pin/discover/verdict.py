@@ -91,8 +91,9 @@ def judge(
     own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.knobs])
     floor = calibration.number("fit.floor") * problem.stated
     floor[:count][own] = 0.0  # their priors are flat
+    by_lengths = tuple(f"{a.candidate.name}." for a in found.added if a.told)
     for i, knob in enumerate(problem.knobs):
-        if knob.name.startswith(tuple(f"{a.candidate.name}." for a in found.added if a.told)):
+        if knob.name.startswith(by_lengths):
             floor[i] = numbers.number("lengths.form") * (knob.value if knob.form == "shift" else 1.0)
     covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
     sd = np.sqrt(np.diag(covariance) + floor**2)
@@ -194,9 +195,9 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     """Whether more is left than noise, and than the form of the effects found."""
     limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
-    doubt = numbers.number("accept.doubt")
+    doubt, heard = numbers.number("accept.doubt"), ~_hammered(found)
     for kind in found.problem.kinds:
-        rows = found.problem.rows(kind) & ~_hammered(found)
+        rows = found.problem.rows(kind) & heard
         if not rows.any():
             continue
         first, last = ([r[:, rows] for r in rest] for rest in (found.refit.normal.rest, found.rest))

@@ -38,18 +38,18 @@ class Spot(NamedTuple):
 def gap_map(problem: Problem, rest: Sequence[Complex]) -> list[list[Spot]]:
     """Of every column of a problem's residuals its spots by rising frequency; rest are whitened bins (m, c) by test."""
     edges = problem.whitener.edges
-    bounds = [float(edges[k]) for k in (*_GROUPS, len(edges) - 1)]
+    bands = list(pairwise(float(edges[k]) for k in (*_GROUPS, len(edges) - 1)))
+    ends = [*(high for _, high in bands[:-1]), np.inf]
+    inside = [[(f >= low) & (f < end) for f in problem.frequency] for (low, _), end in zip(bands, ends, strict=True)]
     found = []
     for kind in RESIDUALS:
         columns = np.flatnonzero(problem.rows(kind))
         for label, column in zip(_labels(problem.machine, kind), columns.tolist(), strict=False):
             spots = []
-            for low, high in pairwise(bounds):
-                end = high if high < edges[-1] else np.inf
-                inside = [(f >= low) & (f < end) for f in problem.frequency]
-                squares = np.concatenate([np.abs(r[i, column]) ** 2 for r, i in zip(rest, inside, strict=True)])
+            for band, tests in zip(bands, inside, strict=True):
+                squares = np.concatenate([np.abs(r[i, column]) ** 2 for r, i in zip(rest, tests, strict=True)])
                 mean = float(squares.mean()) if squares.size else float("nan")
-                spots.append(Spot(kind, label, (low, high), mean, float(np.sum(squares - 1.0))))
+                spots.append(Spot(kind, label, band, mean, float(np.sum(squares - 1.0))))
             found.append(spots)
     return found
 

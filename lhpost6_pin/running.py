@@ -17,6 +17,7 @@ from .equilibrium import Equilibrium, hydraulic_rows
 from .errors import SimulationError
 from .plant import Plant, State
 from .schemes import SAMPLE_RATE, SCHEMES, V, spool_windows
+from .sight import Sight, sight_of
 from .simulate import diagnosis
 from .workspace import make_workspace
 
@@ -87,6 +88,10 @@ class RunningPlant:
             found.force,
         )
         return found
+
+    def sight(self) -> Sight:
+        """What can be seen of the plant now."""
+        return sight_of(self.plant, self._ws, self.time)
 
     def advance(self, command: Array) -> None:
         """Take the command (n_actuators,) of this sample, -1..1, and go on to the next.

@@ -27,6 +27,7 @@ from .equilibrium import Equilibrium, hydraulic_rows
 from .errors import SimulationError
 from .plant import Plant, State
 from .schemes import SAMPLE_RATE, SCHEMES, A, V, spool_windows
+from .sight import EVERY, Watch, sight_of
 from .workspace import Workspace, make_workspace
 
 __all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis"]
@@ -115,8 +116,11 @@ def simulate(
     engine: str = ENGINES[0],
     record_every: int = 1,
     progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> Run:
     """Run `samples` controller samples and return the motion, every `record_every`-th sample.
+
+    `watch` is shown the plant 32 times a second of the run, beginning with its start.
 
     Raises SimulationError for a scheme, engine, rate or drive that cannot be. A run that goes wrong on the way does
     not raise: see `Run.trouble`.
@@ -137,7 +141,7 @@ def simulate(
     status = settle(plant, ws, np.ascontiguousarray(first))
     done = 0
     if status == 0:
-        job = _Job(plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress)
+        job = _Job(plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress, watch)
         status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
     kept = -(-done // record_every)
@@ -264,6 +268,12 @@ class _Job(NamedTuple):
     command: Array  # (samples, n_actuators), closed loop
     every: int
     progress: Progress | None
+    watch: Watch | None
+
+    def look(self, sample: int) -> None:
+        """Show the plant to whoever watches, if it is time."""
+        if self.watch is not None and sample % EVERY == 0:
+            self.watch(sight_of(self.plant, self.ws, sample / SAMPLE_RATE))
 
 
 def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
@@ -279,6 +289,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
         clipped += spools(sample, window)
         if sample % job.every == 0:
             job.log.take(sample // job.every, ws, window.sum(axis=0) / steps)
+        job.look(sample)
         status = advance(ws, window)
         if status:
             return status, sample + 1, clipped
@@ -341,9 +352,10 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     else:
         none = np.zeros((1, 1))
         tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER), none, none)
-    clipped = 0
-    for first in range(0, job.samples, _CHUNK):
-        last = min(first + _CHUNK, job.samples)
+    clipped, chunk = 0, _CHUNK if job.watch is None else EVERY
+    for first in range(0, job.samples, chunk):
+        last = min(first + chunk, job.samples)
+        job.look(first)
         status, done, more = run_fused(
             SCHEMES.index(job.scheme),
             first,

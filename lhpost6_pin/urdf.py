@@ -22,7 +22,7 @@ from .files import models_folder
 from .machine import Machine
 from .parameters import Parameters, load_parameters
 
-__all__ = ["drawing_colour", "drawing_sizes", "legs", "urdf_text"]
+__all__ = ["drawing_colour", "drawing_size", "drawing_sizes", "legs", "urdf_text"]
 
 Vec = Sequence[float]
 ORIGIN = (0.0, 0.0, 0.0)
@@ -39,15 +39,16 @@ def drawing_colour(kind: str) -> str:
     return str(drawing_sizes().words[f"colour.{kind}"])
 
 
-def legs(machine: Machine) -> tuple[Actuator | Strut, ...]:
-    """All that stands between the base and the platen: actuators, then struts."""
-    return (*machine.actuators, *machine.struts)
-
-
-def _size(path: str) -> float:
+def drawing_size(path: str) -> float:
+    """Ratio of lengths by its dotted name, as in ``arrow.length``."""
     value = drawing_sizes()[path].value
     assert isinstance(value, float)
     return value
+
+
+def legs(machine: Machine) -> tuple[Actuator | Strut, ...]:
+    """All that stands between the base and the platen: actuators, then struts."""
+    return (*machine.actuators, *machine.struts)
 
 
 class _Leg(NamedTuple):
@@ -73,12 +74,12 @@ class _Leg(NamedTuple):
 
     @property
     def barrel_length(self) -> float:
-        return _size("barrel.length") * (self.length - self.travel)
+        return drawing_size("barrel.length") * (self.length - self.travel)
 
     @property
     def rod_length(self) -> float:
         """Long enough to stay in the barrel, short enough not to leave it at the bottom."""
-        longest = self.length + self.travel - (1.0 - _size("rod.overlap")) * self.barrel_length
+        longest = self.length + self.travel - (1.0 - drawing_size("rod.overlap")) * self.barrel_length
         return min(longest, self.length - self.travel)
 
 
@@ -86,12 +87,12 @@ def _leg(machine: Machine, component: Actuator | Strut) -> _Leg:
     length = math.dist(component.platen_point, component.base_point)
     masses = component.mass_along, component.mass_across
     if isinstance(component, Strut):
-        kind, area, travel = "strut", component.area, _size("strut.travel") * length
-        rod = _size("rod.plunger") * math.sqrt(area / math.pi)
+        kind, area, travel = "strut", component.area, drawing_size("strut.travel") * length
+        rod = drawing_size("rod.plunger") * math.sqrt(area / math.pi)
         effort, speed = component.area * component.pressure, 0.0
     else:
         kind, area, travel = component.mount, component.area_a, component.stroke
-        rod = _size("rod.plunger") * math.sqrt(area / math.pi)
+        rod = drawing_size("rod.plunger") * math.sqrt(area / math.pi)
         if component.area_b is not None and component.area_b != component.area_a:
             area = max(component.area_a, component.area_b)
             rod = math.sqrt(abs(component.area_a - component.area_b) / math.pi)
@@ -135,7 +136,7 @@ def _platen(robot: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> No
         if leg.kind == "bearing":
             continue
         point = _minus(leg.platen_point, centre)
-        width = 2.0 * _size("swivel.radius") * leg.rod
+        width = 2.0 * drawing_size("swivel.radius") * leg.rod
         low, high = [], []
         for x, m, s in zip(point, middle, size, strict=True):
             inside = min(max(x, m - 0.5 * (s - width)), m + 0.5 * (s - width))
@@ -166,11 +167,11 @@ def _add_leg(robot: ET.Element, leg: _Leg) -> None:
     """Barrel, rod and, for a bearing leg, surface plate."""
     name = leg.name
     barrel, rod = _link(robot, f"{name}_barrel"), _link(robot, f"{name}_rod")
-    half, radius = 0.5 * leg.barrel_length, _size("barrel.radius") * leg.bore
+    half, radius = 0.5 * leg.barrel_length, drawing_size("barrel.radius") * leg.bore
     _visual(barrel, leg.kind, (0.0, 0.0, half), cylinder=(radius, 2.0 * half))
     bearing = leg.kind == "bearing"
-    edge = _size("plate.edge") * leg.bore
-    thickness = _size("plate.thickness") * edge if bearing else 0.0
+    edge = drawing_size("plate.edge") * leg.bore
+    thickness = drawing_size("plate.thickness") * edge if bearing else 0.0
     along, across = leg.masses
     if along > 0.0:
         place = 0.5 if bearing else math.sqrt(across / along)  # the rod's point mass, from the base
@@ -180,7 +181,7 @@ def _add_leg(robot: ET.Element, leg: _Leg) -> None:
     if bearing:
         _joint(robot, f"{name}_base", "fixed", ("world", f"{name}_barrel"), leg.base)
     else:
-        ball = _size("swivel.radius") * leg.rod
+        ball = drawing_size("swivel.radius") * leg.rod
         _visual(barrel, leg.kind, ORIGIN, sphere=ball)
         _visual(rod, "rod", ORIGIN, sphere=ball)
         _universal(robot, name, "swivel", "xy", ("world", f"{name}_barrel"), leg.base, leg.tilt)
@@ -205,8 +206,9 @@ def _universal(robot: ET.Element, name: str, what: str, axes: str, ends: tuple[s
 
 def _reaction_mass(world: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> None:
     """Translucent block that the legs stand on and in, with a pedestal under each swivel above it."""
-    margin = _size("reaction_mass.margin") * max(machine.platen.size)
-    stand = [leg.base[2] - (0.0 if leg.kind == "bearing" else _size("barrel.radius") * leg.bore) for leg in measures]
+    margin = drawing_size("reaction_mass.margin") * max(machine.platen.size)
+    width = drawing_size("barrel.radius")
+    stand = [leg.base[2] - (0.0 if leg.kind == "bearing" else width * leg.bore) for leg in measures]
     under_platen = machine.platen.bearing_plane[2] - 0.5 * margin
     actuators = [z for z, leg in zip(stand, measures, strict=True) if leg.kind != "strut"]
     top, bottom = min(*actuators, under_platen), min(*stand, under_platen) - margin
@@ -220,7 +222,7 @@ def _reaction_mass(world: ET.Element, machine: Machine, measures: Sequence[_Leg]
     _visual(world, "reaction_mass", middle, box=_minus(high, low))
     for leg, z in zip(measures, stand, strict=True):
         if z > top:
-            edge = 3.0 * _size("barrel.radius") * leg.bore
+            edge = 3.0 * width * leg.bore
             _visual(world, "reaction_mass", (*leg.base[:2], 0.5 * (z + top)), box=(edge, edge, z - top))
 
 
@@ -235,7 +237,7 @@ def _minus(a: Vec, b: Vec) -> Vec:
 
 def _material(robot: ET.Element, kind: str) -> None:
     colour = drawing_colour(kind).lstrip("#")
-    opacity = _size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
+    opacity = drawing_size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
     rgba = [int(colour[k : k + 2], 16) / 255.0 for k in (0, 2, 4)]
     ET.SubElement(
         ET.SubElement(robot, "material", name=kind), "color", rgba=_text([*(round(c, 4) for c in rgba), opacity])

@@ -42,7 +42,7 @@ def test_every_script_says_what_it_is_for_and_has_a_main(path):
 def test_every_script_explains_its_options(name):
     ended = script(name, "--help")
     assert ended.returncode == 0
-    assert ("--export" if name == "view_platen.py" else "--out") in ended.stdout
+    assert "--out" in ended.stdout
 
 
 def test_the_example_rehearses_a_motion_with_the_python_interface(tmp_path):
@@ -84,14 +84,6 @@ def test_a_study_is_refused_a_folder_it_could_not_write_before_it_begins(tmp_pat
     (tmp_path / "file").write_text("")
     ended = script(name, option, "--out", tmp_path / "file" / "below")
     assert ended.returncode == 1 and "NotADirectoryError" in ended.stderr and ended.stdout == ""
-
-
-def test_the_viewer_exports_one_file(tmp_path):
-    ended = script("view_platen.py", PRACTICE, "--export", tmp_path / "a.html")
-    assert ended.returncode == 0, ended.stderr
-    assert (tmp_path / "a.html").read_text().lstrip().lower().startswith("<!doctype html>")
-    lost = script("view_platen.py", tmp_path / "absent.nc", "--export", tmp_path / "b.html")
-    assert lost.returncode == 1 and "absent.nc: no such file" in lost.stderr and "Traceback" not in lost.stderr
 
 
 def test_the_shipped_urdf_is_what_its_script_writes(tmp_path):

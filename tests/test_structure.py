@@ -28,7 +28,7 @@ LAYERS = [
     {"plant", "schemes"},
     {"pose", "workspace"},
     {"alignment", "fusion", "equilibrium", "engine_pinocchio", "bodies"},
-    {"control", "capacity", "linearize", "gas"},
+    {"control", "capacity", "linearize", "gas", "sight"},
     {"engine_fused"},
     {"simulate"},
     {"batch", "outputs", "check", "ledger", "running", "drives", "port_path"},
@@ -40,7 +40,7 @@ LAYERS = [
     {"rehearse", "tables", "doctor", "fmi", "link"},
     {"validation"},
     {"discover"},
-    {"report", "viewer_page", "control_tables", "calibration_table", "discovery_table"},
+    {"report", "control_tables", "calibration_table", "discovery_table"},
     {"viewer"},
     {"cli"},
 ]
@@ -57,7 +57,7 @@ PINOCCHIO = {
         "ledger",
         "energy",
     ),  # dynamics
-    *("bodies", "viewer"),  # pictures
+    *("bodies", "viewer.scene", "viewer.live"),  # pictures
 }
 """Modules that may import pinocchio."""
 

@@ -15,6 +15,7 @@ from . import (  # each adds its commands
     look,
     runs,
     validation,
+    view,
 )
 from .app import app, main
 
@@ -31,4 +32,5 @@ __all__ = [
     "main",
     "runs",
     "validation",
+    "view",
 ]

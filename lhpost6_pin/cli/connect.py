@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from .app import app, progress_bar, stderr
+from .live import Amplify, Change, NoOpen, show_address
 from .options import (
     Axes,
     ControllerName,
@@ -59,8 +60,13 @@ def serve(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    live: Annotated[bool, typer.Option("--live", help="Show the table in a browser as it moves.")] = False,
+    amplify: Amplify = 1.0,
+    force_change: Change = False,
+    no_open: NoOpen = False,
 ) -> None:
     """Let a controller in another process or on another computer drive the virtual table over UDP."""
+    from contextlib import ExitStack
     from dataclasses import asdict
 
     from ..equilibrium import find_equilibrium
@@ -76,7 +82,16 @@ def serve(
         served = ServedPlant(plant, find_equilibrium(plant), chosen)
         address, at = sock.getsockname()
         typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends")
-        timing = serve_link(sock, served, seconds=seconds)
+        with ExitStack() as stack:
+            if live:
+                from ..viewer import view_apart
+
+                title = f"{table.name} at {address}:{at}"
+                url, served.watcher = stack.enter_context(
+                    view_apart(table, title, amplify=amplify, change=force_change)
+                )
+                show_address(url, f"{title}, on this computer only", not no_open)
+            timing = serve_link(sock, served, seconds=seconds)
     times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
     print_link(f"{table.name}, {mode}", asdict(served.counts), {**times, "answer of the client": served.answer_time})
 

@@ -9,6 +9,7 @@ import typer
 
 from ..errors import RecordError, SimulationError
 from .app import app, progress_bar
+from .live import Amplify, Change, Live, NoOpen, watched
 from .options import (
     Axes,
     Beyond,
@@ -69,6 +70,10 @@ def run(
     set_: Set = None,
     beyond: Beyond = False,
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
+    live: Live = False,
+    amplify: Amplify = 1.0,
+    force_change: Change = False,
+    no_open: NoOpen = False,
 ) -> None:
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
     from ..control import ControllerSettings
@@ -92,12 +97,16 @@ def run(
     folder = folder_for(out, name)
     if not beyond:
         target_within_limits(make_plant(table), target)
-    with progress_bar(f"{name} on {table.name}") as progress:
+    title = f"{name} x {scale:g} on {table.name}"
+    with (
+        watched(live, table, title, amplify=amplify, change=force_change, open_it=not no_open) as watch,
+        progress_bar(f"{name} on {table.name}") as progress,
+    ):
         run_, record = rehearse(
             table,
             target,
             chosen,
-            attrs={"test": name, "title": f"{name} x {scale:g} on {table.name}"},
+            attrs={"test": name, "title": title},
             inverse=inverse,
             scheme=scheme,
             steps_per_second=rate,
@@ -105,6 +114,7 @@ def run(
             record_every=SAMPLE_RATE // record_rate,
             beyond_limits=True,
             progress=progress,
+            watch=watch,
         )
     _save(table, run_, record, folder, report=True)
 

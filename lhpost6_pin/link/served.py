@@ -22,6 +22,7 @@ from ..errors import LinkError, SimulationError
 from ..plant import Plant
 from ..running import RunningPlant
 from ..schemes import SAMPLE_RATE
+from ..sight import EVERY, Watch
 from .clock import SECOND
 from .protocol import Frame, Kind, Mode, PlantState, ShortFrameError, Welcome, decode, encode, is_newer
 from .statistics import Counts, Histogram
@@ -49,13 +50,14 @@ class ServedPlant:
     """The state of one served plant; every method returns at once, `now` is the caller's clock [ns].
 
     Attributes: mode; state; sample; spool, which the plant took last; counts; answer_time, from the
-    sending of sensors to the coming of the command that answers them.
+    sending of sensors to the coming of the command that answers them; watcher, shown the plant as it moves.
     """
 
     def __init__(self, plant: Plant, rest: Equilibrium, mode: Mode) -> None:
         """Put the plant at rest and run its first samples, so that all is compiled before a client comes."""
         self.plant, self.mode, self._rest = plant, mode, rest
         self.counts, self.answer_time = Counts(), Histogram()
+        self.watcher: Watch | None = None
         self._owner: Hashable = None  # who has the plant, or had it last
         self._taken = False
         self._session, self._at_hello, self._heard = 0, Counts(), 0
@@ -197,6 +199,8 @@ class ServedPlant:
                 self.spool = self._from + share * share * (3.0 - 2.0 * share) * (target - self._from)
             try:
                 self._table.advance(self.spool)
+                if self.watcher is not None and self._table.sample % EVERY == 0:
+                    self.watcher(self._table.sight())
                 numbers = _numbers(self._table.sensors())
                 if not np.isfinite(numbers).all():
                     raise SimulationError(f"stopped at {self._table.time:.4f} s: a sensor is not finite")

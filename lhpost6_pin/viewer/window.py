@@ -1,63 +1,25 @@
-"""Where meshcat's commands go: a page that plays off line, or browsers that look from this computer.
+"""Where meshcat's commands go: into a page that plays off line, or to browsers that look from this computer.
 
 meshcat draws into any "window" with a `send`. Its own server listens on all network interfaces and starts a second
-process; neither of the two here does. `Recorder` keeps the commands, `render_page` puts them into one HTML file.
-`LoopbackWindow` serves that page on 127.0.0.1 and hands it the commands as they come, those sent before included.
+process; neither of the two here does. `Recorder` keeps the commands for `page`; `LoopbackWindow` serves a page on
+127.0.0.1 and hands it the commands as they come, those sent before included.
 """
 
 import asyncio
-import base64
-import html
-import json
 import socket
 import threading
-from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LoopbackWindow", "Recorder", "pack_command", "packed_array", "render_page"]
+__all__ = ["LoopbackWindow", "Recorder", "Window", "pack_command", "packed_array"]
 
 FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
 LOOPBACK = "127.0.0.1"
 HOSTS = r"(127\.0\.0\.1|localhost)"  # a page of another site that points its name here is refused
-
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; \
-style-src 'unsafe-inline'; img-src data: blob:; connect-src {connect}">
-<title>{title}</title>
-<style>
-body {{ margin:0; }}
-#meshcat-pane {{ width:100vw; height:100vh; overflow:hidden; }}
-#caption {{ position:absolute; left:0; top:0; margin:1rem; padding:.5rem .8rem; max-width:calc(100vw - 300px);
-  border-radius:.3rem; background:rgba(255,255,255,.85); color:#1b1f24;
-  font:14px/1.45 system-ui,"Liberation Sans",sans-serif; }}
-#caption b {{ font-size:1.1em; }}
-.kind {{ white-space:nowrap; margin-right:.8em; }}
-.mark {{ display:inline-block; width:.75em; height:.75em; margin-right:.3em; border-radius:2px; }}
-</style>
-</head>
-<body>
-<div id="meshcat-pane"></div>
-<div id="caption"><b>{title}</b><br>{note}<br>{legend}<br>
-<small>Drag to turn, wheel to zoom; "Open Controls" has play, pause, time and speed.</small></div>
-<script>{library}</script>
-<script>
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-for (const packed of {commands})
-  viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
-{connection}
-</script>
-</body>
-</html>
-"""
 
 
 def pack_command(command: Any) -> bytes:
@@ -75,30 +37,11 @@ def packed_array(values: NDArray[Any]) -> Any:
     return umsgpack.Ext(FLOAT_ARRAY, np.ascontiguousarray(values, "<f4").tobytes())
 
 
-def render_page(
-    title: str, note: str, legend: Mapping[str, str], commands: Sequence[bytes] = (), *, live: bool = False
-) -> str:
-    """Return a page that draws `commands` and loads nothing; a live one then asks its own server for more.
+class Window(Protocol):
+    """What meshcat draws into."""
 
-    legend maps words to colours such as ``#0072B2``.
-    """
-    import meshcat
-
-    library = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
-    marks = (
-        f'<span class="kind"><span class="mark" style="background:{html.escape(colour)}"></span>'
-        f"{html.escape(word)}</span> "
-        for word, colour in legend.items()
-    )
-    return PAGE.format(
-        connect="'self'" if live else "'none'",
-        title=html.escape(title),
-        note=html.escape(note),
-        legend="".join(marks),
-        library=library.read_text(encoding="utf-8").replace("</script", "<\\/script"),
-        commands=json.dumps([base64.b64encode(command).decode("ascii") for command in commands]),
-        connection="viewer.connect(`ws://${location.host}/commands`);" if live else "",
-    )
+    def send(self, command: Any) -> None:
+        """Take one command."""
 
 
 class Recorder:
@@ -125,12 +68,22 @@ class LoopbackWindow:
         self._commands: dict[tuple[str, str, str], bytes] = {}
         self._browsers: set[Any] = set()
         self._lock = threading.Lock()
-        self._ready = threading.Event()
+        self._ready, self._looked_at = threading.Event(), threading.Event()
 
     @property
     def url(self) -> str:
         """Address of the page."""
         return f"http://{LOOPBACK}:{self._port}/"
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a browser looks, at most so long [s]; whether one does."""
+        return self._looked_at.wait(seconds)
+
+    def say(self, words: str) -> None:
+        """Show words in the status of the browsers that look."""
+        with self._lock:
+            if self._ready.is_set():
+                self._loop.call_soon_threadsafe(self._hand_out, words)
 
     def send(self, command: Any) -> None:
         """Keep one command for browsers to come and hand it to those that look."""
@@ -174,12 +127,12 @@ class LoopbackWindow:
             browser.close()
         await server.close_all_connections()
 
-    def _hand_out(self, packed: bytes) -> None:
+    def _hand_out(self, message: bytes | str) -> None:
         from tornado.websocket import WebSocketClosedError
 
         for browser in list(self._browsers):
             with suppress(WebSocketClosedError):  # one that is just leaving
-                browser.write_message(packed, binary=True)
+                browser.write_message(message, binary=isinstance(message, bytes))
 
     def _welcome(self, browser: Any) -> None:
         with self._lock:
@@ -187,6 +140,7 @@ class LoopbackWindow:
             commands = list(self._commands.values())
         for packed in commands:
             browser.write_message(packed, binary=True)
+        self._looked_at.set()
 
 
 def _application(window: LoopbackWindow) -> Any:

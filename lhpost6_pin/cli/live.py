@@ -1,0 +1,49 @@
+"""A page that shows a table while a command moves it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ..machine import Machine
+    from ..sight import Watch
+
+__all__ = ["Amplify", "Change", "Live", "NoOpen", "show_address", "watched"]
+
+Amplify = Annotated[float, typer.Option(help="Draw the motion this many times as large.")]
+Change = Annotated[
+    bool, typer.Option("--force-change", help="Draw forces less what they are at the start: weight, preload.")
+]
+Live = Annotated[bool, typer.Option("--live", help="Show the table in a browser as it moves, no faster than it would.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the page's address, open no browser.")]
+
+PATIENCE = 20.0
+"""Longest wait [s] for somebody to look before a run begins."""
+
+
+@contextmanager
+def watched(
+    live: bool, table: "Machine", title: str, *, amplify: float, change: bool, open_it: bool
+) -> "Iterator[Watch | None]":
+    """Yield what shows a running plant in a browser, or None if nobody asked to see it."""
+    if not live:
+        yield None
+        return
+    from ..viewer import LiveView
+
+    with LiveView(table, title, amplify=amplify, change=change) as view:
+        show_address(view.url, f"{title} on this computer only", open_it)
+        if not view.wait(PATIENCE):
+            typer.echo(f"nobody has looked for {PATIENCE:g} s: it goes on", err=True)
+        yield view.show
+
+
+def show_address(url: str, what: str, open_it: bool) -> None:
+    """Print where something is to be seen, and open a browser there if one can be had."""
+    import webbrowser
+
+    typer.echo(f"{url} shows {what}")
+    if open_it and not webbrowser.open(url):
+        typer.echo("no browser could be opened here: open this address in one", err=True)

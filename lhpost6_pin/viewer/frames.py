@@ -1,0 +1,160 @@
+"""Frames of an animation: motions and forces of a record, and of one laid over it, at a uniform frame rate."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..errors import ParameterError, RecordError
+from ..machine import Machine
+from ..plant import make_plant
+from ..pose import forward_kinematics
+from ..records import require
+
+__all__ = ["Frames", "Ghost", "make_frames", "record_frames", "record_title", "refuse_factor"]
+
+Array = NDArray[np.float64]
+
+MOST_TURN = 0.5 * math.pi
+"""Roll or pitch [rad] that is refused: Euler angles end at a pitch of this size."""
+
+
+class Ghost(NamedTuple):
+    """Another motion of the platen over its own time, to be drawn as an outline: the reference, or a second record."""
+
+    name: str  # also its colour's
+    label: str
+    time: Array  # (m,) [s]
+    displacement: Array  # (m, 6) of C in {s} and Euler angles [m, rad]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Motion of C in {s} with Euler angles, and forces on the platen along the legs, at a uniform frame rate."""
+
+    time: Array  # (n,) [s]
+    rate: float  # [1/s]
+    displacement: Array  # (n, 6) [m, rad], enlarged `amplify` times
+    ghosts: tuple[Ghost, ...] = ()  # sampled and enlarged alike
+    force: Array | None = None  # (n, n_legs) that push the platen away from the leg's base [N]; NaN where unknown
+    amplify: float = 1.0  # factor on all motion
+    gap: float = 1.0  # factor on what the ghosts differ by, besides
+    change: bool = False  # whether forces are less those of the first frame
+
+
+def make_frames(
+    time: Array,
+    displacement: Array,
+    ghosts: Sequence[Ghost] = (),
+    force: Array | None = None,
+    *,
+    rate: float = 30.0,
+    amplify: float = 1.0,
+    gap: float = 1.0,
+) -> Frames:
+    """Sample a platen motion (n, 6) and forces (n, n_legs) over time (n,) [s] at `rate` frames a second.
+
+    Motion is enlarged `amplify` times, what the ghosts differ by `gap` times more; only the time that all have is kept.
+    Raises RecordError for a motion that cannot be drawn, ParameterError for a rate or factor that makes no sense.
+    """
+    for name, value in (("rate", rate), ("amplify", amplify), ("gap", gap)):
+        refuse_factor(name, value)
+    time = np.asarray(time, float)
+    moments = _moments([time, *(np.asarray(g.time, float) for g in ghosts)], rate)
+    drawn = amplify * _sampled(moments, time, displacement, "platen_displacement", amplify)
+    others = []
+    for ghost in ghosts:
+        there = amplify * _sampled(moments, ghost.time, ghost.displacement, ghost.label, amplify * gap)
+        others.append(Ghost(ghost.name, ghost.label, moments, drawn + gap * (there - drawn)))
+    for motion in (drawn, *(g.displacement for g in others)):
+        if np.abs(motion[:, 3:5]).max() >= MOST_TURN:
+            raise ParameterError(f"amplified {amplify * gap:g} times the platen turns over; amplify less")
+    legs = None if force is None else _columns(moments, time, np.asarray(force, float))
+    return Frames(moments, rate, drawn, tuple(others), legs, amplify, gap)
+
+
+def record_frames(
+    machine: Machine,
+    record: xr.Dataset,
+    other: xr.Dataset | None = None,
+    *,
+    rate: float = 30.0,
+    amplify: float = 1.0,
+    gap: float = 1.0,
+    change: bool = False,
+) -> Frames:
+    """Frames of a record, with its reference and another record over it.
+
+    A record without platen displacement is drawn from its actuator displacements. With `change` forces are less what
+    they are in the first frame: weight and preload. Raises RecordError if it has neither displacement, or if two
+    records share no time; else as `make_frames`.
+    """
+    time, ghosts = record["time"].values, []
+    if "reference_displacement" in record:
+        ghosts.append(Ghost("reference", "reference", time, record["reference_displacement"].values))
+    if other is not None:
+        label = f"second: {record_title(other)}, {other.attrs.get('kind', 'record')}"
+        ghosts.append(Ghost("other", label, other["time"].values, _motion(machine, other)))
+    motion, force = _motion(machine, record), _forces(machine, record)
+    frames = make_frames(time, motion, ghosts, force, rate=rate, amplify=amplify, gap=gap)
+    if change and frames.force is not None:
+        return replace(frames, force=frames.force - frames.force[0], change=True)
+    return frames
+
+
+def refuse_factor(name: str, value: float) -> None:
+    """Raise ParameterError for a factor or rate that makes no sense."""
+    if not (math.isfinite(value) and value > 0.0):
+        raise ParameterError(f"{name} is {value:g}; it must be a positive number")
+
+
+def record_title(record: xr.Dataset) -> str:
+    """What a record calls itself."""
+    return str(record.attrs.get("title", record.attrs.get("test", "record")))
+
+
+def _moments(times: Sequence[Array], rate: float) -> Array:
+    first, last = max(t[0] for t in times), min(t[-1] for t in times)
+    if last <= first:
+        spans = " and ".join(f"{t[0]:g} to {t[-1]:g} s" for t in (times[0], times[-1]))
+        raise RecordError(f"the records share no time: {spans}; let both begin with the same test")
+    return np.asarray(first + np.arange(int((last - first) * rate * (1.0 + 1e-12)) + 1) / rate)
+
+
+def _sampled(moments: Array, time: Array, motion: Array, name: str, factor: float) -> Array:
+    motion = np.asarray(motion, float)
+    if motion.shape != (time.size, 6) or not np.isfinite(motion).all():
+        raise RecordError(f"{name} must be {time.size} samples of six finite numbers; it is {motion.shape}")
+    if np.abs(motion).max(initial=0.0) > math.pi * 1e6 / factor:
+        raise ParameterError(f"amplified {factor:g} times {name} leaves every picture; amplify less")
+    return _columns(moments, time, motion)
+
+
+def _columns(moments: Array, time: Array, values: Array) -> Array:
+    return np.stack([np.interp(moments, time, column) for column in values.T], axis=1)
+
+
+def _motion(machine: Machine, record: xr.Dataset) -> Array:
+    if "platen_displacement" in record:
+        return np.asarray(record["platen_displacement"].values)
+    require(record, "actuator_displacement")
+    return forward_kinematics(make_plant(machine), record["actuator_displacement"].values)[0]
+
+
+def _forces(machine: Machine, record: xr.Dataset) -> Array | None:
+    """Forces along actuators and struts (n, n_legs); a strut's gas pulls its ends together (Eq. 4-8)."""
+    parts = []
+    for name, legs in (("actuator_force", machine.actuators), ("strut_pressure", machine.struts)):
+        if name not in record:
+            parts.append(np.full((record.sizes["time"], len(legs)), np.nan))
+        elif record[name].shape[1] != len(legs):
+            raise RecordError(f"{name} has {record[name].shape[1]} columns; {machine.name} has {len(legs)}")
+        else:
+            parts.append(record[name].values)
+    forces, pressures = parts
+    force = np.hstack([forces, -pressures * [s.area for s in machine.struts]])
+    return None if np.isnan(force).all() else force

@@ -1,0 +1,113 @@
+"""A table watched while it moves: a simulation, or the plant behind the UDP link."""
+
+import time
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..bodies import body_name, body_poses, joint_positions, load_bodies
+from ..machine import Machine
+from ..sight import Sight
+from ..urdf import legs
+from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
+from .frames import refuse_factor
+from .page import Caption, render_page
+from .scene import ROOT, draw_arrows, draw_machine
+from .show import machine_legend
+from .window import LoopbackWindow
+
+__all__ = ["LiveView"]
+
+Array = NDArray[np.float64]
+
+
+class LiveView:
+    """A page on this computer that shows a plant as it moves, while used in a ``with`` block.
+
+    Arrows are scaled by what holds the table at the start: the largest of those forces is drawn half as long as can be.
+    """
+
+    def __init__(
+        self, machine: Machine, title: str, *, amplify: float = 1.0, change: bool = False, real_time: bool = True
+    ) -> None:
+        """Prepare the page.
+
+        Motion is drawn `amplify` times as large, no faster than it is in `real_time`; forces with `change` less those
+        at the start. Raises ParameterError for a factor that makes no sense.
+        """
+        refuse_factor("amplify", amplify)
+        self._machine, self._amplify, self._real_time, self._change = machine, amplify, real_time, change
+        self._bodies = load_bodies(machine)
+        self._names = [leg.name for leg in legs(machine)]
+        size = "drawn to scale" if amplify == 1.0 else f"motion drawn {amplify:g} times as large"
+        note = f"{machine.name}, live, {size}; +X to the right"
+        self._window = LoopbackWindow(render_page(Caption(title, note, machine_legend(machine)), live=True))
+        draw_machine(self._window, machine, self._bodies)
+        draw_arrows(self._window, self._names)
+        shaped = {shape.parentJoint for shape in self._bodies.shapes.geometryObjects}
+        self._joints = {j: f"/meshcat/{ROOT}/{body_name(self._bodies.model, j)}" for j in shaped if j > 0}
+        self._begin: float | None = None  # by the clock [s], of the plant's time zero
+        self._largest = 1.0  # force of the longest arrow [N]
+        self._still = np.zeros(len(self._names))  # forces that are not drawn [N]
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self._window.url
+
+    def __enter__(self) -> "LiveView":
+        """Start to serve."""
+        self._window.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop serving."""
+        self._window.__exit__(kind, error, trace)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until somebody looks, at most so long [s]; whether somebody does."""
+        return self._window.wait(seconds)
+
+    def show(self, sight: Sight) -> None:
+        """Draw one sight; returns at once, or in real time when its moment has come."""
+        if self._begin is None:
+            self._begin, self._largest = time.monotonic() - sight.time, 2.0 * largest_force(sight.force)
+            self._still = sight.force if self._change else self._still
+        if self._real_time:
+            time.sleep(max(0.0, self._begin + sight.time - time.monotonic()))
+        q = joint_positions(self._machine, self._bodies.model, self._amplify * sight.displacement)
+        poses = body_poses(self._bodies.model, q)[0]
+        for joint, path in self._joints.items():
+            self._window.send(_Place(path, pin.XYZQUATToSE3(poses[joint]).homogeneous))
+        force = sight.force - self._still
+        sizes, colours = arrow_sizes(self._machine, force, self._largest), arrow_colours(force, self._largest)
+        for name, size, colour in zip(self._names, sizes, colours, strict=True):
+            arrow = f"/meshcat/{ROOT}/{name}_rod/force"
+            self._window.send(_Property(arrow, "scale", size.tolist()))
+            self._window.send(_Property(arrow, "color", [*colour.tolist(), OPACITY]))
+        self._window.say(f"{sight.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
+
+
+class _Place:
+    """A `set_transform` command."""
+
+    def __init__(self, path: str, matrix: Array) -> None:
+        self.path, self.matrix = path, matrix
+
+    def lower(self) -> dict[str, Any]:
+        return {"type": "set_transform", "path": self.path, "matrix": self.matrix.T.ravel().tolist()}
+
+
+class _Property:
+    """A `set_property` command."""
+
+    def __init__(self, path: str, name: str, value: Any) -> None:
+        self.path, self.name, self.value = path, name, value
+
+    def lower(self) -> dict[str, Any]:
+        return {"type": "set_property", "path": self.path, "property": self.name, "value": self.value}

@@ -1,0 +1,72 @@
+// The page's own part: meshcat's commands into its viewer, and a bar that drives meshcat's animation.
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+const part = (id) => document.getElementById(id);
+for (const packed of JSON.parse(part("commands").textContent))
+  viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
+const start = START;
+const animator = viewer.animator;
+const shown = (seconds) => seconds.toFixed(2);
+const FITS = 1.5; // width over height in which the camera sees the whole table
+let known = 0, camera = null, field = 0;
+
+function fit() { // a narrower window sees as much in width
+  if (viewer.camera !== camera) { camera = viewer.camera; field = Math.tan((camera.fov * Math.PI) / 360); }
+  const short = Math.max(1, (FITS * window.innerHeight) / window.innerWidth);
+  camera.fov = (360 / Math.PI) * Math.atan(field * short);
+  camera.updateProjectionMatrix();
+  viewer.set_dirty();
+}
+
+function adopt() { // an animation that has come: at once from a file, by and by from a server
+  known = animator.duration;
+  part("bar").hidden = part("keys").hidden = known === 0;
+  part("time").max = known;
+  animator.mixer.timeScale = Number(part("speed").value);
+  repeat();
+}
+function repeat() {
+  for (const action of animator.actions) action.repetitions = part("loop").checked ? Infinity : 1;
+}
+function draw() {
+  if (viewer.camera !== camera) fit();
+  if (animator.duration !== known) adopt();
+  if (document.activeElement !== part("time") || animator.playing) part("time").value = animator.time;
+  part("clock").textContent = `${shown(start + animator.time)} / ${shown(start + known)} s`;
+  part("play").textContent = animator.playing ? "❚❚" : "▶";
+  part("play").setAttribute("aria-label", animator.playing ? "Pause" : "Play");
+  requestAnimationFrame(draw);
+}
+function toggle() { if (animator.playing) animator.pause(); else animator.play(); }
+function seek(time) {
+  const there = Math.min(Math.max(time, 0), known);
+  animator.seek(there);
+  animator.display_progress(there);
+}
+window.addEventListener("resize", fit);
+part("play").addEventListener("click", toggle);
+part("time").addEventListener("input", (e) => { animator.pause(); seek(Number(e.target.value)); });
+part("speed").addEventListener("change", (e) => { animator.mixer.timeScale = Number(e.target.value); });
+part("loop").addEventListener("change", repeat);
+part("bar").addEventListener("submit", (e) => e.preventDefault());
+for (const box of document.querySelectorAll("#layers input"))
+  box.addEventListener("change", () => {
+    for (const path of JSON.parse(box.dataset.paths)) viewer.set_property(path.split("/"), "visible", box.checked);
+    viewer.set_dirty();
+  });
+document.addEventListener("keydown", (e) => {
+  if (known === 0 || ["INPUT", "SELECT", "BUTTON", "SUMMARY"].includes(e.target.tagName)) return;
+  const step = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
+  if (e.key === " ") { toggle(); e.preventDefault(); }
+  if (step) { animator.pause(); seek(animator.time + step * (e.shiftKey ? 1 : STEP)); e.preventDefault(); }
+  if (e.key === "Home") seek(0);
+});
+if (LIVE) { // what is sent: meshcat's commands, and words on how it goes
+  const socket = new WebSocket(`ws://${location.host}/commands`);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({ data }) => {
+    if (typeof data === "string") part("status").textContent = data;
+    else viewer.handle_command_bytearray(new Uint8Array(data));
+  };
+  socket.onclose = () => { part("status").textContent += " (ended)"; };
+}
+draw();

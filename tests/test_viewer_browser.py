@@ -1,0 +1,175 @@
+"""Pages of the viewer in a browser: no errors, the platen where the record has it, keys and boxes that work."""
+
+import asyncio
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import Tab, browse, needs_browser
+
+from lhpost6_pin.bodies import body_name, body_poses, joint_positions, load_bodies
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.records import load_record
+from lhpost6_pin.running import RunningPlant
+from lhpost6_pin.sight import EVERY
+from lhpost6_pin.viewer import LiveView, live_animation, record_frames, save_animation, view_apart
+
+pytestmark = needs_browser
+
+RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
+
+AT = "(name) => viewer.scene_tree.find(['meshcat', 'table', ...name.split('/')]).object"
+DRAWN = "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))"
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    return load_machine()
+
+
+@pytest.fixture(scope="module")
+def record():
+    return load_record(RECORD).isel(time=slice(0, 512 * 12))
+
+
+@pytest.fixture(scope="module")
+def page(machine, record, tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("page") / "out.html"
+    save_animation(
+        machine, record, path, record.assign(platen_displacement=0.9 * record["platen_displacement"]), amplify=3
+    )
+    return path.as_uri()
+
+
+def share(pixels: np.ndarray, colour: tuple[int, int, int], within: int = 40) -> float:
+    """Share of a picture that is nearly of a colour."""
+    return float(np.mean(np.abs(pixels - colour).max(axis=-1) < within))
+
+
+def test_the_page_has_no_errors_and_the_platen_is_where_the_record_has_it(machine, record, page, tmp_path):
+    times = [0.0, 8.0, 10.0]
+
+    async def look(tab: Tab):
+        await tab.evaluate("viewer.animator.pause()")
+        poses, pictures = [], []
+        for k, time in enumerate(times):
+            await tab.evaluate(f"seek({time}), {DRAWN}")
+            read = "[...at(n).position.toArray(), ...at(n).quaternion.toArray()]"
+            poses.append(await tab.evaluate(f"{{ const at = {AT}; ['platen', 'H2_rod', 'other'].map((n) => {read}) }}"))
+            pictures.append(await tab.picture(tmp_path / f"{k}.png"))
+        return tab.faults, np.array(poses), pictures
+
+    faults, poses, pictures = browse(tmp_path, page, look)
+    assert faults == []
+    frames = record_frames(machine, record, amplify=3.0)
+    model = load_bodies(machine).model
+    moments = frames.displacement[[round(30 * t) for t in times]]
+    wanted = body_poses(model, joint_positions(machine, model, moments))
+    names = [body_name(model, joint) for joint in range(model.njoints)]
+    # the page's numbers are in single precision, 1e-7 of 10 m
+    np.testing.assert_allclose(poses[:, 0], wanted[:, names.index("platen")], atol=2e-6)
+    np.testing.assert_allclose(poses[:, 1, :3], wanted[:, names.index("H2_rod"), :3], atol=2e-6)
+    assert np.ptp(poses[:, 0, :3], axis=0).max() > 0.02
+    assert np.abs(poses[1:, 2, 0] - 0.9 * moments[1:, 0]).max() < 0.05  # the box's middle is half a metre below C
+    for picture in pictures:
+        assert share(picture, (0, 100, 165)) > 0.05  # the platen covers a sixth of the page
+    for last, now in pairwise(pictures):
+        assert np.sum(np.abs(now - last).max(axis=-1) > 8) > 1000
+
+
+def test_keys_and_boxes_play_step_and_hide(page, tmp_path):
+    async def look(tab: Tab):
+        seen = {}
+        await tab.key(" ")
+        seen["paused"] = not await tab.evaluate("viewer.animator.playing")
+        await tab.evaluate("seek(5)")
+        await tab.key("ArrowRight")
+        seen["time"] = await tab.evaluate("viewer.animator.time")
+        await tab.evaluate(f"seek(1e9), {DRAWN}")
+        seen["end"] = await tab.evaluate("[viewer.animator.time, document.getElementById('clock').textContent]")
+        await tab.evaluate(f"seek(0), {DRAWN}")
+        with_arrows = await tab.picture(tmp_path / "with.png")
+        boxes = "[...document.querySelectorAll('#layers label')]"
+        seen["layers"] = await tab.evaluate(f"{boxes}.map((l) => l.textContent.trim())")
+        await tab.evaluate(f"{boxes}.find((l) => l.textContent.includes('forces')).click(), {DRAWN}")
+        without = await tab.picture(tmp_path / "without.png")
+        seen["violet"] = share(with_arrows, (94, 60, 153)), share(without, (94, 60, 153))
+        await tab.evaluate("document.activeElement.blur()")  # on a box, space is the box's
+        await tab.key(" ")
+        seen["playing"] = await tab.evaluate("viewer.animator.playing")
+        return tab.faults, seen
+
+    faults, seen = browse(tmp_path, page, look)
+    assert faults == []
+    assert seen["paused"] and seen["playing"], seen
+    assert abs(seen["time"] - (5 + 1 / 30)) < 1e-6  # one frame
+    end, clock = seen["end"]
+    assert abs(end - 11.967) < 1e-3 and clock == "11.97 / 11.97 s"  # 12 s less a sample and less what is no frame
+    assert seen["layers"][0] == "path of C" and seen["layers"][-1] == "forces" and len(seen["layers"]) == 4
+    before, after = seen["violet"]  # the struts' pull; shades of the struts themselves come near
+    assert before > 1e-3 and after < 0.1 * before
+
+
+def test_a_narrow_window_sees_the_whole_table(page, tmp_path):
+    async def look(tab: Tab):
+        await tab.evaluate(f"viewer.animator.pause(), seek(0), {DRAWN}")
+        return await tab.picture(tmp_path / "narrow.png")
+
+    picture = browse(tmp_path, page, look, size=(420, 900))
+    columns = np.flatnonzero((np.abs(picture - (0, 100, 165)).max(axis=-1) < 40).any(axis=0))
+    assert columns.size and columns.min() > 5 and columns.max() < picture.shape[1] - 6  # the platen ends inside
+
+
+def test_the_page_of_this_computer_shows_the_table(machine, record, tmp_path):
+    async def look(tab: Tab):
+        while not await tab.evaluate("viewer.animator.duration > 0"):
+            await asyncio.sleep(0.05)
+        await tab.evaluate(DRAWN)
+        return tab.faults, await tab.picture(tmp_path / "live.png")
+
+    with live_animation(machine, record.isel(time=slice(0, 2048))) as window:
+        faults, picture = browse(tmp_path, window.url, look)
+    assert faults == []
+    assert share(picture, (0, 100, 165)) > 0.05 and share(picture, (230, 159, 0)) > 0.005  # platen, horizontals
+
+
+def moved(plant, show) -> None:
+    """Half a second of a plant whose first actuator is driven hard, shown as it moves."""
+    rest = find_equilibrium(plant)
+    table, spool = RunningPlant(plant, rest), rest.spool.copy()
+    spool[0] += 0.2
+    for sample in range(1024):
+        if sample % EVERY == 0:
+            show(table.sight())
+        table.advance(spool)
+
+
+@pytest.mark.parametrize("apart", [False, True], ids=["in one process", "in a process of its own"])
+def test_a_live_view_follows_the_plant(machine, tmp_path, apart):
+    plant = make_plant(machine)
+
+    def view():
+        return view_apart(machine, "live") if apart else LiveView(machine, "live", real_time=False)
+
+    with view() as found:
+        url, show = found if apart else (found.url, found.show)
+
+        async def look(tab: Tab):
+            where = f"({AT})('platen').position.toArray()"
+            while not await tab.evaluate("document.getElementById('meshcat-pane').childElementCount > 0"):
+                await asyncio.sleep(0.05)
+            await asyncio.to_thread(moved, plant, show)
+            for _ in range(200):
+                status = await tab.evaluate("document.getElementById('status').textContent")
+                if status.startswith("0.5 s" if not apart else "0."):
+                    break
+                await asyncio.sleep(0.05)
+            return tab.faults, status, await tab.evaluate(where)
+
+        faults, status, platen = browse(tmp_path, url, look)
+    assert faults == [] and "largest force" in status
+    centre = np.array(machine.platen.centre_of_gravity)
+    assert np.linalg.norm(platen - centre) > 1e-3  # it has left its place

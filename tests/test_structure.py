@@ -40,6 +40,7 @@ LAYERS = [
     {"rehearse", "tables", "doctor", "fmi", "link"},
     {"validation"},
     {"discover"},
+    {"demo"},
     {"report", "control_tables", "calibration_table", "discovery_table"},
     {"viewer"},
     {"cli"},

@@ -141,12 +141,12 @@ def test_the_animation_holds_the_poses_of_the_moving_bodies(machine, bodies, pos
 
 def test_two_records_are_drawn_over_the_time_that_both_have(machine, record):
     early, late = record.isel(time=slice(0, 4096)), record.isel(time=slice(2048, 6144))
-    frames = record_frames(machine, early, late)
+    frames = record_frames(machine, early, [late])
     assert frames.time[0] == late["time"].values[0] and frames.time[-1] <= early["time"].values[-1]
-    other = next(g for g in frames.ghosts if g.name == "other")
+    other = next(g for g in frames.ghosts if g.name == "first_other")
     np.testing.assert_allclose(other.displacement, frames.displacement, atol=1e-12)  # the same samples
     with pytest.raises(RecordError, match="share no time"):
-        record_frames(machine, early, record.isel(time=slice(8192, 9000)))
+        record_frames(machine, early, [record.isel(time=slice(8192, 9000))])
 
 
 # ------------------------------------------------------------------------------------------------- arrows

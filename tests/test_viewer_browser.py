@@ -39,7 +39,7 @@ def record():
 def page(machine, record, tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("page") / "out.html"
     save_animation(
-        machine, record, path, record.assign(platen_displacement=0.9 * record["platen_displacement"]), amplify=3
+        machine, record, path, [record.assign(platen_displacement=0.9 * record["platen_displacement"])], amplify=3
     )
     return path.as_uri()
 
@@ -58,7 +58,8 @@ def test_the_page_has_no_errors_and_the_platen_is_where_the_record_has_it(machin
         for k, time in enumerate(times):
             await tab.evaluate(f"seek({time}), {DRAWN}")
             read = "[...at(n).position.toArray(), ...at(n).quaternion.toArray()]"
-            poses.append(await tab.evaluate(f"{{ const at = {AT}; ['platen', 'H2_rod', 'other'].map((n) => {read}) }}"))
+            names = ["platen", "H2_rod", "first_other"]
+            poses.append(await tab.evaluate(f"{{ const at = {AT}; {names}.map((n) => {read}) }}"))
             pictures.append(await tab.picture(tmp_path / f"{k}.png"))
         return tab.faults, np.array(poses), pictures
 

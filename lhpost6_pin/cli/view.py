@@ -15,14 +15,12 @@ __all__ = ["view"]
 @app.command()
 def view(
     record: Annotated[Path, typer.Argument(help="Test record (netCDF).")],
-    other: Annotated[Path | None, typer.Argument(help="A second record, laid over it as an outline.")] = None,
+    others: Annotated[list[Path] | None, typer.Argument(help="Other records, laid over it as outlines.")] = None,
     export: Annotated[
         Path | None, typer.Option(help="Write this HTML file, which plays off line, in place of opening a browser.")
     ] = None,
     amplify: Amplify = 1.0,
-    gap: Annotated[
-        float, typer.Option(help="Draw what reference and second record differ by this many times more.")
-    ] = 1.0,
+    gap: Annotated[float, typer.Option(help="Draw what the outlines differ by this many times more.")] = 1.0,
     change: Change = False,
     fps: Annotated[float, typer.Option(min=1.0, max=240.0, help="Frames a second.")] = 30.0,
     no_open: NoOpen = False,
@@ -36,13 +34,13 @@ def view(
     from ..viewer import live_animation, save_animation
 
     table = find_machine(machine, override)
-    test, second = load_record(record), load_record(other) if other else None
+    test, over = load_record(record), [load_record(path) for path in others or []]
     options: dict[str, Any] = {"rate": fps, "amplify": amplify, "gap": gap, "change": change}
     if export is not None:
-        save_animation(table, test, export, second, **options)
+        save_animation(table, test, export, over, **options)
         typer.echo(f"wrote {export} ({export.stat().st_size / 1e6:.1f} MB), which any browser plays")
         return
-    with live_animation(table, test, second, **options) as window:
+    with live_animation(table, test, over, **options) as window:
         show_address(window.url, f"{record} on this computer only; Ctrl-C ends", not no_open)
         try:
             threading.Event().wait()

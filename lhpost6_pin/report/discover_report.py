@@ -58,16 +58,20 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
     return save_page(page, path)
 
 
+def _chance(p: float) -> str:
+    return "less than 1e-300" if p < 1e-300 else f"{p:.1g}"
+
+
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
     shown = [Headline(verdict.word.replace("_", " "), "Verdict"), Headline(named, "Effects")]
     if found.proof and found.proof.gaps:
-        first = found.proof.gaps[0]
+        widest = max(found.proof.gaps, key=lambda gap: gap.refitted)
         shown.append(
             Headline(
-                f"{number(first.refitted)} → {number(first.after)}",
-                f"Gap, {first.phase}, {first.test}",
+                f"{number(widest.refitted)} → {number(widest.after)}",
+                f"Widest gap: {widest.phase}, {widest.test}",
                 "over sensor noise; 1 is noise alone",
             )
         )
@@ -91,7 +95,7 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         blocks.append(
             paragraph(
                 f"{family.equation}. Gain of log-likelihood {number(one.gain)}; chance of as much by noise alone, of "
-                f"all candidates, {one.p_value:.1g}. Often confused with: {confused}."
+                f"all candidates, {_chance(one.p_value)}. Often confused with: {confused}."
             )
         )
     if lines := advice(found):

@@ -19,6 +19,9 @@ __all__ = ["Frames", "Ghost", "make_frames", "record_frames", "record_title", "r
 
 Array = NDArray[np.float64]
 
+OTHERS = ("first_other", "second_other")
+"""Names, and so colours, of records over another."""
+
 MOST_TURN = 0.5 * math.pi
 """Roll or pitch [rad] that is refused: Euler angles end at a pitch of this size."""
 
@@ -80,25 +83,27 @@ def make_frames(
 def record_frames(
     machine: Machine,
     record: xr.Dataset,
-    other: xr.Dataset | None = None,
+    others: Sequence[xr.Dataset] = (),
     *,
     rate: float = 30.0,
     amplify: float = 1.0,
     gap: float = 1.0,
     change: bool = False,
 ) -> Frames:
-    """Frames of a record, with its reference and another record over it.
+    """Frames of a record, with its reference and other records over it, two at most.
 
     A record without platen displacement is drawn from its actuator displacements. With `change` forces are less what
-    they are in the first frame: weight and preload. Raises RecordError if it has neither displacement, or if two
-    records share no time; else as `make_frames`.
+    they are in the first frame: weight and preload. Raises RecordError if it has neither displacement, or if
+    the records share no time; else as `make_frames`.
     """
     time, ghosts = record["time"].values, []
     if "reference_displacement" in record:
         ghosts.append(Ghost("reference", "reference", time, record["reference_displacement"].values))
-    if other is not None:
-        label = f"second: {record_title(other)}, {other.attrs.get('kind', 'record')}"
-        ghosts.append(Ghost("other", label, other["time"].values, _motion(machine, other)))
+    if len(others) > len(OTHERS):
+        raise ParameterError(f"{len(others)} records over another cannot be told apart; give at most {len(OTHERS)}")
+    for name, other in zip(OTHERS, others, strict=False):
+        label = f"{record_title(other)}, {other.attrs.get('kind', 'record')}"
+        ghosts.append(Ghost(name, label, other["time"].values, _motion(machine, other)))
     motion, force = _motion(machine, record), _forces(machine, record)
     frames = make_frames(time, motion, ghosts, force, rate=rate, amplify=amplify, gap=gap)
     if change and frames.force is not None:

@@ -1,5 +1,6 @@
 """A record shown: in one HTML file, in a notebook, or in a browser on this computer."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import xarray as xr
@@ -20,20 +21,20 @@ __all__ = ["live_animation", "machine_legend", "save_animation", "show_record"]
 def show_record(
     machine: Machine,
     record: xr.Dataset,
-    other: xr.Dataset | None = None,
+    others: Sequence[xr.Dataset] = (),
     *,
     rate: float = 30.0,
     amplify: float = 1.0,
     gap: float = 1.0,
     change: bool = False,
 ) -> Picture:
-    """Return a page that shows a record, with another laid over it; as the last line of a notebook's cell it plays.
+    """Return a page that shows a record, with others laid over it; as the last line of a notebook's cell it plays.
 
-    Motion is enlarged `amplify` times, what reference and other record differ by `gap` times more; with `change`,
+    Motion is enlarged `amplify` times, what reference and other records differ by `gap` times more; with `change`,
     forces are less what they are at the start. No server is started. Raises RecordError or ParameterError as
     `record_frames`.
     """
-    frames = record_frames(machine, record, other, rate=rate, amplify=amplify, gap=gap, change=change)
+    frames = record_frames(machine, record, others, rate=rate, amplify=amplify, gap=gap, change=change)
     recorder = Recorder()
     _draw(recorder, machine, frames)
     return Picture(render_page(_caption(machine, record, frames), recorder.commands))
@@ -43,7 +44,7 @@ def save_animation(
     machine: Machine,
     record: xr.Dataset,
     path: Path | str,
-    other: xr.Dataset | None = None,
+    others: Sequence[xr.Dataset] = (),
     *,
     rate: float = 30.0,
     amplify: float = 1.0,
@@ -51,13 +52,13 @@ def save_animation(
     change: bool = False,
 ) -> None:
     """Write one HTML file that shows a record and plays off line; options and errors as those of `show_record`."""
-    show_record(machine, record, other, rate=rate, amplify=amplify, gap=gap, change=change).save(path)
+    show_record(machine, record, others, rate=rate, amplify=amplify, gap=gap, change=change).save(path)
 
 
 def live_animation(
     machine: Machine,
     record: xr.Dataset,
-    other: xr.Dataset | None = None,
+    others: Sequence[xr.Dataset] = (),
     *,
     rate: float = 30.0,
     amplify: float = 1.0,
@@ -68,7 +69,7 @@ def live_animation(
 
     Options and errors as those of `show_record`.
     """
-    frames = record_frames(machine, record, other, rate=rate, amplify=amplify, gap=gap, change=change)
+    frames = record_frames(machine, record, others, rate=rate, amplify=amplify, gap=gap, change=change)
     window = LoopbackWindow(render_page(_caption(machine, record, frames), live=True))
     _draw(window, machine, frames)
     return window
@@ -93,7 +94,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     """Title, note, legend and layers of a record's page."""
     size = "drawn to scale" if frames.amplify == 1.0 else f"motion drawn {frames.amplify:g} times as large"
     if frames.gap != 1.0:
-        size += f", gaps to the outlines {frames.gap:g} times more"
+        size += f", gaps to the outlines {frames.gap:g} times as large"
     seconds = (len(frames.time) - 1) / frames.rate
     kind = str(record.attrs.get("kind", "record"))
     note = f"{machine.name}, {kind}, {seconds:.1f} s at {frames.rate:g} frames/s, {size}; +X to the right"

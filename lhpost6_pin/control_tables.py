@@ -1,7 +1,6 @@
 """Tables that the commands of the virtual 469D print."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -16,8 +15,8 @@ from .tuning import Tuning
 __all__ = ["print_iterations", "print_sine", "print_tuning"]
 
 
-def print_tuning(tuning: Tuning, folder: Path) -> None:
-    """Bands and margins before and after, the gains found, and where the results are."""
+def print_tuning(tuning: Tuning) -> None:
+    """Bands and margins before and after, and the gains found."""
     console = Console()
     title = f"Reference to feedback within {tuning.tolerance:g} dB and with a coherence of {tuning.coherence:g}"
     table = _table(title, "axis", "before [Hz]", "after [Hz]", "delay [ms]", "gain margin", "phase margin")
@@ -42,11 +41,10 @@ def print_tuning(tuning: Tuning, folder: Path) -> None:
         console.print(f"{axis.axis}: {axis.limited_by}", highlight=False, soft_wrap=True)
     stable = "stable" if tuning.doubled else "[bold red]unstable[/]"
     console.print(f"All master gains doubled at once, without dry friction: {stable}")
-    _wrote(console, folder, "controller.toml", "report.html")
 
 
-def print_iterations(result: Iterated, folder: Path) -> None:
-    """Errors of every iteration, why it stopped, and where the results are."""
+def print_iterations(result: Iterated) -> None:
+    """Errors of every iteration, and why it stopped."""
     console = Console()
     moved = [k for k in range(6) if not math.isnan(result.history[0].acceleration[k])]
     title = "RRMSE [%] of the acceleration, 0 to 33 Hz, delay removed"
@@ -63,11 +61,10 @@ def print_iterations(result: Iterated, folder: Path) -> None:
         )
     console.print(table)
     console.print(f"stopped: {result.reason}", highlight=False)
-    _wrote(console, folder, "drive.nc", "inverse.nc", "report.html")
 
 
-def print_sine(test: SineTest, folder: Path) -> None:
-    """Amplitude, phase and distortion before and after, and where the report is."""
+def print_sine(test: SineTest) -> None:
+    """Amplitude, phase and distortion before and after."""
     console = Console()
     unit = "m" if test.axis in "xyz" else "rad"
     title = f"{test.amplitude:g} {unit} at {test.frequency:g} Hz in {test.axis}; distortion over all harmonics to 33 Hz"
@@ -85,7 +82,6 @@ def print_sine(test: SineTest, folder: Path) -> None:
             str(found.run.clipped),
         )
     console.print(table)
-    _wrote(console, folder, "report.html")
 
 
 def _table(title: str, *headings: str) -> Table:
@@ -93,11 +89,6 @@ def _table(title: str, *headings: str) -> Table:
     for n, heading in enumerate(headings):
         table.add_column(escape(heading), justify="right" if n else "left")
     return table
-
-
-def _wrote(console: Console, folder: Path, *names: str) -> None:
-    for name in names:
-        console.print(f"wrote {folder / name}", highlight=False, soft_wrap=True)
 
 
 def _band(band: tuple[float, float]) -> str:

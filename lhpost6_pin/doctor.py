@@ -4,6 +4,8 @@ import platform
 import shutil
 import time
 from importlib import metadata, util
+from pathlib import Path
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.markup import escape
@@ -13,7 +15,7 @@ from . import __version__
 from .compiled import cache_folder
 from .files import models_folder
 
-__all__ = ["print_doctor"]
+__all__ = ["Examined", "examine", "print_doctor"]
 
 _REQUIRED = [
     *("pin", "numpy", "scipy", "numba", "xarray", "h5netcdf", "h5py", "typer", "rich", "plotly", "joblib"),
@@ -26,27 +28,50 @@ _OPTIONAL = {
 }
 
 
-def print_doctor() -> None:
+class Examined(NamedTuple):
+    """What is installed and where things are."""
+
+    version: str
+    python: str
+    required: dict[str, str | None]  # version by package; None: missing
+    optional: dict[str, bool]  # whether it is there
+    browser: str | None
+    machine_files: Path
+    compiled_code: Path | None  # None: not kept between runs
+    first_step: float  # until a plant has taken it [s]
+    compiled_now: bool  # for that step
+
+
+def examine() -> Examined:
+    """Look at versions, compiled code and optional parts; takes one model step."""
+    required: dict[str, str | None] = {}
+    for name in _REQUIRED:
+        try:
+            required[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            required[name] = None
+    optional = {module: util.find_spec(module) is not None for module in _OPTIONAL}
+    browser = next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None)
+    folders = models_folder(), cache_folder()
+    return Examined(__version__, platform.python_version(), required, optional, browser, *folders, *_time_first_step())
+
+
+def print_doctor(found: Examined) -> None:
     """Print versions, whether compiled code is kept between runs and how long loading it takes, optional parts."""
     console = Console()
     state = Column("state", overflow="fold")  # a path is of no use cut off
-    table = Table("part", state, title=f"lhpost6_pin {__version__}, Python {platform.python_version()}")
-    for name in _REQUIRED:
-        try:
-            table.add_row(name, metadata.version(name))
-        except metadata.PackageNotFoundError:
-            table.add_row(name, "[red]missing[/]")
-    for module, remedy in _OPTIONAL.items():
-        table.add_row(module, "there" if util.find_spec(module) else escape(f"not installed; {remedy}"))
-    browser = next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None)
-    table.add_row("browser", browser or "none found; reports and views are HTML files")
-    table.add_row("machine files", escape(str(models_folder())))
-    folder = cache_folder()
-    table.add_row("compiled code", escape(str(folder)) if folder else "[yellow]not kept: every run compiles anew[/]")
+    table = Table("part", state, title=f"lhpost6_pin {found.version}, Python {found.python}")
+    for name, version in found.required.items():
+        table.add_row(name, version or "[red]missing[/]")
+    for module, there in found.optional.items():
+        table.add_row(module, "there" if there else escape(f"not installed; {_OPTIONAL[module]}"))
+    table.add_row("browser", found.browser or "none found; reports and views are HTML files")
+    table.add_row("machine files", escape(str(found.machine_files)))
+    kept = found.compiled_code
+    table.add_row("compiled code", escape(str(kept)) if kept else "[yellow]not kept: every run compiles anew[/]")
     console.print(table)
-    seconds, fresh = _time_first_step()
-    word = "compiled now; the next run loads it" if fresh else "loaded from the cache"
-    console.print(f"first model step after {seconds:.1f} s: {word if folder else 'compiled in memory'}")
+    word = "compiled now; the next run loads it" if found.compiled_now else "loaded from the cache"
+    console.print(f"first model step after {found.first_step:.1f} s: {word if kept else 'compiled in memory'}")
 
 
 def _time_first_step() -> tuple[float, bool]:

@@ -1,8 +1,8 @@
 """What the command line prints: machine, capacity, motions, findings, results; and their rows for reports."""
 
+import math
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from rich.markup import escape
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from .simulate import Run
 
 __all__ = [
+    "Compared",
+    "compare",
     "machine_rows",
     "print_capacity",
     "print_comparison",
@@ -28,7 +30,7 @@ __all__ = [
     "print_machine",
     "print_modes",
     "print_motions",
-    "print_saved",
+    "print_run",
     "print_sensor_findings",
     "report_limits",
 ]
@@ -203,15 +205,26 @@ _SILENT = 1e-6
 """A channel whose peak is below this share of the largest of its kind did not move: its relative error says nothing."""
 
 
-def print_comparison(measured: "xr.Dataset", simulated: "xr.Dataset") -> None:
-    """Print how far a replayed test is from the recorded one, per channel, on common samples."""
+class Compared(NamedTuple):
+    """One channel of a replayed test against the recorded one, in `unit`."""
+
+    channel: str
+    unit: str
+    peak_recorded: float
+    largest_difference: float
+    rrmse: float  # not a number where the channel did not move
+    drift: float  # of the difference [unit/s]
+
+
+def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
+    """How far a replayed test is from the recorded one, per channel, on common samples; empty if these are too few."""
     from .signals import drift_rate, rrmse
 
     t = measured["time"].values - float(measured["time"][0])
     t = t[t <= simulated["time"].values[-1]]
+    found: list[Compared] = []
     if len(t) < 2:
-        return
-    table = Table("channel", "peak recorded", "largest difference", "RRMSE", "drift", title="Model against record")
+        return found
     for name, dim, unit in _COMPARED:
         if name not in measured or name not in simulated:
             continue
@@ -220,15 +233,24 @@ def print_comparison(measured: "xr.Dataset", simulated: "xr.Dataset") -> None:
         ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
         apart, peak = np.abs(model - recorded).max(axis=0), np.abs(recorded).max(axis=0)
         for k, label in enumerate(measured[dim].values):
-            u = unit if isinstance(unit, str) else unit[k]
             moved = peak[k] > _SILENT * peak.max()
-            cells = (f"{peak[k]:.4g} {u}", f"{apart[k]:.3g} {u}", f"{ratio[k]:.3g}" if moved else "")
-            table.add_row(f"{name} {label}", *cells, f"{drift[k]:.3g} {u}/s")
+            numbers = peak[k], apart[k], ratio[k] if moved else math.nan, drift[k]
+            found.append(Compared(f"{name} {label}", unit if isinstance(unit, str) else unit[k], *map(float, numbers)))
+    return found
+
+
+def print_comparison(compared: Sequence[Compared]) -> None:
+    """Print how far a replayed test is from the recorded one."""
+    table = Table("channel", "peak recorded", "largest difference", "RRMSE", "drift", title="Model against record")
+    for c in compared:
+        rrmse = "" if math.isnan(c.rrmse) else f"{c.rrmse:.3g}"
+        sizes = f"{c.peak_recorded:.4g} {c.unit}", f"{c.largest_difference:.3g} {c.unit}"
+        table.add_row(c.channel, *sizes, rrmse, f"{c.drift:.3g} {c.unit}/s")
     make_console().print(table)
 
 
-def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
-    """Print where results are and what they say first."""
+def print_run(run: "Run", summary: "RunSummary | None") -> None:
+    """Print what a run's report says first, and how long and how it ran."""
     console = make_console()
     if summary is not None:
         console.print(f"[bold]{escape(summary.verdict)}[/]")
@@ -238,8 +260,6 @@ def print_saved(folder: Path, run: "Run", summary: "RunSummary | None") -> None:
             if row.peak_target:
                 table.add_row(*map(escape, tracking_cells(row)))
         console.print(table)
-    for name in ("record.nc", "report.html") if summary else ("record.nc",):
-        console.print(f"wrote {folder / name}", markup=False, highlight=False, soft_wrap=True)
     console.print(
         f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second"
     )

@@ -11,7 +11,16 @@ import lhpost6_pin
 PACKAGE = Path(lhpost6_pin.__file__).parent
 
 LAYERS = [
-    {"", "errors", "files", "compiled", "names", "progress", "console"},  # "" is the package itself: its version
+    {
+        "",
+        "errors",
+        "files",
+        "compiled",
+        "names",
+        "plain",
+        "progress",
+        "console",
+    },  # "" is the package itself: its version
     {"laws"},
     {"parameters", "specimen", "signals", "transfer", "distortion"},
     {"schema", "records", "motions", "conditioning"},
@@ -41,7 +50,7 @@ LAYERS = [
     {"validation"},
     {"discover"},
     {"demo"},
-    {"report", "control_tables", "calibration_table", "discovery_table"},
+    {"report", "control_tables", "calibration_table", "discovery_table", "results"},
     {"viewer"},
     {"cli"},
 ]

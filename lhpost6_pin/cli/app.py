@@ -3,10 +3,11 @@
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -15,7 +16,7 @@ from ..errors import LhpostError
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["app", "main", "progress_bar", "stderr"]
+__all__ = ["app", "main", "progress_bar", "stderr", "tell"]
 
 app = typer.Typer(
     help="The UC San Diego LHPOST6 shake table, modelled from first principles on Pinocchio.",
@@ -61,6 +62,23 @@ def stderr() -> "Console":
     from rich.console import Console
 
     return Console(stderr=True, soft_wrap=True)
+
+
+def tell(
+    as_json: bool,
+    entries: Callable[[], Mapping[str, Any]],
+    show: Callable[[], None],
+    files: Sequence[Path] = (),
+) -> None:
+    """Say a result and the files that it left: as JSON and nothing else, or as `show` prints it."""
+    from ..plain import as_json as written
+
+    if as_json:
+        typer.echo(written({**entries(), "files": files} if files else entries()))
+        return
+    show()
+    for path in files:
+        typer.echo(f"wrote {path}")
 
 
 @contextmanager

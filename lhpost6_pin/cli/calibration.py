@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from .app import app, progress_bar
+from .app import app, progress_bar, tell
 from .options import (
+    Json,
     Locked,
     MachineName,
     Out,
@@ -35,6 +36,7 @@ def calibrate(
     locked: Locked = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated sensor noise that sets weights.")] = 0,
     jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
+    json: Json = False,
 ) -> None:
     """Calibrate the machine and its sensors on measured tests; leaves override.toml and report.html."""
     from ..calibration import calibrate as calibrate_machine
@@ -42,6 +44,7 @@ def calibrate(
     from ..calibration_table import print_calibration
     from ..campaign import load_campaign
     from ..report import write_calibrate_report
+    from ..results import calibration_entries
     from ..sensors import load_sensors
 
     refuse_no_jobs(jobs)
@@ -57,8 +60,6 @@ def calibrate(
         save_override(found, folder / "override.toml"),
         write_calibrate_report(found, folder / "report.html", command=repeating_command()),
     ]
-    print_calibration(found)
-    for path in paths:
-        typer.echo(f"wrote {path}")
+    tell(json, lambda: calibration_entries(found), lambda: print_calibration(found), paths)
     if not found.converged:
         raise typer.Exit(1)

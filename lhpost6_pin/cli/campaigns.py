@@ -5,8 +5,9 @@ from typing import Annotated
 import typer
 
 from ..errors import ParameterError
-from .app import app, progress_bar
+from .app import app, progress_bar, tell
 from .options import (
+    Json,
     Locked,
     MachineName,
     Out,
@@ -37,6 +38,7 @@ def campaign(
     scale: Annotated[float, typer.Option(help="Factor on all motions, as for a smaller table.")] = 1.0,
     errors: Annotated[bool, typer.Option(help="Draw gains, offsets and skews of the sensors.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of noise and errors of the sensors.")] = 0,
+    json: Json = False,
 ) -> None:
     """Rehearse a campaign of tests and record it as sensors would: to plan one, and to try what follows."""
     from ..campaign import save_campaign, simulate_campaign
@@ -55,5 +57,5 @@ def campaign(
         made = simulate_campaign(
             table, settings, known, seed=seed, errors=errors, tests=wanted, scale=scale, name=name, progress=progress
         )
-    for path in save_campaign(made, folder):
-        typer.echo(f"wrote {path}")
+    tests_made = [str(r.attrs["test"]) for r in made.records]
+    tell(json, lambda: {"campaign": name, "tests": tests_made}, lambda: None, save_campaign(made, folder))

@@ -5,11 +5,12 @@ from typing import Annotated
 
 import typer
 
-from .app import app, progress_bar, stderr
+from .app import app, progress_bar, stderr, tell
 from .live import Amplify, Change, NoOpen, show_address
 from .options import (
     Axes,
     ControllerName,
+    Json,
     Locked,
     MachineName,
     Motion,
@@ -38,12 +39,13 @@ def export_fmu(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    json: Json = False,
 ) -> None:
     """Export the plant as an FMU (FMI 2.0, co-simulation) for Simulink, Modelica and other tools."""
     from ..fmi import export_fmu as write_fmu
 
     write_fmu(find_table(machine, override, valves, specimen, specimen_at, locked), out)
-    typer.echo(f"wrote {out}")
+    tell(json, dict, lambda: None, [out])
 
 
 @app.command()
@@ -64,6 +66,7 @@ def serve(
     amplify: Amplify = 1.0,
     force_change: Change = False,
     no_open: NoOpen = False,
+    json: Json = False,
 ) -> None:
     """Let a controller in another process or on another computer drive the virtual table over UDP."""
     from contextlib import ExitStack
@@ -72,7 +75,7 @@ def serve(
     from ..equilibrium import find_equilibrium
     from ..link import ServedPlant, find_mode, open_socket
     from ..link import serve as serve_link
-    from ..link.summary import print_link
+    from ..link.summary import link_entries, print_link
     from ..plant import make_plant
 
     chosen = find_mode(mode)
@@ -81,7 +84,7 @@ def serve(
         plant = make_plant(table)
         served = ServedPlant(plant, find_equilibrium(plant), chosen)
         address, at = sock.getsockname()
-        typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends")
+        typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends", err=json)
         with ExitStack() as stack:
             if live:
                 from ..viewer import view_apart
@@ -90,10 +93,12 @@ def serve(
                 url, served.watcher = stack.enter_context(
                     view_apart(table, title, amplify=amplify, change=force_change)
                 )
-                show_address(url, f"{title}, on this computer only", not no_open)
+                show_address(url, f"{title}, on this computer only", not no_open, err=json)
             timing = serve_link(sock, served, seconds=seconds)
     times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
-    print_link(f"{table.name}, {mode}", asdict(served.counts), {**times, "answer of the client": served.answer_time})
+    times |= {"answer of the client": served.answer_time}
+    counts = asdict(served.counts)
+    tell(json, lambda: link_entries(counts, times), lambda: print_link(f"{table.name}, {mode}", counts, times))
 
 
 @app.command()
@@ -112,12 +117,13 @@ def link(
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
     set_: Set = None,
+    json: Json = False,
 ) -> None:
     """Run the virtual 469D, or your own controller, here and the table behind `lhpost6 serve`; leaves record.nc."""
     from ..control import ControllerSettings, make_controller
     from ..equilibrium import find_equilibrium
     from ..link import LinkClient, record_of_link_run, run_over_link
-    from ..link.summary import print_link
+    from ..link.summary import link_entries, print_link
     from ..plant import make_plant
     from ..records import save_record
     from ..rehearse import target_within_limits
@@ -146,8 +152,14 @@ def link(
     counts["unanswered"] = int((~done.answered).sum())
     attrs = {"test": name, "title": f"{moved} x {scale:g} over the link", "link_mode": client.mode.label}
     save_record(record_of_link_run(done, plant, {**attrs, **counts}), folder / "record.nc")
-    print_link(f"{name}, {client.mode.label}", counts, {"command to sensors": client.round_trip})
-    typer.echo(f"wrote {folder / 'record.nc'}")
+    times = {"command to sensors": client.round_trip}
+    title = f"{name}, {client.mode.label}"
+    tell(
+        json,
+        lambda: {**link_entries(counts, times), "tripped": done.tripped},
+        lambda: print_link(title, counts, times),
+        [folder / "record.nc"],
+    )
     if done.tripped:
         stderr().print("the plant tripped: a leg left its stroke, or the run diverged; the server says which")
         raise typer.Exit(1)

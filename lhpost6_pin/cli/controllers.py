@@ -4,11 +4,12 @@ from typing import Annotated
 
 import typer
 
-from .app import app, progress_bar
+from .app import app, progress_bar, tell
 from .options import (
     Axes,
     Beyond,
     HighPass,
+    Json,
     Locked,
     LowPass,
     MachineName,
@@ -41,6 +42,7 @@ def tune(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    json: Json = False,
 ) -> None:
     """Tune the three-variable controller for a machine and specimen; leaves controller.toml and report.html."""
     from dataclasses import replace
@@ -48,6 +50,7 @@ def tune(
     from ..control import save_controller
     from ..control_tables import print_tuning
     from ..report import write_tune_report
+    from ..results import tuning_entries
     from ..tuning import tune as tune_controller
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
@@ -59,7 +62,8 @@ def tune(
     named = replace(found.after, name=f"tuned for {table.name}, {load}")
     save_controller(named, folder / "controller.toml", f"lhpost6 tune on {table.name}, {load}")
     write_tune_report(found, folder / "report.html", command=repeating_command())
-    print_tuning(found, folder)
+    files = [folder / name for name in ("controller.toml", "report.html")]
+    tell(json, lambda: tuning_entries(found), lambda: print_tuning(found), files)
     if not found.doubled:
         raise typer.Exit(1)
 
@@ -83,6 +87,7 @@ def iterate(
     low_pass: LowPass = None,
     set_: Set = None,
     beyond: Beyond = False,
+    json: Json = False,
 ) -> None:
     """Iterate on a motion until the table does what is wanted; leaves drive.nc, inverse.nc and report.html."""
     from dataclasses import replace
@@ -94,6 +99,7 @@ def iterate(
     from ..plant import make_plant
     from ..rehearse import target_within_limits
     from ..report import write_iterate_report
+    from ..results import iteration_entries
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     target = find_target(motion, set_, table, scale=scale, axes=axes, high_pass=high_pass, low_pass=low_pass)
@@ -108,7 +114,8 @@ def iterate(
     save_drive(result.drive, settings.mode, target, folder / "drive.nc", {**facts, "iteration": result.best})
     save_inverse(replace(result.table.inverse, made_with=facts), folder / "inverse.nc")
     write_iterate_report(result, folder / "report.html", command=repeating_command())
-    print_iterations(result, folder)
+    files = [folder / name for name in ("drive.nc", "inverse.nc", "report.html")]
+    tell(json, lambda: iteration_entries(result), lambda: print_iterations(result), files)
 
 
 @app.command()
@@ -125,12 +132,14 @@ def sine(
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
     beyond: Beyond = False,
+    json: Json = False,
 ) -> None:
     """Run a sine without and with amplitude-phase control and harmonic cancellation; leaves report.html."""
     from ..control_tables import print_sine
     from ..plant import make_plant
     from ..rehearse import target_within_limits
     from ..report import write_sine_report
+    from ..results import sine_entries
     from ..sine import axis_row, sine_target, sine_test
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
@@ -142,5 +151,5 @@ def sine(
         target_within_limits(plant, sine_target(axis, amplitude, frequency)[0])
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
-    write_sine_report(found, folder / "report.html", command=repeating_command())
-    print_sine(found, folder)
+    report = write_sine_report(found, folder / "report.html", command=repeating_command())
+    tell(json, lambda: sine_entries(found), lambda: print_sine(found), [report])

@@ -1,13 +1,13 @@
 """Commands for measured data: import, export."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import RecordError
-from .app import app
-from .options import MachineName, Override, find_machine
+from .app import app, tell
+from .options import Json, MachineName, Override, find_machine
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,11 +23,22 @@ def import_(
     out: Annotated[Path | None, typer.Option(help="Record to write, or with --guess the map.")] = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
+    json: Json = False,
 ) -> None:
     """Make a record from measured data: MTS 469D, CSV, MATLAB, HDF5, netCDF, TDMS or Parquet."""
     from ..check import check_dataset
-    from ..importing import described_sources, guess_map, is_export, load_map, load_raw, make_imported_record, save_map
+    from ..importing import (
+        channel_units,
+        described_sources,
+        guess_map,
+        is_export,
+        load_map,
+        load_raw,
+        make_imported_record,
+        save_map,
+    )
     from ..records import save_record
+    from ..results import finding_entries
     from ..tables import print_findings
 
     if guess and map_:
@@ -41,8 +52,13 @@ def import_(
         if path.exists():
             raise RecordError(f"{path}: exists and may have been edited; remove it, or name another with --out")
         save_map(found, path, remarks)
-        typer.echo(f"wrote {path}: {len(found.channels)} channels, {len(remarks)} remarks; read and edit it, then")
-        typer.echo(f"lhpost6 import {' '.join(map(str, files))} --map {path}")
+        then = f"lhpost6 import {' '.join(map(str, files))} --map {path}"
+
+        def hint() -> None:
+            typer.echo(f"{path}: {len(found.channels)} channels, {len(remarks)} remarks; read and edit it, then")
+            typer.echo(then)
+
+        tell(json, lambda: {"channels": len(found.channels), "remarks": remarks, "then": then}, hint, [path])
         return
     if map_ is None and not is_export(raws):
         raise RecordError(f"{files[0]}: which column is which channel? --guess writes a first map, --map uses one")
@@ -53,9 +69,20 @@ def import_(
     if any(path.exists() and path.samefile(file) for file in files):
         raise RecordError(f"{path}: is one of the files to import; name another with --out")
     save_record(record, path)
-    _print_channels(record, described_sources(raws, channels))
-    print_findings(str(path), check_dataset(record, areas))
-    typer.echo(f"wrote {path}")
+    sources, findings = described_sources(raws, channels), check_dataset(record, areas)
+
+    def show() -> None:
+        _print_channels(record, sources)
+        print_findings(str(path), findings)
+
+    def entries() -> dict[str, Any]:
+        channels = {
+            name: {"from": sources.get(name, "derived"), "unit": unit, "least": values.min(), "most": values.max()}
+            for name, unit, values in channel_units(record)
+        }
+        return {**finding_entries({str(path): findings}), "channels": channels}
+
+    tell(json, entries, show, [path])
 
 
 @app.command()
@@ -63,6 +90,7 @@ def export(
     record: Annotated[Path, typer.Argument(help="Record to export.")],
     to: Annotated[str, typer.Option(help="Format: csv, mat or parquet.")],
     out: Annotated[Path | None, typer.Option(help="File to write; else beside the record.")] = None,
+    json: Json = False,
 ) -> None:
     """Write a record as CSV, MATLAB v5 or Parquet, with the unit in every column's name."""
     from ..importing import FORMATS, export_record
@@ -73,7 +101,7 @@ def export(
     if path.exists() and path.samefile(record):
         raise RecordError(f"{path}: is the record to export; name another file with --out")
     export_record(dataset, path, to)
-    typer.echo(f"wrote {path}")
+    tell(json, dict, lambda: None, [path])
 
 
 def _print_channels(record: "xr.Dataset", sources: dict[str, str]) -> None:

@@ -4,9 +4,9 @@ from typing import Annotated
 
 import typer
 
-from .app import app, progress_bar
+from .app import app, progress_bar, tell
 from .live import NoOpen
-from .options import Out, folder_for, refuse_no_jobs
+from .options import Json, Out, folder_for, refuse_no_jobs
 from .runs import repeating_command
 
 __all__ = ["demo"]
@@ -18,13 +18,15 @@ def demo(
     seed: Annotated[int, typer.Option(min=0, help="Of noise and errors of the sensors.")] = 5,
     jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
     no_open: NoOpen = False,
+    json: Json = False,
 ) -> None:
     """Hide an effect in simulated measurements of a real earthquake, find it, name it, add it, see the gap shrink."""
     import webbrowser
+    from functools import partial
 
     from ..campaign import save_campaign
     from ..demo import hidden_effect, measured_tests, open_loops, searched
-    from ..discover import save_verdict
+    from ..discover import save_verdict, verdict_entries
     from ..discovery_table import print_discovery
     from ..library import find_family
     from ..machine import load_machine
@@ -41,7 +43,8 @@ def demo(
     family = find_family(name)
     units = {shape.name: shape.unit for shape in family.shapes}
     what = ", ".join(f"{key} {value:g} {units[key]}" for key, value in numbers.items())
-    typer.echo(
+    say = partial(typer.echo, err=json)
+    say(
         f"1. A table that has what its model lacks: {family.title} ({component}), {what}.\n"
         "   The virtual 469D runs two short tests on it, and half of a real earthquake (Ridgecrest 2019, CCC);\n"
         "   sensors with noise, gains, offsets and skews record them."
@@ -50,15 +53,16 @@ def demo(
         tests = measured_tests(machine, sensors, seed=seed, progress=progress)
     measured.mkdir(exist_ok=True, parents=True)
     for path in save_campaign(tests, measured):
-        typer.echo(f"   wrote {path}")
-    typer.echo("2. The search knows the model and these tests, and keeps the earthquake for the proof.")
+        say(f"   wrote {path}")
+    say("2. The search knows the model and these tests, and keeps the earthquake for the proof.")
     with progress_bar("what does the model lack?") as progress:
         found = searched(machine, tests, sensors, seed=seed, jobs=jobs, progress=progress)
-    print_discovery(found)
-    typer.echo("3. The earthquake's measured spools drive the model without the controller (open loop):")
+    if not json:
+        print_discovery(found)
+    say("3. The earthquake's measured spools drive the model without the controller (open loop):")
     loops = open_loops(machine, found.fitted, tests)
     before, after = loops.apart()
-    typer.echo(
+    say(
         f"   C ends {1e3 * before:.1f} mm from where it was measured with the model as delivered,\n"
         f"   {1e3 * after:.1f} mm with what was found."
     )
@@ -68,12 +72,15 @@ def demo(
     report = write_discover_report(found, folder / "report.html", command=repeating_command())
     view = folder / "view.html"
     save_animation(machine, loops.measured, view, [loops.delivered, loops.found], gap=10.0)
-    typer.echo(
+    say(
         "4. Look at it:\n"
         f"   {report}: where the gap was, why this name, the gap shrinking\n"
         f"   {view}: the earthquake as measured; the outlines of both models, their gaps ten times as large\n"
         f"   {model}: the machine with the effect, for --machine in any command"
     )
+    if json:
+        entries = verdict_entries(found) | {"open_loop_end_apart_m": {"delivered": before, "found": after}}
+        tell(True, lambda: entries, lambda: None, [report, view, model])
     if not no_open:
         for page in (report, view):
             webbrowser.open(page.resolve().as_uri())

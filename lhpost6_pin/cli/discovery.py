@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from .app import app, progress_bar
-from .options import MachineName, Out, SensorsName, find_machine, folder_for, refuse_no_jobs
+from .app import app, progress_bar, tell
+from .options import Json, MachineName, Out, SensorsName, find_machine, folder_for, refuse_no_jobs
 from .runs import repeating_command
 
 __all__ = ["discover"]
@@ -28,6 +28,7 @@ def discover(
     sensors: SensorsName = "lhpost6",
     seed: Annotated[int, typer.Option(help="Of the simulated sensor noise.")] = 0,
     jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
+    json: Json = False,
 ) -> None:
     """Find the effect that the model lacks, name it, add it, prove it; leaves verdict.json, model.toml, report.html.
 
@@ -35,7 +36,7 @@ def discover(
     """
     from ..campaign import load_campaign
     from ..discover import discover as search
-    from ..discover import save_verdict
+    from ..discover import save_verdict, verdict_entries
     from ..discovery_table import print_discovery
     from ..machine_toml import save_machine_toml
     from ..report.discover_report import write_discover_report
@@ -53,6 +54,4 @@ def discover(
     title = f"{table.name} with what was found in campaign {tests.name}; {command}"
     paths.append(save_machine_toml(found.fitted, folder / "model.toml", title))
     paths.append(write_discover_report(found, folder / "report.html", command=command))
-    print_discovery(found)
-    for path in paths:
-        typer.echo(f"wrote {path}")
+    tell(json, lambda: verdict_entries(found), lambda: print_discovery(found), paths)

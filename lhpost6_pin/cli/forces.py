@@ -5,8 +5,19 @@ from typing import Annotated
 
 import typer
 
-from .app import app
-from .options import Locked, MachineName, Out, Override, SensorsName, SpecimenAt, SpecimenName, find_table, folder_for
+from .app import app, tell
+from .options import (
+    Json,
+    Locked,
+    MachineName,
+    Out,
+    Override,
+    SensorsName,
+    SpecimenAt,
+    SpecimenName,
+    find_table,
+    folder_for,
+)
 from .runs import repeating_command
 
 __all__ = ["decompose"]
@@ -24,12 +35,14 @@ def decompose(
     sensors: SensorsName = "lhpost6",
     cutoff: Annotated[float | None, typer.Option(help="Forces are compared up to here [Hz]; else 33.")] = None,
     no_align: Annotated[bool, typer.Option("--no-align", help="Leave skews between channels alone.")] = False,
+    json: Json = False,
 ) -> None:
     """Find the forces behind a test by inverse dynamics; leaves ledger.nc and report.html."""
     from ..decompose import decompose_record, find_agreement, find_work, save_ledger
     from ..decompose.table import print_agreement
     from ..records import load_record
     from ..report import write_decompose_report
+    from ..results import agreement_entries
     from ..sensors import load_sensors
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
@@ -40,6 +53,5 @@ def decompose(
     agreement, work = find_agreement(found), find_work(found)
     save_ledger(found, folder / "ledger.nc", work, str(record))
     report = write_decompose_report(found, agreement, work, folder / "report.html", command=repeating_command())
-    print_agreement(found, agreement)
-    for path in (folder / "ledger.nc", report):
-        typer.echo(f"wrote {path}")
+    files = [folder / "ledger.nc", report]
+    tell(json, lambda: agreement_entries(found, agreement), lambda: print_agreement(found, agreement), files)

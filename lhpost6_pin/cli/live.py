@@ -25,7 +25,7 @@ PATIENCE = 20.0
 
 @contextmanager
 def watched(
-    live: bool, table: "Machine", title: str, *, amplify: float, change: bool, open_it: bool
+    live: bool, table: "Machine", title: str, *, amplify: float, change: bool, open_it: bool, err: bool = False
 ) -> "Iterator[Watch | None]":
     """Yield what shows a running plant in a browser, or None if nobody asked to see it."""
     if not live:
@@ -34,16 +34,16 @@ def watched(
     from ..viewer import LiveView
 
     with LiveView(table, title, amplify=amplify, change=change) as view:
-        show_address(view.url, f"{title} on this computer only", open_it)
+        show_address(view.url, f"{title} on this computer only", open_it, err)
         if not view.wait(PATIENCE):
             typer.echo(f"nobody has looked for {PATIENCE:g} s: it goes on", err=True)
         yield view.show
 
 
-def show_address(url: str, what: str, open_it: bool) -> None:
-    """Print where something is to be seen, and open a browser there if one can be had."""
+def show_address(url: str, what: str, open_it: bool, err: bool = False) -> None:
+    """Print where something is to be seen (as an error if `err`), and open a browser there if one can be had."""
     import webbrowser
 
-    typer.echo(f"{url} shows {what}")
+    typer.echo(f"{url} shows {what}", err=err)
     if open_it and not webbrowser.open(url):
         typer.echo("no browser could be opened here: open this address in one", err=True)

@@ -5,48 +5,60 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .app import app
-from .options import MachineName, Override, SensorsName, find_machine
+from .app import app, tell
+from .options import Json, MachineName, Override, SensorsName, find_machine
 
 if TYPE_CHECKING:
+    from ..consistency import SensorFinding
     from ..machine import Machine
 
 __all__ = ["capacity", "check", "doctor", "info", "motions"]
 
 
 @app.command()
-def doctor() -> None:
+def doctor(json: Json = False) -> None:
     """Say what is installed, whether compiled code is kept, and which optional parts are there."""
-    from ..doctor import print_doctor
+    from ..doctor import examine, print_doctor
 
-    print_doctor()
+    found = examine()
+    tell(json, found._asdict, lambda: print_doctor(found))
 
 
 @app.command()
-def info(machine: MachineName = "lhpost6", override: Override = None) -> None:
+def info(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
     """Print a machine as a table: every number with unit and source, assumed values marked."""
+    from ..results import machine_entries
     from ..tables import print_machine
 
-    print_machine(find_machine(machine, override))
+    table = find_machine(machine, override)
+    tell(json, lambda: machine_entries(table), lambda: print_machine(table))
 
 
 @app.command()
-def capacity(machine: MachineName = "lhpost6", override: Override = None) -> None:
+def capacity(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
     """Compare what the model can give with Table 2.2, and print the oil-column modes."""
+    from ..results import capacity_entries
     from ..tables import print_capacity, print_modes
 
     table = find_machine(machine, override)
-    if "table_2_2.force_actuators" in table.parameters:
-        print_capacity(table)
-    print_modes(table)
+
+    def show() -> None:
+        if "table_2_2.force_actuators" in table.parameters:
+            print_capacity(table)
+        print_modes(table)
+
+    tell(json, lambda: capacity_entries(table), show)
 
 
 @app.command()
-def motions(name: Annotated[str | None, typer.Argument(help="One of them, to see its options.")] = None) -> None:
+def motions(
+    name: Annotated[str | None, typer.Argument(help="One of them, to see its options.")] = None, json: Json = False
+) -> None:
     """List the ground motions and tests known by name."""
+    from ..results import motion_entries
     from ..tables import print_motions
 
-    print_motions(name)
+    tell(json, lambda: motion_entries(name), lambda: print_motions(name))
 
 
 @app.command()
@@ -55,31 +67,37 @@ def check(
     machine: MachineName = "lhpost6",
     override: Override = None,
     sensors: SensorsName = "lhpost6",
+    json: Json = False,
 ) -> None:
     """Say what is in records and what is wrong with them, and whether the sensors of measured ones agree."""
     from ..check import check_record
-    from ..tables import print_findings
+    from ..results import finding_entries
+    from ..tables import print_findings, print_sensor_findings
 
     table = find_machine(machine, override)
     areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
     files = sorted(file.glob("*.nc")) or [file]
-    wrong = False
-    for path in files:
-        findings = check_record(path, areas)
-        print_findings(str(path), findings)
-        wrong = wrong or any(f.severity == "error" for f in findings)
+    found = {str(path): check_record(path, areas) for path in files}
+    wrong = any(f.severity == "error" for findings in found.values() for f in findings)
+    compared = None if wrong else _check_sensors(table, files, sensors)
+
+    def show() -> None:
+        for path, findings in found.items():
+            print_findings(path, findings)
+        if compared is not None:
+            print_sensor_findings(compared)
+
+    tell(json, lambda: {**finding_entries(found), "sensors": compared}, show)
     if wrong:
         raise typer.Exit(1)
-    _check_sensors(table, files, sensors)
 
 
-def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> None:
+def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> "list[SensorFinding] | None":
     """Compare the sensors of measured records of this machine; what was simulated without noise has none."""
     from ..consistency import check_sensors
     from ..plant import make_plant
     from ..records import is_measured, load_record
     from ..sensors import load_sensors
-    from ..tables import print_sensor_findings
 
     records = [load_record(path) for path in files]
     labels = {"actuator": table.actuator_names, "strut": table.strut_names}
@@ -89,5 +107,4 @@ def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> None:
         if is_measured(r)
         and all([str(x) for x in r[dim].values] == list(names) for dim, names in labels.items() if dim in r.coords)
     ]
-    if measured:
-        print_sensor_findings(check_sensors(make_plant(table), measured, load_sensors(sensors)))
+    return list(check_sensors(make_plant(table), measured, load_sensors(sensors))) if measured else None

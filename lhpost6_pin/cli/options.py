@@ -14,7 +14,19 @@ if TYPE_CHECKING:
     from ..motions import GroundMotion, Target
 
 __all__ = ["Axes", "Beyond", "ControllerName", "EngineName", "HighPass", "Locked", "LowPass", "MachineName", "Motion"]
-__all__ += ["Out", "Override", "Rate", "Scale", "Scheme", "Set", "SettingsName", "SpecimenAt", "SpecimenName", "Valves"]
+__all__ += [
+    "Json",
+    "Out",
+    "Override",
+    "Rate",
+    "Scale",
+    "Scheme",
+    "Set",
+    "SettingsName",
+    "SpecimenAt",
+    "SpecimenName",
+    "Valves",
+]
 __all__ += ["find_controller", "find_machine", "find_settings", "find_target", "find_table", "folder_for"]
 __all__ += ["refuse_no_jobs"]
 
@@ -34,6 +46,7 @@ Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's join
 SensorsName = Annotated[
     str, typer.Option("--sensors", help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.")
 ]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
 Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")

@@ -3,12 +3,12 @@
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import RecordError, SimulationError
-from .app import app, progress_bar
+from .app import app, progress_bar, tell
 from .live import Amplify, Change, Live, NoOpen, watched
 from .options import (
     Axes,
@@ -16,6 +16,7 @@ from .options import (
     ControllerName,
     EngineName,
     HighPass,
+    Json,
     Locked,
     LowPass,
     MachineName,
@@ -74,6 +75,7 @@ def run(
     amplify: Amplify = 1.0,
     force_change: Change = False,
     no_open: NoOpen = False,
+    json: Json = False,
 ) -> None:
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
     from ..control import ControllerSettings
@@ -99,7 +101,7 @@ def run(
         target_within_limits(make_plant(table), target)
     title = f"{name} x {scale:g} on {table.name}"
     with (
-        watched(live, table, title, amplify=amplify, change=force_change, open_it=not no_open) as watch,
+        watched(live, table, title, amplify=amplify, change=force_change, open_it=not no_open, err=json) as watch,
         progress_bar(f"{name} on {table.name}") as progress,
     ):
         run_, record = rehearse(
@@ -116,7 +118,7 @@ def run(
             progress=progress,
             watch=watch,
         )
-    _save(table, run_, record, folder, report=True)
+    _save(table, run_, record, folder, json)
 
 
 @app.command()
@@ -133,6 +135,7 @@ def replay(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    json: Json = False,
 ) -> None:
     """Replay a drive file in closed loop; leaves record.nc and report.html against the motion it is for."""
     from ..drives import check_circumstances, load_drive
@@ -161,7 +164,7 @@ def replay(
             beyond_limits=True,
             progress=progress,
         )
-    _save(table, run_, record, folder, report=True)
+    _save(table, run_, record, folder, json)
 
 
 @app.command("open-loop")
@@ -176,11 +179,11 @@ def open_loop(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
+    json: Json = False,
 ) -> None:
     """Drive the plant with a record's spools from its first sample's pressures; leaves record.nc."""
     from ..records import load_record
     from ..rehearse import replay as replay_spools
-    from ..tables import print_comparison
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     measured = load_record(record, {"actuator": table.actuator_names})
@@ -199,8 +202,7 @@ def open_loop(
             engine=engine,
             progress=progress,
         )
-    print_comparison(measured, simulated)
-    _save(table, run_, simulated, folder, report=False)
+    _save(table, run_, simulated, folder, json, against=measured)
 
 
 def repeating_command() -> str:
@@ -208,13 +210,23 @@ def repeating_command() -> str:
     return shlex.join(["lhpost6", *sys.argv[1:]])
 
 
-def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, report: bool) -> None:
+def _save(
+    table: "Machine",
+    run_: "Run",
+    record: "xr.Dataset",
+    folder: Path,
+    as_json: bool,
+    *,
+    against: "xr.Dataset | None" = None,
+) -> None:
+    """Leave a run's record, and its report unless it is held `against` a measured test; say how it went."""
     from ..records import save_record
-    from ..tables import machine_rows, print_saved, report_limits
+    from ..results import run_entries
+    from ..tables import compare, machine_rows, print_comparison, print_run, report_limits
 
     save_record(record, folder / "record.nc")
-    summary = None
-    if report:
+    files, summary = [folder / "record.nc"], None
+    if against is None:
         from ..report import write_run_report
 
         summary = write_run_report(
@@ -225,6 +237,17 @@ def _save(table: "Machine", run_: "Run", record: "xr.Dataset", folder: Path, *, 
             command=repeating_command(),
             machine_table=machine_rows(table),
         )
-    print_saved(folder, run_, summary)
+        files.append(folder / "report.html")
+    compared = [] if against is None else compare(against, record)
+
+    def show() -> None:
+        if compared:
+            print_comparison(compared)
+        print_run(run_, summary)
+
+    def entries() -> dict[str, Any]:
+        return run_entries(run_, summary) | ({} if against is None else {"against_record": compared})
+
+    tell(as_json, entries, show, files)
     if run_.trouble:
         raise typer.Exit(1)

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from ..errors import ParameterError
-from .app import app, progress_bar
+from .app import app, progress_bar, tell
 from .options import (
+    Json,
     Locked,
     MachineName,
     Out,
@@ -41,12 +42,13 @@ def validate(
     ] = None,
     phases: Annotated[str, typer.Option(help="Some of 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
     jobs: Annotated[int, typer.Option(help="Tests at a time, in threads; -1: as many as there are cores.")] = -1,
+    json: Json = False,
 ) -> None:
     """Validate the model on measured tests in three phases; leaves report.html and metrics.json."""
     from ..campaign import load_campaign
     from ..report.validate_report import write_validate_report
     from ..sensors import load_sensors
-    from ..validation import save_metrics
+    from ..validation import metrics, save_metrics
     from ..validation import validate as validate_campaign
     from ..validation.table import print_validation
 
@@ -62,9 +64,7 @@ def validate(
         )
     save_metrics(found, folder / "metrics.json")
     report = write_validate_report(found, folder / "report.html", command=repeating_command())
-    print_validation(found)
-    for path in (folder / "metrics.json", report):
-        typer.echo(f"wrote {path}")
+    tell(json, lambda: metrics(found), lambda: print_validation(found), [folder / "metrics.json", report])
 
 
 def _phases(text: str) -> tuple[int, ...]:

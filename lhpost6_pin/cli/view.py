@@ -5,9 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
-from .app import app
+from .app import app, tell
 from .live import Amplify, Change, NoOpen, show_address
-from .options import MachineName, Override, find_machine
+from .options import Json, MachineName, Override, find_machine
 
 __all__ = ["view"]
 
@@ -26,6 +26,7 @@ def view(
     no_open: NoOpen = False,
     machine: MachineName = "lhpost6",
     override: Override = None,
+    json: Json = False,
 ) -> None:
     """Play a test: platen, actuators, struts and forces follow the record in a browser, or in one HTML file."""
     import threading
@@ -38,7 +39,8 @@ def view(
     options: dict[str, Any] = {"rate": fps, "amplify": amplify, "gap": gap, "change": change}
     if export is not None:
         save_animation(table, test, export, over, **options)
-        typer.echo(f"wrote {export} ({export.stat().st_size / 1e6:.1f} MB), which any browser plays")
+        size = export.stat().st_size / 1e6
+        tell(json, dict, lambda: typer.echo(f"{size:.1f} MB, which any browser plays"), [export])
         return
     with live_animation(table, test, over, **options) as window:
         show_address(window.url, f"{record} on this computer only; Ctrl-C ends", not no_open)

@@ -1,12 +1,11 @@
 """The numbers of a validation as a file, for other programs."""
 
-import json
-import math
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from ..files import write_whole
+from ..plain import as_json
 from .phases import PHASES, Phase
 from .resonance import Peak, Resonance
 from .spectra import Spectrum
@@ -44,7 +43,7 @@ def metrics(found: Validation) -> dict[str, Any]:
 def save_metrics(found: Validation, path: Path) -> None:
     """Write `metrics` as JSON, whole or not at all."""
     with write_whole(path) as beside:
-        beside.write_text(json.dumps(_plain(metrics(found)), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        beside.write_text(as_json(metrics(found)) + "\n", encoding="utf-8")
 
 
 def _phase(phase: Phase, found: Validation) -> dict[str, Any]:
@@ -80,12 +79,3 @@ def _resonance(one: Resonance) -> dict[str, Any]:
         return {"frequency": peak.frequency, "sharpness": peak.sharpness}
 
     return {"linear_model": one.expected, "measured": said(one.measured), "model": said(one.model)}
-
-
-def _plain(value: Any) -> Any:
-    """The value with None for every number that JSON has no word for."""
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_plain(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,6 +1,7 @@
 """Every script runs from the command line, and the plain loop, an independent account of a step, agrees with ours."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -66,6 +67,19 @@ def test_the_benchmarks_run_and_keep_their_figures(tmp_path):
         assert {f"{engine} {scheme} {loop} loop" for scheme in SCHEMES for loop in ("open", "closed")} <= named
     assert all(row["value"] > 0 for row in rows)
     assert any("solve_ivp" in what for what in named) and any("plain" in what for what in named)
+
+
+def test_the_audit_balances_energy_and_repeats_bit_by_bit(tmp_path):
+    ended = script("audit.py", "--seconds", "6", "--out", tmp_path / "audit.md")
+    assert ended.returncode == 0, ended.stderr
+    text = (tmp_path / "audit.md").read_text()
+    assert text.strip() == ended.stdout.strip() and "DIFFERENT" not in text and text.count("| the same |") == 2
+    over = float(re.search(r"\| ([\d.e+-]+) \|$", text, re.MULTILINE)[1])
+    assert over < 2e-3  # the trapezoidal rule at 2048 Hz over flows that jump with the spool
+    report, view = (
+        float(size) for size in re.findall(r"^\| (?:report|animation.*?) \| ([\d.]+) \|$", text, re.MULTILINE)
+    )
+    assert report < 6.0 and view < 6.0  # [MB], of 40 s
 
 
 def test_the_convergence_study_runs_and_keeps_its_errors(tmp_path):

@@ -1,0 +1,135 @@
+"""What the package says of itself: where energy goes over a long test, whether runs repeat, how heavy its pages are.
+
+    python scripts/audit.py [--seconds 60] [--out FILE.md]
+
+energy      white noise on all axes in closed loop: what flows in, is created by the report's equations (`energy`),
+            stored and dissipated, and what of it is left over
+repeating   the same runs twice, over one thread and over as many as asked for, compared bit by bit
+pages       sizes of a forty-second test's report and animation
+"""
+
+import argparse
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from lhpost6_pin.batch import simulate_many
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.energy import energy_audit
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.files import write_whole
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.plant import Plant, make_plant
+from lhpost6_pin.rehearse import rehearse
+from lhpost6_pin.report import write_run_report
+from lhpost6_pin.schemes import SAMPLE_RATE
+from lhpost6_pin.simulate import ClosedLoop, Run, simulate
+from lhpost6_pin.tables import machine_rows, report_limits
+from lhpost6_pin.viewer import save_animation
+
+
+def noise(plant: Plant, seconds: float) -> ClosedLoop:
+    """White noise on all axes under the machine's controller."""
+    target = make_target(find_motion("white-noise", six_axis=True, duration=seconds), rate=float(SAMPLE_RATE))
+    rest = find_equilibrium(plant)
+    controller = make_controller(plant, rest, load_controller(plant.machine.controller))
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    return ClosedLoop(controller, drive[: round(seconds * SAMPLE_RATE)], rest)
+
+
+def energy_rows(plant: Plant, seconds: float) -> list[str]:
+    """The energy balance of a long run."""
+    loop = noise(plant, seconds)
+    audit = energy_audit(simulate(plant, loop, samples=len(loop.drive), engine="fused"))
+    flows = [audit.total(kind)[-1] for kind in ("inflow", "created", "stored", "dissipated")]
+    left = float(np.abs(audit.residual).max())
+    cells = [*(f"{flow / 1e3:.4g}" for flow in flows), f"{left / 1e3:.2g}", f"{left / abs(flows[0]):.1e}"]
+    return [
+        f"## Energy over {seconds:g} s of white noise on all axes, closed loop",
+        "",
+        "| flows in [kJ] | created [kJ] | stored [kJ] | dissipated [kJ] | left over, at most [kJ] | over inflow |",
+        "|---|---|---|---|---|---|",
+        f"| {' | '.join(cells)} |",
+        "",
+    ]
+
+
+def fingerprint(run: Run) -> str:
+    """Hash of all numbers of a run."""
+    digest = hashlib.sha256()
+    for values in (run.q, run.v, run.a, run.z, run.spool):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def repeating_rows(machine, threads: int) -> list[str]:
+    """Whether runs of several machines repeat, twice and over threads."""
+    plants = [make_plant(machine.with_valves(valves)) for valves in (1, 2, 1, 2)]
+    jobs = [(plant, noise(plant, 5.0)) for plant in plants]
+    samples = len(jobs[0][1].drive)
+    found = {}
+    for count in (1, 1, threads):
+        runs = simulate_many(jobs, samples=samples, threads=count)
+        found.setdefault(count, []).append([fingerprint(run) for run in runs])
+    same = len({tuple(prints) for repeats in found.values() for prints in repeats}) == 1
+    steps = [fingerprint(simulate(*jobs[0], samples=samples, engine="pinocchio")) for _ in range(2)]
+    return [
+        "## Runs that repeat",
+        "",
+        "| runs | compared | bit by bit |",
+        "|---|---|---|",
+        f"| {len(jobs)} closed loops of 5 s, fused | twice on one thread, once on {threads} | {said(same)} |",
+        f"| a closed loop of 5 s, step by step on Pinocchio | twice | {said(steps[0] == steps[1])} |",
+        "",
+    ]
+
+
+def said(same: bool) -> str:
+    """The answer in a word."""
+    return "the same" if same else "DIFFERENT"
+
+
+def page_rows(machine) -> list[str]:
+    """Sizes of the pages of a test of forty seconds."""
+    target = make_target(find_motion("ridgecrest"), rate=float(SAMPLE_RATE))
+    settings = load_controller(machine.controller)
+    run, record = rehearse(machine, target, settings, attrs={"test": "ridgecrest"}, engine="fused")
+    part = record.isel(time=slice(0, 40 * SAMPLE_RATE))
+    with tempfile.TemporaryDirectory() as folder:
+        report, view = Path(folder) / "report.html", Path(folder) / "view.html"
+        write_run_report(part, report, limits=report_limits(run.plant), machine_table=machine_rows(machine))
+        save_animation(machine, part, view)
+        sizes = [path.stat().st_size / 1e6 for path in (report, view)]
+    return [
+        "## Pages of a test of 40 s at 2048 Hz",
+        "",
+        "| page | MB |",
+        "|---|---|",
+        f"| report | {sizes[0]:.2f} |",
+        f"| animation at 30 frames a second | {sizes[1]:.2f} |",
+        "",
+    ]
+
+
+def main() -> None:
+    """Audit, and print what was found as Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--threads", type=int, default=max(2, os.cpu_count() or 2))
+    parser.add_argument("--out", type=Path, default=None, help="write it to this file, too")
+    asked = parser.parse_args()
+    machine = load_machine()
+    rows = [*energy_rows(make_plant(machine), asked.seconds), *repeating_rows(machine, asked.threads)]
+    text = "\n".join([*rows, *page_rows(machine)])
+    print(text)
+    if asked.out is not None:
+        with write_whole(asked.out) as beside:
+            beside.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -6,6 +6,7 @@ import logging
 import re
 import socket
 import subprocess
+import sys
 from http.client import HTTPConnection
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tornado.websocket import websocket_connect
 
+from lhpost6_pin import cli
 from lhpost6_pin.bodies import body_name, body_poses, joint_positions, load_bodies
 from lhpost6_pin.errors import LhpostError, ParameterError, RecordError
 from lhpost6_pin.machine import Machine, load_machine
@@ -312,3 +314,28 @@ def test_a_picture_stands_in_a_notebook_and_in_a_file_alike(machine, record, tmp
     assert "<" not in inside and html.unescape(inside) == picture.page
     picture.save(tmp_path / "a.html")
     assert (tmp_path / "a.html").read_text() == picture.page
+
+
+# ------------------------------------------------------------------------------------------------ the command
+def test_the_command_writes_one_file_and_says_what_it_cannot_show(record, tmp_path, monkeypatch, capsys):
+    def view(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["lhpost6", "view", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        return int(end.value.code or 0), *capsys.readouterr()
+
+    page = tmp_path / "page.html"
+    code, out, _ = view(RECORD, RECORD, "--export", page, "--amplify", 20, "--fps", 10, "--gap", 2)
+    assert code == 0 and f"wrote {page}" in out
+    text = page.read_text()
+    assert "drawn 20 times as large, gaps to the outlines 2 times as large" in text and "10 frames/s" in text
+    for wrong, why in (
+        ([tmp_path / "none.nc"], "none.nc: no such file"),
+        ([RECORD, "--machine", "hexapod"], "hexapod"),
+        ([RECORD, *[RECORD] * 3], "at most 2"),
+        ([RECORD, "--amplify", 0], "positive number"),
+        ([RECORD, "--machine", "uniaxial"], "columns"),
+    ):
+        code, _, err = view(*wrong, "--export", tmp_path / "other.html")
+        assert code == 2 and why in " ".join(err.split()) and "Traceback" not in err
+    assert not (tmp_path / "other.html").exists()

@@ -1,0 +1,79 @@
+"""What is seen of a running plant is what its record says, and looking changes nothing."""
+
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from lhpost6_pin import cli
+from lhpost6_pin.cli import live
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.link.protocol import Frame, Kind, Mode, encode
+from lhpost6_pin.link.served import ServedPlant
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.outputs import record_of_run
+from lhpost6_pin.schemes import SAMPLE_RATE
+from lhpost6_pin.sight import EVERY, Sight
+from lhpost6_pin.simulate import ENGINES, ClosedLoop, simulate
+from lhpost6_pin.viewer import LiveView
+
+
+@pytest.fixture(scope="module")
+def loop(plant, rest):
+    target = make_target(find_motion("sine", amplitude=0.02, cycles=0.5, ramp_cycles=0.5), rate=float(SAMPLE_RATE))
+    controller = make_controller(plant, rest, load_controller("lhpost6"))
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    begin = int(np.argmax(np.abs(drive[:, 0]) > 1e-3 * np.abs(drive[:, 0]).max()))
+    return ClosedLoop(controller, drive[begin : begin + 4000], rest)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_sights_are_those_of_the_record_and_looking_changes_nothing(plant, loop, engine):
+    seen: list[Sight] = []
+    run = simulate(plant, loop, samples=4000, engine=engine, watch=seen.append)
+    unseen = simulate(plant, loop, samples=4000, engine=engine)
+    for name in ("q", "v", "a", "z", "spool", "command"):
+        assert np.array_equal(getattr(run, name), getattr(unseen, name)), name
+    record = record_of_run(run, {"test": "sine"})
+    assert [one.time for one in seen] == [k / SAMPLE_RATE for k in range(0, 4000, EVERY)]
+    places = record.isel(time=slice(0, None, EVERY))
+    moved = np.array([one.displacement for one in seen])
+    assert np.abs(moved[:, 0]).max() > 1e-3
+    np.testing.assert_allclose(moved, places["platen_displacement"].values, atol=1e-15)
+    force = np.array([one.force for one in seen])
+    # the ledger's forces against pressures times areas: rounding of 1 MN
+    np.testing.assert_allclose(force[:, : plant.spools], places["actuator_force"].values, rtol=1e-12, atol=1e-6)
+    gas = places["strut_pressure"].values * [s.area for s in plant.machine.struts]
+    np.testing.assert_allclose(-force[:, plant.spools :], gas, rtol=1e-12)  # seals of Table 6.1 have no friction
+
+
+def test_a_served_plant_shows_itself_now_and_then(plant, rest):
+    table, seen = ServedPlant(plant, rest, Mode.LOCK_STEP), []
+    table.watcher = seen.append
+    table.receive(encode(Frame(Kind.HELLO, 1)), "a", 0)
+    n = plant.spools
+    for k in range(1, 2 * EVERY + 2):
+        frame = Frame(Kind.COMMAND, 1, actuators=n, valves=n, sequence=k, numbers=rest.spool)
+        table.receive(encode(frame), "a", k)
+    assert [one.time for one in seen] == [EVERY / SAMPLE_RATE, 2 * EVERY / SAMPLE_RATE]
+
+
+def test_a_live_view_is_no_faster_than_the_table(plant):
+    still = Sight(0.0, np.zeros(6), np.ones(plant.legs.size))
+    with LiveView(plant.machine, "still") as view:
+        begin = time.monotonic()
+        for moment in (3.0, 3.1, 3.3):  # a plant may have run before it is watched
+            view.show(still._replace(time=moment))
+        assert time.monotonic() - begin >= 0.3
+
+
+def test_a_run_can_be_watched_from_the_command_line(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(live, "PATIENCE", 0.0)
+    words = "run sine --set amplitude=0.02 --set cycles=0.5 --set ramp_cycles=0.5 --engine fused --live --no-open"
+    monkeypatch.setattr(sys, "argv", ["lhpost6", *words.split(), "--out", str(tmp_path)])
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    told = capsys.readouterr()
+    assert not end.value.code and "http://127.0.0.1:" in told.out and "nobody has looked" in told.err
+    assert (tmp_path / "record.nc").is_file()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from lhpost6_pin import __version__
 from lhpost6_pin.cli import app
 from lhpost6_pin.machine import load_machine
 
@@ -42,3 +43,8 @@ def test_files_that_are_named_are_there(name):
 def test_continuous_integration_calls_exactly_the_test_command():
     (command,) = (line for line in README.splitlines() if "scripts/checks.py" in line and line.startswith("python3"))
     assert command in (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+
+
+def test_the_citation_is_of_this_version():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {__version__}\n" in text and "cff-version: 1.2.0" in text

@@ -29,7 +29,7 @@ from lhpost6_pin.report import write_run_report
 from lhpost6_pin.schemes import SAMPLE_RATE
 from lhpost6_pin.simulate import ClosedLoop, Run, simulate
 from lhpost6_pin.tables import machine_rows, report_limits
-from lhpost6_pin.viewer import save_animation
+from lhpost6_pin.viewer import show_record
 
 
 def noise(plant: Plant, seconds: float) -> ClosedLoop:
@@ -102,7 +102,7 @@ def page_rows(machine) -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         report, view = Path(folder) / "report.html", Path(folder) / "view.html"
         write_run_report(part, report, limits=report_limits(run.plant), machine_table=machine_rows(machine))
-        save_animation(machine, part, view)
+        show_record(machine, part).save(view)
         sizes = [path.stat().st_size / 1e6 for path in (report, view)]
     return [
         "## Pages of a test of 40 s at 2048 Hz",

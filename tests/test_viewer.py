@@ -24,12 +24,12 @@ from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.records import AXES, load_record, make_record
 from lhpost6_pin.urdf import legs
 from lhpost6_pin.viewer import (
+    Look,
     LoopbackWindow,
     Recorder,
     live_animation,
     make_frames,
     record_frames,
-    save_animation,
     show_record,
 )
 from lhpost6_pin.viewer.animation import draw_animation
@@ -78,12 +78,12 @@ def test_frames_sample_the_record_uniformly_and_amplify_it():
     time = np.linspace(2.0, 4.0, 1025)
     motion = np.outer(np.sin(time - 2.0), [0.1, 0, 0, 0, 0, 0])
     twice = Ghost("reference", "reference", time, 2 * motion)
-    frames = make_frames(time, motion, [twice], rate=30.0, amplify=5.0)
+    frames = make_frames(time, motion, [twice], look=Look(amplify=5.0))
     assert frames.displacement.shape == (61, 6)
     # linear interpolation over 2 ms of 0.5 m sin t: 0.5 h^2 / 8
     np.testing.assert_allclose(frames.displacement[:, 0], 0.5 * np.sin(np.arange(61) / 30.0), atol=3e-7)
     np.testing.assert_allclose(frames.ghosts[0].displacement, 2 * frames.displacement, atol=1e-15)
-    far = make_frames(time, motion, [twice], rate=30.0, gap=10.0)
+    far = make_frames(time, motion, [twice], look=Look(gap=10.0))
     np.testing.assert_allclose(far.ghosts[0].displacement, 11 * far.displacement, atol=1e-14)  # 1 + 10 (2 - 1)
 
 
@@ -108,7 +108,7 @@ def test_what_cannot_be_drawn_is_refused_in_words(rate, amplify, bad, columns):
     motion = np.zeros((10, columns))
     motion[3:4, :1] = bad
     try:
-        frames = make_frames(np.arange(10) / 10.0, motion, rate=rate, amplify=amplify)
+        frames = make_frames(np.arange(10) / 10.0, motion, look=Look(rate, amplify))
     except LhpostError as error:
         assert len(str(error)) > 20
     else:
@@ -117,7 +117,7 @@ def test_what_cannot_be_drawn_is_refused_in_words(rate, amplify, bad, columns):
 
 def test_a_platen_amplified_until_it_turns_over_is_refused():
     with pytest.raises(ParameterError, match="amplify less"):
-        make_frames(np.array([0.0, 1.0]), np.full((2, 6), 0.02), amplify=100.0)
+        make_frames(np.array([0.0, 1.0]), np.full((2, 6), 0.02), look=Look(amplify=100.0))
 
 
 def test_a_motion_drawn_beyond_the_stroke_is_said_to_be(machine, bodies, caplog):
@@ -126,7 +126,7 @@ def test_a_motion_drawn_beyond_the_stroke_is_said_to_be(machine, bodies, caplog)
     with caplog.at_level(logging.WARNING):
         draw_animation(Recorder(), machine, bodies, make_frames(np.array([0.0, 1.0]), motion))
         assert not caplog.records
-        draw_animation(Recorder(), machine, bodies, make_frames(np.array([0.0, 1.0]), motion, amplify=2.0))
+        draw_animation(Recorder(), machine, bodies, make_frames(np.array([0.0, 1.0]), motion, look=Look(amplify=2.0)))
     assert "V1, V2, V3, V4, V5, V6" in caplog.text and "H1" not in caplog.text
 
 
@@ -169,7 +169,7 @@ def test_an_arrow_is_as_long_as_its_force_and_turns_round_under_tension(machine,
 
 def test_forces_since_the_start_begin_at_nothing(machine, record):
     part = record.isel(time=slice(0, 2048))
-    frames, whole = record_frames(machine, part, change=True), record_frames(machine, part)
+    frames, whole = record_frames(machine, part, look=Look(change=True)), record_frames(machine, part)
     assert np.abs(frames.force[0]).max() == 0.0
     np.testing.assert_allclose(frames.force + whole.force[0], whole.force, rtol=1e-12)
 
@@ -219,12 +219,12 @@ def test_forty_seconds_at_30_frames_fit_in_four_megabytes_and_load_nothing(machi
     title = "</script><script>alert(1)</script>"
     labels = {"axis": AXES, "actuator": machine.actuator_names, "strut": machine.strut_names}
     record = make_record(time, channels, labels, {"title": title, "kind": "simulated"})
-    save_animation(machine, record, tmp_path / "out.html")
+    show_record(machine, record).save(tmp_path / "out.html")
     page = (tmp_path / "out.html").read_text()
     assert len(page) < 4e6
     assert "default-src 'none'" in page and not re.search(r'(src|href)="|@import|url\(', page.split("<script>")[0])
     assert "<script>alert" not in page
-    assert page.count("</script>") == 3  # meshcat, the commands, the page's own
+    assert page.count("</script>") == 4  # meshcat, settings, commands, the page's own
 
 
 def test_the_export_starts_no_server_and_no_process(machine, record, tmp_path, monkeypatch):
@@ -234,7 +234,7 @@ def test_the_export_starts_no_server_and_no_process(machine, record, tmp_path, m
     monkeypatch.setattr(subprocess, "Popen", refuse)
     monkeypatch.setattr(socket.socket, "bind", refuse)
     monkeypatch.setattr(socket.socket, "connect", refuse)
-    save_animation(machine, record.isel(time=slice(0, 600)), tmp_path / "out.html")
+    show_record(machine, record.isel(time=slice(0, 600))).save(tmp_path / "out.html")
     assert (tmp_path / "out.html").stat().st_size > 800_000  # meshcat's library is inside
 
 

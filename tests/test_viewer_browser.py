@@ -15,7 +15,7 @@ from lhpost6_pin.plant import make_plant
 from lhpost6_pin.records import load_record
 from lhpost6_pin.running import RunningPlant
 from lhpost6_pin.sight import EVERY
-from lhpost6_pin.viewer import LiveView, live_animation, record_frames, save_animation, view_apart
+from lhpost6_pin.viewer import LiveView, Look, live_animation, record_frames, show_record, view_apart
 
 pytestmark = needs_browser
 
@@ -38,9 +38,8 @@ def record():
 @pytest.fixture(scope="module")
 def page(machine, record, tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("page") / "out.html"
-    save_animation(
-        machine, record, path, [record.assign(platen_displacement=0.9 * record["platen_displacement"])], amplify=3
-    )
+    other = record.assign(platen_displacement=0.9 * record["platen_displacement"])
+    show_record(machine, record, [other], Look(amplify=3.0)).save(path)
     return path.as_uri()
 
 
@@ -65,7 +64,7 @@ def test_the_page_has_no_errors_and_the_platen_is_where_the_record_has_it(machin
 
     faults, poses, pictures = browse(tmp_path, page, look)
     assert faults == []
-    frames = record_frames(machine, record, amplify=3.0)
+    frames = record_frames(machine, record, look=Look(amplify=3.0))
     model = load_bodies(machine).model
     moments = frames.displacement[[round(30 * t) for t in times]]
     wanted = body_poses(model, joint_positions(machine, model, moments))

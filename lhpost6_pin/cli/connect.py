@@ -87,11 +87,11 @@ def serve(
         typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends", err=json)
         with ExitStack() as stack:
             if live:
-                from ..viewer import view_apart
+                from ..viewer import Look, view_apart
 
                 title = f"{table.name} at {address}:{at}"
                 url, served.watcher = stack.enter_context(
-                    view_apart(table, title, amplify=amplify, change=force_change)
+                    view_apart(table, title, Look(amplify=amplify, change=force_change))
                 )
                 show_address(url, f"{title}, on this computer only", not no_open, err=json)
             timing = serve_link(sock, served, seconds=seconds)

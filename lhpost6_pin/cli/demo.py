@@ -33,7 +33,7 @@ def demo(
     from ..machine_toml import save_machine_toml
     from ..report.discover_report import write_discover_report
     from ..sensors import load_sensors
-    from ..viewer import save_animation
+    from ..viewer import Look, show_record
 
     refuse_no_jobs(jobs)
     machine, sensors = load_machine(), load_sensors()
@@ -71,7 +71,7 @@ def demo(
     model = save_machine_toml(found.fitted, folder / "model.toml", title)
     report = write_discover_report(found, folder / "report.html", command=repeating_command())
     view = folder / "view.html"
-    save_animation(machine, loops.measured, view, [loops.delivered, loops.found], gap=10.0)
+    show_record(machine, loops.measured, [loops.delivered, loops.found], Look(gap=10.0)).save(view)
     say(
         "4. Look at it:\n"
         f"   {report}: where the gap was, why this name, the gap shrinking\n"

@@ -31,9 +31,9 @@ def watched(
     if not live:
         yield None
         return
-    from ..viewer import LiveView
+    from ..viewer import LiveView, Look
 
-    with LiveView(table, title, amplify=amplify, change=change) as view:
+    with LiveView(table, title, Look(amplify=amplify, change=change)) as view:
         show_address(view.url, f"{title} on this computer only", open_it, err)
         if not view.wait(PATIENCE):
             typer.echo(f"nobody has looked for {PATIENCE:g} s: it goes on", err=True)

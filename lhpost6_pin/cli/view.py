@@ -1,7 +1,7 @@
 """Command to look at a record in three dimensions."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -32,17 +32,17 @@ def view(
     import threading
 
     from ..records import load_record
-    from ..viewer import live_animation, save_animation
+    from ..viewer import Look, live_animation, show_record
 
     table = find_machine(machine, override)
     test, over = load_record(record), [load_record(path) for path in others or []]
-    options: dict[str, Any] = {"rate": fps, "amplify": amplify, "gap": gap, "change": change}
+    look = Look(fps, amplify, gap, change)
     if export is not None:
-        save_animation(table, test, export, over, **options)
+        show_record(table, test, over, look).save(export)
         size = export.stat().st_size / 1e6
         tell(json, dict, lambda: typer.echo(f"{size:.1f} MB, which any browser plays"), [export])
         return
-    with live_animation(table, test, over, **options) as window:
+    with live_animation(table, test, over, look) as window:
         show_address(window.url, f"{record} on this computer only; Ctrl-C ends", not no_open)
         try:
             threading.Event().wait()

@@ -6,22 +6,22 @@ record, `scene` and `arrows` draw the machine, `animation` moves them; all of it
 """
 
 from .apart import view_apart
-from .frames import Frames, make_frames, record_frames
+from .frames import Frames, Look, make_frames, record_frames
 from .live import LiveView
 from .page import Picture
-from .show import live_animation, save_animation, show_record
+from .show import live_animation, show_record
 from .window import LoopbackWindow, Recorder
 
 __all__ = [
     "Frames",
     "LiveView",
+    "Look",
     "LoopbackWindow",
     "Picture",
     "Recorder",
     "live_animation",
     "make_frames",
     "record_frames",
-    "save_animation",
     "show_record",
     "view_apart",
 ]

@@ -92,5 +92,5 @@ def _seen(values: Array) -> bool:
 
 
 def _clip(frames: Frames, name: str, tracks: list[dict[str, Any]]) -> dict[str, Any]:
-    clip = {"fps": frames.rate, "name": name, "tracks": tracks}
+    clip = {"fps": frames.look.rate, "name": name, "tracks": tracks}
     return {"path": f"/meshcat/{ROOT}/{name}", "clip": clip}

@@ -8,7 +8,7 @@ from multiprocessing.connection import Connection
 
 from ..machine import Machine
 from ..sight import Sight, Watch
-from .frames import refuse_factor
+from .frames import AS_IT_IS, Look
 from .live import LiveView
 
 __all__ = ["view_apart"]
@@ -18,17 +18,15 @@ MOST_UNSEEN = 8
 
 
 @contextmanager
-def view_apart(
-    machine: Machine, title: str, *, amplify: float = 1.0, change: bool = False
-) -> Iterator[tuple[str, Watch]]:
+def view_apart(machine: Machine, title: str, look: Look = AS_IT_IS) -> Iterator[tuple[str, Watch]]:
     """Yield the address of a page that shows a plant, and what to call with its sights; that never waits.
 
-    A view that fell behind, or was ended, misses sights. Options and errors as those of `LiveView`.
+    A view that fell behind, or was ended, misses sights. Raises ParameterError as `Look.refuse`.
     """
-    refuse_factor("amplify", amplify)
+    look.refuse()
     spawn = get_context("spawn")  # a copy of a process with threads may hang
     here, there = spawn.Pipe()
-    process = spawn.Process(target=_draw, args=(there, machine, title, amplify, change), daemon=True)
+    process = spawn.Process(target=_draw, args=(there, machine, title, look), daemon=True)
     process.start()
     there.close()
     unseen = 0
@@ -50,11 +48,10 @@ def view_apart(
         process.join()
 
 
-def _draw(plant: Connection, machine: Machine, title: str, amplify: float, change: bool) -> None:
+def _draw(plant: Connection, machine: Machine, title: str, look: Look) -> None:
     """Draw what comes from the plant until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the plant, and that this
-    live = LiveView(machine, title, amplify=amplify, change=change, real_time=False)
-    with live as view, suppress(OSError, EOFError):
+    with LiveView(machine, title, look, real_time=False) as view, suppress(OSError, EOFError):
         plant.send(view.url)
         while True:
             view.show(plant.recv())

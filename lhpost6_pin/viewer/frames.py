@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..plant import make_plant
 from ..pose import forward_kinematics
 from ..records import require
 
-__all__ = ["Frames", "Ghost", "make_frames", "record_frames", "record_title", "refuse_factor"]
+__all__ = ["AS_IT_IS", "Frames", "Ghost", "Look", "make_frames", "record_frames", "record_title"]
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,31 @@ OTHERS = ("first_other", "second_other")
 
 MOST_TURN = 0.5 * math.pi
 """Roll or pitch [rad] that is refused: Euler angles end at a pitch of this size."""
+
+
+class Look(NamedTuple):
+    """How a record is shown. Raises ParameterError, by `refuse`, for a number that makes no sense."""
+
+    rate: float = 30.0  # frames a second
+    amplify: float = 1.0  # factor on all motion
+    gap: float = 1.0  # factor on what outlines differ by, besides
+    change: bool = False  # forces less what they are in the first frame: weight and preload
+
+    def refuse(self) -> None:
+        """Raise ParameterError naming what is not a positive number."""
+        for name in ("rate", "amplify", "gap"):
+            if not (math.isfinite(value := getattr(self, name)) and value > 0.0):
+                raise ParameterError(f"{name} is {value:g}; it must be a positive number")
+
+    @property
+    def size(self) -> str:
+        """How motion is drawn, in words."""
+        words = "drawn to scale" if self.amplify == 1.0 else f"motion drawn {self.amplify:g} times as large"
+        return words + f", gaps to the outlines {self.gap:g} times as large" * (self.gap != 1.0)
+
+
+AS_IT_IS = Look()
+"""Motion to scale, forces whole."""
 
 
 class Ghost(NamedTuple):
@@ -40,13 +65,10 @@ class Frames:
     """Motion of C in {s} with Euler angles, and forces on the platen along the legs, at a uniform frame rate."""
 
     time: Array  # (n,) [s]
-    rate: float  # [1/s]
-    displacement: Array  # (n, 6) [m, rad], enlarged `amplify` times
-    ghosts: tuple[Ghost, ...] = ()  # sampled and enlarged alike
-    force: Array | None = None  # (n, n_legs) that push the platen away from the leg's base [N]; NaN where unknown
-    amplify: float = 1.0  # factor on all motion
-    gap: float = 1.0  # factor on what the ghosts differ by, besides
-    change: bool = False  # whether forces are less those of the first frame
+    displacement: Array  # (n, 6) [m, rad], enlarged
+    ghosts: tuple[Ghost, ...]  # sampled and enlarged alike
+    force: Array | None  # (n, n_legs) that push the platen away from the leg's base [N]; NaN where unknown
+    look: Look
 
 
 def make_frames(
@@ -54,20 +76,16 @@ def make_frames(
     displacement: Array,
     ghosts: Sequence[Ghost] = (),
     force: Array | None = None,
-    *,
-    rate: float = 30.0,
-    amplify: float = 1.0,
-    gap: float = 1.0,
+    look: Look = AS_IT_IS,
 ) -> Frames:
-    """Sample a platen motion (n, 6) and forces (n, n_legs) over time (n,) [s] at `rate` frames a second.
+    """Sample a platen motion (n, 6), ghosts, and forces (n, n_legs) over time (n,) [s] as `look` says.
 
-    Motion is enlarged `amplify` times, what the ghosts differ by `gap` times more; only the time that all have is kept.
-    Raises RecordError for a motion that cannot be drawn, ParameterError for a rate or factor that makes no sense.
+    Only the time that all have is kept. Raises RecordError for a motion that cannot be drawn, ParameterError for a look
+    that makes no sense.
     """
-    for name, value in (("rate", rate), ("amplify", amplify), ("gap", gap)):
-        refuse_factor(name, value)
-    time = np.asarray(time, float)
-    moments = _moments([time, *(np.asarray(g.time, float) for g in ghosts)], rate)
+    look.refuse()
+    time, amplify, gap = np.asarray(time, float), look.amplify, look.gap
+    moments = _moments([time, *(np.asarray(g.time, float) for g in ghosts)], look.rate)
     drawn = amplify * _sampled(moments, time, displacement, "platen_displacement", amplify)
     others = []
     for ghost in ghosts:
@@ -77,24 +95,18 @@ def make_frames(
         if np.abs(motion[:, 3:5]).max() >= MOST_TURN:
             raise ParameterError(f"amplified {amplify * gap:g} times the platen turns over; amplify less")
     legs = None if force is None else _columns(moments, time, np.asarray(force, float))
-    return Frames(moments, rate, drawn, tuple(others), legs, amplify, gap)
+    if legs is not None and look.change:
+        legs -= legs[0].copy()
+    return Frames(moments, drawn, tuple(others), legs, look)
 
 
 def record_frames(
-    machine: Machine,
-    record: xr.Dataset,
-    others: Sequence[xr.Dataset] = (),
-    *,
-    rate: float = 30.0,
-    amplify: float = 1.0,
-    gap: float = 1.0,
-    change: bool = False,
+    machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset] = (), look: Look = AS_IT_IS
 ) -> Frames:
     """Frames of a record, with its reference and other records over it, two at most.
 
-    A record without platen displacement is drawn from its actuator displacements. With `change` forces are less what
-    they are in the first frame: weight and preload. Raises RecordError if it has neither displacement, or if
-    the records share no time; else as `make_frames`.
+    A record without platen displacement is drawn from its actuator displacements. Raises RecordError if it has neither,
+    or if the records share no time; else as `make_frames`.
     """
     time, ghosts = record["time"].values, []
     if "reference_displacement" in record:
@@ -104,17 +116,7 @@ def record_frames(
     for name, other in zip(OTHERS, others, strict=False):
         label = f"{record_title(other)}, {other.attrs.get('kind', 'record')}"
         ghosts.append(Ghost(name, label, other["time"].values, _motion(machine, other)))
-    motion, force = _motion(machine, record), _forces(machine, record)
-    frames = make_frames(time, motion, ghosts, force, rate=rate, amplify=amplify, gap=gap)
-    if change and frames.force is not None:
-        return replace(frames, force=frames.force - frames.force[0], change=True)
-    return frames
-
-
-def refuse_factor(name: str, value: float) -> None:
-    """Raise ParameterError for a factor or rate that makes no sense."""
-    if not (math.isfinite(value) and value > 0.0):
-        raise ParameterError(f"{name} is {value:g}; it must be a positive number")
+    return make_frames(time, _motion(machine, record), ghosts, _forces(machine, record), look)
 
 
 def record_title(record: xr.Dataset) -> str:

@@ -13,7 +13,7 @@ from ..machine import Machine
 from ..sight import Sight
 from ..urdf import legs
 from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
-from .frames import refuse_factor
+from .frames import AS_IT_IS, Look
 from .page import Caption, render_page
 from .scene import ROOT, draw_arrows, draw_machine
 from .show import machine_legend
@@ -30,20 +30,13 @@ class LiveView:
     Arrows are scaled by what holds the table at the start: the largest of those forces is drawn half as long as can be.
     """
 
-    def __init__(
-        self, machine: Machine, title: str, *, amplify: float = 1.0, change: bool = False, real_time: bool = True
-    ) -> None:
-        """Prepare the page.
-
-        Motion is drawn `amplify` times as large, no faster than it is in `real_time`; forces with `change` less those
-        at the start. Raises ParameterError for a factor that makes no sense.
-        """
-        refuse_factor("amplify", amplify)
-        self._machine, self._amplify, self._real_time, self._change = machine, amplify, real_time, change
+    def __init__(self, machine: Machine, title: str, look: Look = AS_IT_IS, *, real_time: bool = True) -> None:
+        """Prepare the page; in `real_time` motion is no faster than it is. Raises ParameterError as `Look.refuse`."""
+        look.refuse()
+        self._machine, self._look, self._real_time = machine, look, real_time
         self._bodies = load_bodies(machine)
         self._names = [leg.name for leg in legs(machine)]
-        size = "drawn to scale" if amplify == 1.0 else f"motion drawn {amplify:g} times as large"
-        note = f"{machine.name}, live, {size}; +X to the right"
+        note = f"{machine.name}, live, {look.size}; +X to the right"
         self._window = LoopbackWindow(render_page(Caption(title, note, machine_legend(machine)), live=True))
         draw_machine(self._window, machine, self._bodies)
         draw_arrows(self._window, self._names)
@@ -77,10 +70,10 @@ class LiveView:
         """Draw one sight; returns at once, or in real time when its moment has come."""
         if self._begin is None:
             self._begin, self._largest = time.monotonic() - sight.time, 2.0 * largest_force(sight.force)
-            self._still = sight.force if self._change else self._still
+            self._still = sight.force if self._look.change else self._still
         if self._real_time:
             time.sleep(max(0.0, self._begin + sight.time - time.monotonic()))
-        q = joint_positions(self._machine, self._bodies.model, self._amplify * sight.displacement)
+        q = joint_positions(self._machine, self._bodies.model, self._look.amplify * sight.displacement)
         poses = body_poses(self._bodies.model, q)[0]
         for joint, path in self._joints.items():
             self._window.send(_Place(path, pin.XYZQUATToSE3(poses[joint]).homogeneous))

@@ -3,7 +3,7 @@ const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
 const part = (id) => document.getElementById(id);
 for (const packed of JSON.parse(part("commands").textContent))
   viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
-const start = START;
+const { start, step, live } = JSON.parse(part("settings").textContent);
 const animator = viewer.animator;
 const shown = (seconds) => seconds.toFixed(2);
 const FITS = 1.5; // width over height in which the camera sees the whole table
@@ -55,12 +55,12 @@ for (const box of document.querySelectorAll("#layers input"))
   });
 document.addEventListener("keydown", (e) => {
   if (known === 0 || ["INPUT", "SELECT", "BUTTON", "SUMMARY"].includes(e.target.tagName)) return;
-  const step = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
+  const way = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
   if (e.key === " ") { toggle(); e.preventDefault(); }
-  if (step) { animator.pause(); seek(animator.time + step * (e.shiftKey ? 1 : STEP)); e.preventDefault(); }
+  if (way) { animator.pause(); seek(animator.time + way * (e.shiftKey ? 1 : step)); e.preventDefault(); }
   if (e.key === "Home") seek(0);
 });
-if (LIVE) { // what is sent: meshcat's commands, and words on how it goes
+if (live) { // what is sent: meshcat's commands, and words on how it goes
   const socket = new WebSocket(`ws://${location.host}/commands`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => {

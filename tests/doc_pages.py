@@ -1,0 +1,51 @@
+"""What the tests of the site share: its pages by hand, their snippets, and what a built page points to."""
+
+import re
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parent.parent
+PAGES = ROOT / "scripts" / "docs" / "pages"
+
+_FENCE = re.compile(r"^(`{3,})(.*?)\n(.*?)^\1\s*$", re.MULTILINE | re.DOTALL)
+
+
+class Snippet(NamedTuple):
+    """A fenced block of a page."""
+
+    language: str
+    slow: bool
+    text: str
+
+
+def snippets(page: Path) -> Iterator[Snippet]:
+    """All fenced blocks of a page, in order; `{.bash .slow title="..."}` is a slow one of bash."""
+    for _, head, text in _FENCE.findall(page.read_text(encoding="utf-8")):
+        head, _, _ = head.strip().strip("{}").partition("title=")
+        words = [word.lstrip(".") for word in head.split()]
+        assert words, f"{page.name}: a fence without a language: {text[:60]!r}"
+        yield Snippet(words[0], "slow" in words, text)
+
+
+class Links(HTMLParser):
+    """Ids of a built page, where it links to, and what it loads when it is opened."""
+
+    def __init__(self, page: Path) -> None:
+        """Read a page."""
+        super().__init__()
+        self.ids: set[str] = set()
+        self.links: list[str] = []
+        self.loads: list[str] = []
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note ids, links and sources."""
+        given = {key: value or "" for key, value in attrs}
+        self.ids |= {given[key] for key in ("id", "name") if key in given}
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        if tag == "link" and "canonical" not in given.get("rel", ""):
+            self.loads.append(given.get("href", ""))
+        self.loads += [given[key] for key in ("src", "srcset", "poster", "data") if key in given and tag != "meta"]

@@ -1,0 +1,179 @@
+"""The documentation site: it builds with strict links, has all it should, loads nothing, and its snippets run."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from doc_pages import PAGES, ROOT, Links, snippets
+
+from lhpost6_pin.cli import app
+from lhpost6_pin.law_table import LAWS
+from lhpost6_pin.library import families
+from lhpost6_pin.machine import load_machine
+
+BY_HAND = sorted(PAGES.rglob("*.md"))
+RUN = ("bash", "python")
+SHOWN = ("text", "console")
+"""Languages of snippets that are shown and not run."""
+
+
+def name(page: Path) -> str:
+    return page.relative_to(PAGES).as_posix()
+
+
+# --------------------------------------------------------------------------------------------------------- the site
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The finished site."""
+    out = tmp_path_factory.mktemp("docs") / "site"
+    command = [sys.executable, str(ROOT / "scripts" / "build_docs.py"), "--out", str(out)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert ended.stdout.strip() == f"wrote {out / 'index.html'}"
+    assert [p.name for p in out.parent.iterdir()] == ["site"]  # nothing half-built is left beside it
+    return out
+
+
+@pytest.fixture(scope="module")
+def pages(site: Path) -> dict[Path, Links]:
+    """Every page of the site."""
+    return {path: Links(path) for path in sorted(site.rglob("*.html"))}
+
+
+def test_every_page_by_hand_is_there(site):
+    for page in BY_HAND:
+        assert (site / page.relative_to(PAGES)).with_suffix(".html").is_file()
+
+
+def test_no_page_loads_anything_from_elsewhere(site, pages):
+    for path, page in pages.items():
+        for source in page.loads:
+            assert not urlsplit(source).netloc, f"{path.name} loads {source}"
+    for style in site.rglob("*.css"):
+        wanted = re.findall(r"(?:url\(|@import)\s*['\"]?([^'\")]+)", style.read_text(encoding="utf-8"))
+        assert [w for w in wanted if urlsplit(w).netloc] == [], style
+    assert "unpkg" not in "".join(path.read_text(encoding="utf-8") for path in pages)
+
+
+def test_every_link_and_anchor_leads_somewhere(site, pages):
+    for path, page in pages.items():
+        if path.name == "404.html":  # served at any address, so that its links are absolute
+            continue
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            assert target.is_file() and target.is_relative_to(site.resolve()), f"{path.name}: {link}"
+            anchor = unquote(parts.fragment)
+            if anchor and target.suffix == ".html" and not anchor.startswith("__"):  # those are the theme's own
+                assert anchor in pages[site / target.relative_to(site.resolve())].ids, f"{path.name}: {link}"
+
+
+def test_every_image_says_what_it_shows(site):
+    for path in site.rglob("*.html"):
+        for image in re.findall(r"<img [^>]*>", path.read_text(encoding="utf-8")):
+            assert len(re.search(r'alt="([^"]*)"', image).group(1)) > 30, f"{path.name}: {image}"
+
+
+def test_every_command_has_its_section_and_options(site):
+    text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    for command in app.registered_commands:
+        assert f'id="lhpost6-{command.name or command.callback.__name__}"' in text
+    for option in ("--beyond-limits", "--hold-out", "--model, --override", "--errors, --no-errors"):
+        assert f"<code>{option}</code>" in text
+    assert "--no-locked" not in text  # flags with a name of their own have no opposite
+
+
+def test_every_family_has_its_section_with_its_numbers(site, pages):
+    ids = pages[site / "reference" / "library.html"].ids
+    text = (site / "reference" / "library.html").read_text(encoding="utf-8")
+    for family in families().values():
+        assert family.name in ids
+        assert all(f"<code>{s.name}</code>" in text for s in family.shapes if not re.search(r"_\d+$", s.name))
+
+
+def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+    from docs import theory
+
+    assert set(theory.law_modules()) <= set(theory.PAGES)
+    assert {law for laws in theory.PAGES.values() for law in laws} == set(LAWS)
+    for module in theory.law_modules():
+        page = (site / "theory" / f"{module}.html").read_text(encoding="utf-8")
+        assert f'id="lhpost6_pin.laws.{module}.' in page  # its kernels
+        assert 'class="quote"' in page or 'class="mkdocstrings-source"' in page  # their source
+        assert 'id="who-uses-it"' in page and "tests/test_l" in page
+        by_hand = (PAGES / "theory" / f"{module}.md").read_text(encoding="utf-8")
+        assert re.search(r"\*\*Sign\.\*\*", by_hand) and re.search(r"\*\*In a record\.\*\*", by_hand)
+
+
+def test_every_assumed_number_of_the_machine_is_on_its_page(site):
+    text = (site / "assumptions.html").read_text(encoding="utf-8")
+    for path, quantity in load_machine().parameters.items():
+        if quantity.evidence in ("assumed", "drawn", "derived"):
+            assert f"{path}</code>" in text
+
+
+def test_figures_are_the_same_however_often_they_are_drawn(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+    from docs.figures import FIGURES, draw_all
+
+    for folder in ("once", "again"):
+        draw_all(tmp_path / folder)
+    for figure in FIGURES:
+        first, second = ((tmp_path / folder / f"{figure}.svg").read_bytes() for folder in ("once", "again"))
+        assert first == second and b"<dc:date>" not in first
+
+
+def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    command = [sys.executable, str(ROOT / "scripts" / "build_docs.py"), "--out", str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
+    assert ended.returncode == 1 and "holds something else" in ended.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+# --------------------------------------------------------------------------------------------------------- snippets
+@pytest.mark.parametrize("page", BY_HAND, ids=name)
+def test_every_snippet_says_what_it_is(page):
+    for snippet in snippets(page):
+        assert snippet.language in (*RUN, *SHOWN, "{"), f"{page.name}: {snippet.language}"
+
+
+@pytest.mark.parametrize("page", BY_HAND, ids=name)
+def test_what_is_to_be_typed_into_a_console_installs_and_no_more(page):
+    for snippet in snippets(page):
+        if snippet.language == "console":
+            assert all(re.match(r"\$ .*pip install ", line) for line in snippet.text.splitlines())
+
+
+def run_page(page: Path, folder: Path, *, slow: bool) -> None:
+    """Run a page's snippets in order in one folder; those that take minutes only if asked."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    env = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "SOURCE": str(ROOT), "COLUMNS": "120"}
+    for number, snippet in enumerate(s for s in snippets(page) if s.language in RUN):
+        if snippet.slow and not slow:
+            continue
+        if snippet.language == "bash":
+            command = ["bash", "-c", f"set -e -o pipefail\n{snippet.text}"]
+        else:
+            command = [sys.executable, "-c", snippet.text]
+        ended = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=1800)
+        said = f"{name(page)}, snippet {number + 1}:\n{snippet.text}\n{ended.stdout}\n{ended.stderr}"
+        assert ended.returncode == 0, said
+
+
+@pytest.mark.parametrize("page", [p for p in BY_HAND if any(s.language in RUN for s in snippets(p))], ids=name)
+def test_the_snippets_of_a_page_run_in_order(page, tmp_path):
+    run_page(page, tmp_path, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in BY_HAND if any(s.slow for s in snippets(p))], ids=name)
+def test_the_long_snippets_of_a_page_run_too(page, tmp_path):
+    run_page(page, tmp_path, slow=True)

@@ -27,10 +27,20 @@ def build(out: Path) -> bool:
         assemble(folder)
         if not _mkdocs(folder):
             return False
-        if out.exists():
-            out.rename(folder / "before")
-        (folder / "site").rename(out)
+        _replace(out, folder / "site", folder / "before")
     return True
+
+
+def _replace(out: Path, site: Path, before: Path) -> None:
+    """Put the site where another may be; if that fails, the other is put back."""
+    if out.exists():
+        out.rename(before)
+    try:
+        site.rename(out)
+    except OSError:
+        if before.exists():
+            before.rename(out)
+        raise
 
 
 def _mkdocs(folder: Path) -> bool:

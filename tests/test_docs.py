@@ -31,7 +31,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The finished site."""
     out = tmp_path_factory.mktemp("docs") / "site"
     command = [sys.executable, str(ROOT / "scripts" / "build_docs.py"), "--out", str(out)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=3000)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert ended.stdout.strip() == f"wrote {out / 'index.html'}"
     assert [p.name for p in out.parent.iterdir()] == ["site"]  # nothing half-built is left beside it
@@ -72,6 +72,11 @@ def test_every_link_and_anchor_leads_somewhere(site, pages):
             anchor = unquote(parts.fragment)
             if anchor and target.suffix == ".html" and not anchor.startswith("__"):  # those are the theme's own
                 assert anchor in pages[site / target.relative_to(site.resolve())].ids, f"{path.name}: {link}"
+
+
+def test_frames_in_braces_are_not_taken_for_markup(site):
+    text = (site / "machine.html").read_text(encoding="utf-8")
+    assert "<td>those of {s}</td>" in text and "<td>{n_i}</td>" in text
 
 
 def test_every_image_says_what_it_shows(site):
@@ -163,7 +168,7 @@ def run_page(page: Path, folder: Path, *, slow: bool) -> None:
             command = ["bash", "-c", f"set -e -o pipefail\n{snippet.text}"]
         else:
             command = [sys.executable, "-c", snippet.text]
-        ended = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=1800)
+        ended = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=3600)
         said = f"{name(page)}, snippet {number + 1}:\n{snippet.text}\n{ended.stdout}\n{ended.stderr}"
         assert ended.returncode == 0, said
 

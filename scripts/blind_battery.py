@@ -140,6 +140,7 @@ def wrong(labels: dict[str, dict], answered: dict[str, tuple[dict, dict]]) -> st
 def described(asked: argparse.Namespace) -> str:
     """What was run: the command, the version, the day."""
     length = f" --{asked.campaign}" if asked.campaign != "full" else ""
+    length += " --baselines" if asked.baselines else ""
     command = f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{length}"
     today = datetime.now(UTC).date().isoformat()
     return f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."

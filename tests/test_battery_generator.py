@@ -1,6 +1,7 @@
 """The blind battery's generator: its table obeys mechanics, its cases hide what their labels say and nothing else."""
 
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -256,6 +257,18 @@ def labelled(sort: str, accept: str, *effects: tuple[str, float], decoys: tuple[
     return {"sort": sort, "accept": [accept], "effects": hidden, "decoys": [{"family": n} for n in decoys]}
 
 
+def test_closure_is_counted_over_all_phases_and_where_the_gap_is_widest():
+    def gap(refitted: float, closure: float | None) -> dict:
+        return {"EQ": {"refitted": refitted, "after": 1.0, "closure": closure}}
+
+    label = labelled("one", "named", ("backlash", 3.0))
+    phases = ({"inverse dynamics": gap(1.3, 0.1), "open loop": gap(9.0, 0.9)}, {"open loop": gap(2.0, -0.2)})
+    found = scoring.score([(label, {**told("named", "backlash"), "closure": phase}) for phase in phases])
+    assert found["median closure on held-out tests"] == 0.1  # of 0.1, 0.9, -0.2
+    assert found["the same where a case's gap is widest"] == pytest.approx(0.35)  # of 0.9 and -0.2
+    assert found["held-out tests that got worse"] == (1, 3)
+
+
 def test_scores_count_what_was_named_and_what_was_not():
     pairs = [
         (labelled("null", "none"), told("none")),
@@ -274,6 +287,7 @@ def test_scores_count_what_was_named_and_what_was_not():
         (0, 1),
     )
     assert found["unexcited, nothing else named"] == (1, 1)
+    assert math.isnan(found["median closure on held-out tests"])  # no case says
     assert (found["none of the above, named"], found["none of the above, flagged"]) == ((0, 1), (1, 1))
     curve = {words: share for words, share in scoring.strength_curve(pairs).items() if share.of}
     assert curve == {"0.5 to 1": (0, 2), "2 to 4": (1, 1), "10 to 100": (1, 1)}

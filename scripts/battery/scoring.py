@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from statistics import median
 from typing import Any, NamedTuple
 
 __all__ = ["Share", "families", "named_what_is_there", "reach", "score", "strength_curve", "wilson"]
@@ -90,14 +91,13 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         named = {e["family"]: set(e["components"]) for e in answer["effects"]}
         return all(named[e["family"]] == set(e["components"]) for e in label["effects"] if e["family"] in named)
 
-    closures = [
-        gap["closure"]
+    gaps = [
+        [gap for phase in answer["closure"].values() for gap in phase.values() if gap["closure"] is not None]
         for label, answer in cases
         if known(label) and answer["effects"]
-        for phase in answer["closure"].values()
-        for gap in phase.values()
-        if gap["closure"] is not None
     ]
+    closures = [gap["closure"] for some in gaps for gap in some]
+    widest = [max(some, key=lambda gap: gap["refitted"])["closure"] for some in gaps if some]
     named = [(label, answer) for label, answer in cases if answer["effects"]]
     false = sum(len(set(families(answer)) - set(families(label))) for label, answer in named)
     return {
@@ -113,6 +113,7 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         "none of the above, flagged": share(sort("unknown"), lambda _, a: a["verdict"] == "unexplained"),
         "unexcited, nothing else named": share(sort("unexcited"), named_what_is_there),
         "false among all names": Share(false, sum(len(families(answer)) for _, answer in named)),
-        "median closure on held-out tests": sorted(closures)[len(closures) // 2] if closures else math.nan,
+        "median closure on held-out tests": median(closures) if closures else math.nan,
+        "the same where a case's gap is widest": median(widest) if widest else math.nan,
         "held-out tests that got worse": Share(sum(c < -0.02 for c in closures), len(closures)),
     }

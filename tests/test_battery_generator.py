@@ -269,6 +269,15 @@ def test_closure_is_counted_over_all_phases_and_where_the_gap_is_widest():
     assert found["held-out tests that got worse"] == (1, 3)
 
 
+def test_components_are_scored_where_an_effect_has_a_place():
+    label = labelled("two", "named", ("backlash", 3.0), ("gravity_offset", 4.0))
+    label["effects"][0]["components"] = ["H1"]
+    answer = told("named", "backlash", "gravity_offset")
+    for there, right in (("H1", 1), ("H2", 0)):
+        answer["effects"][0]["components"], answer["effects"][1]["components"] = [there], ["platen"]
+        assert scoring.score([(label, answer)])["components right where named"] == (right, 1)
+
+
 def test_scores_count_what_was_named_and_what_was_not():
     pairs = [
         (labelled("null", "none"), told("none")),

@@ -36,7 +36,7 @@ def wilson(hits: int, of: int, z: float = 1.96) -> tuple[float, float]:
     share, square = hits / of, z * z / of
     middle = (share + square / 2) / (1 + square)
     half = z / (1 + square) * math.sqrt(share * (1 - share) / of + square / of / 4)
-    return middle - half, middle + half
+    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def families(one: Answer | Label) -> list[str]:
@@ -87,14 +87,18 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
     def exact(label: Label, answer: Answer) -> bool:
         return set(families(label)) == set(families(answer))
 
-    def right_components(label: Label, answer: Answer) -> bool:
-        named = {e["family"]: set(e["components"]) for e in answer["effects"]}
-        return all(named[e["family"]] == set(e["components"]) for e in label["effects"] if e["family"] in named)
-
     gaps = [
         [gap for phase in answer["closure"].values() for gap in phase.values() if gap["closure"] is not None]
         for label, answer in cases
         if known(label) and answer["effects"]
+    ]
+    placed = [  # effects of the platen and the supply have one place only
+        set(effect["components"]) == set(one["components"])
+        for label, answer in cases
+        if known(label)
+        for effect in label["effects"]
+        for one in answer["effects"]
+        if effect["components"] and one["family"] == effect["family"]
     ]
     closures = [gap["closure"] for some in gaps for gap in some]
     widest = [max(some, key=lambda gap: gap["refitted"])["closure"] for some in gaps if some]
@@ -108,7 +112,7 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         "exact set, one effect": share(lambda x: known(x) and x["sort"] == "one", exact),
         "exact set, two effects": share(lambda x: known(x) and x["sort"] == "two", exact),
         "exact set, three effects": share(lambda x: known(x) and x["sort"] == "three", exact),
-        "components right where named": share(known, right_components),
+        "components right where named": Share(sum(placed), len(placed)),
         "none of the above, named": share(sort("unknown"), lambda _, a: bool(a["effects"])),
         "none of the above, flagged": share(sort("unknown"), lambda _, a: a["verdict"] == "unexplained"),
         "unexcited, nothing else named": share(sort("unexcited"), named_what_is_there),

@@ -28,6 +28,7 @@ START_NOISE = 8.0  # and how many standard deviations of the noise
 STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop dead by itself
 SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike cannot be told from a kink
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
+NEARLY_STILL = 0.1  # share of the variation of others of its kind below which a channel says nothing of its gain
 GAIN_TOLERANCE = 0.1  # between a channel and the derivative of another; calibration errors are far smaller
 LIKE_AXES = tuple((j, k) for k in range(6) for j in range(6) if j // 3 == k // 3)  # of one unit
 USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
@@ -277,16 +278,20 @@ def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
 def _inconsistent_forces(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]]) -> Iterator[_Warning]:
     if not {"actuator_force", "chamber_pressure_a"} <= set(dataset.data_vars):
         return
-    for name in map(str, dataset["actuator"].values):
-        if name not in areas:
-            continue
-        expected = areas[name][0] * dataset["chamber_pressure_a"].sel(actuator=name).values
+    expected = {}
+    for name in (str(n) for n in dataset["actuator"].values if str(n) in areas):
+        force = areas[name][0] * dataset["chamber_pressure_a"].sel(actuator=name).values
         if "chamber_pressure_b" in dataset and name in dataset["horizontal"].values:
-            expected = expected - areas[name][1] * dataset["chamber_pressure_b"].sel(horizontal=name).values
+            force = force - areas[name][1] * dataset["chamber_pressure_b"].sel(horizontal=name).values
+        expected[name] = force - force.mean()
+    for name, varying in expected.items():
+        alike = [np.std(force) for other, force in expected.items() if areas[other] == areas[name]]
+        if np.std(varying) < NEARLY_STILL * max(alike):
+            continue  # noise, for the most part
         found = dataset["actuator_force"].sel(actuator=name).values
-        moving, rest = found - found.mean(), expected - expected.mean()
-        error = float(np.std(moving - rest) / (np.std(rest) or np.inf))
-        if error > GAIN_TOLERANCE:
-            gain = float(moving @ rest / (rest @ rest))
+        moving = found - found.mean()
+        error = float(np.std(moving - varying) / (np.std(varying) or np.inf))
+        gain = float(moving @ varying / (varying @ varying or np.inf))
+        if error > GAIN_TOLERANCE and abs(gain - 1.0) > GAIN_TOLERANCE:  # with a right gain the rest is noise
             what = f"is {gain:.3g} times P_A A_1 - P_B A_2, {100 * error:.0f} % off"
             yield f"actuator_force[{name}]", None, what, "check unit and sign of force and pressures"

@@ -39,6 +39,7 @@ Entries = dict[str, Any]
 
 def machine_entries(machine: Machine) -> Entries:
     """Every quantity of a machine with unit, deviation, evidence and source, and its effects."""
+    every = (*machine.effects, *machine.alterations)
     return {
         "name": machine.name,
         "title": machine.title,
@@ -56,7 +57,7 @@ def machine_entries(machine: Machine) -> Entries:
             }
             for path, q in machine.parameters.quantities.items()
         },
-        "effects": [{"name": e.name, "law": e.law, "ports": e.ports, "source": e.source} for e in machine.effects],
+        "effects": [{n: getattr(e, n) for n in ("name", "law", "ports", "source")} for e in every],
     }
 
 

@@ -4,8 +4,8 @@ Four loops run around these functions: the per-step Pinocchio engine, the fused 
 search for missing effects. Each function walks the effect table and calls the law's kernel.
 
 Arrays: s (n_ports,) port coordinates, sd rates, z (n_states,) hidden states, spool (n_actuators,) valve spools -1..1,
-supply the supply's numbers, pressures first (`supply`), force (n_rows, 3) the ledger: force of each row on its port and
-second port [N or N m], port_force (n_ports,) their sum per port.
+supply the supply's numbers, pressures first (`supply`), force (n_rows, 3) the ledger: force of each row on its first,
+second and third port [N or N m], port_force (n_ports,) their sum per port.
 """
 
 from .compiled import compiled, compiled_inline

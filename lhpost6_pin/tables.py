@@ -87,6 +87,11 @@ def print_machine(machine: Machine) -> None:
     for effect in machine.effects:
         effects.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
     console.print(effects)
+    if machine.alterations:
+        altered = Table("effect", "law", "acts on", "source", title="Effects that alter oil, valves, supply or inertia")
+        for effect in machine.alterations:
+            altered.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
+        console.print(altered)
     if "estimates.platen_alone.mass" in machine.parameters:
         console.print(_inertia_table(machine))
 

@@ -222,6 +222,19 @@ def test_forces_agree_with_pressures_times_areas(tests_by_name: dict[str, xr.Dat
     assert faults(check_dataset(flipped)) == []  # without areas nothing can be said
 
 
+def test_noise_is_not_taken_for_a_wrong_gain_of_forces(tests_by_name: dict[str, xr.Dataset]) -> None:
+    record, rng = tests_by_name["EQ"], np.random.default_rng(4)
+    force, pressure = series(record, "actuator_force[V3]"), series(record, "chamber_pressure_a[V3]")
+    size = len(force)
+    noisy = change(record, "actuator_force[V3]", values=force + 0.2 * force.std() * rng.standard_normal(size))
+    assert faults(check_dataset(noisy, AREAS)) == []
+    still = change(record, "actuator_force[V3]", values=force.mean() + 500.0 * rng.standard_normal(size))
+    still = change(still, "chamber_pressure_a[V3]", values=pressure.mean() + 3000.0 * rng.standard_normal(size))
+    assert faults(check_dataset(still, AREAS)) == []  # 1.5 kN beside the others' tens
+    halved = change(record, "actuator_force[V3]", values=0.5 * force)
+    assert faults(check_dataset(halved, AREAS)) == [("warning", "actuator_force[V3]", None)]
+
+
 # -------------------------------------------------------------------------------------------------- errors
 def test_errors_of_the_layout_come_first_and_leave_the_sound_channels_judged(
     tests_by_name: dict[str, xr.Dataset],

@@ -147,6 +147,10 @@ def test_info_shows_what_an_override_changes(lhpost6, tmp_path):
     (tmp_path / "mine.toml").write_text('[platen]\nmass = { value = [123400.0, 1e5, 1e5], unit = "kg" }\n')
     assert "123400" not in lhpost6("info").words
     assert "123400" in lhpost6("info", "--override", "mine.toml").words
+    (tmp_path / "leak.toml").write_text('[effect.worn]\nfamily = "piston_leakage"\ncomponents = ["H2"]\n')
+    assert "Effects that alter oil" not in lhpost6("info").words
+    altered = lhpost6("info", "--override", "leak.toml").words
+    assert "Effects that alter oil" in altered and "worn" in altered
 
 
 def test_capacity_compares_with_table_2_2_and_gives_the_oil_column_modes(lhpost6):

@@ -92,6 +92,7 @@ KERNELS = {
         Kernel(oscillator.oscillator_force, ((-0.1, 0.1), (-1, 1), (0, 1e4), (5, 100), (0, 0.5))),
         Kernel(oscillator.oscillator_rate, ((-0.1, 0.1), (-1, 1), (5, 100), (0, 0.5))),
         Kernel(oscillator.advance_oscillator, ((-0.1, 0.1), (-1, 1), _SLIP, _DT, (5, 100), (0, 0.5))),
+        Kernel(table.remembered, ((-0.5, 0.5), (-0.5, 0.5), (0, 1))),
         Kernel(gas.pressure_change, ((-0.5, 0.5),)),
         Kernel(gas.slow_heat, ((-0.5, 0.5), (1, 3), (0.9, 2))),
         Kernel(gas.heat_rate, ((-1, 1), (-1, 1), (0.01, 10))),
@@ -126,8 +127,9 @@ def march(case: Case, duration: float, steps: int) -> np.ndarray:
 def test_every_law_of_these_families_has_a_case_and_every_kernel_its_arguments() -> None:
     added = {name for name, law in LAWS.items() if law.code > LAWS["constant"].code}
     assert set(CASES) == added - {"load_friction"}
-    public = {n for module in (friction, dahl, ball, backlash, spring, oscillator, gas) for n in module.__all__}
-    assert set(KERNELS) == public
+    modules = (friction, dahl, ball, backlash, spring, oscillator, gas, table)
+    public = {n for module in modules for n in module.__all__}
+    assert set(KERNELS) == public - {"table_force"}  # that takes an array: below
 
 
 @pytest.mark.parametrize("name", KERNELS)

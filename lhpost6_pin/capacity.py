@@ -15,7 +15,7 @@ from .plant import Plant, make_plant
 from .pose import leg_displacements
 from .rigid_body import platen_inertia
 
-__all__ = ["Capacity", "capacity_table", "leg_speeds", "make_leg_check"]
+__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "leg_speeds", "make_leg_check"]
 
 Array = NDArray[np.float64]
 LegCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
@@ -34,6 +34,11 @@ class Capacity(NamedTuple):
     def deviation(self) -> float:
         """Model over Table 2.2, less one."""
         return self.model / self.printed - 1.0
+
+
+def has_printed_capacity(machine: Machine) -> bool:
+    """Whether a machine file states Table 2.2, which `capacity_table` needs."""
+    return "table_2_2.force_actuators" in machine.parameters
 
 
 def leg_speeds(plant: Plant) -> Array:

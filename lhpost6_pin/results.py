@@ -47,14 +47,7 @@ def machine_entries(machine: Machine) -> Entries:
         "actuators": machine.actuator_names,
         "struts": machine.strut_names,
         "quantities": {
-            path: {
-                "value": q.value,
-                "unit": q.unit,
-                "sd": q.sd,
-                "evidence": q.evidence,
-                "assumed": q.assumed,
-                "source": q.source,
-            }
+            path: {n: getattr(q, n) for n in ("value", "unit", "sd", "evidence", "assumed", "source")}
             for path, q in machine.parameters.quantities.items()
         },
         "effects": [{n: getattr(e, n) for n in ("name", "law", "ports", "source")} for e in every],
@@ -63,12 +56,12 @@ def machine_entries(machine: Machine) -> Entries:
 
 def capacity_entries(machine: Machine) -> Entries:
     """Capacity beside Table 2.2, where the machine has that table, and the oil-column modes."""
-    from .capacity import capacity_table
+    from .capacity import capacity_table, has_printed_capacity
     from .linearize import oil_column_modes
 
-    printed = "table_2_2.force_actuators" in machine.parameters
+    lines = capacity_table(machine) if has_printed_capacity(machine) else None
     return {
-        "capacity": [{**c._asdict(), "deviation": c.deviation} for c in capacity_table(machine)] if printed else None,
+        "capacity": lines and [{**line._asdict(), "deviation": line.deviation} for line in lines],
         "modes": oil_column_modes(machine),
         "modes_with_friction_and_leaks": oil_column_modes(machine, undamped=False),
     }
@@ -76,15 +69,11 @@ def capacity_entries(machine: Machine) -> Entries:
 
 def motion_entries(name: str | None) -> Entries:
     """All motions known by name; or the options of one. Raises UnknownNameError."""
-    from .errors import UnknownNameError
-    from .motions import list_motions, motion_options
+    from .motions import list_motions, motion_entry, motion_options
 
-    known = list_motions()
     if name is None:
-        return {"motions": known}
-    found = next((m for m in known if name.lower() in (m.name, *m.aliases)), None)
-    if found is None:
-        raise UnknownNameError("ground motion", name, [m.name for m in known])
+        return {"motions": list_motions()}
+    found = motion_entry(name)
     words = ("option", "default", "unit", "source")
     return {**found._asdict(), "options": [dict(zip(words, o, strict=True)) for o in motion_options(found.name)]}
 

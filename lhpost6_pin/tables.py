@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from .consistency import SensorFinding
+    from .effects import Effect
     from .plant import Plant
     from .records import Finding
     from .report.run_report import RunSummary
@@ -83,17 +84,18 @@ def print_machine(machine: Machine) -> None:
         table.add_row(escape(path), _text(q.value), escape(q.unit), sd, evidence, escape(q.source))
     console.print(table)
     console.print("* assumed: nobody has published this number; change it with --override")
-    effects = Table("effect", "law", "acts on", "source", title="Force effects, in ledger order")
-    for effect in machine.effects:
-        effects.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
-    console.print(effects)
+    console.print(_effects_table("Force effects, in ledger order", machine.effects))
     if machine.alterations:
-        altered = Table("effect", "law", "acts on", "source", title="Effects that alter oil, valves, supply or inertia")
-        for effect in machine.alterations:
-            altered.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
-        console.print(altered)
+        console.print(_effects_table("Effects that alter oil, valves, supply or inertia", machine.alterations))
     if "estimates.platen_alone.mass" in machine.parameters:
         console.print(_inertia_table(machine))
+
+
+def _effects_table(title: str, effects: "Sequence[Effect]") -> Table:
+    table = Table("effect", "law", "acts on", "source", title=title)
+    for effect in effects:
+        table.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
+    return table
 
 
 def _inertia_table(machine: Machine) -> Table:
@@ -143,22 +145,19 @@ def print_modes(machine: Machine) -> None:
 
 def print_motions(name: str | None = None) -> None:
     """Print the motions known by name and what each needs; with a name, what can be chosen about that one."""
-    from .errors import UnknownNameError
-    from .motions import list_motions, motion_options
+    from .motions import list_motions, motion_entry, motion_options
 
-    console, known = make_console(), list_motions()
+    console = make_console()
     if name is None:
         table = Table(Column("name", no_wrap=True), "kind", "what it is", Column("needs", no_wrap=True))
-        for m in known:
+        for m in list_motions():
             needs = [escape(m.remedy) or "[green]ready[/]"]
             needs += [f"or your file: {m.wanted.record}"] if m.wanted and m.kind != "file" else []
             table.add_row(" ".join((m.name, *m.aliases)), m.kind, m.title, "\n".join(needs))
         console.print(table)
         console.print("lhpost6 motions NAME says what can be chosen about one of them")
         return
-    found = next((m for m in known if name.lower() in (m.name, *m.aliases)), None)
-    if found is None:
-        raise UnknownNameError("ground motion", name, [m.name for m in known])
+    found = motion_entry(name)
     console.print(f"[bold]{found.name}[/]: {found.title}")
     chosen = motion_options(found.name)
     table = Table("option", "default", "unit", "source", title="Options, each as --set key=value")

@@ -22,7 +22,7 @@ from .files import models_folder
 from .machine import Machine
 from .parameters import Parameters, load_parameters
 
-__all__ = ["drawing_colour", "drawing_size", "drawing_sizes", "legs", "urdf_text"]
+__all__ = ["drawing_colour", "drawing_rgb", "drawing_size", "drawing_sizes", "legs", "urdf_text"]
 
 Vec = Sequence[float]
 ORIGIN = (0.0, 0.0, 0.0)
@@ -37,6 +37,12 @@ def drawing_sizes() -> Parameters:
 def drawing_colour(kind: str) -> str:
     """Colour of a kind of body, as ``#0072B2``."""
     return str(drawing_sizes().words[f"colour.{kind}"])
+
+
+def drawing_rgb(kind: str) -> tuple[float, float, float]:
+    """The same as red, green and blue, 0..1."""
+    red, green, blue = (int(drawing_colour(kind)[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return red, green, blue
 
 
 def drawing_size(path: str) -> float:
@@ -236,12 +242,9 @@ def _minus(a: Vec, b: Vec) -> Vec:
 
 
 def _material(robot: ET.Element, kind: str) -> None:
-    colour = drawing_colour(kind).lstrip("#")
     opacity = drawing_size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
-    rgba = [int(colour[k : k + 2], 16) / 255.0 for k in (0, 2, 4)]
-    ET.SubElement(
-        ET.SubElement(robot, "material", name=kind), "color", rgba=_text([*(round(c, 4) for c in rgba), opacity])
-    )
+    rgba = _text([*(round(c, 4) for c in drawing_rgb(kind)), opacity])
+    ET.SubElement(ET.SubElement(robot, "material", name=kind), "color", rgba=rgba)
 
 
 def _link(robot: ET.Element, name: str) -> ET.Element:

@@ -71,11 +71,8 @@ def repeating_rows(machine, threads: int) -> list[str]:
     plants = [make_plant(machine.with_valves(valves)) for valves in (1, 2, 1, 2)]
     jobs = [(plant, noise(plant, 5.0)) for plant in plants]
     samples = len(jobs[0][1].drive)
-    found = {}
-    for count in (1, 1, threads):
-        runs = simulate_many(jobs, samples=samples, threads=count)
-        found.setdefault(count, []).append([fingerprint(run) for run in runs])
-    same = len({tuple(prints) for repeats in found.values() for prints in repeats}) == 1
+    repeats = [simulate_many(jobs, samples=samples, threads=count) for count in (1, 1, threads)]
+    same = len({tuple(map(fingerprint, runs)) for runs in repeats}) == 1
     steps = [fingerprint(simulate(*jobs[0], samples=samples, engine="pinocchio")) for _ in range(2)]
     return [
         "## Runs that repeat",

@@ -17,12 +17,11 @@ import typer
 
 from lhpost6_pin.campaign import simulate_campaign
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.discover import discover, save_verdict
+from lhpost6_pin.discover import discover
 from lhpost6_pin.discovery_table import print_discovery
 from lhpost6_pin.errors import UnknownNameError
 from lhpost6_pin.machine import load_machine
-from lhpost6_pin.machine_toml import save_machine_toml
-from lhpost6_pin.report.discover_report import write_discover_report
+from lhpost6_pin.report.discover_report import save_discovery
 from lhpost6_pin.sensors import load_sensors
 
 HORIZONTAL = ("H1", "H2", "H3", "H4")
@@ -52,9 +51,8 @@ def main(
         print_discovery(found)
         folder = out / name
         folder.mkdir(parents=True, exist_ok=True)
-        save_verdict(found, folder / "verdict.json")
-        save_machine_toml(found.fitted, folder / "model.toml", f"found in example {name}")
-        typer.echo(f"wrote {write_discover_report(found, folder / 'report.html')}")
+        *_, report = save_discovery(found, folder, f"found in example {name}")
+        typer.echo(f"wrote {report}")
 
 
 if __name__ == "__main__":

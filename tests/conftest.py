@@ -3,9 +3,11 @@
 `pytest --hypothesis-profile=explore` draws new ones, to look for what nobody has thought of.
 """
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
+from lhpost6_pin.bodies import load_bodies
 from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.plant import make_plant
@@ -25,3 +27,16 @@ def plant():
 def rest(plant):
     """Its equilibrium in the control zero-position."""
     return find_equilibrium(plant)
+
+
+@pytest.fixture(scope="session")
+def bodies(plant):
+    """Its bodies to look at."""
+    return load_bodies(plant.machine)
+
+
+@pytest.fixture(scope="session")
+def poses():
+    """Two hundred poses (n, 6) of C and Euler angles [m, rad] within most of Table 2.2, legs within their lengths."""
+    travel = np.array([0.6, 0.38, 0.127, 0.038, 0.025, 0.066])
+    return np.random.default_rng(6).uniform(-travel, travel, (200, 6))

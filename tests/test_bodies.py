@@ -6,28 +6,16 @@ import pytest
 
 from lhpost6_pin.bodies import joint_positions, load_bodies
 from lhpost6_pin.files import models_folder
-from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.machine import load_machine
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.pose import leg_displacements, rotation
 from lhpost6_pin.rigid_body import lumped_inertia
 from lhpost6_pin.urdf import drawing_sizes, legs, urdf_text
 
-TRAVEL = np.array([0.6, 0.38, 0.127, 0.038, 0.025, 0.066])  # [m, rad] most of Table 2.2, legs within their lengths
-
 
 @pytest.fixture(scope="module")
-def machine() -> Machine:
-    return load_machine()
-
-
-@pytest.fixture(scope="module")
-def bodies(machine):
-    return load_bodies(machine)
-
-
-@pytest.fixture(scope="module")
-def poses():
-    return np.random.default_rng(6).uniform(-TRAVEL, TRAVEL, (200, 6))
+def machine(plant):
+    return plant.machine
 
 
 def link_poses(bodies, machine, poses) -> dict[str, list[pin.SE3]]:

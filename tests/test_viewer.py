@@ -18,9 +18,8 @@ from hypothesis import strategies as st
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin import cli
-from lhpost6_pin.bodies import body_name, body_poses, joint_positions, load_bodies
+from lhpost6_pin.bodies import body_name, body_poses, joint_positions
 from lhpost6_pin.errors import LhpostError, ParameterError, RecordError
-from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.records import AXES, load_record, make_record
 from lhpost6_pin.urdf import legs
 from lhpost6_pin.viewer import (
@@ -37,22 +36,11 @@ from lhpost6_pin.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
 from lhpost6_pin.viewer.frames import Ghost
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
-TRAVEL = np.array([0.6, 0.38, 0.127, 0.038, 0.025, 0.066])  # [m, rad] most of Table 2.2, legs within their lengths
 
 
 @pytest.fixture(scope="module")
-def machine() -> Machine:
-    return load_machine()
-
-
-@pytest.fixture(scope="module")
-def bodies(machine):
-    return load_bodies(machine)
-
-
-@pytest.fixture(scope="module")
-def poses():
-    return np.random.default_rng(6).uniform(-TRAVEL, TRAVEL, (200, 6))
+def machine(plant):
+    return plant.machine
 
 
 @pytest.fixture(scope="module")

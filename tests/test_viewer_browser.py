@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from browser import Tab, browse, needs_browser
 
-from lhpost6_pin.bodies import body_name, body_poses, joint_positions, load_bodies
+from lhpost6_pin.bodies import body_name, body_poses, joint_positions
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.plant import make_plant
 from lhpost6_pin.records import load_record
 from lhpost6_pin.running import RunningPlant
 from lhpost6_pin.sight import EVERY
@@ -26,8 +24,8 @@ DRAWN = "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFram
 
 
 @pytest.fixture(scope="module")
-def machine() -> Machine:
-    return load_machine()
+def machine(plant):
+    return plant.machine
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +46,7 @@ def share(pixels: np.ndarray, colour: tuple[int, int, int], within: int = 40) ->
     return float(np.mean(np.abs(pixels - colour).max(axis=-1) < within))
 
 
-def test_the_page_has_no_errors_and_the_platen_is_where_the_record_has_it(machine, record, page, tmp_path):
+def test_the_page_has_no_errors_and_the_platen_is_where_the_record_has_it(machine, bodies, record, page, tmp_path):
     times = [0.0, 8.0, 10.0]
 
     async def look(tab: Tab):
@@ -65,7 +63,7 @@ def test_the_page_has_no_errors_and_the_platen_is_where_the_record_has_it(machin
     faults, poses, pictures = browse(tmp_path, page, look)
     assert faults == []
     frames = record_frames(machine, record, look=Look(amplify=3.0))
-    model = load_bodies(machine).model
+    model = bodies.model
     moments = frames.displacement[[round(30 * t) for t in times]]
     wanted = body_poses(model, joint_positions(machine, model, moments))
     names = [body_name(model, joint) for joint in range(model.njoints)]
@@ -148,9 +146,7 @@ def moved(plant, show) -> None:
 
 
 @pytest.mark.parametrize("apart", [False, True], ids=["in one process", "in a process of its own"])
-def test_a_live_view_follows_the_plant(machine, tmp_path, apart):
-    plant = make_plant(machine)
-
+def test_a_live_view_follows_the_plant(plant, machine, tmp_path, apart):
     def view():
         return view_apart(machine, "live") if apart else LiveView(machine, "live", real_time=False)
 

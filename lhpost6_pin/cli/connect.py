@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .app import app, progress_bar, stderr, tell
-from .live import Amplify, Change, NoOpen, show_address
+from .live import Amplify, Change, NoOpen, watched
 from .options import (
     Axes,
     ControllerName,
@@ -69,7 +69,6 @@ def serve(
     json: Json = False,
 ) -> None:
     """Let a controller in another process or on another computer drive the virtual table over UDP."""
-    from contextlib import ExitStack
     from dataclasses import asdict
 
     from ..equilibrium import find_equilibrium
@@ -85,15 +84,10 @@ def serve(
         served = ServedPlant(plant, find_equilibrium(plant), chosen)
         address, at = sock.getsockname()
         typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends", err=json)
-        with ExitStack() as stack:
-            if live:
-                from ..viewer import Look, view_apart
-
-                title = f"{table.name} at {address}:{at}"
-                url, served.watcher = stack.enter_context(
-                    view_apart(table, title, Look(amplify=amplify, change=force_change))
-                )
-                show_address(url, f"{title}, on this computer only", not no_open, err=json)
+        title = f"{table.name} at {address}:{at}"
+        with watched(
+            live, table, title, amplify=amplify, change=force_change, open_it=not no_open, err=json, apart=True
+        ) as served.watcher:
             timing = serve_link(sock, served, seconds=seconds)
     times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
     times |= {"answer of the client": served.answer_time}

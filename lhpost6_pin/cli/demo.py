@@ -26,12 +26,11 @@ def demo(
 
     from ..campaign import save_campaign
     from ..demo import hidden_effect, measured_tests, open_loops, searched
-    from ..discover import save_verdict, verdict_entries
+    from ..discover import verdict_entries
     from ..discovery_table import print_discovery
     from ..library import find_family
     from ..machine import load_machine
-    from ..machine_toml import save_machine_toml
-    from ..report.discover_report import write_discover_report
+    from ..report.discover_report import save_discovery
     from ..sensors import load_sensors
     from ..viewer import Look, show_record
 
@@ -66,10 +65,8 @@ def demo(
         f"   C ends {1e3 * before:.1f} mm from where it was measured with the model as delivered,\n"
         f"   {1e3 * after:.1f} mm with what was found."
     )
-    save_verdict(found, folder / "verdict.json")
     title = f"{machine.name} with what `lhpost6 demo` found"
-    model = save_machine_toml(found.fitted, folder / "model.toml", title)
-    report = write_discover_report(found, folder / "report.html", command=repeating_command())
+    _, model, report = save_discovery(found, folder, title, repeating_command())
     view = folder / "view.html"
     show_record(machine, loops.measured, [loops.delivered, loops.found], Look(gap=10.0)).save(view)
     say(

@@ -36,10 +36,9 @@ def discover(
     """
     from ..campaign import load_campaign
     from ..discover import discover as search
-    from ..discover import save_verdict, verdict_entries
+    from ..discover import verdict_entries
     from ..discovery_table import print_discovery
-    from ..machine_toml import save_machine_toml
-    from ..report.discover_report import write_discover_report
+    from ..report.discover_report import save_discovery
     from ..sensors import load_sensors
 
     refuse_no_jobs(jobs)
@@ -50,8 +49,6 @@ def discover(
     with progress_bar(f"searching {tests.name} for what {table.name} lacks") as progress:
         found = search(table, tests, known, hold_out=held, seed=seed, jobs=jobs, unfinished=folder, progress=progress)
     command = repeating_command()
-    paths = [save_verdict(found, folder / "verdict.json")]
     title = f"{table.name} with what was found in campaign {tests.name}; {command}"
-    paths.append(save_machine_toml(found.fitted, folder / "model.toml", title))
-    paths.append(write_discover_report(found, folder / "report.html", command=command))
+    paths = save_discovery(found, folder, title, command)
     tell(json, lambda: verdict_entries(found), lambda: print_discovery(found), paths)

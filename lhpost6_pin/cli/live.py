@@ -25,16 +25,33 @@ PATIENCE = 20.0
 
 @contextmanager
 def watched(
-    live: bool, table: "Machine", title: str, *, amplify: float, change: bool, open_it: bool, err: bool = False
+    live: bool,
+    table: "Machine",
+    title: str,
+    *,
+    amplify: float,
+    change: bool,
+    open_it: bool,
+    err: bool = False,
+    apart: bool = False,
 ) -> "Iterator[Watch | None]":
-    """Yield what shows a running plant in a browser, or None if nobody asked to see it."""
+    """Yield what shows a running plant in a browser, or None if nobody asked to see it.
+
+    A view `apart` is drawn by another process and holds nothing up; else the run begins when somebody looks.
+    """
     if not live:
         yield None
         return
-    from ..viewer import LiveView, Look
+    from ..viewer import LiveView, Look, view_apart
 
-    with LiveView(table, title, Look(amplify=amplify, change=change)) as view:
-        show_address(view.url, f"{title} on this computer only", open_it, err)
+    look, what = Look(amplify=amplify, change=change), f"{title} on this computer only"
+    if apart:
+        with view_apart(table, title, look) as (url, show):
+            show_address(url, what, open_it, err)
+            yield show
+        return
+    with LiveView(table, title, look) as view:
+        show_address(view.url, what, open_it, err)
         if not view.wait(PATIENCE):
             typer.echo(f"nobody has looked for {PATIENCE:g} s: it goes on", err=True)
         yield view.show

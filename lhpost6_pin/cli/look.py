@@ -37,13 +37,14 @@ def info(machine: MachineName = "lhpost6", override: Override = None, json: Json
 @app.command()
 def capacity(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
     """Compare what the model can give with Table 2.2, and print the oil-column modes."""
+    from ..capacity import has_printed_capacity
     from ..results import capacity_entries
     from ..tables import print_capacity, print_modes
 
     table = find_machine(machine, override)
 
     def show() -> None:
-        if "table_2_2.force_actuators" in table.parameters:
+        if has_printed_capacity(table):
             print_capacity(table)
         print_modes(table)
 

@@ -1,6 +1,5 @@
 """What a search leaves in its folder: verdict.json."""
 
-import json
 import math
 from dataclasses import asdict
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 from .. import __version__
 from ..files import write_whole
 from ..library import find_family
+from ..plain import as_json
 from .discover import Discovery
 from .verdict import Estimate, Finding
 
@@ -18,7 +18,7 @@ __all__ = ["save_verdict", "verdict_entries"]
 def save_verdict(found: Discovery, path: Path) -> Path:
     """Write the verdict as JSON, whole or not at all."""
     with write_whole(path) as beside:
-        beside.write_text(json.dumps(verdict_entries(found), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        beside.write_text(as_json(verdict_entries(found)) + "\n", encoding="utf-8")
     return path
 
 

@@ -3,7 +3,7 @@
 from .ac156 import required_spectrum
 from .at2 import load_at2
 from .csv import load_csv
-from .library import MotionEntry, find_motion, list_motions, motion_options
+from .library import MotionEntry, find_motion, list_motions, motion_entry, motion_options
 from .limits import (
     LegUtilisation,
     LimitsSummary,
@@ -33,6 +33,7 @@ __all__ = [
     "find_motion",
     "largest_scale",
     "list_motions",
+    "motion_entry",
     "load_at2",
     "load_csv",
     "load_motion",

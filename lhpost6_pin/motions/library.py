@@ -19,7 +19,7 @@ from .synthetic import sine, six_axial, triangle, white_noise
 from .toml import load_toml, values_of
 from .wanted import WantedRecord, request
 
-__all__ = ["MotionEntry", "find_motion", "list_motions", "motion_options"]
+__all__ = ["MotionEntry", "find_motion", "list_motions", "motion_entry", "motion_options"]
 
 _GENERATORS: dict[str, Callable[..., GroundMotion]] = {
     "ac156": ac156,
@@ -87,7 +87,7 @@ def motion_options(name: str) -> tuple[MotionOption, ...]:
 
     Raises UnknownNameError for a name that does not exist.
     """
-    entry = _entry(name)
+    entry = motion_entry(name)
     return options_of(_tables()[1], entry.name) if entry.options else ()
 
 
@@ -102,7 +102,7 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
     take, a value that it cannot have (named), numbers that do not go together, files that cannot be read or are
     missing (with the record wanted and where it can be had), or a package that is not installed.
     """
-    entry = _entry(name)
+    entry = motion_entry(name)
     if files:
         return _from_files(entry, files, options)
     if entry.wanted and not entry.available:
@@ -140,7 +140,8 @@ def _from_files(entry: MotionEntry, files: MotionFiles, options: Mapping[str, An
     return replace(motion, source=f"{entry.title}; {motion.source}")
 
 
-def _entry(name: str) -> MotionEntry:
+def motion_entry(name: str) -> MotionEntry:
+    """The line of a motion by its name or an alias; raises UnknownNameError."""
     entries = {key: entry for entry in list_motions() for key in (entry.name, *entry.aliases)}
     entry = entries.get(name.lower())
     if entry is None:

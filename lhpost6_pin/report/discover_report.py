@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..discover import Discovery
+from ..discover import Discovery, save_verdict
 from ..discover.save import advice
 from ..discover.words import said, title_of, where
 from ..library import find_family
+from ..machine_toml import save_machine_toml
 from .control_blocks import load_of
 from .discover_plots import gain_figure, gap_figure, left_figure, map_blocks
 from .page import (
@@ -27,9 +28,18 @@ from .page import (
     versions,
 )
 
-__all__ = ["write_discover_report"]
+__all__ = ["save_discovery", "write_discover_report"]
 
 _LEVELS: dict[str, Level] = {"none": "good", "parameters_only": "good", "named": "good", "unexplained": "bad"}
+
+
+def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
+    """Leave verdict.json, model.toml (with `title` on top) and report.html in a folder, and say where."""
+    return [
+        save_verdict(found, folder / "verdict.json"),
+        save_machine_toml(found.fitted, folder / "model.toml", title),
+        write_discover_report(found, folder / "report.html", command=command),
+    ]
 
 
 def write_discover_report(found: Discovery, path: Path | str, command: str = "") -> Path:

@@ -15,7 +15,7 @@ from .frames import Frames
 from .scene import ROOT
 from .window import Window, packed_array
 
-__all__ = ["draw_animation", "leg_forces", "outline_poses", "warn_of_strokes"]
+__all__ = ["draw_animation", "leg_forces"]
 
 log = logging.getLogger(__name__)
 
@@ -30,10 +30,10 @@ _POSE = (("position", "vector3", slice(0, 3)), ("quaternion", "quaternion", slic
 def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Frames) -> None:
     """Send the frames as one animation that loops; bodies that stand still are left out."""
     q = joint_positions(machine, bodies.model, frames.displacement)
-    warn_of_strokes(machine, bodies.model, q)
+    _warn_of_strokes(machine, bodies.model, q)
     poses = body_poses(bodies.model, q)
     moving = {body_name(bodies.model, joint): poses[:, joint] for joint in range(1, bodies.model.njoints)}
-    moving |= {g.name: outline_poses(machine, g.displacement) for g in frames.ghosts}
+    moving |= {g.name: _outline_poses(machine, g.displacement) for g in frames.ghosts}
     clips = []
     for name, pose in moving.items():
         tracks = [_track(key, kind, pose[:, part]) for key, kind, part in _POSE if _seen(pose[:, part])]
@@ -56,14 +56,14 @@ def leg_forces(machine: Machine, frames: Frames) -> dict[str, Array]:
     return {leg.name: force for leg, force in named if np.isfinite(force).all()}
 
 
-def outline_poses(machine: Machine, displacement: Array) -> Array:
+def _outline_poses(machine: Machine, displacement: Array) -> Array:
     """Position and quaternion (n, 7) in {s} of the box that a ghost's platen is drawn as."""
     middle = np.array([0.0, 0.0, 0.5 * machine.platen.bearing_plane[2]])
     turn = rotation(displacement[:, 3:])
     return np.hstack([displacement[:, :3] + turn @ middle, quaternions(turn)])
 
 
-def warn_of_strokes(machine: Machine, model: Any, q: Array) -> None:
+def _warn_of_strokes(machine: Machine, model: Any, q: Array) -> None:
     """Log which actuators are drawn longer or shorter than they can be."""
     extension = [np.abs(q[:, model.idx_qs[model.getJointId(f"{a.name}_extension")]]).max() for a in machine.actuators]
     beyond = [a.name for a, most in zip(machine.actuators, extension, strict=True) if most > a.stroke]

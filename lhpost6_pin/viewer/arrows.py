@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..machine import Machine
-from ..urdf import drawing_colour, drawing_size
+from ..urdf import drawing_rgb, drawing_size
 
 __all__ = ["OPACITY", "arrow_colours", "arrow_sizes", "arrow_solid", "largest_force"]
 
@@ -37,7 +37,7 @@ def arrow_sizes(machine: Machine, force: Array, largest: float) -> Array:
 
 def arrow_colours(force: Array, largest: float) -> Array:
     """Red, green and blue (n, 3), 0..1, from that of no force to that of the largest push or pull."""
-    none, push, pull = (_rgb(f"force_{kind}") for kind in ("none", "push", "pull"))
+    none, push, pull = (np.array(drawing_rgb(f"force_{kind}")) for kind in ("none", "push", "pull"))
     share = np.clip(np.abs(force) / largest, 0.0, 1.0)[:, None]
     return np.asarray(none + share * (np.where(force[:, None] >= 0.0, push, pull) - none))
 
@@ -60,8 +60,3 @@ def arrow_solid() -> Any:
             high = low + CORNERS
             faces += [(low + k, low + n, high + n), (low + k, high + n, high + k)]
     return geometry.TriangularMeshGeometry(points, faces)
-
-
-def _rgb(kind: str) -> Array:
-    colour = drawing_colour(kind).lstrip("#")
-    return np.array([int(colour[k : k + 2], 16) / 255.0 for k in (0, 2, 4)])

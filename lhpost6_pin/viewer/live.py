@@ -2,7 +2,6 @@
 
 import time
 from types import TracebackType
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +14,7 @@ from ..urdf import legs
 from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
 from .frames import AS_IT_IS, Look
 from .page import Caption, render_page
-from .scene import ROOT, draw_arrows, draw_machine
+from .scene import draw_arrows, draw_machine, table_of
 from .show import machine_legend
 from .window import LoopbackWindow
 
@@ -41,7 +40,8 @@ class LiveView:
         draw_machine(self._window, machine, self._bodies)
         draw_arrows(self._window, self._names)
         shaped = {shape.parentJoint for shape in self._bodies.shapes.geometryObjects}
-        self._joints = {j: f"/meshcat/{ROOT}/{body_name(self._bodies.model, j)}" for j in shaped if j > 0}
+        self._table = table_of(self._window)
+        self._moving = {j: body_name(self._bodies.model, j) for j in shaped if j > 0}  # by joint
         self._begin: float | None = None  # by the clock [s], of the plant's time zero
         self._largest = 1.0  # force of the longest arrow [N]
         self._still = np.zeros(len(self._names))  # forces that are not drawn [N]
@@ -75,32 +75,12 @@ class LiveView:
             time.sleep(max(0.0, self._begin + sight.time - time.monotonic()))
         q = joint_positions(self._machine, self._bodies.model, self._look.amplify * sight.displacement)
         poses = body_poses(self._bodies.model, q)[0]
-        for joint, path in self._joints.items():
-            self._window.send(_Place(path, pin.XYZQUATToSE3(poses[joint]).homogeneous))
+        for joint, name in self._moving.items():
+            self._table[name].set_transform(pin.XYZQUATToSE3(poses[joint]).homogeneous)
         force = sight.force - self._still
         sizes, colours = arrow_sizes(self._machine, force, self._largest), arrow_colours(force, self._largest)
         for name, size, colour in zip(self._names, sizes, colours, strict=True):
-            arrow = f"/meshcat/{ROOT}/{name}_rod/force"
-            self._window.send(_Property(arrow, "scale", size.tolist()))
-            self._window.send(_Property(arrow, "color", [*colour.tolist(), OPACITY]))
+            arrow = self._table[f"{name}_rod"]["force"]
+            arrow.set_property("scale", size.tolist())
+            arrow.set_property("color", [*colour.tolist(), OPACITY])
         self._window.say(f"{sight.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
-
-
-class _Place:
-    """A `set_transform` command."""
-
-    def __init__(self, path: str, matrix: Array) -> None:
-        self.path, self.matrix = path, matrix
-
-    def lower(self) -> dict[str, Any]:
-        return {"type": "set_transform", "path": self.path, "matrix": self.matrix.T.ravel().tolist()}
-
-
-class _Property:
-    """A `set_property` command."""
-
-    def __init__(self, path: str, name: str, value: Any) -> None:
-        self.path, self.name, self.value = path, name, value
-
-    def lower(self) -> dict[str, Any]:
-        return {"type": "set_property", "path": self.path, "property": self.name, "value": self.value}

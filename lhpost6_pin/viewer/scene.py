@@ -15,7 +15,7 @@ from .arrows import OPACITY, arrow_solid
 from .frames import Frames
 from .window import Window
 
-__all__ = ["ROOT", "draw_arrows", "draw_machine", "draw_motion"]
+__all__ = ["ROOT", "draw_arrows", "draw_machine", "draw_motion", "table_of"]
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def draw_machine(window: Window, machine: Machine, bodies: Bodies) -> None:
 
 def draw_motion(window: Window, machine: Machine, frames: Frames) -> None:
     """Send what frames add that stands still: outlines of the ghosts, and the path of C of every motion."""
-    table = _visualizer(window)[ROOT]
+    table = table_of(window)
     corners = _box_edges(np.array([*machine.platen.size, -machine.platen.bearing_plane[2]]))
     for ghost in frames.ghosts:
         table[ghost.name].set_object(_lines(corners, ghost.name))
@@ -67,10 +67,15 @@ def draw_arrows(window: Window, names: Sequence[str]) -> None:
     """Send one arrow for each of the legs `names`, fixed to its rod's end at the platen."""
     from meshcat import geometry
 
-    table, solid = _visualizer(window)[ROOT], arrow_solid()
+    table, solid = table_of(window), arrow_solid()
     for name in names:
         material = geometry.MeshBasicMaterial(opacity=OPACITY, depthTest=False)
         table[f"{name}_rod"]["force"].set_object(solid, material)
+
+
+def table_of(window: Window) -> Any:
+    """Meshcat's handle on all that belongs to the table, by path."""
+    return _visualizer(window)[ROOT]
 
 
 def _visualizer(window: Window) -> Any:

@@ -1,12 +1,15 @@
 """A record to look at: frames, arrows and the commands that draw them; pages that load nothing, on loopback only."""
 
 import asyncio
+import gc
 import html
 import logging
 import re
 import socket
+import struct
 import subprocess
 import sys
+import time
 from http.client import HTTPConnection
 from pathlib import Path
 
@@ -294,6 +297,30 @@ def test_a_browser_that_comes_late_gets_what_was_drawn_and_what_is_drawn_later()
         window.send(command)
     with window:
         assert asyncio.run(listen(window)) == [2, 5, 3]
+
+
+def test_a_browser_that_leaves_in_the_middle_of_a_message_leaves_no_complaint(caplog):
+    class Command:
+        def lower(self) -> dict[str, object]:
+            return {"type": "set_property", "path": "/a", "property": "visible", "value": "x" * 20_000}
+
+    ask = (
+        "GET /commands HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+    )
+    with caplog.at_level(logging.ERROR), LoopbackWindow("") as window:
+        port = int(window.url.rstrip("/").rsplit(":", 1)[1])
+        for _ in range(10):
+            with socket.create_connection(("127.0.0.1", port), timeout=60) as browser:
+                browser.sendall(ask.encode())
+                assert browser.recv(4096).startswith(b"HTTP/1.1 101")
+                assert window.wait(60.0)
+                browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # as a killed tab
+            for _ in range(200):
+                window.send(Command())
+            time.sleep(0.05)
+    gc.collect()  # what nobody has asked after is complained of when it goes
+    assert caplog.text == ""
 
 
 def test_a_picture_stands_in_a_notebook_and_in_a_file_alike(machine, record, tmp_path):

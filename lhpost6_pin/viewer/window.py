@@ -128,19 +128,25 @@ class LoopbackWindow:
         await server.close_all_connections()
 
     def _hand_out(self, message: bytes | str) -> None:
-        from tornado.websocket import WebSocketClosedError
-
         for browser in list(self._browsers):
-            with suppress(WebSocketClosedError):  # one that is just leaving
-                browser.write_message(message, binary=isinstance(message, bytes))
+            _write(browser, message)
 
     def _welcome(self, browser: Any) -> None:
         with self._lock:
             self._browsers.add(browser)
             commands = list(self._commands.values())
         for packed in commands:
-            browser.write_message(packed, binary=True)
+            _write(browser, packed)
         self._looked_at.set()
+
+
+def _write(browser: Any, message: bytes | str) -> None:
+    """Hand a browser one message, unless it is just leaving: tornado says so at once, or when it has tried."""
+    from tornado.websocket import WebSocketClosedError
+
+    with suppress(WebSocketClosedError):
+        written = browser.write_message(message, binary=isinstance(message, bytes))
+        written.add_done_callback(lambda done: done.cancelled() or done.exception())
 
 
 def _application(window: LoopbackWindow) -> Any:

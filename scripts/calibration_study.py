@@ -19,7 +19,7 @@ from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
 
-from lhpost6_pin.calibration import calibrate, machine_knobs, with_knobs
+from lhpost6_pin.calibration import calibrate, drawn_coordinates, machine_knobs, with_knobs
 from lhpost6_pin.campaign import simulate_campaign
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.files import write_whole
@@ -34,12 +34,7 @@ def one_case(seed: int) -> dict[str, Any]:
     machine, sensors = load_machine(), load_sensors()
     knobs = machine_knobs(machine)
     rng = np.random.default_rng([seed, 1])
-    prior = np.array([k.sd for k in knobs])
-    lowest = np.array([k.lowest for k in knobs])
-    truth = np.full(len(knobs), np.nan)
-    while not np.all(truth > lowest):
-        drawn = prior * np.clip(rng.standard_normal(len(knobs)), -3.0, 3.0)
-        truth = np.where(truth > lowest, truth, drawn)
+    truth = drawn_coordinates(knobs, rng)
     turned = with_knobs(machine, knobs, truth)
     campaign = simulate_campaign(turned, load_controller("lhpost6"), sensors, seed=seed)
     found = calibrate(machine, campaign.records, sensors, seed=seed, jobs=1)

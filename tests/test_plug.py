@@ -274,7 +274,7 @@ def test_a_controller_runs_from_the_command_line_by_a_relative_path(file, monkey
 @pytest.fixture(scope="module")
 def lqg():
     pytest.importorskip("control", reason="the LQG example needs python-control")
-    return load_plugged(f"{SCRIPTS / 'lqg_controller.py'}:Lqg")
+    return load_plugged(f"{SCRIPTS / 'example_5_lqg_controller.py'}:Lqg")
 
 
 def errors(machine, controller, target):

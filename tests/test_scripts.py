@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from machine_cases import DATA, machine_named
 
-from lhpost6_pin.check import check_record
 from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.files import models_folder
 from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import load_record
 from lhpost6_pin.schemes import SCHEMES
 from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
 
@@ -44,18 +42,6 @@ def test_every_script_explains_its_options(name):
     ended = script(name, "--help")
     assert ended.returncode == 0
     assert "--out" in ended.stdout
-
-
-def test_the_example_rehearses_a_motion_with_the_python_interface(tmp_path):
-    ended = script("rehearse_earthquake.py", "sine", "--scale", "0.2", "--out", tmp_path)
-    assert ended.returncode == 0, ended.stderr
-    assert [f for f in check_record(tmp_path / "record.nc") if f.severity == "error"] == []
-    record = load_record(tmp_path / "record.nc")
-    asked, achieved = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
-    error = 100 * np.sqrt(np.sum((achieved - asked) ** 2) / np.sum(asked**2))
-    assert f"x: displacement RRMSE {error:.2f} %" in ended.stdout
-    assert "y: displacement" not in ended.stdout
-    assert str(tmp_path / "report.html") in ended.stdout and (tmp_path / "report.html").is_file()
 
 
 def test_the_benchmarks_run_and_keep_their_figures(tmp_path):

@@ -17,7 +17,7 @@ from ..machine import Machine
 from ..parameters import Quantity
 from ..residuals import RESIDUALS
 
-__all__ = ["Knob", "machine_knobs", "plan_knobs", "scatter_knobs", "with_knobs"]
+__all__ = ["Knob", "drawn_coordinates", "machine_knobs", "plan_knobs", "scatter_knobs", "with_knobs"]
 
 Array = NDArray[np.float64]
 
@@ -215,6 +215,15 @@ def scatter_knobs(machine: Machine, share: float, reach: float) -> tuple[Knob, .
                 Knob(own, ((own, -1),), "1", 1.0, share, "factor", shows_in, -most, most, of=kind, place=place)
             )
     return tuple(found)
+
+
+def drawn_coordinates(knobs: Sequence[Knob], rng: np.random.Generator) -> Array:
+    """Coordinates (k,) drawn from the priors: normal within three deviations, no knob below its lowest."""
+    sd, lowest = np.array([k.sd for k in knobs]), np.array([k.lowest for k in knobs])
+    drawn = np.full(len(knobs), np.nan)
+    while not np.all(drawn > lowest):
+        drawn = np.where(drawn > lowest, drawn, sd * np.clip(rng.standard_normal(len(knobs)), -3.0, 3.0))
+    return drawn
 
 
 def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> Machine:

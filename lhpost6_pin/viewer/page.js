@@ -9,6 +9,10 @@ const shown = (seconds) => seconds.toFixed(2);
 const FITS = 1.5; // width over height in which the camera sees the whole table
 let known = 0, camera = null, field = 0;
 
+const SMOOTH = 1000 / 33; // [ms] that a frame may take: thirty a second, and some to spare
+const JUDGED = 15, COARSEST = 0.4; // frames judged together; least share of the screen's pixels, along each side
+let share = 1, drawn = 1, frames = 0, since = 0;
+
 function fit() { // a narrower window sees as much in width
   if (viewer.camera !== camera) { camera = viewer.camera; field = Math.tan((camera.fov * Math.PI) / 360); }
   const short = Math.max(1, (FITS * window.innerHeight) / window.innerWidth);
@@ -27,7 +31,24 @@ function adopt() { // an animation that has come: at once from a file, by and by
 function repeat() {
   for (const action of animator.actions) action.repetitions = part("loop").checked ? Infinity : 1;
 }
-function draw() {
+function resolve(wanted) {
+  if (wanted === drawn) return;
+  drawn = wanted;
+  viewer.renderer.setPixelRatio(drawn * window.devicePixelRatio);
+  viewer.set_dirty();
+}
+function keep_pace(now) { // a computer too slow for every pixel draws fewer while the table moves, all of them at rest
+  if (!animator.playing || document.hidden) { frames = 0; resolve(1); return; }
+  resolve(share);
+  if (frames === 0) since = now;
+  if (frames++ < JUDGED) return;
+  const taken = (now - since) / JUDGED;
+  if (taken > 1.1 * SMOOTH || taken < 0.6 * SMOOTH)
+    share = Math.min(1, Math.max(COARSEST, share * Math.min(1.2, Math.sqrt(SMOOTH / taken))));
+  frames = 0;
+}
+function draw(now) {
+  keep_pace(now);
   if (viewer.camera !== camera) fit();
   if (animator.duration !== known) adopt();
   if (document.activeElement !== part("time") || animator.playing) part("time").value = animator.time;
@@ -69,4 +90,4 @@ if (live) { // what is sent: meshcat's commands, and words on how it goes
   };
   socket.onclose = () => { part("status").textContent += " (ended)"; };
 }
-draw();
+requestAnimationFrame(draw);

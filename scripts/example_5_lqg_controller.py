@@ -1,7 +1,7 @@
 """A controller of one's own at the plug point: LQG in place of the 469D's displacement loop, and both compared.
 
-    lhpost6 run ridgecrest --controller scripts/lqg_controller.py:Lqg
-    python scripts/lqg_controller.py [MOTION] [--scale 1] [--axes xyz] [--out DIR]
+    lhpost6 run ridgecrest --controller scripts/example_5_lqg_controller.py:Lqg
+    python scripts/example_5_lqg_controller.py [MOTION] [--scale 1] [--axes xyz] [--out DIR]
 
 Needs python-control (`pip install control`). The linearised plant, without dry friction, is brought down to three
 quantities per free axis: pose p of C and Euler angles, its rate v, and the compression s of the oil columns as the

@@ -1,6 +1,6 @@
 """The Python interface end to end: an earthquake on the virtual table, its record and its report.
 
-    python scripts/rehearse_earthquake.py [MOTION] [--scale 0.5] [--out DIR]
+    python scripts/example_1_rehearse_earthquake.py [MOTION] [--scale 0.5] [--out DIR]
 
 What `lhpost6 run` does, in seven steps to copy from.
 """

@@ -1,6 +1,6 @@
 """The forces behind a test by inverse dynamics: what `lhpost6 decompose` does, with the Python interface.
 
-    python scripts/decompose_forces.py [RECORD] [--out DIR]
+    python scripts/example_3_decompose_forces.py [RECORD] [--out DIR]
 
 Without a record it makes one: a triangular wave in x, as test TX5 in kind, simulated and passed through noisy sensors.
 """

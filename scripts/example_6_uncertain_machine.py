@@ -1,0 +1,100 @@
+"""How sure is a rehearsal, when numbers of the machine are uncertain? Many machines, one motion, all at once.
+
+    python scripts/example_6_uncertain_machine.py [MOTION] [--machines 30] [--scale 1] [--out DIR]
+
+Every uncertain number of the machine is drawn from its stated distribution, all runs go over threads in compiled code,
+and what is wanted from them gets an interval, with the numbers of the machine that it follows most.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+import xarray as xr
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from lhpost6_pin.batch import simulate_many
+from lhpost6_pin.calibration import drawn_coordinates, machine_knobs, with_knobs
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.equilibrium import find_equilibrium
+from lhpost6_pin.files import write_whole
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.outputs import record_of_run
+from lhpost6_pin.plant import make_plant
+from lhpost6_pin.pose import PlatenMotion
+from lhpost6_pin.signals import rrmse
+from lhpost6_pin.simulate import ClosedLoop
+
+
+def figures(record: xr.Dataset) -> dict[str, float]:
+    """What is wanted of a run."""
+    asked, achieved = record["reference_acceleration"].values, record["platen_acceleration"].values
+    moved = asked.any(axis=0)
+    return {
+        "acceleration RRMSE, worst axis [%]": 100 * float(rrmse(asked[:, moved], achieved[:, moved]).max()),
+        "largest actuator force [kN]": float(abs(record["actuator_force"]).max()) / 1e3,
+        "largest spool [%]": 100 * float(abs(record["spool_position"]).max()),
+        "highest chamber pressure [MPa]": float(record["chamber_pressure_a"].max()) / 1e6,
+    }
+
+
+def main(
+    motion: Annotated[str, typer.Argument(help="Name, as `lhpost6 motions` lists them.")] = "ridgecrest",
+    machines: Annotated[int, typer.Option(min=3, help="How many are drawn.")] = 30,
+    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Of what is drawn.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for drawn.csv: numbers drawn and what came of them.")] = Path(
+        "out/uncertain"
+    ),
+) -> None:
+    """Run MOTION on machines drawn from what is stated of the LHPOST6."""
+    nominal = load_machine("lhpost6")
+    target = make_target(find_motion(motion), scale=scale)
+
+    # 1. Machines: every number that states an uncertainty is a knob; twins stay alike
+    knobs = machine_knobs(nominal)
+    rng = np.random.default_rng(seed)
+    drawn = np.array([drawn_coordinates(knobs, rng) for _ in range(machines)])
+
+    # 2. A controller with the same settings for each, at rest before the motion
+    asked = PlatenMotion(target.displacement, target.velocity, target.acceleration)
+    jobs = []
+    for coordinates in drawn:
+        plant = make_plant(with_knobs(nominal, knobs, coordinates))
+        rest = find_equilibrium(plant)
+        controller = make_controller(plant, rest, load_controller(nominal.controller))
+        jobs.append((plant, ClosedLoop(controller, controller.drive_for(*asked), rest)))
+
+    # 3. All runs at once; the order of results is that of the jobs, whatever the number of threads
+    runs = simulate_many(jobs, samples=len(target.time))
+    found = [figures(record_of_run(run, {"test": motion}, asked)) for run in runs]
+
+    # 4. An interval for each figure, and what it follows: the correlation of ranks with each number drawn
+    table = Table("figure", "median", "5 to 95 %", "follows most (correlation of ranks)")
+    for name in found[0]:
+        values = np.array([one[name] for one in found])
+        low, middle, high = np.percentile(values, [5, 50, 95])
+        ranks = np.argsort(np.argsort(np.column_stack([values, drawn]), axis=0), axis=0)
+        with_value = np.corrcoef(ranks.T)[0, 1:]
+        first = np.argsort(-np.abs(with_value))[:2]
+        follows = ", ".join(f"{knobs[k].name} {with_value[k]:+.2f}" for k in first)
+        table.add_row(escape(name), f"{middle:.4g}", f"{low:.4g} to {high:.4g}", escape(follows))
+    Console(width=120).print(table)
+
+    # 5. Everything in a table for other tools
+    header = ",".join([*(f"{k.name} [{k.unit}]" for k in knobs), *found[0]])
+    rows = [
+        [*(k.at(x) for k, x in zip(knobs, coordinates, strict=True)), *one.values()]
+        for coordinates, one in zip(drawn, found, strict=True)
+    ]
+    with write_whole(out / "drawn.csv") as beside:
+        np.savetxt(beside, rows, "%.9g", ",", header=header, comments="")
+    print(out / "drawn.csv")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,104 @@
+"""Every numbered example runs from the command line, and does what it says."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_scripts import PRACTICE, SCRIPTS, script
+
+from lhpost6_pin.check import check_record
+from lhpost6_pin.drives import load_drive
+from lhpost6_pin.library import find_family
+from lhpost6_pin.machine import load_machine
+from lhpost6_pin.records import load_record
+
+EXAMPLES = sorted(SCRIPTS.glob("example_*.py"))
+
+
+def run(number: int, *arguments: object) -> str:
+    """What an example prints."""
+    (path,) = SCRIPTS.glob(f"example_{number}_*.py")
+    ended = script(path.name, *arguments)
+    assert ended.returncode == 0, ended.stderr
+    return str(ended.stdout)
+
+
+def test_every_example_is_run_here():
+    here = Path(__file__).read_text()
+    for k, path in enumerate(EXAMPLES, start=1):
+        assert path.name.startswith(f"example_{k}_") and f"run({k}, " in here
+
+
+def test_1_a_motion_is_rehearsed(tmp_path):
+    said = run(1, "sine", "--scale", "0.2", "--out", tmp_path)
+    assert [f for f in check_record(tmp_path / "record.nc") if f.severity == "error"] == []
+    record = load_record(tmp_path / "record.nc")
+    asked, achieved = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
+    error = 100 * np.sqrt(np.sum((achieved - asked) ** 2) / np.sum(asked**2))
+    assert f"x: displacement RRMSE {error:.2f} %" in said
+    assert "y: displacement" not in said
+    assert str(tmp_path / "report.html") in said and (tmp_path / "report.html").is_file()
+
+
+def test_2_a_motion_of_ones_own_moves_a_specimen(tmp_path):
+    said = run(2, "--scale", "0.5", "--out", tmp_path)
+    bare, loaded = (load_record(tmp_path / f"{name}.nc") for name in ("bare", "loaded"))
+    assert bare.attrs["specimen"] == "none" and loaded.attrs["specimen"] == "pendulum"
+    force = float(abs(loaded["actuator_force"]).max()) / 1e3
+    assert "loaded: acceleration RRMSE" in said and f"largest force {force:.0f} kN" in said
+    assert "leg velocity:" in said and (tmp_path / "view.html").is_file()
+
+
+def test_2_a_motion_that_does_not_fit_is_refused_with_the_scale_that_would(tmp_path):
+    ended = script("example_2_own_motion_and_specimen.py", "--scale", "5", "--out", tmp_path)
+    assert ended.returncode == 1 and "largest scale that fits" in ended.stderr and "Traceback" not in ended.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["pulse.csv"]
+
+
+def test_3_a_record_is_taken_apart(tmp_path):
+    said = run(3, PRACTICE, "--out", tmp_path)
+    assert "pad_friction: -" in said and (tmp_path / "ledger.nc").is_file() and (tmp_path / "report.html").is_file()
+
+
+def test_4_iterating_makes_the_table_follow_more_closely(tmp_path):
+    said = run(4, "sine", "--scale", "0.2", "--machine", "uniaxial", "--most", "1", "--out", tmp_path)
+    first, best = (float(x) for x in re.findall(r"iteration .*RRMSE x ([\d.]+) %", said))
+    assert best < first
+    plain, inverse = (float(x) for x in re.findall(r"^sine, .*RRMSE ([\d.]+) %", said, re.MULTILINE))
+    assert inverse < plain
+    assert load_drive(tmp_path / "drive.nc").attrs["machine"] == "uniaxial"
+
+
+def test_5_lqg_is_compared_with_the_469d(tmp_path):
+    pytest.importorskip("control")
+    said = run(5, "sine", "--scale", "0.2", "--axes", "x", "--out", tmp_path)
+    panel, own = (float(x) for x in re.search(r"displacement x.*? ([\d.]+) %.*? ([\d.]+) %", said).groups())
+    assert own < panel and (tmp_path / "lqg.html").is_file()
+
+
+def test_6_uncertain_numbers_give_an_interval(tmp_path):
+    said = run(6, "sine", "--scale", "0.2", "--machines", "4", "--out", tmp_path)
+    assert "largest actuator force [kN]" in said and "platen.mass" not in said.split("figure")[0]
+    with (tmp_path / "drawn.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 4
+    flows = [float(row["horizontal.flow [m3/s]"]) for row in rows]
+    stated = load_machine().parameters["horizontal.flow"]
+    assert len(set(flows)) == 4 and max(abs(f - stated.value) for f in flows) <= 3.001 * stated.sd
+    assert all(float(row["largest spool [%]"]) < 100 for row in rows)
+
+
+def test_7_a_hidden_effect_is_found(tmp_path):
+    said = run(7, "bearing_thrust_direction", "--out", tmp_path)
+    assert find_family("bearing_thrust_direction").title in said
+    verdict = json.loads((tmp_path / "verdict.json").read_text())
+    assert verdict["verdict"] == "named"
+    (effect,) = verdict["effects"]
+    assert effect["family"] == "bearing_thrust_direction"
+    low, high = effect["parameters"]["share"]["ci90"]
+    assert low < 1.0 < high  # the typical size is what is hidden
+    (added,) = load_machine(tmp_path / "model.toml").alterations
+    assert added.name.startswith("bearing_thrust_direction")

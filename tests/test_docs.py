@@ -138,6 +138,15 @@ def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site, monk
     assert " dB at " in pages["stability"]
 
 
+def test_the_stored_audit_is_a_whole_one_that_found_nothing_amiss(site):
+    stored = (ROOT / "scripts" / "docs" / "audit.md").read_text()
+    assert "`python scripts/audit.py --seconds 60`" in stored
+    assert stored.count("| the same |") == 2 and "DIFFERENT" not in stored
+    titles = re.findall(r"^## (.+)$", stored, re.MULTILINE)
+    page = (site / "results" / "audit.html").read_text()
+    assert len(titles) == 3 and all(title in page for title in titles)
+
+
 def test_every_assumed_number_of_the_machine_is_on_its_page(site):
     text = (site / "assumptions.html").read_text(encoding="utf-8")
     for path, quantity in load_machine().parameters.items():

@@ -41,6 +41,11 @@ def _generated(words: str) -> str:
     return INSERTS[name](*arguments)
 
 
+def _audit() -> str:
+    """What the audit last printed."""
+    return (HERE / "audit.md").read_text(encoding="utf-8").strip()
+
+
 def _battery() -> str:
     """The published scores, without their title."""
     text = (ROOT / "scripts" / "battery" / "results.md").read_text(encoding="utf-8")
@@ -93,6 +98,7 @@ def _validation() -> str:
 INSERTS: Mapping[str, Callable[..., str]] = {
     "api": _api,
     "assumptions": tables.assumptions,
+    "audit": _audit,
     "battery": _battery,
     "capacity": tables.capacity,
     "commands": commands.commands,

@@ -6,16 +6,20 @@ energy      white noise on all axes in closed loop: what flows in, is created by
             stored and dissipated, and what of it is left over
 repeating   the same runs twice, over one thread and over as many as asked for, compared bit by bit
 pages       sizes of a forty-second test's report and animation
+
+What it found last is on the site's page Audit: `python scripts/audit.py --out scripts/docs/audit.md`.
 """
 
 import argparse
 import hashlib
 import os
 import tempfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
+from lhpost6_pin import __version__
 from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.energy import energy_audit
@@ -85,6 +89,12 @@ def repeating_rows(machine, threads: int) -> list[str]:
     ]
 
 
+def run_line(seconds: float) -> str:
+    """What was run: the command, the version, the day."""
+    today = datetime.now(UTC).date().isoformat()
+    return f"`python scripts/audit.py --seconds {seconds:g}`, version {__version__}, {today}."
+
+
 def said(same: bool) -> str:
     """The answer in a word."""
     return "the same" if same else "DIFFERENT"
@@ -120,7 +130,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=None, help="write it to this file, too")
     asked = parser.parse_args()
     machine = load_machine()
-    rows = [*energy_rows(make_plant(machine), asked.seconds), *repeating_rows(machine, asked.threads)]
+    rows = [
+        run_line(asked.seconds),
+        "",
+        *energy_rows(make_plant(machine), asked.seconds),
+        *repeating_rows(machine, asked.threads),
+    ]
     text = "\n".join([*rows, *page_rows(machine)])
     print(text)
     if asked.out is not None:

@@ -11,6 +11,7 @@ import pytest
 from doc_pages import PAGES, ROOT, Links, snippets
 
 from lhpost6_pin.cli import app
+from lhpost6_pin.control import load_controller
 from lhpost6_pin.law_table import LAWS
 from lhpost6_pin.library import families
 from lhpost6_pin.machine import load_machine
@@ -115,6 +116,35 @@ def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site, mo
         assert 'id="who-uses-it"' in page and "tests/test_l" in page
         by_hand = (PAGES / "theory" / f"{module}.md").read_text(encoding="utf-8")
         assert re.search(r"\*\*Sign\.\*\*", by_hand) and re.search(r"\*\*In a record\.\*\*", by_hand)
+
+
+def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+    from docs import controller
+
+    settings = load_controller("lhpost6")
+    named = {key.split(".")[1] for key in settings.stated}
+    assert set(controller.SYMBOLS) == named - {"rate", "spool_limit"}  # which no equation has
+    pages = {name: (site / "theory" / f"{name}.html").read_text() for name in ("control", "stability", "iteration")}
+    for key in settings.stated:
+        section, setting = key.split(".")
+        assert f"<code>{setting}</code>" in pages["control"] or f"<code>{section}</code>" in pages["control"]
+    for name, page in pages.items():
+        assert 'id="code"' in page and 'id="what-holds-it"' in page and "<code>tests/test_" in page
+        by_hand = (PAGES / "theory" / f"{name}.md").read_text()
+        assert all(f"**{word}.**" in by_hand for word in ("Where it acts", "Sign", "In a record"))
+    assert 'id="lhpost6_pin.control.loop.control_step"' in pages["control"]
+    assert 'id="lhpost6_pin.control.filters.reference_generator"' in pages["control"]
+    assert " dB at " in pages["stability"]
+
+
+def test_the_stored_audit_is_a_whole_one_that_found_nothing_amiss(site):
+    stored = (ROOT / "scripts" / "docs" / "audit.md").read_text()
+    assert "`python scripts/audit.py --seconds 60`" in stored
+    assert stored.count("| the same |") == 2 and "DIFFERENT" not in stored
+    titles = re.findall(r"^## (.+)$", stored, re.MULTILINE)
+    page = (site / "results" / "audit.html").read_text()
+    assert len(titles) == 3 and all(title in page for title in titles)
 
 
 def test_every_assumed_number_of_the_machine_is_on_its_page(site):

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from . import commands, figures, tables, theory
+from . import commands, controller, figures, tables, theory
 
 __all__ = ["HERE", "INSERTS", "PAGES", "ROOT", "assemble"]
 
@@ -39,6 +39,11 @@ def assemble(folder: Path) -> None:
 def _generated(words: str) -> str:
     name, *arguments = shlex.split(words)
     return INSERTS[name](*arguments)
+
+
+def _audit() -> str:
+    """What the audit last printed."""
+    return (HERE / "audit.md").read_text(encoding="utf-8").strip()
 
 
 def _battery() -> str:
@@ -93,18 +98,26 @@ def _validation() -> str:
 INSERTS: Mapping[str, Callable[..., str]] = {
     "api": _api,
     "assumptions": tables.assumptions,
+    "audit": _audit,
     "battery": _battery,
     "capacity": tables.capacity,
     "commands": commands.commands,
+    "docstring": controller.docstring,
     "effects": tables.effects,
     "evidence": tables.evidence,
+    "functions": controller.functions,
     "law": theory.law,
     "laws": theory.laws_of,
     "layout": tables.layout,
     "library": tables.library,
+    "margins": controller.margins,
+    "members": controller.members,
     "modes": tables.modes,
     "motions": tables.motions,
+    "numbers": controller.numbers,
     "open_loop": _open_loop,
+    "panel": controller.panel,
+    "tests_in": controller.tests_in,
     "validation": _validation,
 }
 """Generators by name."""

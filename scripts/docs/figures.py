@@ -13,6 +13,7 @@ from matplotlib.patches import FancyBboxPatch, Polygon, Rectangle
 
 from lhpost6_pin import kinematics
 from lhpost6_pin.components import Actuator, Strut
+from lhpost6_pin.control import load_controller
 from lhpost6_pin.files import write_whole
 from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.urdf import drawing_colour, legs
@@ -271,11 +272,78 @@ def _flow(machine: Machine) -> Figure:
     return figure
 
 
+# ------------------------------------------------------------------------------------------------- the virtual 469D
+def _control(machine: Machine) -> Figure:
+    """From the motion wanted to the spools, what is per degree of freedom and what per actuator, and back."""
+    rate, n = load_controller(machine.controller).rate, len(machine.actuators)
+    late = " or ".join(dict.fromkeys(f"{1e3 * a.valve_delay:g}" for a in machine.actuators))
+    figure, axes = _bare(6.3, 8.8, (0, 6.3), (0.3, 9.1))
+    motion, legs_of = drawing_colour("platen"), drawing_colour("swivel")
+    forward = (
+        ("motion wanted", "of C and the Euler angles", INK),
+        ("drive", "what the generator is fed with", motion),
+        ("reference generator", "$x_r$, $v_r$, $a_r$, $j_r$", motion),
+        ("three-variable law", "feed-forward, errors, force", motion),
+        ("notches, master gain", "a velocity $u$ each", motion),
+        ("Jacobian $K$", f"{n} leg rates $K u - b\\,(f - f_0)$", legs_of),
+        ("valve linearisation", "rate, opening, spool; clipped", legs_of),
+        ("hold and delay", f"1/{rate:g} s, then {late} ms", legs_of),
+        ("table", "valves, oil, friction, platen", INK),
+    )
+    left, right, bus = (0.45, 3.15), (4.0, 1.85), 6.1
+
+    def level(k: float) -> float:
+        return 8.35 - k
+
+    def box(k: float, column: tuple[float, float], title: str, text: str, colour: str, line: str = "-") -> None:
+        x, width = column
+        place, size = (x, level(k)), {"width": width, "height": 0.62}
+        style = {"boxstyle": "round,pad=0.02", "facecolor": PAPER, "edgecolor": colour, "lw": 1.8, "ls": line}
+        axes.add_patch(FancyBboxPatch(place, **size, **style))
+        for up, words, weight in ((0.43, title, "bold"), (0.16, text, "normal")):
+            middle = (x + width / 2, level(k) + up)
+            axes.text(*middle, words, ha="center", va="center", fontweight=weight)
+
+    for k, (title, text, colour) in enumerate(forward):
+        box(k, left, title, text, colour)
+        if k:
+            _arrow(axes, (2.0, level(k - 1) - 0.02), (2.0, level(k) + 0.64))
+    for k, title, text, colour, line in (
+        (1, "cancellers", "sine tests only", motion, "--"),
+        (2, "force feedback", "$K_F$ HP$(K^T (f - f_0))$", motion, "-"),
+        (3, "feedback gen.", "$x_f$, $v_f$, $a_f$", motion, "-"),
+        (4, "kinematics", "$s$ to pose $x_s$", motion, "-"),
+        (5, "force balance", "$b\\,(f - f_0)$", legs_of, "-"),
+        (8, "sensors", "$s$, $f$, acceleration", INK, "-"),
+    ):
+        box(k, right, title, text, colour, line)
+    edge, start, middle = sum(left) + 0.02, right[0] - 0.02, 0.31
+    for k in (1, 3, 5):
+        _arrow(axes, (start, level(k) + middle), (edge, level(k) + middle))
+    axes.plot([start, 3.8, 3.8], [level(2) + middle] * 2 + [level(3) + 0.5], color=INK, lw=1.8)
+    _arrow(axes, (3.8, level(3) + 0.5), (edge, level(3) + 0.5))
+    _arrow(axes, (4.9, level(4) + 0.64), (4.9, level(3) - 0.02))
+    _arrow(axes, (edge, level(8) + middle), (start, level(8) + middle))
+    side = sum(right) + 0.02
+    axes.plot([side, bus, bus], [level(8) + middle] * 2 + [level(2) + middle], color=FAINT, lw=1.8)
+    for k, carried in ((2, "$f$"), (3, "$a$"), (4, "$s$"), (5, "$f$")):
+        _arrow(axes, (bus, level(k) + middle), (side, level(k) + middle), FAINT)
+        axes.text(bus + 0.06, level(k) + middle, carried, ha="left", va="center")
+    for first, last, words, colour in (
+        (1, 4, "per degree of freedom", motion),
+        (5, 7, "per actuator", legs_of),
+    ):
+        axes.plot([0.27, 0.27], [level(first) + 0.62, level(last)], color=colour, lw=1.8)
+        axes.text(0.12, (level(first) + level(last) + 0.62) / 2, words, rotation=90, ha="center", va="center")
+    return figure
+
+
 FIGURES: Mapping[str, Callable[[Machine], Figure]] = {
     "plan": _plan,
     "elevation": _elevation,
     "frames": _frames,
     "leg": _leg,
     "flow": _flow,
+    "control": _control,
 }
 """Figures by the name of their file."""

@@ -6,8 +6,15 @@ __all__ = ["cell", "code_cell", "number", "table"]
 
 
 def cell(text: str) -> str:
-    """Text for a cell of a table, on one line, bars, markup and tags made harmless."""
-    text = " ".join(text.split()).replace("\\", "\\\\")
+    """Text for a cell of a table, on one line, bars, markup and tags made harmless; between backticks is code."""
+    parts = " ".join(text.split()).split("`")
+    if len(parts) % 2 == 0:
+        return _harmless("`".join(parts))
+    return "".join(code_cell(part) if k % 2 else _harmless(part) for k, part in enumerate(parts))
+
+
+def _harmless(text: str) -> str:
+    text = text.replace("\\", "\\\\")
     for sign in "|*_<[":
         text = text.replace(sign, {"<": "&lt;"}.get(sign, f"\\{sign}"))
     return text

@@ -16,7 +16,7 @@ from lhpost6_pin.machine import load_machine
 
 from .markdown import cell, code_cell, table
 
-__all__ = ["PAGES", "law", "law_modules", "laws_of", "page_of_law", "tests_of"]
+__all__ = ["PAGES", "law", "law_modules", "laws_of", "page_of_law", "tests_of", "tree"]
 
 ROOT = Path(__file__).parents[2]
 PAGES: dict[str, tuple[str, ...]] = {
@@ -139,7 +139,7 @@ def tests_of(page: str) -> str:
     parts = []
     for battery in BATTERIES:
         functions = [
-            n for n in _tree(battery.file).body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")
+            n for n in tree(battery.file).body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")
         ]
         over = {f.name: _over(f, battery, page) for f in functions}
         single = [f for f in functions if over[f.name] is None and kernels & set(_of_module(f, page, battery.file))]
@@ -174,7 +174,7 @@ def _names_in(file: str, variable: str) -> frozenset[str]:
     """Names and strings in what a file assigns to a variable."""
     nodes = [
         inner
-        for n in _tree(file).body
+        for n in tree(file).body
         if isinstance(n, ast.Assign) and any(isinstance(t, ast.Name) and t.id == variable for t in n.targets)
         for inner in ast.walk(n.value)
     ]
@@ -183,7 +183,8 @@ def _names_in(file: str, variable: str) -> frozenset[str]:
 
 
 @cache
-def _tree(file: str) -> ast.Module:
+def tree(file: str) -> ast.Module:
+    """A file of tests, parsed."""
     return ast.parse((ROOT / "tests" / file).read_text(encoding="utf-8"))
 
 
@@ -201,7 +202,7 @@ def _of_module(function: ast.FunctionDef, page: str, file: str) -> Iterator[str]
 def _imported(file: str) -> dict[str, set[str]]:
     """Modules of `laws` that a file of tests imports, with the names that it takes from each."""
     found: dict[str, set[str]] = {}
-    for node in _tree(file).body:
+    for node in tree(file).body:
         if isinstance(node, ast.ImportFrom) and node.module == "lhpost6_pin.laws":
             found |= {alias.name: set() for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("lhpost6_pin.laws."):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Tab, browse, needs_browser
+from browser import BROWSER, Tab, browse
 
 from lhpost6_pin.bodies import body_name, body_poses, joint_positions
 from lhpost6_pin.equilibrium import find_equilibrium
@@ -15,7 +15,7 @@ from lhpost6_pin.running import RunningPlant
 from lhpost6_pin.sight import EVERY
 from lhpost6_pin.viewer import LiveView, Look, live_animation, record_frames, show_record, view_apart
 
-pytestmark = needs_browser
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
 
@@ -109,6 +109,24 @@ def test_keys_and_boxes_play_step_and_hide(page, tmp_path):
     assert seen["layers"][0] == "path of C" and seen["layers"][-1] == "forces" and len(seen["layers"]) == 4
     before, after = seen["violet"]  # the struts' pull; shades of the struts themselves come near
     assert before > 1e-3 and after < 0.1 * before
+
+
+def test_a_computer_too_slow_for_every_pixel_draws_fewer_while_the_table_moves(page, tmp_path):
+    """Frames are said to have come every so many milliseconds; none is drawn in between."""
+    ask = "(frame, count) => { frames = 0; for (let k = 0; k < count; k++) keep_pace(frame * k); return drawn; }"
+
+    async def look(tab: Tab):
+        seen = {}
+        for name, frame, count in (("slow", 60, 20), ("slower", 500, 200), ("fast", 16, 200), ("steady", 30, 200)):
+            await tab.evaluate("animator.play()")
+            seen[name] = await tab.evaluate(f"({ask})({frame}, {count})")
+        await tab.evaluate(f"({ask})(500, 200), animator.pause(), {DRAWN}")
+        seen["paused"] = await tab.evaluate("drawn")
+        return seen
+
+    seen = browse(tmp_path, page, look)
+    assert seen["slower"] == 0.4 < seen["slow"] < 0.8  # the least; half the pixels
+    assert seen["fast"] == seen["steady"] == seen["paused"] == 1
 
 
 def test_a_narrow_window_sees_the_whole_table(page, tmp_path):

@@ -28,6 +28,12 @@ LIGHTS = (
     ("AmbientLight", "intensity", 0.5),
 )
 HIDDEN = ("/Grid", "/Axes", "/Lights/PointLightNegativeX", "/Lights/PointLightPositiveX")
+FACES = {
+    "radialSegments": 18,
+    "widthSegments": 14,
+    "heightSegments": 8,
+}  # of round bodies: fewer than usual
+FINE = 0.004  # [m] between points of a path: a pixel where the whole table is seen
 BACKGROUND = {"top_color": [0.93, 0.95, 0.97], "bottom_color": [0.80, 0.84, 0.88]}
 
 
@@ -59,7 +65,7 @@ def draw_motion(window: Window, machine: Machine, frames: Frames) -> None:
     for name, motion in (*((g.name, g.displacement) for g in frames.ghosts), ("platen", frames.displacement)):
         path = motion[:, :3]
         if len(path) > 1:
-            pieces = np.repeat(path, 2, axis=0)[1:-1]
+            pieces = np.repeat(_thinned(path), 2, axis=0)[1:-1]
             table["trace"][name].set_object(_lines(pieces, "trace" if name == "platen" else name, seen_through=True))
 
 
@@ -125,8 +131,24 @@ def _primitive(shape: Any) -> tuple[Any, Array]:
         return geometry.Box([2.0 * float(s) for s in shape.halfSide]), upright
     if hasattr(shape, "halfLength"):
         upright[:3, :3] = pin.rpy.rpyToMatrix(0.5 * math.pi, 0.0, 0.0)
-        return geometry.Cylinder(2.0 * float(shape.halfLength), float(shape.radius)), upright
-    return geometry.Sphere(float(shape.radius)), upright
+        return _with_faces(geometry.Cylinder(2.0 * float(shape.halfLength), float(shape.radius))), upright
+    return _with_faces(geometry.Sphere(float(shape.radius))), upright
+
+
+def _with_faces(body: Any) -> Any:
+    """The same round body with `FACES`."""
+    lower = body.lower
+    body.lower = lambda data: {key: FACES.get(key, value) for key, value in lower(data).items()}
+    return body
+
+
+def _thinned(path: Array) -> Array:
+    """First, last, and those points of a path (n, 3) that are `FINE` from the last one taken."""
+    taken = [0]
+    for k in range(1, len(path) - 1):
+        if np.abs(path[k] - path[taken[-1]]).max() >= FINE:
+            taken.append(k)
+    return path[[*taken, len(path) - 1]]
 
 
 def _box_edges(size: Array) -> Array:

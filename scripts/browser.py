@@ -1,4 +1,9 @@
-"""Chromium without a window, asked over its DevTools protocol: what a page shows, says and complains of."""
+"""A page in Chromium without a window: a picture of it, and what it complains of.
+
+    python scripts/browser.py PAGE.html --out picture.png [--size 1280x800] [--after 2] [--print]
+
+Also the tests' way to a browser, over its DevTools protocol. WebGL is drawn by the processor.
+"""
 
 import asyncio
 import base64
@@ -6,17 +11,18 @@ import json
 import re
 import shutil
 import subprocess
+import sys
+import tempfile
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-import pytest
+import typer
 from PIL import Image
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
 BROWSER = next((b for b in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if b), None)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")
 
 FLAGS = "--headless --no-sandbox --use-gl=swiftshader --enable-unsafe-swiftshader --hide-scrollbars"
 WAIT = 120.0  # [s] for the browser to start: this computer may be busy
@@ -68,6 +74,11 @@ class Tab:
         path.write_bytes(base64.b64decode(shot["data"]))
         return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
+    async def paper(self, path: Path) -> None:
+        """What would be printed, as a PDF file."""
+        printed = await self.ask("Page.printToPDF", printBackground=True)
+        path.write_bytes(base64.b64decode(printed["data"]))
+
 
 def browse(folder: Path, url: str, look: Callable[[Tab], Awaitable[Any]], size: tuple[int, int] = (1280, 800)) -> Any:
     """What `look` makes of a page that has loaded; folder takes the browser's profile."""
@@ -100,3 +111,32 @@ async def _visit(port: str, url: str, look: Callable[[Tab], Awaitable[Any]]) -> 
         return await look(tab)
     finally:
         socket.close()
+
+
+def main(
+    page: Annotated[str, typer.Argument(help="HTML file, or an address.")],
+    out: Annotated[Path, typer.Option(help="The picture, PNG; with --print the pages, PDF.")] = Path("out/page.png"),
+    size: Annotated[str, typer.Option(help="Width and height of the window [pixels].")] = "1280x800",
+    after: Annotated[float, typer.Option(help="Seconds to wait for what the page draws.")] = 2.0,
+    paper: Annotated[bool, typer.Option("--print", help="As it would be printed.")] = False,
+) -> None:
+    """Picture a page and say what it complains of; exit code 1 if it does."""
+    if BROWSER is None:
+        raise SystemExit("error: no Chromium on this computer")
+    width, height = (int(x) for x in size.split("x"))
+    out.parent.mkdir(parents=True, exist_ok=True)
+
+    async def look(tab: Tab) -> list[str]:
+        await asyncio.sleep(after)
+        await (tab.paper(out) if paper else tab.picture(out))
+        return tab.faults
+
+    url = page if "://" in page else Path(page).resolve().as_uri()
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        faults = browse(Path(folder), url, look, (width, height))
+    print(out, *faults, sep="\n")
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .layout import ROW, axis_suffix, level_label, level_line, on_row, stacked_layout
+from .layout import ROW, axis_suffix, level_label, level_line, log_ticks, on_row, stacked_layout
 from .page import Figure
 from .plots import packed
 
@@ -191,13 +191,10 @@ def _scaled(log: bool, span: tuple[float, float] | None) -> dict[str, Any]:
 
 
 def _decades(panel: Panel) -> dict[str, Any]:
-    """Ticks of a logarithmic value axis: at 1, 2 and 5 over a few decades, at powers of ten over many."""
+    """Ticks of a logarithmic value axis."""
     drawn = np.concatenate([np.ravel(curve.y) for curve in panel.curves]) if panel.curves else np.ones(1)
     low, high = panel.span or (np.min(drawn[drawn > 0.0], initial=np.inf), np.max(drawn, initial=0.0))
-    if not 0.0 < high < 300.0 * low:
-        return {"dtick": 1, "exponentformat": "power"}
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    return {"tickvals": [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]}
+    return log_ticks(float(low), float(high))
 
 
 def _value_band(low: float, high: float, k: int) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..discover.proof import FLOOR
 from ..discover.state import Round
 from ..discover.where import gap_map
 from ..discover.words import where
-from .layout import stacked_layout
+from .layout import log_ticks, stacked_layout
 from .page import Figure, Markup, paragraph, table, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
 
@@ -92,14 +92,14 @@ def gain_figure(one: Round, number: int, least: float, mimicked: float) -> Figur
                     "orientation": "h",
                     "name": words,
                     "x": [max(shown[i].gain, 1.0) for i in some],
-                    "y": some,
+                    "y": [i + _BELOW for i in some],
                     "text": [html.escape(s) for s in said],
                     "textposition": "none",
                     "hovertemplate": "%{x:.4g}: %{text}",
                     "marker": {"color": color},
                 }
             )
-    layout = _bars(names, "Gain of log-likelihood", 26 * max(len(names), 3), 250, least)
+    layout = _bars(names, "Gain of log-likelihood", 38, least, max(s.gain for s in shown))
     words = (
         "The best candidate of each family, everything known refitted beside it. "
         f"The dashed line is the least gain, {least:g}; families that another form of the report's laws may pass for "
@@ -126,12 +126,13 @@ def gap_figure(found: Discovery) -> Figure:
                 "orientation": "h",
                 "name": words,
                 "x": [getattr(gap, key) for gap in gaps],
-                "y": list(range(len(gaps))),
+                "y": [i + _BELOW for i in range(len(gaps))],
                 "hovertemplate": "%{x:.3g} × noise",
                 "marker": {"color": color},
             }
         )
-    layout = _bars(names, "Gap over sensor noise", 62 * max(len(names), 1), 170, FLOOR) | {"barmode": "group"}
+    most = max(max(gap.delivered, gap.refitted, gap.after) for gap in gaps)
+    layout = _bars(names, "Gap over sensor noise", 74, FLOOR, most) | {"barmode": "group"}
     words = "Root mean square error over everything that moves, in deviations of noise; the dashed line is noise alone."
     return Figure("gap", "The gap on tests that were not searched", words, traces, layout, layout["height"])
 
@@ -167,19 +168,32 @@ def left_figure(left: Left) -> Figure:
     return Figure("left", "What has no name", words, traces, layout, layout["height"])
 
 
-def _bars(names: Sequence[str], x_title: str, height: int, left: int, mark: float) -> dict[str, Any]:
-    """Layout of rows of bars over a logarithmic axis: height of all, room for names [CSS px], a line at `mark`."""
-    layout = stacked_layout([""], x_title, row_height=height)
+_BELOW = 0.2
+"""How far a bar stands below the middle of its row, whose name is above it; in rows."""
+
+
+def _bars(names: Sequence[str], x_title: str, height: int, mark: float, most: float) -> dict[str, Any]:
+    """Layout of rows of bars, `height` [CSS px] each, over a logarithmic axis to `most`; a line at `mark`."""
+    layout = stacked_layout([""], x_title, row_height=height * max(len(names), 1))
     layout["yaxis"] |= {
         "range": [len(names) - 0.5, -0.5],
-        "tickvals": list(range(len(names))),
-        "ticktext": [html.escape(name) for name in names],
-        "tickfont": {"size": 11},
+        "showticklabels": False,
+        "showgrid": False,
         "zeroline": False,
     }
-    layout["xaxis"] |= {"type": "log"}
-    layout["margin"]["l"] = left
-    layout["hovermode"] = "closest"
-    place = {"type": "line", "xref": "x", "x0": mark, "x1": mark, "yref": "paper", "y0": 0, "y1": 1}
-    layout["shapes"].append(place | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}})
+    layout["yaxis"] |= {"ticks": "", "fixedrange": True}
+    layout["xaxis"] |= {"type": "log"} | log_ticks(1.0, most)
+    layout["margin"]["l"] = 14
+    layout["hovermode"], layout["bargap"] = "closest", 0.45
+    for k, name in enumerate(names):
+        place = {"x": 0, "xref": "paper", "xanchor": "left", "y": k - 0.48, "yref": "y", "yanchor": "top"}
+        words = {
+            "text": html.escape(name),
+            "showarrow": False,
+            "font": {"size": 11},
+            "bgcolor": "rgba(255,255,255,0.7)",
+        }
+        layout["annotations"].append(place | words)
+    line = {"type": "line", "xref": "x", "x0": mark, "x1": mark, "yref": "paper", "y0": 0, "y1": 1}
+    layout["shapes"].append(line | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}})
     return layout

@@ -1,10 +1,11 @@
 """The frame of every figure: rows over one x axis, each with a title and a legend, and the lines and bands on them."""
 
 import html
+import math
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = ["ROW", "axis_suffix", "level_label", "level_line", "on_row", "stacked_layout", "time_band"]
+__all__ = ["ROW", "axis_suffix", "level_label", "level_line", "log_ticks", "on_row", "stacked_layout", "time_band"]
 
 ROW, GAP, TOP, BOTTOM = 170, 48, 40, 44  # [CSS px] height of a row, between rows, above the first, below the last
 
@@ -66,6 +67,14 @@ def _row_title(words: str, top: float) -> dict[str, Any]:
         "showarrow": False,
         "font": {"size": 12},
     }
+
+
+def log_ticks(low: float, high: float) -> dict[str, Any]:
+    """Return ticks of a logarithmic axis: at 1, 2 and 5 over a few decades, at powers of ten over many."""
+    if not 0.0 < high < 300.0 * low:
+        return {"dtick": 1, "exponentformat": "power"}
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return {"tickvals": [float(f"{m}e{d}") for d in decades for m in (1, 2, 5)]}
 
 
 def level_line(level: float, k: int) -> dict[str, Any]:

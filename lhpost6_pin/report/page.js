@@ -43,7 +43,11 @@
   function stackTitles(width, layout, traces) {
     const entries = {};
     for (const t of traces) if (t.showlegend !== false) (entries[t.legend || "legend"] ||= []).push(t.name.length);
-    const lines = Math.max(...Object.values(entries).map((e) => Math.ceil(e.length * (52 + 6.5 * Math.max(...e)) / width)));
+    const lines = Math.max(0, ...Object.values(entries).map((names) => { // plotly stacks in columns as wide as the longest
+      const columns = Math.max(1, Math.floor((width - 75) / (52 + 6.5 * Math.max(...names))));
+      return Math.ceil(names.length / columns);
+    }));
+    layout.margin.b += 22; // the buttons stand below the axis title
     const titles = layout.annotations.filter((a) => a.name === "title");
     const { row } = layout.meta, above = 22 + 19 * lines, bottom = layout.margin.b;
     const inner = titles.length * row + (titles.length - 1) * (above + 12);

@@ -61,6 +61,17 @@ def usable_or_refused(reader: Reader, content: bytes, folder: Path) -> None:
             return
 
 
+def plainly_broken(seed: bytes) -> list[bytes]:
+    """An empty file, bytes that mean nothing, half a file, and one with a number that is none."""
+    half = seed[: len(seed) // 2]
+    return [
+        b"",
+        bytes(range(256)),
+        half + b"\xff\x00",
+        re.sub(rb"(?<=[ ,=])\d\.\d+", b"nan", seed, count=1)[: len(half)],
+    ]
+
+
 @pytest.mark.parametrize("reader", READERS, ids=lambda r: r.name)
 def test_a_valid_file_is_read_and_can_be_used(reader, tmp_path):
     path = tmp_path / reader.file
@@ -71,6 +82,9 @@ def test_a_valid_file_is_read_and_can_be_used(reader, tmp_path):
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda r: r.name)
 def test_a_broken_file_is_refused_by_name_or_usable(reader, tmp_path):
+    for content in plainly_broken(reader.seed()):
+        usable_or_refused(reader, content, tmp_path)
+
     @settings(max_examples=max(5, int(reader.share * settings().max_examples)), suppress_health_check=CHECKS)
     @given(reader.broken())
     def holds(content):
@@ -223,6 +237,14 @@ def test_a_fault_found_in_netcdf_stays_mended(name, tmp_path):
     assert path.stem in str(caught.value)
 
 
+@pytest.mark.parametrize("bad", [b"aliases = [[]]", b"aliases = [1]"])
+def test_strange_words_in_the_index_of_motions_are_taken_as_texts(bad, tmp_path):
+    path = tmp_path / "index.toml"
+    path.write_bytes(seed("motions", b'aliases = ["ridgecrest"]', bad).replace(b"\ncommand = ", b"\ncommand = 3 # "))
+    with no_leak():
+        BY_NAME["motions"].use(BY_NAME["motions"].load(path))
+
+
 def test_a_time_step_of_an_age_makes_no_target(tmp_path):
     path = tmp_path / "slow.csv"
     path.write_text("time_s,ax_g\n0,0.1\n1e12,0.2\n2e12,0.1\n")
@@ -299,17 +321,6 @@ def ends_well(command: Command, content: bytes, folder: Path) -> int:
     assert left <= set(command.leaves if code < 2 else ()), (code, left)
     assert code < 2 or said.count("error:") == 1, said
     return code
-
-
-def plainly_broken(seed: bytes) -> list[bytes]:
-    """An empty file, bytes that mean nothing, half a file, and one with a number that is none."""
-    half = seed[: len(seed) // 2]
-    return [
-        b"",
-        bytes(range(256)),
-        half + b"\xff\x00",
-        re.sub(rb"(?<=[ ,=])\d\.\d+", b"nan", seed, count=1)[: len(half)],
-    ]
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda c: c.words.split(" --out")[0].format(c.reader))

@@ -88,21 +88,24 @@ def _blamed(file: str) -> Iterator[None]:
 def _records_of(index: Mapping[str, Any]) -> tuple[list[MotionEntry], list[MotionEntry]]:
     """Entries of the records that are shipped; and of those that come with a package or from the user."""
     records = [
-        MotionEntry(name, "record", record["title"], tuple(record["aliases"]), True, "", ())
+        MotionEntry(name, "record", record["title"], tuple(map(str, record["aliases"])), True, "", ())
         for name, record in index["records"].items()
     ]
     entries = []
     package = index["package"]
     remedy = INSTALL if missing_package(package["module"]) else ""
     wanted = {
-        name: WantedRecord(*(record[key] for key in WantedRecord._fields)) for name, record in index["wanted"].items()
+        name: WantedRecord(*(str(record[key]) for key in WantedRecord._fields))
+        for name, record in index["wanted"].items()
     }
     for name, record in package["records"].items():
-        aliases, own = tuple(record.get("aliases", ())), wanted.pop(name, None)
+        aliases, own = tuple(map(str, record.get("aliases", ()))), wanted.pop(name, None)
         entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, (), own))
     for name, own in wanted.items():
         record, remedy = index["wanted"][name], f"your file: {own.record}"
-        entries.append(MotionEntry(name, "file", record["title"], tuple(record["aliases"]), False, remedy, (), own))
+        entries.append(
+            MotionEntry(name, "file", record["title"], tuple(map(str, record["aliases"])), False, remedy, (), own)
+        )
     return records, entries
 
 

@@ -1,6 +1,6 @@
 """Ground motions by name: shipped records, tests made from a few numbers, records of a package or of the user."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
@@ -72,6 +72,10 @@ def list_motions() -> tuple[MotionEntry, ...]:
     return (*records, *made, *packaged)
 
 
+def _texts(words: Iterable[Any]) -> tuple[str, ...]:
+    return tuple(map(str, words))
+
+
 def _options_of(test: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(key for key in test if key not in ("kind", "title"))
 
@@ -88,24 +92,22 @@ def _blamed(file: str) -> Iterator[None]:
 def _records_of(index: Mapping[str, Any]) -> tuple[list[MotionEntry], list[MotionEntry]]:
     """Entries of the records that are shipped; and of those that come with a package or from the user."""
     records = [
-        MotionEntry(name, "record", record["title"], tuple(map(str, record["aliases"])), True, "", ())
+        MotionEntry(name, "record", record["title"], _texts(record["aliases"]), True, "", ())
         for name, record in index["records"].items()
     ]
     entries = []
     package = index["package"]
     remedy = INSTALL if missing_package(package["module"]) else ""
     wanted = {
-        name: WantedRecord(*(str(record[key]) for key in WantedRecord._fields))
+        name: WantedRecord(*_texts(record[key] for key in WantedRecord._fields))
         for name, record in index["wanted"].items()
     }
     for name, record in package["records"].items():
-        aliases, own = tuple(map(str, record.get("aliases", ()))), wanted.pop(name, None)
+        aliases, own = _texts(record.get("aliases", ())), wanted.pop(name, None)
         entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, (), own))
     for name, own in wanted.items():
         record, remedy = index["wanted"][name], f"your file: {own.record}"
-        entries.append(
-            MotionEntry(name, "file", record["title"], tuple(map(str, record["aliases"])), False, remedy, (), own)
-        )
+        entries.append(MotionEntry(name, "file", record["title"], _texts(record["aliases"]), False, remedy, (), own))
     return records, entries
 
 

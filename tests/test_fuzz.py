@@ -353,6 +353,11 @@ def test_records_that_are_valid_but_do_not_fit_a_command_are_refused(tmp_path):
     assert ends_well(next(c for c in COMMANDS if c.words.startswith("decompose {}")), slow, tmp_path) == 2
 
 
+def test_a_measured_record_too_short_to_compare_its_sensors_is_still_checked(tmp_path):
+    measured = opened_and_changed("record", lambda d: d.assign_attrs(kind="measured"))
+    assert ends_well(COMMANDS[0], measured, tmp_path) == 0
+
+
 # ------------------------------------------------------------------------------------------------- UDP
 FLOATS = st.floats() | st.sampled_from([0.0, 1.0, -1.0, 1e308, -1e308, 5e-324])
 U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)

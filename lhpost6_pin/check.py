@@ -65,9 +65,9 @@ def check_dataset(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] 
     errors = layout_faults(dataset)
     broken = {finding.channel.split("[")[0] for finding in errors}
     contents = [Finding("info", *fact) for fact in _contents(dataset)]
-    if "time" in broken:
-        return errors + contents  # nothing can be said about signals on a broken time axis
     known = [name for name in LAYOUT if name in dataset and not {name, *LAYOUT[name].dims} & broken]
+    if "time" in broken or not known:
+        return errors + contents  # nothing can be said about signals on a broken time axis
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
     faults = chain(
         _unlikely_units(sound),

@@ -78,6 +78,8 @@ def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors)
     for record in records:
         require(record, "time")
         for comparison in comparisons(plant, record, sensors):
+            if not len(comparison.y):
+                continue  # of a record that is all edge nothing is left
             key = comparison.check, comparison.channel
             sums[key] = _added(sums.get(key), comparison)
     order = {check: k for k, check in enumerate(dict.fromkeys(check for check, _ in sums))}

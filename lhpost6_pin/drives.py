@@ -19,6 +19,7 @@ from .files import write_whole
 from .machine import Machine
 from .motions import Reference, Target
 from .names import AXES
+from .parameters import LARGEST
 from .records import open_record
 from .schemes import SAMPLE_RATE
 
@@ -103,15 +104,17 @@ def save_drive(values: Array, mode: str, target: Target, path: Path, attrs: Mapp
 def load_drive(path: Path | str) -> Drive:
     """Read a drive file; raises RecordError naming the file and what it lacks."""
     data = open_record(path)
-    if data.attrs.get("kind") != "drive":
+    if str(data.attrs.get("kind")) != "drive":
         raise RecordError(f"{path}: is no drive file; make one with `lhpost6 iterate`")
     try:
         mode = str(data.attrs["mode"])
         arrays = {
-            name: np.ascontiguousarray(data[name].sel(axis=list(AXES)).transpose("time", "axis").values, float)
+            name: np.ascontiguousarray(
+                data[name].sel(axis=list(AXES)).transpose("time", "axis").values.astype(float, casting="safe")
+            )
             for name in ("drive", *(f"wanted_{q}" for q in _UNITS))
         }
-        time = data["time"].values.astype(float)
+        time = data["time"].values.astype(float, casting="safe")
         axes = [pair.split("=") for pair in str(data.attrs["axes"]).split(",")]
         reference = Reference(
             motion=str(data.attrs["motion"]),
@@ -122,15 +125,21 @@ def load_drive(path: Path | str) -> Drive:
             low_pass=float(data.attrs["low_pass_hz"]),
             start=float(data.attrs["start_s"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except Exception as error:  # xarray and pandas raise nearly anything for labels that repeat or are missing
         raise RecordError(f"{path}: is damaged or incomplete: {error}; make it again with `lhpost6 iterate`") from error
+    numbers = (reference.scale, reference.high_pass, reference.low_pass, reference.start)
+    if not (np.isfinite(numbers).all() and {name for pair in reference.axes for name in pair} <= set(AXES)):
+        raise RecordError(f"{path}: says of its motion what cannot be: {reference}; make it again")
     if mode not in MODES:
         raise RecordError(f"{path}: mode {mode!r} is not one of {', '.join(MODES)}")
     for name, values in arrays.items():
-        if not np.isfinite(values).all():
-            at, axis = np.argwhere(~np.isfinite(values))[0]
-            raise RecordError(f"{path}: {name} is not finite in {AXES[axis]} at sample {at}; make the file again")
-    if len(time) < 2 or not np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() <= 1e-6:  # nan is none of them either
+        if not (usable := np.abs(values) <= LARGEST).all():
+            at, axis = np.argwhere(~usable)[0]
+            what = f"beyond {LARGEST:g}" if np.isfinite(values[at, axis]) else "not finite"
+            raise RecordError(f"{path}: {name} is {what} in {AXES[axis]} at sample {at}; make the file again")
+    with np.errstate(over="ignore", invalid="ignore"):
+        uniform = len(time) > 1 and np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() <= 1e-6  # nan is not either
+    if not uniform:
         raise RecordError(f"{path}: its samples are not those of the controller, {SAMPLE_RATE} Hz; make the file again")
     displacement, velocity, acceleration = (arrays[f"wanted_{q}"] for q in ("displacement", "velocity", "acceleration"))
     target = Target(time, displacement, velocity, acceleration, reference)

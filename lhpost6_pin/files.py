@@ -1,13 +1,15 @@
-"""Where shipped data lives, and writing files whole or not at all."""
+"""Where shipped data lives, reading TOML, and writing files whole or not at all."""
 
 import errno
 import os
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-__all__ = ["models_folder", "refuse_folder", "write_whole"]
+__all__ = ["models_folder", "read_toml", "refuse_folder", "write_whole"]
 
 
 def models_folder() -> Path:
@@ -15,6 +17,28 @@ def models_folder() -> Path:
     package = Path(__file__).parent
     installed = package / "models"
     return installed if installed.is_dir() else package.parent / "models"
+
+
+def read_toml(path: "Path | str") -> dict[str, Any]:
+    """Content of a TOML file; raises OSError, or ValueError that says what is wrong with it."""
+    try:
+        tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        _refuse_long_numbers(tree, "")
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    return tree
+
+
+def _refuse_long_numbers(value: object, key: str) -> None:
+    """TOML's whole numbers have 64 bits; Python's have no end, and the longest cannot even be put in a message."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _refuse_long_numbers(item, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, list):
+        for item in value:
+            _refuse_long_numbers(item, key)
+    elif isinstance(value, int) and value.bit_length() > 63:
+        raise ValueError(f"{key} is a whole number of more than 64 bits")
 
 
 def refuse_folder(folder: "Path | str") -> None:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import RecordError
 from .files import write_whole
 from .names import AXES
+from .parameters import LARGEST
 from .records import open_record
 from .transfer import Transfer, delay_of
 
@@ -162,17 +163,18 @@ def save_inverse(inverse: InverseFilter, path: Path | str) -> None:
 def load_inverse(path: Path | str) -> InverseFilter:
     """Read an inverse that `save_inverse` wrote. Raises `RecordError`, naming the file, if it is none."""
     data = open_record(path)
-    if data.attrs.get("kind") != "inverse":
+    if str(data.attrs.get("kind")) != "inverse":
         raise RecordError(f"{path}: is not a saved inverse; make one with `lhpost6 iterate`")
     try:
-        taps = data["inverse_taps"].transpose("tap", "drive_axis", "reference_axis").values.astype(float)
-        axes = tuple(map(str, data["drive_axis"].values))
+        stored = data["inverse_taps"].transpose("tap", "drive_axis", "reference_axis")
+        taps = stored.values.astype(float, casting="safe")
+        axes, references = (tuple(map(str, data[dim].values)) for dim in stored.dims[1:])
         low, high = map(float, data.attrs["band_hz"])
         rate = float(data.attrs["sample_rate_hz"])
     except (KeyError, TypeError, ValueError) as error:
         raise RecordError(f"{path}: is damaged or incomplete: {error}; make it again with `lhpost6 iterate`") from error
-    fits = taps.shape[1:] == (len(axes),) * 2 and len(taps) % 2 and set(axes) <= set(AXES) and rate > 0
-    if not (fits and np.isfinite(taps).all()):
+    fits = axes == references and len(taps) % 2 and set(axes) <= set(AXES) and len(set(axes)) == len(axes) > 0
+    if not (fits and (np.abs(taps) <= LARGEST).all() and 0 < rate < np.inf and 0 < low < high < np.inf):
         raise RecordError(f"{path}: holds an inverse of shape {taps.shape} for {' '.join(axes)}; make it again")
     made_with = {key: str(value) for key, value in data.attrs.items() if isinstance(value, str) and key != "kind"}
     return InverseFilter(taps, rate, (low, high), axes, made_with)

@@ -219,7 +219,10 @@ def build_machine(
     )
     _check_names(parameters, components, kinds)
     _check_machine(machine)
-    _ = machine.added_effects  # raises for an effect that cannot be
+    try:
+        _ = machine.added_effects  # raises for an effect that cannot be
+    except (ParameterError, UnknownNameError) as error:
+        raise ParameterError(f"{parameters.origin}: {error}") from None
     return machine
 
 

@@ -6,17 +6,17 @@ one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or `
 """
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from .errors import ParameterError, UnknownNameError
-from .files import models_folder
+from .files import models_folder, read_toml
 
 __all__ = [
     "EVIDENCE",
+    "LARGEST",
     "EffectEntry",
     "Parameters",
     "Quantity",
@@ -30,6 +30,9 @@ Value: TypeAlias = float | tuple[float, ...]
 
 EVIDENCE = ("report", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
 """How well a number is known, strongest claim first; `override` is what a user set by hand."""
+
+LARGEST = 1e30
+"""No quantity of a machine or a test in SI is larger, and the powers of this one can still be computed with."""
 
 _QUANTITY_KEYS = {"value", "unit", "evidence", "source", "printed", "rel_sd", "sd"}
 _GROUPS = ("kind", "component", "estimates")
@@ -130,16 +133,22 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
     which only value is needed; or it is the path of a small TOML file of such tables. A component's path
     (``H3.seal_friction``) may be new if its kind has that key, and a number of an effect that is there
     (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError
-    naming the key, or UnknownNameError.
+    naming the key and the file; or UnknownNameError for what is given by hand.
     """
-    if isinstance(changes, str | Path):
-        path = Path(changes)
-        tree = _read_toml(path)
-        entries, origin = _entries(tree, path.name), path.name
-        added = _effects(tree, path.name)
-    else:
-        added = {}
-        entries, origin = dict(changes), "given by hand"
+    if not isinstance(changes, str | Path):
+        return _overridden(parameters, changes, {}, "given by hand")
+    path = Path(changes)
+    tree = _read_toml(path)
+    entries, added = _entries(tree, path.name), _effects(tree, path.name)
+    try:
+        return _overridden(parameters, entries, added, path.name)
+    except (ParameterError, UnknownNameError) as error:
+        raise ParameterError(f"{path.name}: {error}") from None
+
+
+def _overridden(
+    parameters: Parameters, entries: Mapping[str, Any], added: Mapping[str, EffectEntry], origin: str
+) -> Parameters:
     quantities, words = dict(parameters.quantities), dict(parameters.words)
     effects = {**parameters.effects, **added}
     for key, entry in entries.items():
@@ -202,11 +211,10 @@ def _pint_spelling(unit: str) -> str:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        with path.open("rb") as handle:
-            return tomllib.load(handle)
+        return read_toml(path)
     except FileNotFoundError:
         raise ParameterError(f"{path}: no such machine file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except ValueError as error:  # of TOML and of UTF-8
         raise ParameterError(f"{path}: not a TOML file: {error}") from None
     except OSError as error:
         raise ParameterError(f"{path}: cannot be read: {error.strerror}") from None
@@ -231,7 +239,9 @@ def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:
 def _effects(tree: Mapping[str, Any], file: str) -> dict[str, EffectEntry]:
     """Effects of the library that a file names, ``[effect.NAME]``."""
     found = {}
-    for name, table in dict(tree.get("effect", {})).items():
+    if not isinstance(tree.get("effect", {}), dict):
+        raise ParameterError(f"{file}: effect must be sections [effect.NAME]")
+    for name, table in tree.get("effect", {}).items():
         key = f"{file}: effect.{name}"
         if not isinstance(table, dict) or not isinstance(table.get("family"), str):
             raise ParameterError(f"{key} must be a section with family = a name of the library")
@@ -294,8 +304,9 @@ def _scalar(value: object, key: str) -> float:
         number = float(value)
     except OverflowError:
         number = math.inf
-    if not math.isfinite(number):
-        raise ParameterError(f"{key}: value {str(value)[:40]} is not finite")
+    if not abs(number) <= LARGEST:
+        what = f"beyond {LARGEST:g}" if math.isfinite(number) else "not finite"
+        raise ParameterError(f"{key}: value {str(value)[:40]} is {what}")
     return number
 
 

@@ -6,6 +6,7 @@ others may be added; what is there must be right: `load_record` refuses a record
 
 import math
 import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -13,13 +14,15 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import h5py
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .errors import RecordError, UnknownNameError
 from .files import write_whole
 from .names import AXES
+from .parameters import LARGEST
 
 __all__ = [
     "AXES",
@@ -42,6 +45,7 @@ __all__ = [
 LAYOUT_VERSION = 1
 STEP_TOLERANCE = 0.01  # of one sample: how far a time stamp may be from its place
 RATE_TOLERANCE = 1e-4  # relative: 2 ms over 20 s, the least that would spoil a comparison of two records
+SLOWEST, FASTEST = 0.1, 1e6  # [Hz]: a test at another rate has its time in another unit
 DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 1032:1, times int16 to float64)
 
 
@@ -104,10 +108,16 @@ def open_record(path: Path | str) -> xr.Dataset:
     if not path.is_file():
         raise RecordError(f"{path}: no such file")
     try:
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as lazy:
-            if lazy.nbytes > DEFLATE_LIMIT * path.stat().st_size:
-                raise RecordError(f"claims {lazy.nbytes / 1e9:.3g} GB, more than so small a file can hold")
-            return lazy.load()
+        with h5py.File(path) as file:  # h5netcdf complains to the terminal of a file whose attributes are damaged
+            _ = dict(file.attrs)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)  # attributes that contradict their variable; overflow
+            warnings.simplefilter("error", UserWarning)  # a dimension that a variable has twice
+            warnings.simplefilter("ignore", FutureWarning)  # labels in half precision
+            with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as lazy:
+                if lazy.nbytes > DEFLATE_LIMIT * path.stat().st_size:
+                    raise RecordError(f"claims {lazy.nbytes / 1e9:.3g} GB, more than so small a file can hold")
+                return lazy.load()
     except Exception as error:  # a damaged file makes HDF5 raise nearly anything
         raise RecordError(
             f"{path}: not a netCDF-4 (HDF5) file, or damaged: {error}; make or export the record again"
@@ -172,7 +182,7 @@ def make_record(
     except ValueError as error:
         raise RecordError(f"channels, labels and time do not fit together: {error}") from error
     if len(time) > 1 and time[-1] > time[0]:  # the rate to nine figures, so that 2048 Hz reads 2048
-        record.attrs["sample_rate_hz"] = float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
+        record.attrs["sample_rate_hz"] = float(f"{_rate(time):.9g}")
     record.attrs |= dict(attrs) | {"layout_version": LAYOUT_VERSION}
     _refuse(layout_faults(record), "record")
     return record
@@ -229,10 +239,11 @@ def _time_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
         return
     if not same_unit(units := dataset["time"].attrs.get("units", "s"), "s"):
         yield "time", None, f"has units {units!r}", "give time in s"
-    if not np.isfinite(time).all():
-        yield "time", int(np.argmin(np.isfinite(time))), "is not a number", "give one time per sample"
+    time = time.astype(float)
+    if not (usable := np.abs(time) <= LARGEST).all():  # NaN is none of them either
+        yield "time", int(np.argmin(usable)), "is not a number", "give one time per sample"
         return
-    step = np.diff(time.astype(float))
+    step = np.diff(time)
     usual = float(np.median(step))
     if (step <= 0).any():
         k = int(np.argmax(step <= 0)) + 1
@@ -242,11 +253,18 @@ def _time_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
         lost = round(step[k - 1] / usual) - 1
         what = f"a gap of {lost} missing samples" if lost > 0 else f"a step of {step[k - 1]:g} s"
         yield "time", k, f"is not uniform: {what} where {usual:g} s is usual", "resample to a uniform rate"
+    elif not SLOWEST <= (rate := _rate(time)) <= FASTEST:
+        yield "time", None, f"runs at {rate:g} Hz, which no test does", "give time in seconds"
     else:
-        rate = len(step) / (time[-1] - time[0])
         stated = dataset.attrs.get("sample_rate_hz", rate)
         if not (_is_number(stated) and abs(stated / rate - 1) <= RATE_TOLERANCE):
             yield "time", None, f"runs at {rate:g} Hz, sample_rate_hz says {stated}", "correct the wrong one"
+
+
+def _rate(time: NDArray[np.float64]) -> float:
+    """Samples a second; infinite for times too close to tell apart."""
+    with np.errstate(over="ignore", divide="ignore"):
+        return float((len(time) - 1) / (time[-1] - time[0]))
 
 
 def _label_faults(dataset: xr.Dataset, wanted: Mapping[str, Sequence[str]]) -> Iterator[_Fault]:
@@ -278,14 +296,24 @@ def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault
     if not same_unit(units := variable.attrs.get("units"), channel.units):
         what = "has no units" if units is None else f"has units {units!r}"
         yield name, None, what, f"give it in {channel.units!r} and say so in its attribute units"
-    bad = ~np.isfinite(variable.values.reshape(len(variable), -1))
+    if not variable.size:
+        yield name, None, "is empty", "leave it out"
+        return
+    values = variable.values.reshape(len(variable), -1).astype(float)
+    bad = ~(np.abs(values) <= LARGEST)  # NaN is not either
     for column in np.flatnonzero(bad.any(axis=0)):
-        what = f"is not finite in {bad[:, column].sum()} samples"
-        where = channel_name(variable, int(column)), int(np.argmax(bad[:, column]))
-        yield *where, what, "fill the gap or cut the record there"
+        sample = int(np.argmax(bad[:, column]))
+        kind = f"beyond {LARGEST:g}" if np.isfinite(values[sample, column]) else "not finite"
+        what = f"is {kind} in {bad[:, column].sum()} samples"
+        yield channel_name(variable, int(column)), sample, what, "fill the gap or cut the record there"
 
 
 def _attribute_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
+    for key in ("kind", "test", "title", "specimen", "machine", "scheme", "controller", "motion", "drive"):
+        if not isinstance(said := dataset.attrs.get(key, ""), str) or "\0" in said:
+            yield "", None, f"attribute {key} is {said!r}", "it must be a text"
+    if not _is_number(steps := dataset.attrs.get("steps_per_second", 1)):
+        yield "", None, f"attribute steps_per_second is {steps!r}", "it must be a number"
     valves = dataset.attrs.get("valves_per_horizontal_actuator", 1)
     if not (_is_number(valves) and valves in (1, 2)):
         yield "", None, f"attribute valves_per_horizontal_actuator is {valves}", "it must be 1 or 2"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .errors import ParameterError
 from .specimen import Specimen
+from .urdf_numbers import check_urdf
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -79,6 +80,7 @@ def _mount(model: Any, specimen: Specimen) -> Any:
     """Bolt the specimen's URDF to the platen's top frame."""
     if not specimen.urdf.is_file():
         raise ParameterError(f"{specimen.urdf}: no such URDF file")
+    check_urdf(specimen.urdf)
     try:
         body = pin.buildModelFromUrdf(str(specimen.urdf))
     except Exception as error:  # urdfdom reports malformed files as plain exceptions

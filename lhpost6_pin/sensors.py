@@ -122,9 +122,15 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> Sensors:
         if len(values) != (6 if section == "noise" and "axis" in LAYOUT[channel].dims else 1) or (values < 0).any():
             raise ParameterError(f"{given.origin}: {key}: {quantity.value!r} has the wrong length, or is negative")
         tables[section][channel] = values
+    if missing := [key for key in SAMPLING if f"sampling.{key}" not in given]:
+        raise ParameterError(f"{given.origin}: sampling.{missing[0]} is missing")
     sampling = {key: given.number(f"sampling.{key}") for key in SAMPLING}
     if min(sampling.values()) <= 0:
         raise ParameterError(f"{given.origin}: sampling: {sampling} should be positive")
+    for key, least, most in (("bits", 1, 64), ("low_pass_order", 2, 1000)):  # no recorder, no filter has more
+        if not (sampling[key].is_integer() and least <= sampling[key] <= most):
+            what = f"{sampling[key]:g} should be a whole number from {least} to {most}"
+            raise ParameterError(f"{given.origin}: sampling.{key}: {what}")
     noise, *ranges = tables.values()
     return Sensors(
         name=str(given.words.get("sensors.name", path.stem)),

@@ -1,6 +1,7 @@
 """Settings of all tests: hypothesis draws the same examples each time.
 
-`pytest --hypothesis-profile=explore` draws new ones, to look for what nobody has thought of.
+`pytest --hypothesis-profile=explore` draws new ones, to look for what nobody has thought of; `long` draws so many that
+the readers of `test_fuzz` take some ten minutes.
 """
 
 import numpy as np
@@ -14,6 +15,7 @@ from lhpost6_pin.plant import make_plant
 
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("explore", max_examples=1000, deadline=None)
+settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile("fixed")
 
 

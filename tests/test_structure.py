@@ -23,7 +23,7 @@ LAYERS = [
     },  # "" is the package itself: its version
     {"laws"},
     {"parameters", "specimen", "signals", "transfer", "distortion"},
-    {"schema", "records", "motions", "conditioning"},
+    {"schema", "records", "motions", "conditioning", "urdf_numbers"},
     {"components", "inverse", "importing", "sensors"},
     {"law_table", "ports"},
     {"alterations"},

@@ -186,7 +186,7 @@ def open_loop(
     from ..rehearse import replay as replay_spools
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
-    measured = load_record(record, {"actuator": table.actuator_names})
+    measured = load_record(record, {"actuator": table.actuator_names, "horizontal": table.double_acting})
     test = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record"))
     name = f"{test}_open_loop"
     if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():

@@ -74,7 +74,8 @@ def raws_of_leaves(leaves: Iterable[Leaf], source: str, form: str, facts: Mappin
         length = clock.values.size if clock is not None else max(shape)
         key = (clock.group if clock is not None else leaf.step, length)
         if key not in clocks:
-            steps = None if leaf.step is None else leaf.step * np.arange(length)
+            with np.errstate(over="ignore", invalid="ignore"):  # times without end are refused with their sample
+                steps = None if leaf.step is None else leaf.step * np.arange(length)
             clocks[key] = steps if clock is None else _seconds(clock, source)
         together.setdefault(key, []).extend(_columns(leaf, length))
     if not together:
@@ -96,7 +97,8 @@ def _columns(leaf: Leaf, length: int) -> list[tuple[str, str | None, Array]]:
         name = leaf.columns[0] if leaf.columns else path
         return [(name, leaf.unit or unit_in_name(name), values)]
     table = values if values.shape[0] == length else values.T
-    names = leaf.columns or tuple(f"{path}_{k + 1}" for k in range(table.shape[1]))
+    numbered = tuple(f"{path}_{k + 1}" for k in range(table.shape[1]))
+    names = leaf.columns if len(leaf.columns) == len(numbered) else numbered
     units = (leaf.unit or "").split(",")  # "m, rad" are two units for equal shares of the columns
     each = [units[k * len(units) // len(names)] or unit_in_name(name) for k, name in enumerate(names)]
     return [(name, each[k], table[:, k]) for k, name in enumerate(names)]
@@ -112,7 +114,8 @@ def _clock(leaf: Leaf, times: Sequence[Leaf]) -> Leaf | None:
 def _seconds(clock: Leaf, source: str) -> Array:
     unit = time_unit(clock.name, clock.unit) or "s"
     try:
-        return np.squeeze(clock.values).astype(float) * si_factor(unit, "s")
+        with np.errstate(over="ignore"):
+            return np.squeeze(clock.values).astype(float) * si_factor(unit, "s")
     except RecordError as error:
         raise RecordError(f"{source}, {clock.name}: {error}") from None
 

@@ -66,7 +66,10 @@ def make_imported_record(
     constant = [name for name, source in channels.channels.items() if source.constant is not None]
     if constant:
         attrs["constant"] = "not measured, stated in the map: " + ", ".join(constant)
-    return make_record(time, variables, labels, attrs)
+    try:
+        return make_record(time, variables, labels, attrs)
+    except RecordError as error:
+        raise RecordError(f"{channels.origin}: {error}") from None
 
 
 def described_sources(raws: Sequence[RawTest], channels: ChannelMap) -> dict[str, str]:

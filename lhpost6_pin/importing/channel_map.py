@@ -12,16 +12,15 @@ valves_per_horizontal_actuator = 1
 import fnmatch
 import json
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, get_args
 
 from ..errors import RecordError
-from ..files import write_whole
+from ..files import read_toml, write_whole
 from ..names import AXES
-from ..records import LAYOUT
+from ..records import FASTEST, LAYOUT, SLOWEST
 from .raw import RawTest, shown
 
 __all__ = ["ChannelMap", "Source", "TestFacts", "channels_of", "check_map", "find_column", "load_map", "save_map"]
@@ -78,10 +77,10 @@ def load_map(path: Path | str) -> ChannelMap:
     """Read a channel map; raises RecordError naming file and key of what cannot be understood."""
     origin = str(path)
     try:
-        tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        tree = read_toml(path)
     except OSError as error:
         raise RecordError(f"{origin}: cannot be read: {error.strerror or error}; --guess writes a first map") from None
-    except (ValueError, RecursionError) as error:  # TOML and UTF-8 errors are ValueErrors
+    except ValueError as error:  # of TOML and of UTF-8
         raise RecordError(f"{origin}: not a TOML file: {error}") from None
     _known(tree, ("test", "channel"), origin)
     for section in ("test", "channel"):
@@ -163,11 +162,12 @@ def _check_source(source: Source, where: str) -> None:
 
 
 def _check_test(test: TestFacts, where: str) -> None:
+    rates = f"must be positive, from {SLOWEST:g} to {FASTEST:g} Hz"
     faults = {
         "kind": test.kind not in ("measured", "simulated") and "must be measured or simulated",
         "valves_per_horizontal_actuator": test.valves_per_horizontal_actuator not in (1, 2) and "must be 1 or 2",
-        "rate": test.rate is not None and test.rate <= 0 and "must be positive",
-        "file_rate": test.file_rate is not None and test.file_rate <= 0 and "must be positive",
+        "rate": test.rate is not None and not SLOWEST <= test.rate <= FASTEST and rates,
+        "file_rate": test.file_rate is not None and not SLOWEST <= test.file_rate <= FASTEST and rates,
         "fill_gaps": test.fill_gaps < 0 and "must be 0 or more samples",
     }
     for key, fault in faults.items():

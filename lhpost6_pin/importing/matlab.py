@@ -1,5 +1,6 @@
 """MATLAB `.mat` files: v4 to v7 through scipy, v7.3 (which is HDF5) through h5py; structs, cells and time vectors."""
 
+import warnings
 from io import BytesIO
 from typing import Any
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from ..errors import RecordError
 from .arrays import leaves_of, raws_of_leaves
+from .hdf5 import text_of, values_of
+from .mat5 import is_mat5, unpacked_mat5
 from .raw import RawTest
 
 __all__ = ["read_mat", "read_mat73"]
@@ -17,7 +20,11 @@ def read_mat(content: bytes, source: str) -> tuple[RawTest, ...]:
     from scipy.io import loadmat
 
     try:
-        tree = loadmat(BytesIO(content), simplify_cells=True)
+        if is_mat5(content):
+            content = unpacked_mat5(content)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # scipy's, of what it would rather guess: two of one name
+            tree = loadmat(BytesIO(content), simplify_cells=True)
     except Exception as error:  # a damaged file makes scipy raise nearly anything
         raise RecordError(f"{source}: not a MATLAB file, or damaged: {error}; save it again") from error
     plain = {name: value for name, value in tree.items() if not name.startswith("__")}
@@ -30,7 +37,8 @@ def read_mat73(content: bytes, source: str) -> tuple[RawTest, ...]:
 
     try:
         with h5py.File(BytesIO(content), "r") as file:
-            tree = {name: _value(item) for name, item in file.items() if not name.startswith("#")}
+            named = {text_of(name): item for name, item in file.items()}
+            tree = {name: _value(item) for name, item in named.items() if not name.startswith("#")}
     except Exception as error:  # a damaged file makes HDF5 raise nearly anything
         raise RecordError(f"{source}: not a MATLAB v7.3 file, or damaged: {error}; save it again") from error
     return raws_of_leaves(*_arranged(tree, source, "MATLAB v7.3 file"))
@@ -46,11 +54,11 @@ def _value(item: Any) -> Any:
     import h5py
 
     if isinstance(item, h5py.Group):
-        return {name: _value(child) for name, child in item.items()}
+        return {text_of(name): _value(child) for name, child in item.items()}
     if item.attrs.get("MATLAB_empty"):
         return []
     if h5py.check_ref_dtype(item.dtype) is not None:
-        return [_value(item.file[reference]) for reference in np.ravel(item[()].T)]
+        return [_value(item.file[reference]) for reference in np.ravel(values_of(item).T)]
     if item.attrs.get("MATLAB_class") == b"char":
-        return "".join(map(chr, np.ravel(item[()])))
-    return np.squeeze(np.asarray(item[()]).T)
+        return "".join(map(chr, np.ravel(values_of(item))))
+    return np.squeeze(values_of(item).T)

@@ -18,6 +18,7 @@ Indices = NDArray[np.intp]
 _SAME_TIME = 1e-6  # of one sample: two clocks that differ by less are the same
 _ANTI_ALIAS = (0.4, 16)  # cutoff of the new rate, order: 1 % lost at 0.3 of the rate, 0.2 % left at 0.6
 _MOST_DIGITS = 9
+_MOST = 2**24  # samples: more than two hours at 2048 Hz
 _LONGEST = 1e12  # [s]: seconds since any usual epoch are far fewer
 
 
@@ -60,6 +61,8 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
             f"{where}, time, sample {k + 1}: {lost[k]:.0f} samples are missing between {time[k]:.9g} s and "
             f"{time[k + 1]:.9g} s; set fill_gaps = {count} in [test] of the map to interpolate them, or cut the file"
         )
+    if lost.sum() + len(time) > _MOST:
+        raise RecordError(f"{where}, time: its gaps are {lost.sum():.3g} samples long; cut the file at the longest")
     place = np.concatenate([[0], np.cumsum(lost + 1)]).astype(np.intp)
     step, start = np.polyfit(place, time - time[0], 1)
     off = np.abs(time - time[0] - start - step * place)
@@ -122,6 +125,8 @@ def common_time(samplings: Sequence[Sampling], rate: float | None, where: str) -
     step = 1.0 / rate if rate else fastest.step
     start, end = max(float(s.time[0]) for s in samplings), min(float(s.time[-1]) for s in samplings)
     count = int(np.floor((end - start) / step + _SAME_TIME)) + 1
+    if count > max(_MOST, *(len(s.time) for s in samplings)):
+        raise RecordError(f"{where}: {count:.3g} samples at {1 / step:g} Hz are too many; ask for a lower rate")
     if count < 2:
         spans = ", ".join(f"{s.time[0]:g} to {s.time[-1]:g} s" for s in samplings)
         raise RecordError(f"{where}: the files share no stretch of time: {spans}; give files of one test")

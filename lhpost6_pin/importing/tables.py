@@ -216,6 +216,7 @@ def _raw_of_columns(
         raise RecordError(f"{source}: {shown([names[k] for k in clocks])} are all named as time; rename all but one")
     time = None
     if clocks:
-        time = values[:, clocks[0]] * si_factor(time_unit(names[clocks[0]], units[clocks[0]]) or "s", "s")
+        with np.errstate(over="ignore"):  # times without end are refused with their sample
+            time = values[:, clocks[0]] * si_factor(time_unit(names[clocks[0]], units[clocks[0]]) or "s", "s")
     rest = [k for k in range(len(names)) if k not in clocks]
     return make_raw(source, form, [names[k] for k in rest], [units[k] for k in rest], values[:, rest], time, facts)

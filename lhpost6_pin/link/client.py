@@ -67,7 +67,8 @@ class LinkClient:
 
             def told_all(frame: Frame) -> bool:
                 found[frame.kind] = frame
-                return {Kind.WELCOME, Kind.SENSORS} <= found.keys()
+                answers = [found.get(Kind.WELCOME), found.get(Kind.SENSORS)]
+                return None not in answers and len({a.actuators for a in answers if a}) == 1
 
             self._ask(Frame(Kind.HELLO, self._session), told_all)
         except OSError as error:

@@ -197,7 +197,7 @@ def decode(datagram: bytes) -> Frame:
     if kind in (Kind.COMMAND, Kind.SENSORS):
         return Frame(*head, numbers=_finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64))
     if kind == Kind.WELCOME:
-        return Frame(*head, welcome=_unpacked_welcome(datagram))
+        return Frame(*head, welcome=_unpacked_welcome(datagram, valves))
     return Frame(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
 
 
@@ -230,12 +230,15 @@ def _packed_header(frame: Frame) -> bytes:
     )
 
 
-def _unpacked_welcome(datagram: bytes) -> Welcome:
+def _unpacked_welcome(datagram: bytes, valves: int) -> Welcome:
     rate, machine = _WELCOME.unpack_from(datagram, _HEADER.size)
     if not (math.isfinite(rate) and rate > 0.0):
         raise LinkError(f"a rate of {rate} samples a second")
     rows = list(_ACTUATOR.iter_unpack(datagram[_HEADER.size + _WELCOME.size :]))
-    return Welcome(rate, _text(machine), tuple(_text(name) for name, _ in rows), tuple(valves for _, valves in rows))
+    counts = tuple(count for _, count in rows)
+    if sum(counts) != valves:
+        raise LinkError(f"{valves} valves, of which the actuators have {sum(counts)}")
+    return Welcome(rate, _text(machine), tuple(_text(name) for name, _ in rows), counts)
 
 
 def _finite(numbers: Array | None) -> Array:

@@ -1,6 +1,7 @@
 """Ground motions by name: shipped records, tests made from a few numbers, records of a package or of the user."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
@@ -60,26 +61,54 @@ def _tables() -> tuple[dict[str, Any], dict[str, Any]]:
 def list_motions() -> tuple[MotionEntry, ...]:
     """Every motion known by name, with what is needed to have it."""
     index, tests = _tables()
-    entries = [
-        MotionEntry(name, "record", record["title"], tuple(record["aliases"]), True, "", ())
+    with _blamed("index.toml"):
+        records, packaged = _records_of(index)
+    with _blamed("tests.toml"):
+        made = [
+            MotionEntry(name, test["kind"], test["title"], (), True, "", _options_of(test))
+            for name, test in tests.items()
+            if name != "processing"
+        ]
+    return (*records, *made, *packaged)
+
+
+def _texts(words: Iterable[Any]) -> tuple[str, ...]:
+    return tuple(map(str, words))
+
+
+def _options_of(test: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(key for key in test if key not in ("kind", "title"))
+
+
+@contextmanager
+def _blamed(file: str) -> Iterator[None]:
+    """Raise MotionError that names a file of `models/ground_motions` for whatever its tables lack."""
+    try:
+        yield
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise MotionError(f"{file}: is damaged: {error!r}; install the package again") from error
+
+
+def _records_of(index: Mapping[str, Any]) -> tuple[list[MotionEntry], list[MotionEntry]]:
+    """Entries of the records that are shipped; and of those that come with a package or from the user."""
+    records = [
+        MotionEntry(name, "record", record["title"], _texts(record["aliases"]), True, "", ())
         for name, record in index["records"].items()
     ]
-    for name, test in tests.items():
-        if name != "processing":
-            options = tuple(key for key in test if key not in ("kind", "title"))
-            entries.append(MotionEntry(name, test["kind"], test["title"], (), True, "", options))
+    entries = []
     package = index["package"]
     remedy = INSTALL if missing_package(package["module"]) else ""
     wanted = {
-        name: WantedRecord(*(record[key] for key in WantedRecord._fields)) for name, record in index["wanted"].items()
+        name: WantedRecord(*_texts(record[key] for key in WantedRecord._fields))
+        for name, record in index["wanted"].items()
     }
     for name, record in package["records"].items():
-        aliases, own = tuple(record.get("aliases", ())), wanted.pop(name, None)
+        aliases, own = _texts(record.get("aliases", ())), wanted.pop(name, None)
         entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, (), own))
     for name, own in wanted.items():
         record, remedy = index["wanted"][name], f"your file: {own.record}"
-        entries.append(MotionEntry(name, "file", record["title"], tuple(record["aliases"]), False, remedy, (), own))
-    return tuple(entries)
+        entries.append(MotionEntry(name, "file", record["title"], _texts(record["aliases"]), False, remedy, (), own))
+    return records, entries
 
 
 def motion_options(name: str) -> tuple[MotionOption, ...]:
@@ -88,7 +117,8 @@ def motion_options(name: str) -> tuple[MotionOption, ...]:
     Raises UnknownNameError for a name that does not exist.
     """
     entry = motion_entry(name)
-    return options_of(_tables()[1], entry.name) if entry.options else ()
+    with _blamed("tests.toml"):
+        return options_of(_tables()[1], entry.name) if entry.options else ()
 
 
 def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> GroundMotion:

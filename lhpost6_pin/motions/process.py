@@ -22,6 +22,10 @@ from .toml import load_toml, values_of
 __all__ = ["Reference", "Target", "axes_map", "make_target", "smooth_step", "with_scale"]
 
 
+_MOST = 2**24
+"""Samples that a target may have: more than two hours at 2048 Hz, and 0.8 GB an array."""
+
+
 @dataclass(frozen=True)
 class Reference:
     """What was done to the motion to make a target of it."""
@@ -125,6 +129,7 @@ def make_target(
     _refuse_infinite(motion.name, scale, channels)
     step = Fraction(motion.time_step * rate).limit_denominator(10_000)  # in samples of the target
     memory = max(settings["memory"] / high_pass if high_pass else 0.0, 2 * pad)
+    _refuse_endless(motion, (last - first) * motion.time_step + 2 * memory, rate)
     # both the record's first sample and the period fall on samples of the target
     ends = _multiple(round(memory / motion.time_step) + 1, step.denominator)
     total = _multiple(len(channels) + 2 * ends, step.denominator)
@@ -181,6 +186,15 @@ def smooth_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _refuse_infinite(name: str, scale: float, *arrays: np.ndarray) -> None:
     if not all(np.isfinite(array).all() for array in arrays):
         raise MotionError(f"{name}: at scale {scale:g} its samples are too large to compute with; give a smaller scale")
+
+
+def _refuse_endless(motion: GroundMotion, span: float, rate: float) -> None:
+    """Refuse a time step with which some `span` [s] would need more samples than memory holds."""
+    if max(span / motion.time_step, span * rate) > _MOST:
+        raise MotionError(
+            f"{motion.name}: {span:g} s with a time step of {motion.time_step:g} s are more than {_MOST} samples; "
+            "correct the time step, or cut a window"
+        )
 
 
 def _multiple(count: int, of: int) -> int:

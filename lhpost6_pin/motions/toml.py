@@ -1,10 +1,10 @@
 """Ground-motion data files: a quantity is a table {value, unit, source}, converted to SI on reading."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from ..errors import MotionError
+from ..files import read_toml
 
 __all__ = ["load_toml", "si_unit", "values_of"]
 
@@ -15,7 +15,7 @@ _SI = ("", "1", "m", "m/s", "m/s^2", "rad", "s", "Hz")  # "" for texts and switc
 def load_toml(path: "Path | str") -> dict[str, Any]:
     """Contents of a TOML file; raises MotionError naming the file and line."""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return read_toml(path)
     except (OSError, ValueError) as error:
         raise MotionError(f"{path}: {error}") from error
 

@@ -29,6 +29,8 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 _RELATIVE_IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 _KEEP = 4
 """Cache folders of older sources that are kept, newest first."""
+_ROOM = 50e6
+"""Bytes that must be free where compiled code is kept: four times what all of it takes."""
 
 
 @cache
@@ -70,15 +72,15 @@ def cache_folder() -> Path | None:
         try:
             base.mkdir(parents=True, exist_ok=True, mode=0o700)  # in two steps: parents=True gives the mode to the last
             folder.mkdir(exist_ok=True, mode=0o700)
-            if not (_private(base) and _writable(folder)):
+            if not (_private(base) and _writable(folder) and shutil.disk_usage(folder).free > _ROOM):
                 continue
         except OSError:
             continue
         _drop_old(base, folder)
         return folder
     log.warning(
-        "no private folder for compiled code can be written: this run compiles anew (about half a minute); "
-        "set LHPOST6_CACHE_DIR to a folder of your own to keep it"
+        "no private folder with 50 MB free for compiled code can be written: this run compiles anew (about half a "
+        "minute); set LHPOST6_CACHE_DIR to a folder of your own to keep it"
     )
     return None
 

@@ -7,7 +7,7 @@ others may be added; what is there must be right: `load_record` refuses a record
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
@@ -43,6 +43,11 @@ __all__ = [
 ]
 
 LAYOUT_VERSION = 1
+"""Of the layout below. A change that older records do not follow (of a name, unit or sign) counts it up."""
+
+STEPS: Mapping[int, Callable[[xr.Dataset], xr.Dataset]] = {}
+"""From each older version to the next: what is done to a record of it when it is read."""
+
 STEP_TOLERANCE = 0.01  # of one sample: how far a time stamp may be from its place
 RATE_TOLERANCE = 1e-4  # relative: 2 ms over 20 s, the least that would spoil a comparison of two records
 SLOWEST, FASTEST = 0.1, 1e6  # [Hz]: a test at another rate has its time in another unit
@@ -100,9 +105,9 @@ class Finding:
 
 # ---------------------------------------------------------------------------------------------- disk
 def open_record(path: Path | str) -> xr.Dataset:
-    """Read a whole netCDF-4 file into memory without judging its content.
+    """Read a whole netCDF-4 file into memory without judging its content; an older layout is brought to today's.
 
-    Raises `RecordError`, naming the file, if it is missing, not netCDF-4, or damaged.
+    The file stays as it is. Raises `RecordError`, naming the file, if it is missing, not netCDF-4, or damaged.
     """
     path = Path(path)
     if not path.is_file():
@@ -117,11 +122,19 @@ def open_record(path: Path | str) -> xr.Dataset:
             with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as lazy:
                 if lazy.nbytes > DEFLATE_LIMIT * path.stat().st_size:
                     raise RecordError(f"claims {lazy.nbytes / 1e9:.3g} GB, more than so small a file can hold")
-                return lazy.load()
+                return _brought_up(lazy.load())
     except Exception as error:  # a damaged file makes HDF5 raise nearly anything
         raise RecordError(
             f"{path}: not a netCDF-4 (HDF5) file, or damaged: {error}; make or export the record again"
         ) from error
+
+
+def _brought_up(dataset: xr.Dataset) -> xr.Dataset:
+    """A record in today's layout; what says no version, or none that is known, is left for `layout_faults`."""
+    said = dataset.attrs.get("layout_version", LAYOUT_VERSION)
+    for version in range(int(said) if _is_number(said) and said >= 1 else LAYOUT_VERSION, LAYOUT_VERSION):
+        dataset = STEPS[version](dataset).assign_attrs(layout_version=version + 1, written_in_layout=said)
+    return dataset
 
 
 def load_record(path: Path | str, labels: Mapping[str, Sequence[str]] | None = None) -> xr.Dataset:

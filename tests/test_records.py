@@ -10,6 +10,7 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from lhpost6_pin import records
 from lhpost6_pin.check import check_record
 from lhpost6_pin.errors import RecordError, UnknownNameError
 from lhpost6_pin.records import (
@@ -52,6 +53,46 @@ def write_anyway(dataset: xr.Dataset, path: Path) -> Path:
     """Write whatever it is, valid or not."""
     dataset.to_netcdf(path, engine="h5netcdf")
     return path
+
+
+# ---------------------------------------------------------------------------------------- older layouts
+def test_there_is_a_step_from_every_older_layout_to_the_next():
+    assert set(records.STEPS) == set(range(1, records.LAYOUT_VERSION))
+
+
+@pytest.mark.parametrize("path", sorted(RECORDS.glob("layout_*.nc")), ids=lambda path: path.stem)
+def test_a_record_of_every_layout_so_far_is_read(path):
+    """Kept from when the layout was new; `full_record(8)` has the numbers that are in it."""
+    record = load_record(path, LABELS)
+    assert record.attrs["layout_version"] == records.LAYOUT_VERSION and set(LAYOUT) <= set(record)
+    np.testing.assert_array_equal(record["strut_pressure"], full_record(8)["strut_pressure"])
+
+
+def test_a_record_of_every_layout_so_far_is_kept():
+    assert [p.stem for p in sorted(RECORDS.glob("layout_*.nc"))] == [
+        f"layout_{version}" for version in range(1, records.LAYOUT_VERSION + 1)
+    ]
+
+
+def test_a_record_of_an_older_layout_is_brought_to_todays_step_by_step(tmp_path, monkeypatch):
+    def renamed(old: xr.Dataset) -> xr.Dataset:
+        return old.rename(legs="actuator_displacement")
+
+    def in_metres(old: xr.Dataset) -> xr.Dataset:
+        legs = (1e-3 * old["actuator_displacement"]).assign_attrs(units="m")
+        return old.assign(actuator_displacement=legs)
+
+    new = full_record(16)
+    legs = (1e3 * new["actuator_displacement"]).assign_attrs(units="mm")
+    old = new.assign(actuator_displacement=legs).rename(actuator_displacement="legs")
+    path = write_anyway(old, tmp_path / "old.nc")
+    written = path.read_bytes()
+    monkeypatch.setattr(records, "LAYOUT_VERSION", 3)
+    monkeypatch.setattr(records, "STEPS", {1: renamed, 2: in_metres})
+    found = load_record(path, LABELS)
+    np.testing.assert_allclose(found["actuator_displacement"], new["actuator_displacement"], rtol=1e-15)
+    assert found.attrs["layout_version"] == 3 and found.attrs["written_in_layout"] == 1
+    assert path.read_bytes() == written
 
 
 # --------------------------------------------------------------------------------------- what is accepted

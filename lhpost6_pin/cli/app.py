@@ -1,7 +1,9 @@
 """The application that the commands are added to, its entry point, and what it shows while it works."""
 
+import errno
 import logging
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -32,19 +34,58 @@ def main() -> None:
 
     handler = RichHandler(console=stderr(), show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
-    try:
-        app()
-    except LhpostError as error:
-        _fail(str(error))
-    except OSError as error:  # disk full, no permission, a file where a folder should be
-        path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
-        where = f"cannot read or write {path}" if path else "cannot read or write a file"
-        _fail(f"{where}: {os.strerror(error.errno) if error.errno else error}")
-    except SystemExit as end:
-        if end.code == _INTERRUPTED:
-            stderr().print("interrupted; nothing half-written is left behind")
-        raise
+    with _noting_ctrl_c():
+        try:
+            app()
+        except LhpostError as error:
+            _fail(str(error))
+        except OSError as error:  # disk full, no permission, a file where a folder should be
+            path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
+            where = f"cannot read or write {path}" if path else "cannot read or write a file"
+            remedy = "; make room, or choose another folder with --out" * (error.errno in _NO_ROOM)
+            _fail(f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
+        except SystemExit as end:
+            if end.code == _INTERRUPTED:
+                _say_interrupted()
+            raise
+        except Exception:
+            if not _PRESSED:
+                raise
+            _say_interrupted()
+            sys.exit(_INTERRUPTED)
 
+
+@contextmanager
+def _noting_ctrl_c() -> Iterator[None]:
+    """Keep in mind that Ctrl-C was pressed: the compiler's callbacks swallow the exception, and complain of it."""
+    _PRESSED.clear()
+
+    def note(number: int, frame: Any) -> None:
+        _PRESSED.append(number)
+        signal.default_int_handler(number, frame)
+
+    def swallowed(lost: Any) -> None:
+        if lost.exc_type is not KeyboardInterrupt:
+            hook(lost)
+
+    handler, hook = signal.signal(signal.SIGINT, note), sys.unraisablehook
+    sys.unraisablehook = swallowed
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        sys.unraisablehook = hook
+
+
+def _say_interrupted() -> None:
+    stderr().print("interrupted; nothing half-written is left behind")
+
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+"""What is wrong with where results are to go, not with what is read."""
+
+_PRESSED: list[int] = []
+"""What Ctrl-C has sent since the command began."""
 
 _INTERRUPTED = 130
 """Exit code that typer gives to Ctrl-C."""
@@ -98,4 +139,10 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
         name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=stderr()
     ) as bar:
         task = bar.add_task(title, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+
+        def advance(share: float) -> None:
+            if _PRESSED:  # and was swallowed
+                raise KeyboardInterrupt
+            bar.update(task, completed=share)
+
+        yield advance

@@ -1,6 +1,7 @@
 """Data files of every format give the numbers that were put in; bad ones are refused with file, place and remedy."""
 
 import re
+import struct
 from pathlib import Path
 
 import h5py
@@ -100,6 +101,14 @@ def test_a_damaged_469d_file_is_refused_with_its_key_or_sample(tmp_path, case):
     assert str(path) in str(caught.value)
     for phrase in phrases:
         assert phrase in str(caught.value)
+
+
+def test_a_signalling_nan_of_a_binary_469d_file_is_a_hole_like_any_other(tmp_path):
+    """In double precision it becomes a quiet one, of which numpy warns; warnings fail tests here."""
+    content = bytearray(binary_469d(header(CHANNELS, 1 / RATE), VALUES))
+    content[-4:] = struct.pack("<I", 0x7FA00000)
+    found = one(put(tmp_path, "run.bin", bytes(content)))
+    assert np.argwhere(np.isnan(found.values)).tolist() == [[len(VALUES) - 1, len(CHANNELS) - 1]]
 
 
 def test_a_key_given_twice_is_refused(tmp_path):

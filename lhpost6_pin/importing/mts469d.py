@@ -52,8 +52,9 @@ def read_469d(content: bytes, source: str) -> RawTest:
             f"{source}: ends within sample {len(values) // count}, after {lost}: the file is cut short, or CHANNELS "
             "is wrong; fetch it again"
         )
-    table = values.reshape(-1, count).astype(np.float64)
-    with np.errstate(over="ignore"):  # times without end are refused with their sample
+    # what is not finite is refused with its sample: signalling NaN of a binary file, times without end
+    with np.errstate(over="ignore", invalid="ignore"):
+        table = values.reshape(-1, count).astype(np.float64)
         time = header.step * np.arange(len(table), dtype=np.float64)
     return make_raw(source, form, header.names, header.units, table, time, header.facts)
 

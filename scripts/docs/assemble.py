@@ -3,6 +3,7 @@
 A line `<!-- insert: NAME ... -->` of a page is replaced by what the generator NAME returns for the words behind it.
 """
 
+import ast
 import os
 import re
 import shlex
@@ -44,6 +45,25 @@ def _generated(words: str) -> str:
 def _audit() -> str:
     """What the audit last printed."""
     return (HERE / "audit.md").read_text(encoding="utf-8").strip()
+
+
+def _fresh() -> str:
+    """How long a newcomer waited when it was last tried."""
+    return (HERE / "fresh.md").read_text(encoding="utf-8").strip()
+
+
+def _examples() -> str:
+    """The numbered examples: what each is, how it is called, and its code to unfold."""
+    parts = []
+    for path in sorted((ROOT / "scripts").glob("example_*.py")):
+        code = path.read_text(encoding="utf-8")
+        said = ast.get_docstring(ast.parse(code)) or ""
+        first, call, *more = said.split("\n\n")
+        lines = [f"## {path.stem.split('_')[1]}. {first.rstrip('.')}", *more]
+        calls = "\n".join(line.strip() for line in call.splitlines())
+        shown = "\n".join(f"    {line}".rstrip() for line in ["```python", *code.splitlines(), "```"])
+        parts += [*lines, f"```text\n{calls}\n```", f'??? example "{path.relative_to(ROOT)}"\n\n{shown}']
+    return "\n\n".join(parts)
 
 
 def _battery() -> str:
@@ -105,6 +125,8 @@ INSERTS: Mapping[str, Callable[..., str]] = {
     "docstring": controller.docstring,
     "effects": tables.effects,
     "evidence": tables.evidence,
+    "examples": _examples,
+    "fresh": _fresh,
     "functions": controller.functions,
     "law": theory.law,
     "laws": theory.laws_of,

@@ -115,14 +115,17 @@ def expected_response(model: LoopModel, controller: Controller) -> Complex:
     return model.displacement @ inner
 
 
-def margins(model: LoopModel, controller: Controller) -> tuple[Margin, ...]:
-    """Gain and phase margin of each free axis, the others closed; of a loop that is stable as it is."""
+def margins(model: LoopModel, controller: Controller, below: float = np.inf) -> tuple[Margin, ...]:
+    """Gain and phase margin of each free axis, the others closed; of a loop that is stable as it is.
+
+    Phase margins count where the loop crosses gain one at a frequency up to `below` [Hz].
+    """
     inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(model, controller))
     alone = 1.0 / np.einsum("mkk->mk", inner) - 1.0  # what an axis sees of itself around its own loop, others closed
-    return tuple(_margin(model.frequency, loop) for loop in alone.T)
+    return tuple(_margin(model.frequency, loop, below) for loop in alone.T)
 
 
-def _margin(frequency: Array, loop: Complex) -> Margin:
+def _margin(frequency: Array, loop: Complex, below: float = np.inf) -> Margin:
     """Smallest margins of a scalar loop: where it crosses the negative real axis inside, and the unit circle."""
     if not loop.any():
         return Margin(np.inf, np.nan, np.inf, np.nan)
@@ -138,7 +141,7 @@ def _margin(frequency: Array, loop: Complex) -> Margin:
     for i in np.flatnonzero(np.diff(np.sign(size))):
         share = -size[i] / (size[i + 1] - size[i])
         left = abs(np.angle(-np.exp(1j * ((1.0 - share) * turn[i] + share * turn[i + 1]))))
-        if left < phase:
+        if left < phase and frequency[i] <= below:
             phase, at_phase = left, frequency[i]
     return Margin(float(gain), float(at_gain), float(phase), float(at_phase))
 

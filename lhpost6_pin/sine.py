@@ -2,12 +2,12 @@
 
 Both are the same least-mean-squares law, one canceller per multiple h of the fundamental. It adds to the drive
 
-    c(t) = w_c cos(h w t) + w_s sin(h w t),   (w_c, w_s)' = (2 / tau |T|) e (cos, sin)(h w t + arg T),
+    c(t) = w_c cos(h w t) + w_s sin(h w t),   (w_c, w_s)' = (2 / (tau |T|)) e (cos, sin)(h w t + arg T),
 
-at the level of the sine's envelope; e = wanted - achieved acceleration, T the response from drive to acceleration at
-that frequency: that of the reference generator, then from reference to feedback, from the linear model (`margins`).
-Nothing is learnt while spool commands are clipped. The fundamental's canceller (APC) brings amplitude and phase to what
-is wanted; the others (AHC) take out what friction, valve flow and geometry add.
+at the level of the sine's envelope, as e is; e = wanted - achieved acceleration (af), T the response from drive to
+acceleration at that frequency: that of the reference generator, then from reference to feedback, from the linear model
+(`margins`). Nothing is learnt while spool commands are clipped. The fundamental's canceller (APC) brings amplitude and
+phase to what is wanted; the others (AHC) take out what friction, valve flow and geometry add.
 """
 
 from collections.abc import Callable

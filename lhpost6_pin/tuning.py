@@ -5,11 +5,11 @@ feed-forward Kvf, jerk feed-forward Kjf, again, acceleration feed-forward Kaf. F
 (`margins`) as far as gain margin, phase margin and sensitivity allow. Feed-forward is fitted to the response measured
 under white noise (`identify`): with the loop closed as it is,
 
-    T = G (Kxf + Kvf s + Kaf s^2 + Kjf s^3 + Kx),
+    T = G (Kxf + Kvf s + Kaf s^2 + Kjf s^3 + Kx + Kv s + Ka s^2),
 
-so a measured T gives G, and the gains that bring T nearest to a pure delay follow by least squares over all
-frequencies, weighted by coherence. The delay is one for all axes, so that they stay in step; it is the one with which
-the fit is best.
+(the reset integrator is far below) so a measured T gives G, and the gains that bring T nearest to a pure delay follow
+by least squares over all frequencies, weighted by coherence. The delay is one for all axes, so that they stay in step;
+it is the one with which the fit is best.
 """
 
 from collections.abc import Callable, Sequence
@@ -277,11 +277,10 @@ def _allowed(job: _Job, model: LoopModel, settings: ControllerSettings, a: int) 
     controller = job.controller(settings)
     inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(model, controller))
     sensitivity = np.abs(np.einsum("mkk->mk", inner)).max(axis=0)
-    slowest = _slowest_column(model)
-    for k, m in enumerate(margins(model, controller)):
+    for k, m in enumerate(margins(model, controller, _slowest_column(model))):
         slack = 1.0 if k == a else numbers.number("feedback_targets.neighbours")
-        late = m.phase * slack < want["phase_margin"] and m.phase_frequency <= slowest
-        if late or m.gain * slack < want["gain_margin"] or sensitivity[k] > slack * want["sensitivity"]:
+        late, near = m.phase * slack < want["phase_margin"], m.gain * slack < want["gain_margin"]
+        if late or near or sensitivity[k] > slack * want["sensitivity"]:
             return False
     return True
 
@@ -355,7 +354,8 @@ class _Fit:
         self.bands, self.terms = [(f >= low) & (f <= high) for low, high in bands], terms
         self.s = 2j * np.pi * f
         self.weight = np.sqrt(transfer.coherence[:, 0])
-        self.fixed = settings.displacement_feedforward[k] + settings.displacement_gain[k]
+        fed_back = (settings.displacement_gain, settings.velocity_gain, settings.acceleration_gain)
+        self.fixed = settings.displacement_feedforward[k] + sum(g[k] * self.s**n for n, g in enumerate(fed_back))
         self.before = [float(getattr(settings, name)[k]) for name in _FEEDFORWARD]
         self.plant = transfer.response[:, 0, 0] / (self.fixed + self._ahead(self.before))
 

@@ -39,6 +39,18 @@ def test_margins_of_an_integrator_with_delay_are_those_of_its_closed_form(gain, 
     assert found.phase_frequency == pytest.approx(gain / (2 * np.pi), rel=step - 1)
 
 
+def test_phase_margins_can_be_asked_for_below_a_frequency():
+    """An integrator, and an oil column at 30 Hz that crosses gain one again with less phase left."""
+    s = 2j * np.pi * FREQUENCIES
+    column = (2 * np.pi * 30.0) ** 2
+    loop = 3.0 / s * np.exp(-1e-3 * s) * column / (s**2 + 0.01 * 2 * np.pi * 30.0 * s + column)
+    everywhere, low = _margin(FREQUENCIES, loop), _margin(FREQUENCIES, loop, below=10.0)
+    assert everywhere.phase_frequency > 25.0 and everywhere.phase < low.phase
+    assert low.phase_frequency == pytest.approx(3.0 / (2 * np.pi), rel=0.01)
+    assert low.phase == pytest.approx(np.pi / 2 - 3e-3, abs=1e-3)  # the column, far above, turns it by 2e-4
+    assert (low.gain, low.gain_frequency) == (everywhere.gain, everywhere.gain_frequency)
+
+
 def test_a_loop_that_only_falls_below_a_gain_is_not_taken_for_one_with_an_upper_limit():
     """Three integrators with leads cross the negative real axis twice: gains too small are unstable, too."""
     s = 2j * np.pi * FREQUENCIES

@@ -109,6 +109,21 @@ def test_settings_that_are_unstable_on_a_machine_are_tuned_all_the_same(uniaxial
     assert np.isnan(axis.margin_before.gain) and axis.margin_after.gain > 2.0
 
 
+def test_a_panel_with_velocity_and_acceleration_feedback_is_fitted_exactly():
+    """The plant comes back from a response made by hand with all feedback gains, whatever they are."""
+    frequency = np.linspace(0.5, 33.0, 200)
+    s = 2j * np.pi * frequency
+    plant = np.exp(-0.005 * s) / (s + 3.0)
+    given = {"displacement_gain": 2.0, "velocity_gain": 0.3, "acceleration_gain": 0.01, "displacement_feedforward": 0.4}
+    given |= {"velocity_feedforward": 1.0, "acceleration_feedforward": 0.002, "jerk_feedforward": 1e-5}
+    settings = replace(load_controller("lhpost6"), **{name: (value,) * 6 for name, value in given.items()})
+    gains = [2.0 + 0.4, 0.3 + 1.0, 0.01 + 0.002, 1e-5]  # on s^0 to s^3
+    response = plant * sum(g * s**n for n, g in enumerate(gains))
+    seen = Transfer(frequency, response[:, None, None], np.ones((200, 1)))
+    fit = tuning._Fit(seen, settings, 0, ((0.5, 5.0), (0.5, 33.0)), (1, 2))
+    np.testing.assert_allclose(fit.plant, plant, rtol=1e-12)
+
+
 def test_a_machine_that_no_gain_can_hold_is_refused(monkeypatch):
     with_number(monkeypatch, feedback_targets__first_gain=40.0)
     with pytest.raises(SimulationError, match="unstable even with the lowest gains tried"):

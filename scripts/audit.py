@@ -18,13 +18,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+from docs.markdown import print_and_keep
 
 from lhpost6_pin import __version__
 from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.energy import energy_audit
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import write_whole
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.plant import Plant, make_plant
@@ -136,11 +136,7 @@ def main() -> None:
         *energy_rows(make_plant(machine), asked.seconds),
         *repeating_rows(machine, asked.threads),
     ]
-    text = "\n".join([*rows, *page_rows(machine)])
-    print(text)
-    if asked.out is not None:
-        with write_whole(asked.out) as beside:
-            beside.write_text(text, encoding="utf-8")
+    print_and_keep([*rows, *page_rows(machine)], asked.out)
 
 
 if __name__ == "__main__":

@@ -17,9 +17,9 @@ import time
 from pathlib import Path
 
 from browser import BROWSER, Tab, browse
+from docs.markdown import print_and_keep
 
 from lhpost6_pin import __version__
-from lhpost6_pin.files import write_whole
 
 ROOT = Path(__file__).parent.parent
 SHOWN = 5.0  # [s] of the animation over which frames are counted
@@ -86,11 +86,7 @@ def main() -> None:
         f"| playing | {rate:.0f} | 30 |",
         "",
     ]
-    text = "\n".join(rows)
-    print(text)
-    if asked.out is not None:
-        with write_whole(asked.out) as beside:
-            beside.write_text(text, encoding="utf-8")
+    print_and_keep(rows, asked.out)
 
 
 if __name__ == "__main__":

@@ -147,6 +147,22 @@ def test_the_stored_audit_is_a_whole_one_that_found_nothing_amiss(site):
     assert len(titles) == 3 and all(title in page for title in titles)
 
 
+def test_the_stored_wait_of_a_newcomer_is_within_what_is_wanted(site):
+    stored = (ROOT / "scripts" / "docs" / "fresh.md").read_text()
+    rows = re.findall(r"^\| .+ \| (\d+) \| (\d+) \|$", stored, re.MULTILINE)
+    assert len(rows) == 4
+    assert all(float(found) <= float(wanted) for found, wanted in rows[:3])  # seconds
+    assert float(rows[3][0]) >= float(rows[3][1])  # frames a second
+    assert "How long a newcomer waits" in (site / "results" / "audit.html").read_text()
+
+
+def test_every_example_is_on_its_page_with_its_code(site):
+    page = (site / "tutorials" / "examples.html").read_text()
+    for path in sorted((ROOT / "scripts").glob("example_*.py")):
+        assert path.name in page
+    assert page.count("find_missing_effect") >= 2 and "simulate_many" in page
+
+
 def test_every_assumed_number_of_the_machine_is_on_its_page(site):
     text = (site / "assumptions.html").read_text(encoding="utf-8")
     for path, quantity in load_machine().parameters.items():

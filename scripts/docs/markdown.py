@@ -1,8 +1,11 @@
 """Small pieces of Markdown."""
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
-__all__ = ["cell", "code_cell", "number", "table"]
+from lhpost6_pin.files import write_whole
+
+__all__ = ["cell", "code_cell", "number", "print_and_keep", "table"]
 
 
 def cell(text: str) -> str:
@@ -37,3 +40,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def number(value: float | Sequence[float]) -> str:
     """A number, or several, as the tables of the package print them."""
     return ", ".join(f"{v:.6g}" for v in value) if isinstance(value, Sequence) else f"{value:.6g}"
+
+
+def print_and_keep(rows: Iterable[str], path: Path | None) -> None:
+    """Print lines of Markdown, and write them to a file if there is one to write."""
+    text = "\n".join(rows)
+    print(text)
+    if path is not None:
+        with write_whole(path) as beside:
+            beside.write_text(text, encoding="utf-8")

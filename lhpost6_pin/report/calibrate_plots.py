@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..calibration import Calibration
 from ..calibration.verdicts import changed_knobs, contradictions
 from .layout import stacked_layout, time_band
-from .page import Figure, Markup, figure, number, paragraph, table, text
+from .page import Figure, Markup, figure, number, paragraph, shaded, table
 from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION
 
 __all__ = ["INTERVAL", "PROBABILITY", "forest_block", "half_interval", "information_blocks", "subset_block"]
@@ -23,8 +23,8 @@ INTERVAL = f"{100 * PROBABILITY:g}\N{NO-BREAK SPACE}% interval"
 ROW, SUBSET_ROW = 19, 38  # [CSS px] height of a parameter's row
 TOGETHER = "all together"
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "star", "hexagon")
-_SHADES = (("#0a3358", "#ffffff"), ("#2f76ad", "#ffffff"), ("#93c0e0", "#1b1f24"), ("#dceaf6", "#1b1f24"))
-"""Ground and ink, from much to little told: a single hue, told apart with any colour vision and in grey."""
+_SHADES = (4, 3, 2, 0)
+"""From much to little told."""
 
 
 class Dots(NamedTuple):
@@ -115,23 +115,12 @@ def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> lis
     informed = calibration.numbers.number("report.informed")
     edges = (0.2 * informed, 0.5 * informed, informed)
     said = [f"up to {edge:g}" for edge in edges] + [f"above {informed:g}: next to nothing"]
-    key = " ".join(_shaded(words, k) for k, words in enumerate(said))
+    key = " ".join(map(shaded, said, _SHADES))
     ratios = np.vstack([calibration.sd, calibration.alone])[:, unknowns] / calibration.prior[unknowns]
     rows = [
         (
             calibration.names[i],
-            *(
-                _shaded(
-                    number(float(r), 2),
-                    int(
-                        np.searchsorted(
-                            edges,
-                            r,
-                        )
-                    ),
-                )
-                for r in column
-            ),
+            *(shaded(number(float(r), 2), _SHADES[int(np.searchsorted(edges, r))]) for r in column),
         )
         for i, column in zip(unknowns, ratios.T, strict=True)
     ]
@@ -177,12 +166,3 @@ def _trace(dots: Dots) -> dict[str, Any]:
         },
         "error_x": {"type": "data", "array": list(dots.half), "color": dots.color, "thickness": 1.6, "width": 3},
     }
-
-
-def _shaded(words: str, k: int) -> Markup:
-    """Words on one of the shades."""
-    ground, ink = _SHADES[k]
-    style = f"display:inline-block;min-width:3.6em;padding:.1em .45em;border-radius:3px;background:{ground};color:{ink}"
-    return Markup(
-        f'<span style="{style};print-color-adjust:exact;-webkit-print-color-adjust:exact">{text(words)}</span>'
-    )

@@ -14,7 +14,7 @@ from ..discover.state import Round
 from ..discover.where import gap_map
 from ..discover.words import where
 from .layout import log_ticks, stacked_layout
-from .page import Figure, Markup, paragraph, table, text
+from .page import Figure, Markup, paragraph, shaded, table, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
 
 __all__ = ["gain_figure", "gap_figure", "left_figure", "map_blocks"]
@@ -22,13 +22,8 @@ __all__ = ["gain_figure", "gap_figure", "left_figure", "map_blocks"]
 Array = NDArray[np.float64]
 
 SHOWN = 10  # families in a figure
-_SHADES = (
-    (1.3, "#eef4fa", "#1b1f24"),
-    (3.0, "#93c0e0", "#1b1f24"),
-    (10.0, "#2f76ad", "#ffffff"),
-    (np.inf, "#0a3358", "#ffffff"),
-)
-"""Misfit up to which a cell has a ground and ink."""
+_SHADES = {0: 1.3, 2: 3.0, 3: 10.0, 4: np.inf}
+"""Misfit up to which a cell has each shade."""
 
 _KINDS = {
     "wrench": "Wrench",
@@ -66,10 +61,8 @@ def _cell(before: float, after: float) -> Markup:
     """Before and after, on a ground that says how much was there before."""
     if not np.isfinite(before):
         return text("–")
-    _, ground, ink = next(shade for shade in _SHADES if before <= shade[0])
-    style = f"display:inline-block;padding:.1em .45em;border-radius:3px;background:{ground};color:{ink}"
-    style += ";print-color-adjust:exact;-webkit-print-color-adjust:exact"
-    return Markup(f'<span style="{style}">{_short(before)} → {_short(after)}</span>')
+    shade = next(k for k, top in _SHADES.items() if before <= top)
+    return shaded(f"{_short(before)} → {_short(after)}", shade)
 
 
 def _short(value: float) -> str:

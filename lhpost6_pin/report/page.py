@@ -37,6 +37,7 @@ __all__ = [
     "paragraph",
     "render_page",
     "save_page",
+    "shaded",
     "table",
     "text",
     "versions",
@@ -157,6 +158,11 @@ def bar(fraction: float, tolerance: float = 0.0) -> Markup:
         f'<span class="bar {level}"><span class="fill" style="width:{width:.1f}%"></span></span>'
         f'<span class="percent">{percent}</span>'
     )
+
+
+def shaded(words: str, shade: int) -> Markup:
+    """Return words on one of five shades of a hue, 0 the lightest."""
+    return Markup(f'<span class="shade shade{shade}">{text(words)}</span>')
 
 
 def table(caption: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> Markup:

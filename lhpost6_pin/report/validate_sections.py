@@ -6,7 +6,7 @@ import numpy as np
 
 from ..names import AXES
 from ..validation import PHASES, Agreement, Phase, Validation
-from .page import Markup, details, number, paragraph, table, text
+from .page import Markup, details, number, paragraph, shaded, table, text
 from .run_motion import percent, shown_as
 from .validate_plots import actuator_blocks, force_blocks, motion_blocks, scale_of, spectrum_block
 
@@ -35,14 +35,8 @@ _NAMES = {
     "chamber_pressure_b": "pressure in chamber B",
     "spool_command": "spool command",
 }
-# A single hue from light to dark, told apart with any colour vision and in grey: RRMSE up to, ground, ink.
-_SHADES = (
-    (0.01, "#edf4fa", "#1b1f24"),
-    (0.03, "#c9dff0", "#1b1f24"),
-    (0.10, "#93c0e0", "#1b1f24"),
-    (0.30, "#2f76ad", "#ffffff"),
-    (np.inf, "#0a3358", "#ffffff"),
-)
+_SHADES = (0.01, 0.03, 0.10, 0.30, np.inf)
+"""RRMSE up to which a cell has each shade."""
 
 
 def named(quantity: str) -> str:
@@ -71,8 +65,8 @@ def _judged(phase: Phase) -> list[Agreement]:
 # --------------------------------------------------------------------------------------------- over all tests
 def summary_blocks(found: Validation) -> list[Markup]:
     """Return the error of every phase, test and axis as a shaded table."""
-    tops = [f"up to {100 * top:g} %" for top, _, _ in _SHADES[:-1]] + [f"above {100 * _SHADES[-2][0]:g} %"]
-    key = " ".join(_shaded(words, top) for words, (top, _, _) in zip(tops, _SHADES, strict=True))
+    tops = [f"up to {100 * top:g} %" for top in _SHADES[:-1]] + [f"above {100 * _SHADES[-2]:g} %"]
+    key = " ".join(shaded(words, k) for k, words in enumerate(tops))
     how = (
         "RRMSE = √(Σ error² ∕ Σ measured²), delay removed; forces less their means, which are compared below. ▲ marks "
         "the worst of each phase. An axis that hardly moves has no percentage: its error stands as a multiple of what "
@@ -159,21 +153,13 @@ def _mean_cell(one: Agreement) -> str:
 
 def _cell(one: Agreement, worst: bool) -> Markup:
     if one.moves:
-        return _shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", one.rrmse_aligned)
+        shade = next(k for k, top in enumerate(_SHADES) if not one.rrmse_aligned > top)
+        return shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", shade)
     if one.quantity == "displacement":
         return text(f"{number(1e6 * one.error, 2)}\N{NO-BREAK SPACE}{'µrad' if one.column in AXES[3:] else 'µm'}")
     if not np.isfinite(one.error_to_noise):
         return text("hardly moves")
     return text(f"{'! ' * (one.error_to_noise > NOISE)}{number(one.error_to_noise, 2)} × noise")
-
-
-def _shaded(words: str, ratio: float) -> Markup:
-    """Words on the shade of a ratio."""
-    _, ground, ink = next(shade for shade in _SHADES if not ratio > shade[0])
-    style = f"display:inline-block;min-width:4.6em;padding:.1em .45em;border-radius:3px;background:{ground};color:{ink}"
-    return Markup(
-        f'<span style="{style};print-color-adjust:exact;-webkit-print-color-adjust:exact">{text(words)}</span>'
-    )
 
 
 # ---------------------------------------------------------------------------------------------- test by test

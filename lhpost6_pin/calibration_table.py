@@ -24,7 +24,7 @@ def print_calibration(calibration: Calibration) -> None:
     console.print(
         f"converged after {rounds}"
         if calibration.converged
-        else f"[bold red]not converged[/] in {rounds}: try again from the override file just written"
+        else f"[bold red]not converged[/] in {rounds}: these tests tell too little; give more, or stronger ones"
     )
 
 

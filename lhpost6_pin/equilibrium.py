@@ -102,8 +102,9 @@ def _fill(plant: Plant, force: Array, supply: Array, z: Array, spool: Array) -> 
         if not all(low <= p <= high for p in pressures):
             name = plant.machine.actuators[i].name
             raise SimulationError(
-                f"{name} must give {force[i]:.4g} N at rest, beyond its supply: {pressures} Pa is not between "
-                f"{low:g} and {high:g} Pa; lighten the specimen or raise hydraulics.supply_pressure"
+                f"{name} must give {force[i]:.4g} N at rest, beyond its supply: "
+                f"{', '.join(f'{p / 1e6:.3g}' for p in pressures)} MPa is not between {low / 1e6:.3g} and "
+                f"{high / 1e6:.3g} MPa; lighten the specimen or raise hydraulics.supply_pressure"
             )
         start_line(plant.rows, at, spool[i], pressures[0], pressures[-1], high, low, z)
 

@@ -130,7 +130,7 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
     """Return a copy with some values replaced.
 
     `changes` maps a path to a number or array in the file's unit, or to a table ``{value, unit, source, ...}`` of
-    which only value is needed; or it is the path of a small TOML file of such tables. A component's path
+    which only value is needed; or it is the path of a small TOML file of such tables, with units. A component's path
     (``H3.seal_friction``) may be new if its kind has that key, and a number of an effect that is there
     (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError
     naming the key and the file; or UnknownNameError for what is given by hand.
@@ -141,7 +141,12 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
     tree = _read_toml(path)
     entries, added = _entries(tree, path.name), _effects(tree, path.name)
     try:
-        return _overridden(parameters, entries, added, path.name)
+        changed = _overridden(parameters, entries, added, path.name)
+        for key, entry in entries.items():
+            unit = changed[key].unit if key in changed else "1"
+            if unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
+                raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{unit}' }}")
+        return changed
     except (ParameterError, UnknownNameError) as error:
         raise ParameterError(f"{path.name}: {error}") from None
 

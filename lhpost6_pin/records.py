@@ -68,7 +68,7 @@ _INVERSE, _OPEN = ("inverse dynamics",), ("open loop",)
 
 LAYOUT: Mapping[str, Channel] = {
     "platen_displacement": Channel(_AXIS, "m, rad", "position of C in {s}; Euler angles", _INVERSE),
-    "platen_velocity": Channel(_AXIS, "m/s, rad/s", "velocity of C in {s}; Euler angle rates", _INVERSE),
+    "platen_velocity": Channel(_AXIS, "m/s, rad/s", "velocity of C in {s}; Euler angle rates"),
     "platen_acceleration": Channel(
         _AXIS, "m/s2, rad/s2", "acceleration of C in {s} without gravity; Euler angle accelerations", _INVERSE
     ),

@@ -90,12 +90,12 @@ def browse(folder: Path, url: str, look: Callable[[Tab], Awaitable[Any]], size: 
             port = next(
                 m[1] for line in browser.stderr if (m := re.search(r"listening on ws://127.0.0.1:(\d+)/", line))
             )
-            return asyncio.run(asyncio.wait_for(_visit(port, url, look), WAIT))
+            return asyncio.run(asyncio.wait_for(_visit(port, url, look, size), WAIT))
         finally:
             browser.kill()
 
 
-async def _visit(port: str, url: str, look: Callable[[Tab], Awaitable[Any]]) -> Any:
+async def _visit(port: str, url: str, look: Callable[[Tab], Awaitable[Any]], size: tuple[int, int]) -> Any:
     from tornado.httpclient import AsyncHTTPClient
 
     pages = json.loads((await AsyncHTTPClient().fetch(f"http://127.0.0.1:{port}/json/list")).body)
@@ -104,6 +104,9 @@ async def _visit(port: str, url: str, look: Callable[[Tab], Awaitable[Any]]) -> 
     tab = Tab(socket)
     for domain in ("Page", "Runtime", "Log"):
         await tab.ask(f"{domain}.enable")
+    width, height = size  # a window is wider than a phone, and lower than asked by its frame
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    await tab.ask("Emulation.setDeviceMetricsOverride", **metrics)
     await tab.ask("Page.navigate", url=url)
     while not await tab.evaluate("document.readyState === 'complete' && location.href !== 'about:blank'"):
         await asyncio.sleep(0.05)

@@ -44,7 +44,7 @@ def figures(record: xr.Dataset) -> dict[str, float]:
 
 def main(
     motion: Annotated[str, typer.Argument(help="Name, as `lhpost6 motions` lists them.")] = "ridgecrest",
-    machines: Annotated[int, typer.Option(min=3, help="How many are drawn.")] = 30,
+    machines: Annotated[int, typer.Option(min=4, help="How many are drawn.")] = 30,
     scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Of what is drawn.")] = 1,
     out: Annotated[Path, typer.Option(help="Folder for drawn.csv: numbers drawn and what came of them.")] = Path(
@@ -73,15 +73,17 @@ def main(
     runs = simulate_many(jobs, samples=len(target.time))
     found = [figures(record_of_run(run, {"test": motion}, asked)) for run in runs]
 
-    # 4. An interval for each figure, and what it follows: the correlation of ranks with each number drawn
+    # 4. An interval for each figure, and what it follows: the correlation of ranks with each number drawn, where it is
+    #    larger than the largest that chance would give among so many numbers
+    chance = np.sqrt(2.0 * np.log(2.0 * len(knobs)) / machines)
     table = Table("figure", "median", "5 to 95 %", "follows most (correlation of ranks)")
     for name in found[0]:
         values = np.array([one[name] for one in found])
         low, middle, high = np.percentile(values, [5, 50, 95])
         ranks = np.argsort(np.argsort(np.column_stack([values, drawn]), axis=0), axis=0)
         with_value = np.corrcoef(ranks.T)[0, 1:]
-        first = np.argsort(-np.abs(with_value))[:2]
-        follows = ", ".join(f"{knobs[k].name} {with_value[k]:+.2f}" for k in first)
+        first = [k for k in np.argsort(-np.abs(with_value))[:2] if abs(with_value[k]) > chance]
+        follows = ", ".join(f"{knobs[k].name} {with_value[k]:+.2f}" for k in first) or "none beyond chance"
         table.add_row(escape(name), f"{middle:.4g}", f"{low:.4g} to {high:.4g}", escape(follows))
     Console(width=120).print(table)
 

@@ -196,7 +196,7 @@ bulk_modulus = { value = 8e8, unit = "Pa", evidence = "assumed", source = "a try
 [platen]
 mass = { value = [150.0, 150.0, 150.0], unit = "t" }
 [component.H1]
-seal_friction = { value = 3e3 }
+seal_friction = { value = 3e3, unit = "N" }
 [machine]
 thrust = "normal"
 [effect.rub]

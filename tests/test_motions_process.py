@@ -314,3 +314,9 @@ def test_a_still_target_fits_at_any_scale():
 def test_limits_that_are_no_limits_are_refused(bad):
     with pytest.raises(ValueError, match="six positive numbers"):
         MotionLimits(np.ones(6), bad, np.ones(6))
+
+
+def test_axes_that_leave_nothing_of_a_motion_are_refused():
+    with pytest.raises(MotionError, match="moves x only, of which axes 'z' leave nothing; 'z=x' moves z of the table"):
+        make_target(find_motion("sine"), axes="z")
+    assert make_target(find_motion("sine"), axes="z=x").displacement[:, 2].any()

@@ -252,3 +252,10 @@ def test_any_text_is_a_unit_or_a_motion_error(text, axis):
     except MotionError:
         return
     assert factor[0] > 0 and quantity in ("acceleration", "displacement")
+
+
+def test_a_csv_file_without_a_header_row_is_told_so(tmp_path):
+    path = tmp_path / "bare.csv"
+    path.write_text("0.0,0.0\n0.01,0.1\n")
+    with pytest.raises(MotionError, match="line 1: no header row"):
+        load_csv(path)

@@ -410,3 +410,13 @@ def test_any_override_gives_a_machine_or_one_of_our_errors(path, value):
         assert path.split(".")[-1] in str(error) or path.split(".")[0] in str(error)
     else:
         assert isinstance(machine.parameters[path], Quantity)
+
+
+@pytest.mark.parametrize("entry", ["5.0", "{ value = 5.0 }", "{ value = 5.0, source = 'ours' }"])
+def test_an_override_file_must_give_units(tmp_path, entry):
+    path = tmp_path / "ours.toml"
+    path.write_text(f"[kind.horizontal]\nleakage = {entry}\n")
+    with pytest.raises(ParameterError, match=r"ours.toml: horizontal.leakage: has no unit; write .* unit = 'm3/s/Pa'"):
+        override_parameters(load_parameters("lhpost6"), path)
+    path.write_text("[kind.horizontal]\nflow_curve = 1.2\n")  # a pure number
+    assert override_parameters(load_parameters("lhpost6"), path).number("horizontal.flow_curve") == 1.2

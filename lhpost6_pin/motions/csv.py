@@ -56,6 +56,8 @@ def load_csv(
         raise MotionError(f"{where}: no header row; the first line that is no comment must name the columns")
     separator = next((mark for mark in ";\t" if mark in lines[start]), ",")
     names = [field.strip().strip('"') for field in lines[start].split(separator)]
+    if all(_is_number(name) for name in names):
+        raise MotionError(f"{where}, line {start + 1}: no header row; the first must name the columns, as time_s,x_g")
     if len(set(names)) != len(names):
         twice = next(column for column in names if names.count(column) > 1)
         raise MotionError(f"{where}, line {start + 1}: two columns named {twice!r}; rename one")
@@ -74,6 +76,14 @@ def load_csv(
         raise MotionError(f"{where}: accelerations and displacements are mixed: {quantities}; give one kind")
     kind = next(iter(quantities.values()))
     return make_motion(name or Path(path).stem, step, data, kind, f"CSV file {Path(path).name}")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _channels(
@@ -101,11 +111,11 @@ def _channels(
             if match is None:
                 raise MotionError(
                     f"{where}: column {column[:60]!r} names no axis; call it such as x_m_s2, ay_g, z_m, "
-                    "roll_rad, or say which column to use with columns={axis: column}"
+                    "roll_rad (from Python, columns={axis: column} says which to use)"
                 )
             axis = _AXIS_NAMES[match["axis"].lower()]
             if axis in (channel.axis for channel in chosen):
-                raise MotionError(f"{where}: two columns for axis {axis}; choose with columns={{axis: column}}")
+                raise MotionError(f"{where}: two columns for axis {axis}; leave one out")
             chosen.append(_Channel(axis, index, _unit(match, axis, units)))
     if not chosen:
         raise MotionError(f"{where}: no column for any axis; call them such as x_m_s2, ay_g, z_m, roll_rad")
@@ -113,7 +123,7 @@ def _channels(
         if not channel.unit:
             raise MotionError(
                 f"{where}: column {names[channel.column]!r} has no unit; write it in the name "
-                f"({names[channel.column]}_m_s2) or give units="
+                f"({names[channel.column]}_m_s2)"
             )
     return chosen
 

@@ -127,6 +127,12 @@ def make_target(
     for axis, channel in pairs:
         channels[:, AXES.index(axis)] = scale * motion.samples[first:last, AXES.index(channel)]
     _refuse_infinite(motion.name, scale, channels)
+    given = [axis for axis, samples in zip(AXES, motion.samples.T, strict=True) if samples.any()]
+    if given and not any(channel in given for _, channel in pairs):
+        raise MotionError(
+            f"{motion.name}: moves {', '.join(given)} only, of which axes {axes!r} leave nothing; "
+            f"'{pairs[0][0]}={given[0]}' moves {pairs[0][0]} of the table by {given[0]} of the motion"
+        )
     step = Fraction(motion.time_step * rate).limit_denominator(10_000)  # in samples of the target
     memory = max(settings["memory"] / high_pass if high_pass else 0.0, 2 * pad)
     _refuse_endless(motion, (last - first) * motion.time_step + 2 * memory, rate)

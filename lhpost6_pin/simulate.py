@@ -404,7 +404,7 @@ def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) ->
         stroke = plant.legs["stroke"][status - 1]
         return (
             f"stopped at {time:.4f} s: {leg} left its stroke of +-{stroke:g} m; "
-            "scale the motion down, or start from the record's own pose and pressures"
+            "scale the motion down, look at the controller, or start from the record's own pose and pressures"
         )
     hint = "use --scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"
     return f"stopped at {time:.4f} s: the run diverged with {scheme} at {rate} steps a second; {hint} or raise --rate"

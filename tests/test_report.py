@@ -346,6 +346,14 @@ def test_the_verdict_leads_with_clipped_spools(tmp_path):
     assert clean.level == "good"
 
 
+def test_the_verdict_on_a_run_that_stopped_begins_with_that_and_judges_nothing_else(tmp_path):
+    record = make_record()
+    record.attrs["trouble"] = "stopped at 0.1606 s: V1 left its stroke of +-0.4 m; scale the motion down"
+    summary, _ = report(tmp_path, record, limits=LIMITS)
+    assert summary.verdict.startswith("The run stopped at 0.1606 s: V1 left its stroke of +-0.4 m: how closely")
+    assert "RRMSE" not in summary.verdict and "limits" not in summary.verdict and summary.level == "bad"
+
+
 @pytest.mark.parametrize(("share", "beyond"), [(0.9995, False), (1.0005, False), (1.002, True)])
 def test_a_peak_counts_as_beyond_its_limit_from_a_thousandth_on(tmp_path, share, beyond):
     record = make_record()

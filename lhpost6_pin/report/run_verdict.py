@@ -26,6 +26,11 @@ def judge(
     notes: Sequence[str],
 ) -> tuple[str, Level]:
     """Return the verdict in words and how grave it is: spools clipped, target followed, limits kept, notes to read."""
+    stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
+    if stopped != "none":  # how a piece was followed, and what it left of the limits, says nothing of the test
+        clipped = _clipped(record, spools)
+        said = [f"The run {stopped}: how closely the table followed is not judged.", clipped, "See the notes below."]
+        return " ".join(filter(None, said)), "bad"
     sentences, level = _followed(record, found)
     clipped, beyond = _clipped(record, spools), _beyond(record, found, limits)
     if clipped:

@@ -71,7 +71,7 @@ def write_whole(path: "Path | str") -> Iterator[Path]:
         beside.chmod(0o666 & ~umask)  # mkstemp makes private files; results get the ordinary permissions
         beside.replace(target)
     except OSError as error:
-        if error.filename is None:  # a disk that is full does not say whose
+        if error.errno and error.filename is None:  # a disk that is full does not say whose
             error.filename = str(target)
         raise
     finally:

@@ -59,7 +59,7 @@ def search(name: str, folder: Path, phases: tuple[int, ...], with_baselines: boo
     begin = time.perf_counter()
     try:
         with parallel_config("threading", n_jobs=1):  # one case a worker, of whatever kind
-            found = discover(machine, campaign, sensors, hold_out=hold_out, phases=phases, jobs=1)
+            found = discover(machine, campaign, sensors, hold_out=hold_out, phases=phases, jobs=1, propose=False)
     except LhpostError as error:
         (home / "error.txt").write_text(str(error), encoding="utf-8")
         return

@@ -68,6 +68,7 @@ def discover(
     phases: Sequence[int] = (1, 2, 3),
     seed: int = 0,
     jobs: int = -1,
+    propose: bool = True,
     unfinished: Path | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
@@ -75,8 +76,9 @@ def discover(
 
     hold_out are tests that are not searched but prove what was found; None: with more than three tests, the one that
     tells least of the machine. phases are those of a validation that the proof goes through. Deterministic for a seed
-    (of the simulated noise), whatever the number of `jobs` (threads; -1: one a core). In the folder `unfinished` the
-    search keeps what it has until it has ended; a search with the same inputs goes on from there, to the same verdict.
+    (of the simulated noise), whatever the number of `jobs` (threads; -1: one a core). `propose` simulates tests that
+    would tell rivals apart where the verdict is ambiguous. In the folder `unfinished` the search keeps what it has until
+    it has ended; a search with the same inputs goes on from there, to the same verdict.
 
     Raises UnknownNameError for a test that the campaign has not; RecordError where fewer than one test is left to
     search; and what `calibrate` raises.
@@ -121,7 +123,7 @@ def discover(
         proof = prove(machine, found, [records[i] for i in held], sensors, phases=phases, jobs=jobs, progress=part)
     verdict = judge(found, left, instead, faults, calibration, numbers)
     tests: tuple[NextTest, ...] = ()
-    if verdict.word == "ambiguous":
+    if propose and verdict.word == "ambiguous":
         tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
     bookmark.remove()
     report(1.0)

@@ -77,8 +77,8 @@ def discover(
     hold_out are tests that are not searched but prove what was found; None: with more than three tests, the one that
     tells least of the machine. phases are those of a validation that the proof goes through. Deterministic for a seed
     (of the simulated noise), whatever the number of `jobs` (threads; -1: one a core). `propose` simulates tests that
-    would tell rivals apart where the verdict is ambiguous. In the folder `unfinished` the search keeps what it has until
-    it has ended; a search with the same inputs goes on from there, to the same verdict.
+    would tell rivals apart where the verdict is ambiguous. In the folder `unfinished` the search keeps what it has
+    until it has ended; a search with the same inputs goes on from there, to the same verdict.
 
     Raises UnknownNameError for a test that the campaign has not; RecordError where fewer than one test is left to
     search; and what `calibrate` raises.

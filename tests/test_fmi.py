@@ -323,7 +323,7 @@ def test_many_instances_come_and_go(folder):
 
 
 def test_parameters_choose_scheme_rate_and_changes_of_the_machine(folder, rest):
-    text = "[platen]\nmass = { value = [150e3, 150e3, 160e3] }\n"
+    text = "[platen]\nmass = { value = [150e3, 150e3, 160e3], unit = 'kg' }\n"
     one = Instance(folder, scheme="rk4", steps_per_second=4 * SAMPLE_RATE, override=text)
     plant = make_plant(load_machine().with_params(platen__mass=[150e3, 150e3, 160e3]))
     table = RunningPlant(plant, find_equilibrium(plant), scheme="rk4")
@@ -451,7 +451,7 @@ def test_without_pythonfmu_the_exporter_says_what_to_install(tmp_path, monkeypat
 
 def test_the_command_line_exports_a_machine_with_its_changes(tmp_path):
     changes = tmp_path / "change.toml"
-    changes.write_text("[platen]\nmass = { value = [150e3, 150e3, 160e3] }\n")
+    changes.write_text("[platen]\nmass = { value = [150e3, 150e3, 160e3], unit = 'kg' }\n")
     out = tmp_path / "new" / "table.fmu"
     ended = CliRunner().invoke(app, ["export-fmu", "--override", str(changes), "--valves", "2", "--out", str(out)])
     assert ended.exit_code == 0, ended.output

@@ -19,7 +19,7 @@ from .files import write_whole
 from .machine import Machine
 from .motions import Reference, Target
 from .names import AXES
-from .parameters import LARGEST
+from .parameters import LARGEST, unusable
 from .records import open_record
 from .schemes import SAMPLE_RATE
 
@@ -135,7 +135,7 @@ def load_drive(path: Path | str) -> Drive:
     for name, values in arrays.items():
         if not (usable := np.abs(values) <= LARGEST).all():
             at, axis = np.argwhere(~usable)[0]
-            what = f"beyond {LARGEST:g}" if np.isfinite(values[at, axis]) else "not finite"
+            what = unusable(values[at, axis])
             raise RecordError(f"{path}: {name} is {what} in {AXES[axis]} at sample {at}; make the file again")
     with np.errstate(over="ignore", invalid="ignore"):
         uniform = len(time) > 1 and np.abs(np.diff(time) * SAMPLE_RATE - 1.0).max() <= 1e-6  # nan is not either

@@ -24,6 +24,7 @@ __all__ = [
     "load_parameters",
     "override_parameters",
     "to_unit",
+    "unusable",
 ]
 
 Value: TypeAlias = float | tuple[float, ...]
@@ -141,18 +142,17 @@ def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str
     tree = _read_toml(path)
     entries, added = _entries(tree, path.name), _effects(tree, path.name)
     try:
-        changed = _overridden(parameters, entries, added, path.name)
-        for key, entry in entries.items():
-            unit = changed[key].unit if key in changed else "1"
-            if unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
-                raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{unit}' }}")
-        return changed
+        return _overridden(parameters, entries, added, path.name, in_a_file=True)
     except (ParameterError, UnknownNameError) as error:
         raise ParameterError(f"{path.name}: {error}") from None
 
 
 def _overridden(
-    parameters: Parameters, entries: Mapping[str, Any], added: Mapping[str, EffectEntry], origin: str
+    parameters: Parameters,
+    entries: Mapping[str, Any],
+    added: Mapping[str, EffectEntry],
+    origin: str,
+    in_a_file: bool = False,
 ) -> Parameters:
     quantities, words = dict(parameters.quantities), dict(parameters.words)
     effects = {**parameters.effects, **added}
@@ -171,6 +171,8 @@ def _overridden(
             near = [p for p in (*quantities, *words) if p.split(".")[0] == key.split(".")[0]]
             raise UnknownNameError("parameter", key, near or list(quantities))
         quantities[key] = _changed(base, entry, key, origin)
+        if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
+            raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
     return Parameters(quantities, words, f"{parameters.origin} + {origin}", effects)
 
 
@@ -293,6 +295,11 @@ def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping
             yield (f"{name}.{sub}" if name == "estimates" else sub), inner
 
 
+def unusable(number: float) -> str:
+    """What is wrong with a number that is not within `LARGEST`, in words."""
+    return f"beyond {LARGEST:g}" if math.isfinite(number) else "not finite"
+
+
 def _number(value: object, key: str) -> Value:
     value = value.tolist() if hasattr(value, "tolist") else value  # an array, or a number of one
     if isinstance(value, list | tuple):
@@ -310,8 +317,7 @@ def _scalar(value: object, key: str) -> float:
     except OverflowError:
         number = math.inf
     if not abs(number) <= LARGEST:
-        what = f"beyond {LARGEST:g}" if math.isfinite(number) else "not finite"
-        raise ParameterError(f"{key}: value {str(value)[:40]} is {what}")
+        raise ParameterError(f"{key}: value {str(value)[:40]} is {unusable(number)}")
     return number
 
 

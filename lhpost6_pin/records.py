@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import RecordError, UnknownNameError
 from .files import write_whole
 from .names import AXES
-from .parameters import LARGEST
+from .parameters import LARGEST, unusable
 
 __all__ = [
     "AXES",
@@ -316,8 +316,7 @@ def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault
     bad = ~(np.abs(values) <= LARGEST)  # NaN is not either
     for column in np.flatnonzero(bad.any(axis=0)):
         sample = int(np.argmax(bad[:, column]))
-        kind = f"beyond {LARGEST:g}" if np.isfinite(values[sample, column]) else "not finite"
-        what = f"is {kind} in {bad[:, column].sum()} samples"
+        what = f"is {unusable(values[sample, column])} in {bad[:, column].sum()} samples"
         yield channel_name(variable, int(column)), sample, what, "fill the gap or cut the record there"
 
 

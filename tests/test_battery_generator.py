@@ -2,19 +2,12 @@
 
 import json
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from battery import cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table
 
 from lhpost6_pin.records import load_record
-
-SCRIPTS = str(Path(__file__).parents[1] / "scripts")
-sys.path.insert(0, SCRIPTS)
-from battery import cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table  # noqa: E402
-
-sys.path.remove(SCRIPTS)
 
 
 def nominal() -> tuple[np.ndarray, np.ndarray]:

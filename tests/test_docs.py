@@ -103,8 +103,7 @@ def test_every_family_has_its_section_with_its_numbers(site, pages):
         assert all(f"<code>{s.name}</code>" in text for s in family.shapes if not re.search(r"_\d+$", s.name))
 
 
-def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site, monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site):
     from docs import theory
 
     assert set(theory.law_modules()) <= set(theory.PAGES)
@@ -118,8 +117,7 @@ def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site, mo
         assert re.search(r"\*\*Sign\.\*\*", by_hand) and re.search(r"\*\*In a record\.\*\*", by_hand)
 
 
-def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site, monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site):
     from docs import controller
 
     settings = load_controller("lhpost6")
@@ -170,8 +168,7 @@ def test_every_assumed_number_of_the_machine_is_on_its_page(site):
             assert f"{path}</code>" in text
 
 
-def test_figures_are_the_same_however_often_they_are_drawn(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+def test_figures_are_the_same_however_often_they_are_drawn(tmp_path):
     from docs.figures import FIGURES, draw_all
 
     for folder in ("once", "again"):

@@ -3,7 +3,6 @@
 import base64
 import json
 import re
-import shutil
 import subprocess
 import zlib
 from html.parser import HTMLParser
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from browser import BROWSER
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.constants import g
@@ -25,7 +25,6 @@ AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
 ACTUATORS = ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"]
 DELAY = 0.025
 PEAKS = np.array([0.1, 0.08, 0.02, 0.0, 0.0, 0.0])
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 def make_record(duration: float = 8.0, rate: float = 512.0) -> xr.Dataset:
@@ -636,7 +635,7 @@ probe();
 </script>"""
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+@pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_together(tmp_path):
     _, page = report(tmp_path, make_record(), limits=LIMITS, machine_table=MACHINE)
     probed = tmp_path / "probed.html"
@@ -649,7 +648,7 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
         "--enable-logging=stderr",
     ]
     options += ["--virtual-time-budget=900000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom"]
-    run = subprocess.run([str(CHROMIUM), *options, probed.as_uri()], capture_output=True, text=True, timeout=120)
+    run = subprocess.run([str(BROWSER), *options, probed.as_uri()], capture_output=True, text=True, timeout=120)
     console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]
     assert not console
     answers = Reader(run.stdout).attributes("data-found")

@@ -103,13 +103,12 @@ def test_cutting_records_without_the_wheel_says_which_wheel_to_give(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_the_plain_loop_is_the_fused_engines_euler_to_rounding(monkeypatch):
+def test_the_plain_loop_is_the_fused_engines_euler_to_rounding():
     """NumPy over components, written from the equations: it shares no law, port or stage with the package.
 
     Sixteen steps a sample, every actuator driven by a sine of its own; the pads and seals slide, no orifice's drop
     comes below the 500 Pa at which ours rounds the root off (theirs does not).
     """
-    monkeypatch.syspath_prepend(str(SCRIPTS))
     from plain_loop import PlainPlant
 
     plant = make_plant(machine_named("lhpost6"))

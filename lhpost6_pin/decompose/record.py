@@ -98,9 +98,9 @@ def decompose_record(
     """
     _check_machine(machine, record)
     comparison = _comparison(cutoff)
-    if 1.0 / sample_interval(record) <= comparison.band.high:
+    if (rate := 1.0 / sample_interval(record)) <= comparison.band.high:
         raise RecordError(
-            f"{_source(record)}: {1.0 / sample_interval(record):g} samples a second are too few to compare forces up "
+            f"{_source(record)}: {rate:g} samples a second are too few to compare forces up "
             f"to {comparison.band.high:g} Hz; lower the cutoff"
         )
     plant = make_plant(machine)

@@ -42,14 +42,9 @@ def _generated(words: str) -> str:
     return INSERTS[name](*arguments)
 
 
-def _audit() -> str:
-    """What the audit last printed."""
-    return (HERE / "audit.md").read_text(encoding="utf-8").strip()
-
-
-def _fresh() -> str:
-    """How long a newcomer waited when it was last tried."""
-    return (HERE / "fresh.md").read_text(encoding="utf-8").strip()
+def _stored(name: str) -> str:
+    """What a script last printed, kept beside this module."""
+    return (HERE / f"{name}.md").read_text(encoding="utf-8").strip()
 
 
 def _examples() -> str:
@@ -118,7 +113,6 @@ def _validation() -> str:
 INSERTS: Mapping[str, Callable[..., str]] = {
     "api": _api,
     "assumptions": tables.assumptions,
-    "audit": _audit,
     "battery": _battery,
     "capacity": tables.capacity,
     "commands": commands.commands,
@@ -126,7 +120,6 @@ INSERTS: Mapping[str, Callable[..., str]] = {
     "effects": tables.effects,
     "evidence": tables.evidence,
     "examples": _examples,
-    "fresh": _fresh,
     "functions": controller.functions,
     "law": theory.law,
     "laws": theory.laws_of,
@@ -139,6 +132,7 @@ INSERTS: Mapping[str, Callable[..., str]] = {
     "numbers": controller.numbers,
     "open_loop": _open_loop,
     "panel": controller.panel,
+    "stored": _stored,
     "tests_in": controller.tests_in,
     "validation": _validation,
 }

@@ -105,6 +105,7 @@ def run_entries(run: Run, summary: "RunSummary | None") -> Entries:
             "level": summary.level,
             "tracking": [{n: getattr(row, n) for n in names} for row in summary.tracking if row.peak_target],
             "spools": [{n: getattr(s, n) for n in ("actuator", "peak", "rms")} for s in summary.spools],
+            "limits": [use._asdict() for use in summary.limits],
             "channels_missing": summary.missing,
         }
     return entries

@@ -50,11 +50,13 @@ def machine_rows(machine: Machine) -> list[tuple[str, str, str, str, bool]]:
 
 
 def report_limits(plant: "Plant") -> dict[str, Any]:
-    """Limits that a run report draws: Table 2.2, strokes, actuator forces, supply, strut areas."""
+    """Limits that a run report draws: Table 2.2, strokes, speeds and forces of the actuators, supply, strut areas."""
+    from .capacity import leg_speeds
     from .equilibrium import hydraulic_rows
 
     machine = plant.machine
     rows = plant.rows[hydraulic_rows(plant)]
+    speeds = leg_speeds(plant)
     return {
         "displacement": machine.limits.displacement,
         "velocity": machine.limits.velocity,
@@ -62,6 +64,8 @@ def report_limits(plant: "Plant") -> dict[str, Any]:
         "actuator_stroke": [a.stroke for a in machine.actuators],
         "actuator_force": plant.supply[0] * rows["p"][:, 0] - plant.supply[1] * rows["p"][:, 1],
         "actuator_pull": np.maximum(0.0, plant.supply[0] * rows["p"][:, 1] - plant.supply[1] * rows["p"][:, 0]),
+        "actuator_extending": speeds[:, 0],
+        "actuator_retracting": speeds[:, 1],
         "supply_pressure": plant.supply[0],
         "strut_area": [s.area for s in machine.struts],
     }
@@ -255,6 +259,8 @@ def print_comparison(compared: Sequence[Compared]) -> None:
 
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
     """Print what a run's report says first, and how long and how it ran."""
+    from .report.run_limits import nearest_limits
+
     console = make_console()
     if summary is not None:
         console.print(f"[bold]{escape(summary.verdict)}[/]")
@@ -264,6 +270,9 @@ def print_run(run: "Run", summary: "RunSummary | None") -> None:
             if row.peak_target:
                 table.add_row(*map(escape, tracking_cells(row)))
         console.print(table)
+        nearest = [f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in nearest_limits(summary.limits)]
+        if nearest:
+            console.print(f"limits used, the nearest first: {', '.join(nearest)}")
     console.print(
         f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second"
     )

@@ -321,7 +321,7 @@ def test_what_was_exceeded_is_named_in_the_verdict(tmp_path):
     tight = {"displacement": [0.05, 1, 1, 1, 1, 1], "actuator_stroke": [0.001] + [1.0] * 9}
     summary, page = report(tmp_path, record, limits=tight)
     assert summary.level == "bad"
-    for name in ("x displacement", "H1 displacement", "spool V6"):
+    for name in ("x displacement", "H1 leg stroke", "spool V6"):
         assert name in summary.verdict
     assert "y displacement" not in summary.verdict
     assert "within all given limits" not in summary.verdict
@@ -353,6 +353,28 @@ def test_the_verdict_on_a_run_that_stopped_begins_with_that_and_judges_nothing_e
     assert "RRMSE" not in summary.verdict and "limits" not in summary.verdict and summary.level == "bad"
 
 
+def test_the_nearest_limit_is_said_first_and_every_quantity_has_its_row(tmp_path):
+    record = make_record()
+    t, amplitude, w = record["time"].values, 0.06, 2 * np.pi * 1.5
+    sine = amplitude * np.sin(w * t)
+    record["actuator_displacement"] = (("time", "actuator"), np.outer(sine, [0.1] * 3 + [1.0] + [0.1] * 6))
+    speeds = {"actuator_extending": [4.0] * 10, "actuator_retracting": [0.6] * 10}
+    summary, page = report(tmp_path, record, limits={**LIMITS, **speeds})
+    uses = {(use.quantity, use.name): use for use in summary.limits}
+    leg = uses["leg velocity", "H4"]  # retracting: the lesser limit; central differences lose (w dt)^2 / 6 of it
+    assert leg.peak == pytest.approx(amplitude * w, rel=1e-4) and leg.share == pytest.approx(leg.peak / 0.6)
+    assert uses["leg stroke", "H4"].share == pytest.approx(amplitude / 0.75, rel=1e-4)  # the peak falls between samples
+    moved = np.abs(record["platen_displacement"].values[:, 1]).max()
+    assert uses["displacement", "y"].share == pytest.approx(moved / 0.38)
+    assert "leg velocity" in summary.headlines[2].note and "H4" in summary.headlines[2].note
+    assert summary.headlines[2].level == "attention" and "within all given limits" in summary.verdict
+    rows = page.partition("<caption><span>Limits used</span>")[2].partition("</table>")[0]
+    named = re.findall('<th scope="row">(.*?)</th>', rows)
+    assert named[0] == "Leg velocity" and set(named[1:]) == {
+        *("Displacement", "Velocity", "Acceleration", "Leg stroke", "Spool"),
+    }
+
+
 @pytest.mark.parametrize(("share", "beyond"), [(0.9995, False), (1.0005, False), (1.002, True)])
 def test_a_peak_counts_as_beyond_its_limit_from_a_thousandth_on(tmp_path, share, beyond):
     record = make_record()
@@ -360,7 +382,7 @@ def test_a_peak_counts_as_beyond_its_limit_from_a_thousandth_on(tmp_path, share,
     summary, page = report(tmp_path, record, limits={"displacement": [peak / share] + [1.0] * 5})
     found = re.search("Beyond a limit: x displacement \\((.*) of its limit\\)", summary.verdict)
     assert bool(found) == beyond == ("within all given limits" not in summary.verdict)
-    assert beyond == (summary.level == "bad") == (summary.headlines[1].level == "bad") == ("bar over" in page)
+    assert beyond == (summary.level == "bad") == (summary.headlines[2].level == "bad") == ("bar over" in page)
     if found:
         assert found[1] == "100.2\N{NO-BREAK SPACE}%"  # not the 100 % that it would be in three digits
 

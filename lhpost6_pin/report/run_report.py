@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import UnknownNameError
 from .page import Headline, Level, Page, number, save_page, versions
 from .run_components import Limits
+from .run_limits import LimitUse, limit_uses
 from .run_metrics import (
     QUANTITIES,
     SpoolUse,
@@ -34,6 +35,8 @@ LIMIT_NAMES = (
     "actuator_stroke",  # (n_act,) one-sided [m]
     "actuator_force",  # (n_act,) largest force [N]; of pushing alone where actuator_pull is given
     "actuator_pull",  # (n_act,) magnitude of the largest pulling force [N]; 0: it cannot pull
+    "actuator_extending",  # (n_act,) speed of the unloaded piston at full spool [m/s]
+    "actuator_retracting",  # (n_act,) the other way [m/s]
     "supply_pressure",  # [Pa]
     "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
 )
@@ -49,6 +52,7 @@ class RunSummary:
     headlines: tuple[Headline, ...]
     tracking: tuple[Tracking, ...]
     spools: tuple[SpoolUse, ...]
+    limits: tuple[LimitUse, ...]  # of every axis and actuator whose limit is known
     missing: tuple[str, ...]  # variables of the record layout that the record lacks
 
 
@@ -88,21 +92,23 @@ def write_run_report(
     found = [row for quantity in QUANTITIES for row in track(record, quantity)]
     spools = spool_use(record)
     notes = [*(notes or ()), *_gaps(record)]
-    verdict, level = judge(record, found, spools, bounds, notes)
+    uses = limit_uses(record, found, spools, bounds)
+    verdict, level = judge(record, found, spools, uses, notes)
     page = Page(
         kind=f"Run report · {record.attrs.get('kind', 'test')}",
         title=str(record.attrs.get("title") or record.attrs.get("test") or "Test on the shake table"),
         asked=_asked(record, found),
         verdict=verdict,
         level=level,
-        headlines=headlines(found, spools, bounds),
-        sections=run_sections(record, found, spools, bounds, list(machine_table or ())),
+        headlines=headlines(found, uses),
+        sections=run_sections(record, found, spools, bounds, uses, list(machine_table or ())),
         notes=notes,
         command=command,
         versions=versions(),
     )
     absent = tuple(name for name in EXPECTED if name not in record)
-    return RunSummary(save_page(page, path), verdict, level, tuple(page.headlines), tuple(found), tuple(spools), absent)
+    said = (verdict, level, tuple(page.headlines))
+    return RunSummary(save_page(page, path), *said, tuple(found), tuple(spools), tuple(uses), absent)
 
 
 def _checked(limits: Mapping[str, ArrayLike]) -> Limits:

@@ -16,6 +16,7 @@ from .run_components import (
     share_of_limit,
     strut_blocks,
 )
+from .run_limits import LimitUse, limit_blocks
 from .run_metrics import QUANTITIES, SpoolUse, Tracking
 from .run_motion import (
     axis_scale,
@@ -35,6 +36,7 @@ def run_sections(
     found: Sequence[Tracking],
     spools: Sequence[SpoolUse],
     limits: Limits,
+    uses: Sequence[LimitUse],
     machine_table: Sequence[Sequence[Any]],
 ) -> list[Section]:
     """Return the sections of the report; each shows its channels or names those that the record lacks."""
@@ -46,6 +48,7 @@ def run_sections(
         Section("spools", "Servovalve spools", spool_blocks(record, spools)),
         Section("struts", "Hold-down struts", strut_blocks(record, limits)),
         Section("drift", "Drift", drift_blocks(record)),
+        Section("limits", "Limits used", limit_blocks(uses)),
         Section("metrics", "Table of metrics", [_metrics(found, limits)]),
         Section("assumptions", "Assumptions and sources", _assumptions(machine_table)),
         Section("record", "The record", _contents(record)),

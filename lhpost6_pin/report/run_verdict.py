@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from .page import Headline, Level, number
+from .page import Headline, Level
 from .plots import SCALES
-from .run_components import TOLERANCE, Limits, force_use, share_of_limit
-from .run_metrics import SpoolUse, Tracking, channel, peaks
+from .run_components import TOLERANCE
+from .run_limits import LimitUse, nearest_limits, of_limit
+from .run_metrics import SpoolUse, Tracking, channel
 from .run_motion import axis_scale, percent, shown_as
 
 __all__ = ["FOLLOWED", "NEAR", "headlines", "judge"]
@@ -22,7 +23,7 @@ def judge(
     record: xr.Dataset,
     found: Sequence[Tracking],
     spools: Sequence[SpoolUse],
-    limits: Limits,
+    uses: Sequence[LimitUse],
     notes: Sequence[str],
 ) -> tuple[str, Level]:
     """Return the verdict in words and how grave it is: spools clipped, target followed, limits kept, notes to read."""
@@ -32,12 +33,12 @@ def judge(
         said = [f"The run {stopped}: how closely the table followed is not judged.", clipped, "See the notes below."]
         return " ".join(filter(None, said)), "bad"
     sentences, level = _followed(record, found)
-    clipped, beyond = _clipped(record, spools), _beyond(record, found, limits)
+    clipped, beyond = _clipped(record, spools), _beyond(uses)
     if clipped:
         sentences.insert(0, clipped)
     if beyond:
         sentences.append(f"Beyond a limit: {', '.join(beyond)}.")
-    elif limits:
+    elif any(use.quantity != "spool" for use in uses):
         sentences.append("The rest is within all given limits." if clipped else "The test is within all given limits.")
     elif spools and not clipped:
         sentences.append("No spool reached its limit.")
@@ -49,9 +50,9 @@ def judge(
     return " ".join(sentences), level
 
 
-def headlines(found: Sequence[Tracking], spools: Sequence[SpoolUse], limits: Limits) -> list[Headline]:
-    """Return worst RRMSE, peak displacement and valve utilisation."""
-    return [_worst_rrmse(found), _peak_displacement(found, limits), _valves(spools)]
+def headlines(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headline]:
+    """Return worst RRMSE, peak displacement and the limit that the test came nearest to."""
+    return [_worst_rrmse(found), _peak_displacement(found), _nearest_limit(uses)]
 
 
 def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str], Level]:
@@ -85,22 +86,10 @@ def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
     return f"{start}: {', '.join(full)}." if full else f"{start}."
 
 
-def _beyond(record: xr.Dataset, found: Sequence[Tracking], limits: Limits) -> list[str]:
-    """Name what passed its limit by more than the tolerance."""
-    uses = [(f"{row.axis} {row.quantity}", _used(row, limits)) for row in found]
-    actuators = [str(name) for name in record["actuator"].values] if "actuator" in record.coords else []
-    if "actuator_displacement" in record and "actuator_stroke" in limits:
-        largest = peaks(channel(record, "actuator_displacement", "actuator"))
-        shares = [share_of_limit(peak, limits, "actuator_stroke", k) for k, peak in enumerate(largest)]
-        uses += zip((f"{name} displacement" for name in actuators), shares, strict=True)
-    for words, _, share in force_use(record, limits):
-        uses += zip((f"{name} {words}" for name in actuators), map(float, share), strict=True)
-    return [f"{name} ({_of_limit(use)})" for name, use in uses if use > 1.0 + TOLERANCE]
-
-
-def _of_limit(use: float) -> str:
-    """Share of a limit with a digit more than elsewhere, to tell 100.2 % from 100 %."""
-    return f"{number(100 * use, 4)}\N{NO-BREAK SPACE}% of its limit" if np.isfinite(use) else "it can give none"
+def _beyond(uses: Sequence[LimitUse]) -> list[str]:
+    """Name what passed its limit by more than the tolerance; spools at full stroke are said apart."""
+    beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
+    return [f"{use.name} {use.quantity} ({of_limit(use.share)})" for use in beyond]
 
 
 def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
@@ -114,37 +103,29 @@ def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
     return Headline("–", "Worst acceleration RRMSE", "no target and achieved motion in the record")
 
 
-def _peak_displacement(found: Sequence[Tracking], limits: Limits) -> Headline:
-    """Return the displacement nearest to its limit, or without limits the largest translation."""
+def _peak_displacement(found: Sequence[Tracking]) -> Headline:
+    """Return the largest translation, or rotation where nothing else is known."""
     rows = [row for row in found if row.quantity == "displacement" and np.isfinite(row.peak_achieved)]
-    limited = [row for row in rows if np.isfinite(_used(row, limits))]
     straight = [row for row in rows if axis_scale(row.axis, "displacement") is SCALES["displacement"]]
-    if limited:
-        row = max(limited, key=lambda row: _used(row, limits))
-        used = _used(row, limits)
-        level: Level = "bad" if used > 1.0 + TOLERANCE else "attention" if used >= NEAR else "good"
-        note = f"axis {row.axis}, {percent(used)} of its limit, nearest of all axes"
-    elif rows:
-        row = max(straight or rows, key=lambda row: row.peak_achieved)
-        note, level = f"axis {row.axis}", "plain"
-    else:
+    if not rows:
         return Headline("–", "Peak displacement", "no platen_displacement in the record")
-    shown = shown_as(row.peak_achieved, axis_scale(row.axis, "displacement"))
-    return Headline(shown, "Peak displacement", note, level)
+    row = max(straight or rows, key=lambda row: row.peak_achieved)
+    return Headline(
+        shown_as(row.peak_achieved, axis_scale(row.axis, "displacement")), "Peak displacement", f"axis {row.axis}"
+    )
 
 
-def _valves(spools: Sequence[SpoolUse]) -> Headline:
-    if not spools:
-        return Headline("–", "Valve utilisation", "no spool_position or spool_command in the record")
-    most = max(spools, key=lambda spool: spool.peak)
-    level: Level = "bad" if most.saturated else "attention" if most.peak >= NEAR else "good"
-    return Headline(percent(most.peak), "Valve utilisation", f"largest spool opening, {most.actuator}", level)
+def _nearest_limit(uses: Sequence[LimitUse]) -> Headline:
+    if not uses:
+        return Headline("–", "Nearest limit", "neither limits of the machine nor spools are known")
+    use = nearest_limits(uses)[0]
+    level: Level = "bad" if use.share > 1.0 + TOLERANCE else "attention" if use.share >= NEAR else "good"
+    if use.quantity == "spool" and use.share >= 1.0:
+        level = "bad"
+    said = percent(use.share) if np.isfinite(use.share) else "impossible"
+    return Headline(said, "Nearest limit", f"{use.name}, {use.quantity}", level)
 
 
 def _worst(found: Sequence[Tracking], quantity: str) -> Tracking | None:
     rows = [row for row in found if row.quantity == quantity and np.isfinite(row.rrmse_aligned)]
     return max(rows, key=lambda row: row.rrmse_aligned, default=None)
-
-
-def _used(row: Tracking, limits: Limits) -> float:
-    return share_of_limit(row.peak_achieved, limits, row.quantity, row.place)

@@ -70,9 +70,15 @@ def _altered(inertia: Any, machine: "Machine") -> Any:
                 total = inertia.mass + mass
                 if total <= 0.0:
                     raise ParameterError(f"{effect.name}: {mass:g} kg leave the platen no mass")
+                if machine.motion != "free":  # what turns has no part
+                    inertia = pin.Inertia(total, inertia.lever, inertia.inertia)
+                    continue
                 lever = (inertia.mass * inertia.lever + np.array([x, y, z])) / total
                 about_b = inertia.matrix()[3:, 3:] + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-                inertia = pin.Inertia(total, lever, about_b + total * pin.skew(lever) @ pin.skew(lever))
+                about_middle = about_b + total * pin.skew(lever) @ pin.skew(lever)
+                if np.linalg.eigvalsh(about_middle)[0] <= 0.0:
+                    raise ParameterError(f"{effect.name}: its moments and products leave the platen no inertia")
+                inertia = pin.Inertia(total, lever, about_middle)
     return inertia
 
 

@@ -259,8 +259,6 @@ def print_comparison(compared: Sequence[Compared]) -> None:
 
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
     """Print what a run's report says first, and how long and how it ran."""
-    from .report.run_limits import nearest_limits
-
     console = make_console()
     if summary is not None:
         console.print(f"[bold]{escape(summary.verdict)}[/]")
@@ -270,7 +268,7 @@ def print_run(run: "Run", summary: "RunSummary | None") -> None:
             if row.peak_target:
                 table.add_row(*map(escape, tracking_cells(row)))
         console.print(table)
-        nearest = [f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in nearest_limits(summary.limits)]
+        nearest = [f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in summary.nearest]
         if nearest:
             console.print(f"limits used, the nearest first: {', '.join(nearest)}")
     console.print(

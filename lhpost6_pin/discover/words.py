@@ -7,7 +7,13 @@ __all__ = ["said", "title_of", "where"]
 
 
 def said(found: Discovery) -> str:
-    """What was found, in a sentence or two."""
+    """What was found, in a sentence or two; and that nothing proves it, where no test was held out."""
+    if found.verdict.effects and found.proof is None:
+        return f"{_found(found)} No test was held out to prove it: give more, or name one with --hold-out."
+    return _found(found)
+
+
+def _found(found: Discovery) -> str:
     verdict = found.verdict
     effects = " and ".join(f"{title_of(one.family)} ({where(one.components)})" for one in verdict.effects)
     if verdict.word == "none":

@@ -41,7 +41,7 @@ class Family:
     name: str
     title: str
     equation: str
-    acts_on: tuple[str, ...]  # kinds of components, "platen", "axis" or "level axis" of the platen, "supply"
+    acts_on: tuple[str, ...]  # kinds of components, "platen", one that turns, its "axis" or "level axis", "supply"
     shapes: tuple[Shape, ...]  # the amplitude first
     shows_in: tuple[str, ...]  # kinds of residuals
     confused_with: tuple[str, ...]
@@ -61,7 +61,10 @@ class Family:
                 found.append(actuator.name)
         if "strut" in self.acts_on:
             found += machine.strut_names
-        found += [word for word in ("platen", "supply") if word in self.acts_on]
+        if "platen" in self.acts_on or ("turning platen" in self.acts_on and machine.motion == "free"):
+            found.append("platen")
+        if "supply" in self.acts_on:
+            found.append("supply")
         axes = PLATEN_PORTS if "axis" in self.acts_on else PLATEN_PORTS[:2] if "level axis" in self.acts_on else ()
         found += [axis for axis in axes if machine.motion in ("free", axis.removeprefix("platen."))]
         return tuple(found)

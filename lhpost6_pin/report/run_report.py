@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..errors import UnknownNameError
 from .page import Headline, Level, Page, number, save_page, versions
 from .run_components import Limits
-from .run_limits import LimitUse, limit_uses
+from .run_limits import LimitUse, limit_uses, nearest_limits
 from .run_metrics import (
     QUANTITIES,
     SpoolUse,
@@ -54,6 +54,11 @@ class RunSummary:
     spools: tuple[SpoolUse, ...]
     limits: tuple[LimitUse, ...]  # of every axis and actuator whose limit is known
     missing: tuple[str, ...]  # variables of the record layout that the record lacks
+
+    @property
+    def nearest(self) -> list[LimitUse]:
+        """Of each quantity the limit that the test came nearest to, the nearest of all first."""
+        return nearest_limits(self.limits)
 
 
 EXPECTED = (

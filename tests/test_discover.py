@@ -471,8 +471,8 @@ def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_n
     """A vertical triangle hardly moves the horizontal seals."""
     assert (found.used, found.held_out) == (("TX", "WN"), ("TZ",))
     (gap,) = found.proof.gaps
-    assert gap.after == pytest.approx(gap.refitted, rel=0.08)  # parameters that share the search's noise
-    assert gap.after < 1.2  # one is noise alone; friction at rest adds some
+    for other in (gap.refitted, gap.delivered):  # the machine as delivered is right about what this test feels
+        assert gap.after == pytest.approx(other, rel=0.08)  # parameters that share the search's noise
 
 
 def test_the_verdict_goes_through_json_and_the_model_through_toml(found, tmp_path):

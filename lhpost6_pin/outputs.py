@@ -14,6 +14,7 @@ from .oil import rods_ahead
 from .pose import PlatenMotion, leg_displacements, platen_motion
 from .records import make_record
 from .simulate import Run
+from .specimen_joints import specimen_joints, specimen_positions
 from .supply import supply_pressures
 
 __all__ = ["record_of_run"]
@@ -69,9 +70,11 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
             channels[f"reference_{name}"] = (("time", "axis"), values, about)
     channels |= _hidden_states(run)
     if plant.articulated:
-        about = {"units": "m or rad", "long_name": "configuration of the specimen's joints, Pinocchio order"}
-        platen_q = 7 if plant.axes.size == 6 else 1
-        channels["specimen_joint_position"] = (("time", "specimen_joint"), run.q[:, platen_q:], about)
+        joints = specimen_joints(plant)
+        about = {"units": "m or rad", "long_name": "position of the specimen's joints"}
+        about["joint_units"] = " ".join(joint.unit for joint in joints)
+        labels["specimen_joint"] = tuple(joint.name for joint in joints)
+        channels["specimen_joint_position"] = (("time", "specimen_joint"), specimen_positions(plant, run.q), about)
     valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
     facts: dict[str, Any] = {
         "kind": "simulated",

@@ -35,7 +35,7 @@ LAYERS = [
     {"supply"},
     {"stage", "oil_residuals"},
     {"plant", "schemes"},
-    {"pose", "workspace"},
+    {"pose", "workspace", "specimen_joints"},
     {"alignment", "fusion", "equilibrium", "engine_pinocchio", "bodies"},
     {"control", "capacity", "linearize", "gas", "sight"},
     {"engine_fused"},

@@ -1,5 +1,6 @@
 """Options that commands share, and the machine, motion and controller that they name."""
 
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
     from ..control.plug import UserController
     from ..machine import Machine
     from ..motions import GroundMotion, Target
+
+log = logging.getLogger(__name__)
 
 __all__ = ["Axes", "Beyond", "ControllerName", "EngineName", "HighPass", "Locked", "LowPass", "MachineName", "Motion"]
 __all__ += [
@@ -76,7 +79,10 @@ def find_machine(name: str, override: Path | None) -> "Machine":
 def find_table(
     machine: str, override: Path | None, valves: int, specimen: str | None, at: str | None, locked: bool
 ) -> "Machine":
-    """Machine with its open valves, and the specimen that the options name, if any."""
+    """Machine with its open valves, and the specimen that the options name, if any; its doubts are logged."""
+    from ..plant import make_plant
+    from ..specimen_joints import specimen_doubts
+
     table = find_machine(machine, override).with_valves(valves)
     if specimen is None:
         if locked or at:
@@ -89,7 +95,10 @@ def find_table(
     if len(place) not in (3, 6):
         raise ParameterError(f"--specimen-at {at}: write x,y,z in metres, or x,y,z,roll,pitch,yaw with radians")
     x, y, z, roll, pitch, yaw = (*place, 0.0, 0.0, 0.0)[:6]
-    return table.with_specimen(specimen, (x, y, z), (roll, pitch, yaw), locked=locked)
+    loaded = table.with_specimen(specimen, (x, y, z), (roll, pitch, yaw), locked=locked)
+    for doubt in specimen_doubts(make_plant(loaded)):
+        log.warning("%s", doubt)
+    return loaded
 
 
 def find_settings(name: str | None, table: "Machine") -> "ControllerSettings":

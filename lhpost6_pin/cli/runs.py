@@ -1,5 +1,6 @@
 """Commands that run the virtual table: run, replay, open-loop."""
 
+import logging
 import shlex
 import sys
 from pathlib import Path
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 
     from ..machine import Machine
     from ..simulate import Run
+
+log = logging.getLogger(__name__)
 
 __all__ = ["open_loop", "repeating_command", "replay", "run"]
 
@@ -222,10 +225,14 @@ def _save(
     """Leave a run's record, and its report unless it is held `against` a measured test; say how it went."""
     from ..records import save_record
     from ..results import run_entries
+    from ..specimen_joints import joints_beyond, specimen_doubts
     from ..tables import compare, machine_rows, print_comparison, print_run, report_limits
 
     save_record(record, folder / "record.nc")
     files, summary = [folder / "record.nc"], None
+    beyond = joints_beyond(run_.plant, run_.time, run_.q)
+    for word in beyond:
+        log.warning("%s", word)
     if against is None:
         from ..report import write_run_report
 
@@ -233,7 +240,7 @@ def _save(
             record,
             folder / "report.html",
             limits=report_limits(run_.plant),
-            notes=[run_.trouble] if run_.trouble else [],
+            notes=[*filter(None, [run_.trouble]), *specimen_doubts(run_.plant), *beyond],
             command=repeating_command(),
             machine_table=machine_rows(table),
         )

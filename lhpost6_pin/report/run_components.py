@@ -23,6 +23,7 @@ __all__ = [
     "force_use",
     "kinds",
     "pressure_blocks",
+    "specimen_blocks",
     "share_of_limit",
     "strut_blocks",
 ]
@@ -30,6 +31,7 @@ __all__ = [
 Limits = Mapping[str, NDArray[np.float64]]
 
 OFF_SCALE = 0.4  # share of a limit below which pressures and forces get a scale of their own, without its line
+JOINTS = (("rad", "Angle", "rotation"), ("m", "Position", "displacement"), ("1", "Quaternion", "ratio"))
 TOLERANCE = 1e-3  # share of a limit by which a sampled peak may pass it before it counts as beyond
 
 
@@ -97,6 +99,22 @@ def strut_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
     else:
         words += " The pull is not drawn: the area of the struts was not given."
     return [draw_over_time(record, "strut", "Hold-down struts over time", words, rows)]
+
+
+def specimen_blocks(record: xr.Dataset) -> list[Markup]:
+    """Return the positions of the free joints of the record's specimen, which has some."""
+    joints = record["specimen_joint_position"]
+    values = channel(record, "specimen_joint_position", "specimen_joint")
+    names = [str(name) for name in joints["specimen_joint"].values]
+    units = str(joints.attrs["joint_units"]).split()
+    rows = []
+    for unit, title, scale in JOINTS:
+        own = [k for k, its in enumerate(units) if its == unit]
+        traces = [Trace(names[k], values[:, k], line) for k, line in zip(own, palette(len(own)), strict=True)]
+        named = title if len(own) > 1 else " ".join([title, *(names[k] for k in own)])
+        rows += [Row(named, traces, SCALES[scale])] if own else []
+    words = "Positions of the specimen's free joints, as its URDF names them."
+    return [draw_over_time(record, "specimen", "Specimen joints over time", words, rows)]
 
 
 def draw_over_time(record: xr.Dataset, name: str, title: str, words: str, rows: Sequence[Row]) -> Markup:

@@ -14,6 +14,7 @@ from .run_components import (
     force_blocks,
     pressure_blocks,
     share_of_limit,
+    specimen_blocks,
     strut_blocks,
 )
 from .run_limits import LimitUse, limit_blocks
@@ -40,6 +41,8 @@ def run_sections(
     machine_table: Sequence[Sequence[Any]],
 ) -> list[Section]:
     """Return the sections of the report; each shows its channels or names those that the record lacks."""
+    moves = "specimen_joint_position" in record
+    specimen = [Section("specimen", "Specimen", specimen_blocks(record))] if moves else []
     return [
         Section("tracking", "Target and achieved", tracking_blocks(record, found)),
         Section("spectra", "Response spectra", spectrum_blocks(record)),
@@ -47,6 +50,7 @@ def run_sections(
         Section("pressures", "Chamber pressures", pressure_blocks(record, limits)),
         Section("spools", "Servovalve spools", spool_blocks(record, spools)),
         Section("struts", "Hold-down struts", strut_blocks(record, limits)),
+        *specimen,
         Section("drift", "Drift", drift_blocks(record)),
         Section("limits", "Limits used", limit_blocks(uses)),
         Section("metrics", "Table of metrics", [_metrics(found, limits)]),

@@ -30,7 +30,7 @@ def judge(
     stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
     if stopped != "none":  # how a piece was followed, and what it left of the limits, says nothing of the test
         clipped = _clipped(record, spools)
-        said = [f"The run {stopped}: how closely the table followed is not judged.", clipped, "See the notes below."]
+        said = [f"The run {stopped}: how closely the table followed is not judged.", clipped, "See the notes."]
         return " ".join(filter(None, said)), "bad"
     sentences, level = _followed(record, found)
     clipped, beyond = _clipped(record, spools), _beyond(uses)
@@ -46,7 +46,7 @@ def judge(
         level = "bad"
     if notes:
         level = "attention" if level in ("good", "plain") else level
-        sentences.append("See the notes below.")
+        sentences.append("See the notes.")
     return " ".join(sentences), level
 
 

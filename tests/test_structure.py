@@ -37,6 +37,7 @@ LAYERS = [
     {"plant", "schemes"},
     {"pose", "workspace", "specimen_joints"},
     {"alignment", "fusion", "equilibrium", "engine_pinocchio", "bodies"},
+    {"specimen_bodies"},
     {"control", "capacity", "linearize", "gas", "sight"},
     {"engine_fused"},
     {"simulate"},
@@ -67,7 +68,7 @@ PINOCCHIO = {
         "ledger",
         "energy",
     ),  # dynamics
-    *("bodies", "viewer.scene", "viewer.live"),  # pictures
+    *("bodies", "specimen_bodies", "viewer.scene", "viewer.live"),  # pictures
 }
 """Modules that may import pinocchio."""
 

@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from http.client import HTTPConnection
 from pathlib import Path
 
@@ -21,9 +22,10 @@ from hypothesis import strategies as st
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin import cli
-from lhpost6_pin.bodies import body_name, body_poses, joint_positions
+from lhpost6_pin.bodies import body_name, body_poses, joint_positions, load_bodies
 from lhpost6_pin.errors import LhpostError, ParameterError, RecordError
 from lhpost6_pin.records import AXES, load_record, make_record
+from lhpost6_pin.specimen_bodies import load_specimen_bodies
 from lhpost6_pin.urdf import legs
 from lhpost6_pin.viewer import (
     Look,
@@ -37,6 +39,7 @@ from lhpost6_pin.viewer import (
 from lhpost6_pin.viewer.animation import draw_animation
 from lhpost6_pin.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
 from lhpost6_pin.viewer.frames import Ghost
+from lhpost6_pin.viewer.scene import draw_machine
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
 
@@ -130,6 +133,45 @@ def test_the_animation_holds_the_poses_of_the_moving_bodies(machine, bodies, pos
             np.testing.assert_allclose(clips[name][".position"], wanted[:, joint, :3], atol=1e-6)
         assert (".position" in clips.get(name, {})) != name.endswith(("_barrel", "_swivel_cross"))
     assert "V1_barrel" not in clips
+
+
+def test_a_specimen_stands_on_the_platen_and_its_joints_move(machine, poses):
+    loaded = machine.with_specimen("pendulum", (1.0, 2.0, 0.0))
+    angle = np.linspace(0.0, 0.3, len(poses))
+    frames = make_frames(np.arange(len(poses)) / 30.0, poses)
+    frames = replace(frames, joints={"pivot": angle})
+    bodies = load_bodies(loaded)
+    clips = clips_of(loaded, bodies, frames)
+    turned = clips["platen/specimen/1"][".quaternion"]
+    np.testing.assert_allclose(turned[:, 1], np.sin(0.5 * angle), atol=1e-7)  # about Y; the page's numbers are single
+    assert ".position" not in clips["platen/specimen/1"]  # the pivot is on the platen
+    window = Recorder()
+    draw_machine(window, loaded, bodies)
+    sent = [umsgpack.unpackb(c) for c in window.commands]
+    (at,) = (m["matrix"] for m in sent if m["type"] == "set_transform" and m["path"].endswith("platen/specimen/1"))
+    from_b = np.array([1.0, 2.0, 3.0]) - machine.platen.centre_of_gravity  # the pivot is 3 m above the root
+    np.testing.assert_allclose(at[12:15], from_b, atol=1e-6)
+    drawn = [m["path"] for m in sent if m["type"] == "set_object" and "/specimen/" in m["path"]]
+    assert [path.split("/")[-2] for path in drawn] == ["0", "1"]
+    bare = Recorder()
+    draw_machine(bare, machine, load_bodies(machine))
+    assert not any("/specimen/" in umsgpack.unpackb(c)["path"] for c in bare.commands)
+
+
+def test_a_body_without_shapes_is_the_uniform_box_of_its_inertia(tmp_path, machine):
+    mass, edges = 240.0, np.array([1.0, 2.0, 3.0])
+    xx, yy, zz = mass / 12.0 * (np.sum(edges**2) - edges**2)
+    inertia = f'ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"'
+    path = tmp_path / "box.urdf"
+    link = f'<link name="a"><inertial><mass value="{mass}"/><inertia {inertia}/></inertial></link>'
+    path.write_text(f'<robot name="box">{link}</robot>')
+    (shape,) = load_specimen_bodies(machine.with_specimen(path)).shapes
+    size = np.abs(shape.placement.rotation @ (2.0 * shape.geometry.halfSide))
+    np.testing.assert_allclose(size, edges, rtol=1e-12)
+    mesh = path.read_text().replace("</link>", '<visual><geometry><mesh filename="no.stl"/></geometry></visual></link>')
+    path.write_text(mesh)
+    (shape,) = load_specimen_bodies(machine.with_specimen(path)).shapes
+    np.testing.assert_allclose(np.sort(2.0 * shape.geometry.halfSide), edges)
 
 
 def test_two_records_are_drawn_over_the_time_that_both_have(machine, record):

@@ -7,7 +7,7 @@ import typer
 
 from .app import app, tell
 from .live import Amplify, Change, NoOpen, show_address
-from .options import Json, MachineName, Override, find_machine
+from .options import Json, Locked, MachineName, Override, SpecimenAt, SpecimenName, find_table
 
 __all__ = ["view"]
 
@@ -26,6 +26,9 @@ def view(
     no_open: NoOpen = False,
     machine: MachineName = "lhpost6",
     override: Override = None,
+    specimen: SpecimenName = None,
+    specimen_at: SpecimenAt = None,
+    locked: Locked = False,
     json: Json = False,
 ) -> None:
     """Play a test: platen, actuators, struts and forces follow the record in a browser, or in one HTML file."""
@@ -34,7 +37,7 @@ def view(
     from ..records import load_record
     from ..viewer import Look, live_animation, show_record
 
-    table = find_machine(machine, override)
+    table = find_table(machine, override, 0, specimen, specimen_at, locked)
     test, over = load_record(record), [load_record(path) for path in others or []]
     look = Look(fps, amplify, gap, change)
     if export is not None:

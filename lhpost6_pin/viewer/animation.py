@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from ..bodies import Bodies, body_name, body_poses, joint_positions, quaternions
 from ..machine import Machine
 from ..pose import rotation
+from ..specimen_bodies import load_specimen_bodies, specimen_poses
 from ..urdf import legs
 from .arrows import arrow_colours, arrow_sizes, largest_force
 from .frames import Frames
-from .scene import ROOT
+from .scene import ROOT, specimen_body
 from .window import Window, packed_array
 
 __all__ = ["draw_animation", "leg_forces"]
@@ -33,6 +34,9 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
     _warn_of_strokes(machine, bodies.model, q)
     poses = body_poses(bodies.model, q)
     moving = {body_name(bodies.model, joint): poses[:, joint] for joint in range(1, bodies.model.njoints)}
+    if frames.joints and (specimen := load_specimen_bodies(machine)) is not None:
+        on_platen = specimen_poses(specimen, frames.joints, len(frames.time))
+        moving |= {specimen_body(joint): on_platen[:, joint] for joint in range(1, specimen.model.njoints)}
     moving |= {g.name: _outline_poses(machine, g.displacement) for g in frames.ghosts}
     clips = []
     for name, pose in moving.items():

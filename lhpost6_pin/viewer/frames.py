@@ -1,8 +1,8 @@
 """Frames of an animation: motions and forces of a record, and of one laid over it, at a uniform frame rate."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +69,7 @@ class Frames:
     ghosts: tuple[Ghost, ...]  # sampled and enlarged alike
     force: Array | None  # (n, n_legs) that push the platen away from the leg's base [N]; NaN where unknown
     look: Look
+    joints: Mapping[str, Array] = field(default_factory=dict)  # (n,) of the specimen's free joints [m, rad], enlarged
 
 
 def make_frames(
@@ -116,7 +117,8 @@ def record_frames(
     for name, other in zip(OTHERS, others, strict=False):
         label = f"{record_title(other)}, {other.attrs.get('kind', 'record')}"
         ghosts.append(Ghost(name, label, other["time"].values, _motion(machine, other)))
-    return make_frames(time, _motion(machine, record), ghosts, _forces(machine, record), look)
+    frames = make_frames(time, _motion(machine, record), ghosts, _forces(machine, record), look)
+    return replace(frames, joints=_joints(record, frames))
 
 
 def record_title(record: xr.Dataset) -> str:
@@ -150,6 +152,14 @@ def _motion(machine: Machine, record: xr.Dataset) -> Array:
         return np.asarray(record["platen_displacement"].values)
     require(record, "actuator_displacement")
     return forward_kinematics(make_plant(machine), record["actuator_displacement"].values)[0]
+
+
+def _joints(record: xr.Dataset, frames: Frames) -> dict[str, Array]:
+    if "specimen_joint_position" not in record:
+        return {}
+    drawn = _columns(frames.time, record["time"].values, record["specimen_joint_position"].values)
+    names = map(str, record["specimen_joint"].values)
+    return dict(zip(names, frames.look.amplify * drawn.T, strict=True))
 
 
 def _forces(machine: Machine, record: xr.Dataset) -> Array | None:

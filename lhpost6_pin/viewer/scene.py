@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from ..bodies import Bodies, body_name, body_poses, joint_positions
 from ..machine import Machine
+from ..specimen_bodies import SpecimenBodies, load_specimen_bodies, specimen_poses
 from ..urdf import drawing_colour, legs
 from .arrows import OPACITY, arrow_solid
 from .frames import Frames
 from .window import Window
 
-__all__ = ["ROOT", "draw_arrows", "draw_machine", "draw_motion", "table_of"]
+__all__ = ["ROOT", "draw_arrows", "draw_machine", "draw_motion", "specimen_body", "table_of"]
 
 Array = NDArray[np.float64]
 
@@ -47,13 +48,19 @@ def draw_machine(window: Window, machine: Machine, bodies: Bodies) -> None:
     for shape in bodies.shapes.geometryObjects:
         body = table[body_name(bodies.model, shape.parentJoint)]
         body.set_transform(pin.XYZQUATToSE3(poses[shape.parentJoint]).homogeneous)
-        primitive, upright = _primitive(shape.geometry)
         red, green, blue, opacity = (float(c) for c in shape.meshColor)
         colour = sum(round(255.0 * c) << s for c, s in ((red, 16), (green, 8), (blue, 0)))
         material = geometry.MeshLambertMaterial(color=colour, opacity=opacity, depthWrite=opacity == 1.0)
-        body[shape.name].set_object(primitive, material)
-        body[shape.name].set_transform(shape.placement.homogeneous @ upright)
-    _set_stage(vis, machine)
+        _draw(body[shape.name], shape, material)
+    specimen = load_specimen_bodies(machine)
+    if specimen is not None:
+        _draw_specimen(table, specimen)
+    _set_stage(vis, machine, specimen)
+
+
+def specimen_body(joint: int) -> str:
+    """Path in the scene of a body of the specimen, by joint: part of the platen."""
+    return f"platen/specimen/{joint}"
 
 
 def draw_motion(window: Window, machine: Machine, frames: Frames) -> None:
@@ -79,6 +86,28 @@ def draw_arrows(window: Window, names: Sequence[str]) -> None:
         table[f"{name}_rod"]["force"].set_object(solid, material)
 
 
+def _draw_specimen(table: Any, specimen: SpecimenBodies) -> None:
+    from meshcat import geometry
+
+    poses = specimen_poses(specimen, {}, 1)[0]
+    for shape in specimen.shapes:
+        body = table[specimen_body(shape.joint)]
+        body.set_transform(pin.XYZQUATToSE3(poses[shape.joint]).homogeneous)
+        _draw(body[shape.name], shape, geometry.MeshLambertMaterial(color=_number("specimen")))
+
+
+def _draw(node: Any, shape: Any, material: Any) -> None:
+    """Send a primitive to its place on its body."""
+    primitive, upright = _primitive(shape.geometry)
+    node.set_object(primitive, material)
+    node.set_transform(shape.placement.homogeneous @ upright)
+
+
+def _number(kind: str) -> int:
+    """Colour of a kind of body, as meshcat wants it."""
+    return int(drawing_colour(kind).lstrip("#"), 16)
+
+
 def table_of(window: Window) -> Any:
     """Meshcat's handle on all that belongs to the table, by path."""
     return _visualizer(window)[ROOT]
@@ -95,7 +124,7 @@ def _lines(points: Array, colour: str, seen_through: bool = False) -> Any:
     from meshcat import geometry
 
     material = geometry.LineBasicMaterial(
-        color=int(drawing_colour(colour).lstrip("#"), 16),
+        color=_number(colour),
         linewidth=2.0,
         transparent=seen_through,
         depthTest=not seen_through,
@@ -103,12 +132,14 @@ def _lines(points: Array, colour: str, seen_through: bool = False) -> Any:
     return geometry.LineSegments(geometry.PointsGeometry(points.T.astype(np.float32)), material)
 
 
-def _set_stage(vis: Any, machine: Machine) -> None:
-    """Camera that sees the whole table from -Y, +X to the right; light from above; no grid through the platen."""
+def _set_stage(vis: Any, machine: Machine, specimen: SpecimenBodies | None) -> None:
+    """Camera from -Y, +X to the right, that sees the table and what stands on it; light from above; no grid."""
     from meshcat import geometry
 
     points = np.array([p for leg in legs(machine) for p in (leg.base_point, leg.platen_point)])
     points = np.vstack([points, 0.5 * np.array([[*machine.platen.size, 0.0]]) * [[1, 1, 1], [-1, -1, 1]]])
+    if specimen is not None:
+        points = np.vstack([points, _reach(specimen) + machine.platen.centre_of_gravity])
     middle, radius = 0.5 * (points.max(0) + points.min(0)), 0.5 * float(np.linalg.norm(np.ptp(points, axis=0)))
     vis[ROOT].set_transform(pin.SE3(np.eye(3), -middle).homogeneous)  # meshcat's camera turns about the origin
     camera = vis["/Cameras/default/rotated"]
@@ -120,6 +151,18 @@ def _set_stage(vis: Any, machine: Machine) -> None:
         vis["/Background"].set_property(end, colour)
     for thing in HIDDEN:
         vis[thing].set_property("visible", False)
+
+
+def _reach(specimen: SpecimenBodies) -> Array:
+    """Corners (n, 3) in the platen's {b} of boxes along it around a specimen's shapes."""
+    poses, corners = specimen_poses(specimen, {}, 1)[0], []
+    for shape in specimen.shapes:
+        at = pin.XYZQUATToSE3(poses[shape.joint]) * shape.placement
+        round_body = getattr(shape.geometry, "radius", 0.0) * np.ones(3)
+        round_body[2] += getattr(shape.geometry, "halfLength", 0.0)
+        size = np.abs(at.rotation) @ getattr(shape.geometry, "halfSide", round_body)
+        corners += [at.translation - size, at.translation + size]
+    return np.array(corners)
 
 
 def _primitive(shape: Any) -> tuple[Any, Array]:

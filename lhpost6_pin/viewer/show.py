@@ -47,6 +47,7 @@ def machine_legend(machine: Machine) -> dict[str, str]:
     """Words and colours of what a machine is drawn with."""
     kinds = {"platen": "platen"} | {a.mount: f"{a.kind} actuators" for a in machine.actuators}
     kinds |= {"strut": f"{machine.struts[0].kind} struts"} if machine.struts else {}
+    kinds |= {"specimen": "specimen"} if machine.specimen else {}
     return {word.replace("_", "-"): drawing_colour(kind) for kind, word in kinds.items()}
 
 
@@ -63,6 +64,9 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     look, seconds = frames.look, (len(frames.time) - 1) / frames.look.rate
     kind = str(record.attrs.get("kind", "record"))
     note = f"{machine.name}, {kind}, {seconds:.1f} s at {look.rate:g} frames/s, {look.size}; +X to the right"
+    carried = str(record.attrs.get("specimen", "none"))
+    if carried != "none" and machine.specimen is None:
+        note += f"; specimen {carried} not drawn: it was not named"
     legend = machine_legend(machine) | {"path of C": drawing_colour("trace")}
     legend |= {f"{g.label} (outline)": drawing_colour(g.name) for g in frames.ghosts}
     layers = {"path of C": [f"meshcat/{ROOT}/trace"]}

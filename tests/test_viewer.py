@@ -39,7 +39,7 @@ from lhpost6_pin.viewer import (
 from lhpost6_pin.viewer.animation import draw_animation
 from lhpost6_pin.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
 from lhpost6_pin.viewer.frames import Ghost
-from lhpost6_pin.viewer.scene import draw_machine
+from lhpost6_pin.viewer.scene import draw_machine, draw_names
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
 
@@ -156,6 +156,22 @@ def test_a_specimen_stands_on_the_platen_and_its_joints_move(machine, poses):
     bare = Recorder()
     draw_machine(bare, machine, load_bodies(machine))
     assert not any("/specimen/" in umsgpack.unpackb(c)["path"] for c in bare.commands)
+
+
+def test_every_leg_has_its_name_where_it_is(machine):
+    window = Recorder()
+    draw_names(window, machine)
+    sent = [umsgpack.unpackb(c) for c in window.commands]
+    objects = [m for m in sent if m["type"] == "set_object"]
+    written = {m["path"].rsplit("/", 1)[1]: m["object"]["textures"][0]["text"] for m in objects}
+    assert written == {leg.name: leg.name for leg in legs(machine)}
+    assert {m["path"].rsplit("/", 1)[0] for m in sent} == {"/meshcat/table/names", "/meshcat/table/platen/names"}
+    for m in sent:
+        if m["type"] == "set_transform":
+            name, x = m["path"].rsplit("/", 1)[1], m["matrix"][12]
+            leg = next(leg for leg in legs(machine) if leg.name == name)
+            ends = sorted((leg.base_point[0], leg.platen_point[0]))
+            assert ends[0] - 0.5 <= x + machine.platen.centre_of_gravity[0] <= ends[1] + 0.5
 
 
 def test_a_body_without_shapes_is_the_uniform_box_of_its_inertia(tmp_path, machine):

@@ -106,7 +106,7 @@ def test_keys_and_boxes_play_step_and_hide(page, tmp_path):
     assert abs(seen["time"] - (5 + 1 / 30)) < 1e-6  # one frame
     end, clock = seen["end"]
     assert abs(end - 11.967) < 1e-3 and clock == "11.97 / 11.97 s"  # 12 s less a sample and less what is no frame
-    assert seen["layers"][0] == "path of C" and seen["layers"][-1] == "forces" and len(seen["layers"]) == 4
+    assert seen["layers"][:2] == ["names", "path of C"] and seen["layers"][-1] == "forces" and len(seen["layers"]) == 5
     before, after = seen["violet"]  # the struts' pull; shades of the struts themselves come near
     assert before > 1e-3 and after < 0.1 * before
 

@@ -14,7 +14,7 @@ from ..urdf import legs
 from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
 from .frames import AS_IT_IS, Look
 from .page import Caption, render_page
-from .scene import draw_arrows, draw_machine, table_of
+from .scene import draw_arrows, draw_machine, draw_names, table_of
 from .show import machine_legend
 from .window import LoopbackWindow
 
@@ -39,6 +39,7 @@ class LiveView:
         self._window = LoopbackWindow(render_page(Caption(title, note, machine_legend(machine)), live=True))
         draw_machine(self._window, machine, self._bodies)
         draw_arrows(self._window, self._names)
+        draw_names(self._window, machine)
         shaped = {shape.parentJoint for shape in self._bodies.shapes.geometryObjects}
         self._table = table_of(self._window)
         self._moving = {j: body_name(self._bodies.model, j) for j in shaped if j > 0}  # by joint

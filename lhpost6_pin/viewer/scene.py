@@ -16,7 +16,16 @@ from .arrows import OPACITY, arrow_solid
 from .frames import Frames
 from .window import Window
 
-__all__ = ["ROOT", "draw_arrows", "draw_machine", "draw_motion", "specimen_body", "table_of"]
+__all__ = [
+    "ROOT",
+    "draw_arrows",
+    "draw_machine",
+    "draw_motion",
+    "draw_names",
+    "names_layer",
+    "specimen_body",
+    "table_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -34,6 +43,8 @@ FACES = {
     "widthSegments": 14,
     "heightSegments": 8,
 }  # of round bodies: fewer than usual
+NAMES = "names"
+NAME = 0.12  # edge of the square that a leg's name is written in, over the platen's length
 FINE = 0.004  # [m] between points of a path: a pixel where the whole table is seen
 BACKGROUND = {"top_color": [0.93, 0.95, 0.97], "bottom_color": [0.80, 0.84, 0.88]}
 
@@ -58,9 +69,34 @@ def draw_machine(window: Window, machine: Machine, bodies: Bodies) -> None:
     _set_stage(vis, machine, specimen)
 
 
+def names_layer() -> list[str]:
+    """Paths in the scene of the legs' names."""
+    return [f"meshcat/{ROOT}/{NAMES}", f"meshcat/{ROOT}/platen/{NAMES}"]
+
+
 def specimen_body(joint: int) -> str:
     """Path in the scene of a body of the specimen, by joint: part of the platen."""
     return f"platen/specimen/{joint}"
+
+
+def draw_names(window: Window, machine: Machine) -> None:
+    """Send the names of the legs, upright: of swivel actuators over their barrels, of the others on the platen."""
+    from meshcat import geometry
+
+    table, size = table_of(window), NAME * max(machine.platen.size)
+    upright = pin.rpy.rpyToMatrix(0.5 * math.pi, 0.0, 0.0)
+    for leg in legs(machine):
+        base, point = np.array(leg.base_point), np.array(leg.platen_point)
+        if getattr(leg, "mount", "strut") == "swivel":
+            body, place = table[NAMES], 0.75 * base + 0.25 * point + [0.0, 0.0, 0.4 * size]
+        else:  # beside its arrow, in {b}
+            body, place = table["platen"][NAMES], np.array([point[0] + 0.3 * size, point[1], 0.2 * size])
+            place -= machine.platen.centre_of_gravity
+        letters = {"type": "_text", "text": leg.name, "font_size": 110, "font_face": "sans-serif"}
+        written = geometry.GenericTexture(letters)
+        material = geometry.MeshBasicMaterial(map=written, side=0, transparent=True, depthWrite=False)
+        body[leg.name].set_object(geometry.Box([size, size, 1e-3]), material)
+        body[leg.name].set_transform(pin.SE3(upright, place).homogeneous)
 
 
 def draw_motion(window: Window, machine: Machine, frames: Frames) -> None:

@@ -11,7 +11,7 @@ from .animation import draw_animation, leg_forces
 from .arrows import largest_force
 from .frames import AS_IT_IS, Frames, Look, record_frames, record_title
 from .page import Caption, Picture, render_page
-from .scene import ROOT, draw_arrows, draw_machine, draw_motion
+from .scene import ROOT, draw_arrows, draw_machine, draw_motion, draw_names, names_layer
 from .window import LoopbackWindow, Recorder, Window
 
 __all__ = ["live_animation", "machine_legend", "show_record"]
@@ -54,6 +54,7 @@ def machine_legend(machine: Machine) -> dict[str, str]:
 def _draw(window: Window, machine: Machine, frames: Frames) -> None:
     bodies = load_bodies(machine)
     draw_machine(window, machine, bodies)
+    draw_names(window, machine)
     draw_motion(window, machine, frames)
     draw_arrows(window, list(leg_forces(machine, frames)))
     draw_animation(window, machine, bodies, frames)
@@ -69,7 +70,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
         note += f"; specimen {carried} not drawn: it was not named"
     legend = machine_legend(machine) | {"path of C": drawing_colour("trace")}
     legend |= {f"{g.label} (outline)": drawing_colour(g.name) for g in frames.ghosts}
-    layers = {"path of C": [f"meshcat/{ROOT}/trace"]}
+    layers = {"names": names_layer(), "path of C": [f"meshcat/{ROOT}/trace"]}
     layers |= {g.label: [f"meshcat/{ROOT}/{g.name}", f"meshcat/{ROOT}/trace/{g.name}"] for g in frames.ghosts}
     if forces := leg_forces(machine, frames):
         assert frames.force is not None

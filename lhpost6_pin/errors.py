@@ -40,6 +40,11 @@ class MotionError(LhpostError):
 class OutOfRangeError(LhpostError):
     """A motion asks for more than the machine can give; the message says which limit and the scale that fits."""
 
+    def __init__(self, message: str, largest_scale: float | None = None) -> None:
+        """Keep the scale that would fit, where one is known."""
+        super().__init__(message)
+        self.largest_scale = largest_scale
+
 
 class SimulationError(LhpostError):
     """A run cannot be started as asked, or it diverged; the message names time and component."""

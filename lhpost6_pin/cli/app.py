@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..errors import LhpostError
+from ..errors import LhpostError, OutOfRangeError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,12 +38,13 @@ def main() -> None:
         try:
             app()
         except LhpostError as error:
-            _fail(str(error))
+            known = {"largest_scale": error.largest_scale} if isinstance(error, OutOfRangeError) else {}
+            _fail(type(error).__name__, str(error), **known)
         except OSError as error:  # disk full, no permission, a file where a folder should be
             path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
             where = f"cannot read or write {path}" if path else "cannot read or write a file"
             remedy = "; make room, or choose another folder with --out" * (error.errno in _NO_ROOM)
-            _fail(f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
+            _fail("OSError", f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
         except SystemExit as end:
             if end.code == _INTERRUPTED:
                 _say_interrupted()
@@ -91,9 +92,14 @@ _INTERRUPTED = 130
 """Exit code that typer gives to Ctrl-C."""
 
 
-def _fail(message: str) -> None:
+def _fail(kind: str, message: str, **known: Any) -> None:
+    """Say what is refused, as JSON, too, where that was asked for, and end."""
+    from ..plain import as_json
+
     stderr().print("[bold red]error:[/] ", end="")
     stderr().print(message, markup=False, highlight=False)
+    if "--json" in sys.argv[1:]:
+        typer.echo(as_json({"error": {"kind": kind, "message": message, **known}}))
     sys.exit(2)
 
 

@@ -83,7 +83,8 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
         fits = largest_scale(target, limits, leg_check)
         raise OutOfRangeError(
             f"{target.reference.motion} at scale {target.reference.scale:g} is more than the table can give. "
-            f"The largest scale that fits is {fits:g}; beyond the limits: {'; '.join(_clauses(over, target.time))}"
+            f"The largest scale that fits is {fits:g}; beyond the limits: {'; '.join(_clauses(over, target.time))}",
+            fits,
         )
     utilisation: dict[str, dict[str, float]] = {}
     for peak in peaks:

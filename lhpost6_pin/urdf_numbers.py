@@ -27,7 +27,9 @@ def check_urdf(path: Path) -> None:
         for part in parts:
             for tag, keys in _PLACES.items():
                 for element in part.findall(tag):
-                    _vectors(element, [key for key in keys if key in element.attrib], 3, where)
+                    numbers = _vectors(element, [key for key in keys if key in element.attrib], 3, where)
+                    if tag == "axis" and numbers and not any(numbers):
+                        raise ParameterError(f"{where}: its axis has no direction; give one that is not 0 0 0")
         for inertial in owner.findall("inertial"):
             mass, (xx, xy, xz, yy, yz, zz) = (_of(inertial, tag, keys, where) for tag, keys in _NUMBERS.items())
             moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

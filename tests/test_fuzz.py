@@ -188,6 +188,7 @@ MASS, MOMENT, PLACE = b'mass value="200"', b'ixx="20"', b'xyz="0 0 3"'
         (MOMENT, b'ixx="-1e9"', "link bob: its mass or a principal moment of inertia is negative"),
         (MOMENT, b'ixx="x"', "link bob: inertia ixx = 'x'"),
         (PLACE, b'xyz="0 0"', "joint pivot: origin xyz = '0 0' should be 3 finite"),
+        (b'axis xyz="0 1 0"', b'axis xyz="0 0 0"', "joint pivot: its axis has no direction"),
         (b"</robot>", b"", "not a URDF that Pinocchio can read: no element found"),
     ],
 )

@@ -109,6 +109,11 @@ def test_what_cannot_be_drawn_is_refused_in_words(rate, amplify, bad, columns):
         assert columns == 6 and rate > 0 and amplify > 0 and np.isfinite(frames.displacement).all()
 
 
+def test_a_record_of_hours_is_refused_before_it_is_drawn():
+    with pytest.raises(ParameterError, match="more than 36000: cut the record"):
+        make_frames(np.linspace(0.0, 5000.0, 500), np.zeros((500, 6)))
+
+
 def test_a_platen_amplified_until_it_turns_over_is_refused():
     with pytest.raises(ParameterError, match="amplify less"):
         make_frames(np.array([0.0, 1.0]), np.full((2, 6), 0.02), look=Look(amplify=100.0))

@@ -8,9 +8,10 @@ Per degree of freedom a velocity is asked for (report, Chapter 5),
 xr, vr, ar, jr come from the reference generator, xf, vf, af from the feedback generator (`filters`). The feedback
 generator takes the displacement xs, which follows from the actuators' by forward kinematics (one Gauss-Newton step a
 sample), and the acceleration as of the platen. f is the actuators' force on that degree of freedom, HP a first-order
-high-pass, N five notches. The actuators' rates follow by the kinematic Jacobian at xs (Eq. 3-33). In the directions of
-force that do not move the platen a velocity lets internal forces decay. Each rate becomes a spool by the inverse of
-the valve's flow curve (Eq. 4-2) and its unloaded speed; an opening at rest feeds the leak.
+high-pass, N five notches. The actuators' rates follow by the kinematic Jacobian (Eq. 3-33) at the xs of the sample
+before, which the step begins with. In the directions of force that do not move the platen a velocity lets internal
+forces decay. Each rate becomes a spool by the inverse of the valve's flow curve (Eq. 4-2) and its unloaded speed; an
+opening at rest feeds the leak.
 
 For sine tests a canceller adds harmonics to the drive before the reference generator (`sine`).
 """

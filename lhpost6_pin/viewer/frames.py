@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 OTHERS = ("first_other", "second_other")
 """Names, and so colours, of records over another."""
 
+MOST_FRAMES = 36_000
+"""Frames that a browser still plays: 20 minutes at 30 a second, a page of some 100 MB."""
+
 MOST_TURN = 0.5 * math.pi
 """Roll or pitch [rad] that is refused: Euler angles end at a pitch of this size."""
 
@@ -131,7 +134,13 @@ def _moments(times: Sequence[Array], rate: float) -> Array:
     if last <= first:
         spans = " and ".join(f"{t[0]:g} to {t[-1]:g} s" for t in (times[0], times[-1]))
         raise RecordError(f"the records share no time: {spans}; let both begin with the same test")
-    return np.asarray(first + np.arange(int((last - first) * rate * (1.0 + 1e-12)) + 1) / rate)
+    frames = int((last - first) * rate * (1.0 + 1e-12)) + 1
+    if frames > MOST_FRAMES:
+        raise ParameterError(
+            f"{last - first:g} s at {rate:g} frames a second are {frames}, more than {MOST_FRAMES}: cut the record, or ask "
+            "for fewer frames a second"
+        )
+    return np.asarray(first + np.arange(frames) / rate)
 
 
 def _sampled(moments: Array, time: Array, motion: Array, name: str, factor: float) -> Array:

@@ -137,8 +137,8 @@ def _moments(times: Sequence[Array], rate: float) -> Array:
     frames = int((last - first) * rate * (1.0 + 1e-12)) + 1
     if frames > MOST_FRAMES:
         raise ParameterError(
-            f"{last - first:g} s at {rate:g} frames a second are {frames}, more than {MOST_FRAMES}: cut the record, or ask "
-            "for fewer frames a second"
+            f"{last - first:g} s at {rate:g} frames a second are {frames}, more than {MOST_FRAMES}: cut the record, or "
+            "ask for fewer frames a second"
         )
     return np.asarray(first + np.arange(frames) / rate)
 

@@ -143,6 +143,9 @@ def grid(*blocks: Markup, pairs: bool = False) -> Markup:
     return Markup(f'<div class="{"grid pairs" if pairs else "grid"}">{"".join(blocks)}</div>')
 
 
+UNSEEN = 1e-6  # share of a limit that is shown as none
+
+
 def bar(fraction: float, tolerance: float = 0.0) -> Markup:
     """Return a bar filled to `fraction` of a limit, with the per cent in words.
 
@@ -153,7 +156,8 @@ def bar(fraction: float, tolerance: float = 0.0) -> Markup:
         return text("–")
     level = "over" if fraction >= 1.0 + tolerance else "near" if fraction >= 0.8 else "within"
     width = min(100.0 * fraction, 100.0)
-    percent = f"{number(100.0 * fraction, 3 if fraction >= 1.0 else 2)} %" if fraction < float("inf") else "impossible"
+    shown = 100.0 * fraction if fraction > UNSEEN else 0.0
+    percent = f"{number(shown, 3 if fraction >= 1.0 else 2)} %" if fraction < float("inf") else "impossible"
     return Markup(
         f'<span class="bar {level}"><span class="fill" style="width:{width:.1f}%"></span></span>'
         f'<span class="percent">{percent}</span>'

@@ -2,12 +2,13 @@
 
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from machine_cases import DATA
+
+from lhpost6_pin.cli import main
 
 PAGE = Path(__file__).parents[1] / "scripts" / "docs" / "pages" / "reference" / "json.md"
 PRACTICE = str(DATA / "records" / "practice_a_TX.nc")
@@ -25,12 +26,18 @@ def documented(command: str) -> set[str]:
     raise AssertionError(f"{command} is not on the page")
 
 
-def said(folder: Path, *words: str) -> tuple[int, dict]:
-    """Exit code of a command in a process of its own, and what it printed."""
-    program = "import sys; from lhpost6_pin.cli import main; sys.argv[0] = 'lhpost6'; main()"
-    command = [sys.executable, "-c", program, *words, "--json"]
-    ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-    return ended.returncode, json.loads(ended.stdout)
+@pytest.fixture
+def said(tmp_path, monkeypatch, capsys):
+    """Runs a command as the shell would: its exit code, and what it printed."""
+
+    def run(*words: str) -> tuple[int, dict]:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["lhpost6", *words, "--json"])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return int(ended.value.code or 0), json.loads(capsys.readouterr().out)
+
+    return run
 
 
 @pytest.mark.parametrize(
@@ -44,16 +51,16 @@ def said(folder: Path, *words: str) -> tuple[int, dict]:
     ],
     ids=lambda words: words[0] if isinstance(words, tuple) else "",
 )
-def test_the_page_has_every_field_of_a_command_and_no_other(tmp_path, words, others):
-    code, entries = said(tmp_path, *words)
+def test_the_page_has_every_field_of_a_command_and_no_other(said, words, others):
+    code, entries = said(*words)
     assert code == 0
     assert set(entries) == documented(words[0]) - others
 
 
-def test_the_page_has_the_fields_of_what_only_looks(tmp_path):
+def test_the_page_has_the_fields_of_what_only_looks(said):
     wanted = documented("info")
-    found = [set(said(tmp_path, *words)[1]) for words in (("info",), ("capacity",), ("motions",), ("doctor",))]
-    found.append(set(said(tmp_path, "motions", "sine")[1]))
+    found = [set(said(*words)[1]) for words in (("info",), ("capacity",), ("motions",), ("doctor",))]
+    found.append(set(said("motions", "sine")[1]))
     assert set.union(*found) == wanted
 
 
@@ -66,8 +73,8 @@ def test_the_page_has_the_fields_of_what_only_looks(tmp_path):
         (("export", PRACTICE, "--to", "csv", "--out", "/proc/none/a.csv"), "OSError", "/proc/none"),
     ],
 )
-def test_a_refusal_is_an_object_too(tmp_path, words, kind, message):
-    code, entries = said(tmp_path, *words)
+def test_a_refusal_is_an_object_too(said, words, kind, message):
+    code, entries = said(*words)
     assert code == 2 and set(entries) == {"error"}
     assert entries["error"]["kind"] == kind and message in entries["error"]["message"]
     fits = entries["error"].get("largest_scale")

@@ -13,7 +13,7 @@ from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.plant import make_plant
 
-settings.register_profile("fixed", derandomize=True, deadline=None)
+settings.register_profile("fixed", derandomize=True, deadline=None, max_examples=50)
 settings.register_profile("explore", max_examples=1000, deadline=None)
 settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile("fixed")

@@ -163,6 +163,20 @@ def test_a_specimen_stands_on_the_platen_and_its_joints_move(machine, poses):
     assert not any("/specimen/" in umsgpack.unpackb(c)["path"] for c in bare.commands)
 
 
+def test_joints_of_a_record_are_drawn_enlarged_if_they_are_numbers(machine, record):
+    angle = np.linspace(0.0, 0.2, record.sizes["time"])[:, None]
+    moved = record.assign(specimen_joint_position=(("time", "specimen_joint"), angle))
+    moved = moved.assign_coords(specimen_joint=["pivot"])
+    frames = record_frames(machine, moved, look=Look(amplify=3.0))
+    np.testing.assert_allclose(
+        frames.joints["pivot"][[0, -1]], [0.0, 0.6], atol=2e-3
+    )  # the last frame is before the end
+    angle[7] = np.nan
+    for broken in (moved, record.assign(specimen_joint_position=("time", np.zeros(len(angle))))):
+        with pytest.raises(RecordError, match="specimen_joint_position must be finite"):
+            record_frames(machine, broken)
+
+
 def test_every_leg_has_its_name_where_it_is(machine):
     window = Recorder()
     draw_names(window, machine)

@@ -166,7 +166,10 @@ def _motion(machine: Machine, record: xr.Dataset) -> Array:
 def _joints(record: xr.Dataset, frames: Frames) -> dict[str, Array]:
     if "specimen_joint_position" not in record:
         return {}
-    drawn = _columns(frames.time, record["time"].values, record["specimen_joint_position"].values)
+    joints = record["specimen_joint_position"]
+    if joints.dims != ("time", "specimen_joint") or joints.dtype.kind != "f" or not np.isfinite(joints.values).all():
+        raise RecordError("specimen_joint_position must be finite numbers by time and joint; leave it out, or mend it")
+    drawn = _columns(frames.time, record["time"].values, joints.values)
     names = map(str, record["specimen_joint"].values)
     return dict(zip(names, frames.look.amplify * drawn.T, strict=True))
 

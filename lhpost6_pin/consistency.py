@@ -6,7 +6,12 @@ are filtered by one band. X has noise as well; its known variance is taken off X
 
 A theta may be off by its noise, and by what calibration leaves open: each such error is a signal E (its size one
 standard deviation) that y may contain, and moves theta by (X'X)^-1 X'E. Three times the root sum of squares of these
-moves is the tolerance. What E leaves in the residual is allowed there.
+moves is the tolerance, or the sum of all at the ends of their ranges (sqrt(3) deviations), if that is more. What E
+leaves in the residual is allowed there; less than the stated noise always is.
+
+A force that hardly varies cannot tell a gain from an offset. So what the records do not test is held at what it should
+be, and the rest is solved again: the stated range of what is held, a part of E, then counts in the tolerance of the
+rest, and a finding says what may be off instead.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,18 +30,21 @@ from .sensors import Sensors
 __all__ = ["SensorFinding", "check_sensors", "scaled_inverse"]
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
+LEVELS = ("offset", "drift")  # quantities that noise does not hide
 CONFIDENCE = 3.0  # standard deviations
-MOST_NOISE = 0.1  # of X'X: where more is noise, its correction is worth no more than the stated noise
+MOST_NOISE = 0.1  # of what the other columns leave of one: where more is noise, its correction is worth little
 
 
 @dataclass(frozen=True)
 class SensorFinding:
     """One number by which two sensors (or a sensor and a law) were compared.
 
-    `tolerance` is what calibration and geometry may make of it, three standard deviations; `standard_error` is that
-    of the noise. The verdict on a gain or delay is "untested" where noise is more than what is
-    compared allows: a standard error beyond the tolerance, or a tenth of X'X.
+    `tolerance` is what calibration and geometry may make of it, at least three deviations; `standard_error` is that
+    of the noise. The verdict on a gain or delay is "untested" where noise is more than what is compared allows: a
+    standard error beyond the tolerance, or a tenth of what the gain is told by. `instead` are untested quantities that
+    would show here: where nothing varies, an offset may be a gain.
     """
 
     check: str
@@ -48,6 +56,12 @@ class SensorFinding:
     expected: float
     tolerance: float
     verdict: Literal["ok", "suspicious", "untested"]
+    instead: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> str:
+        """The quantity and what may be off instead, as in `offset or gain a`."""
+        return " or ".join((self.quantity, *self.instead))
 
     @property
     def deviation(self) -> float:
@@ -61,7 +75,7 @@ class SensorFinding:
 
     def __str__(self) -> str:
         """One line, as in `force against pressures, actuator_force[H1]: gain a 1.003 +- 0.001 1, ...`."""
-        value = f"{self.quantity} {self.estimate:.5g} +- {self.standard_error:.2g} {self.unit}"
+        value = f"{self.named} {self.estimate:.5g} +- {self.standard_error:.2g} {self.unit}"
         due = f"expected {self.expected:.5g} within {self.tolerance:.2g}"
         return f"{self.check}, {self.channel}: {value}, {due}: {self.verdict}"
 
@@ -121,31 +135,65 @@ def _added(sums: _Sums | None, c: Comparison) -> _Sums:
     )
 
 
-def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[SensorFinding]:
+class _Solved(NamedTuple):
+    """Coefficients with what they may be off by, and what they leave."""
+
+    theta: Array  # (p,)
+    inverse: Array  # (p, p) of X'X, zero where held
+    error: Array  # (p,) standard errors
+    lawful: Array  # (p,) by what calibration leaves open
+    doubt: Array  # (p,) by what the stated noise may be off
+    square: float  # mean square of the residual
+    noise: float  # of it, that of noise
+    allowed: float  # of it, that of what calibration leaves open, one standard deviation
+
+
+def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
+    """Least squares for the coefficients `kept` (p,), the others held at what they should be; `noise` (p,) is of X."""
     xx, xy, xe, ee = (np.asarray(x) for x in (s.xx, s.xy, s.xe, s.ee))
+    inverse = np.zeros(xx.shape)
+    inverse[np.ix_(kept, kept)] = scaled_inverse((xx - np.diag(noise))[np.ix_(kept, kept)], np.diag(xx)[kept])
+    due = np.where(kept, 0.0, [term.due for term in s.terms])
+    theta = due + inverse @ (xy - xx @ due)
+    moved = inverse @ xe
+    square = (s.yy - 2 * theta @ xy + theta @ xx @ theta) / s.samples
+    noise_left = (s.variance + float(theta**2 @ np.asarray(s.noise))) / s.samples
+    left = ee - 2 * np.sum(moved * xe, axis=0) + np.einsum("pk,pq,qk->k", moved, xx, moved)
+    spread = np.sqrt(max(square, noise_left) * s.samples / s.independent)
+    return _Solved(
+        theta,
+        inverse,
+        spread * np.sqrt(np.maximum(np.diag(inverse), 0.0)),
+        np.maximum(CONFIDENCE * np.sqrt(np.sum(moved**2, axis=1)), np.sqrt(3.0) * np.sum(np.abs(moved), axis=1)),
+        ((1 + noise_range) ** 2 - 1) * np.abs(inverse @ (noise * theta)),
+        float(square),
+        float(noise_left),
+        float(np.sum(np.maximum(left, 0.0))) / s.samples,
+    )
+
+
+def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[SensorFinding]:
+    xx, noise = np.asarray(s.xx), np.asarray(s.noise)
     unit = LAYOUT[channel.split("[")[0]].units.split(", ")
     unit_y = unit[-1] if channel.endswith(("[roll]", "[pitch]", "[yaw]")) else unit[0]
-    inverse = scaled_inverse(xx - np.diag(s.noise), np.diag(xx))
-    theta, moved = inverse @ xy, inverse @ xe
-    square = (s.yy - 2 * theta @ xy + theta @ xx @ theta) / s.samples
-    noise = (s.variance + float(theta**2 @ np.asarray(s.noise))) / s.samples
-    left = ee - 2 * np.sum(moved * xe, axis=0) + np.einsum("pk,pq,qk->k", moved, xx, moved)
-    allowed = float(np.sum(np.maximum(left, 0.0))) / s.samples
-    spread = np.sqrt(max(square, noise) * s.samples / s.independent)
-    error = spread * np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    share = np.asarray(s.noise) / np.maximum(np.diag(xx), 1e-300)  # of the noise in X'X
-    doubt = (1 + noise_range) ** 2
-    tolerance = CONFIDENCE * np.sqrt(np.sum(moved**2, axis=1)) + (doubt - 1) * share * np.abs(theta)
-    gain = theta[0] if len(theta) and theta[0] else 1.0
-    hidden = share > MOST_NOISE
-    whole = bool(np.any([h and not term.beside for h, term in zip(hidden, s.terms, strict=True)]))
-    for term, value, sigma, range_, buried in zip(s.terms, theta, error, tolerance, hidden, strict=True):
+    hidden = noise * np.diag(scaled_inverse(xx, np.diag(xx))) > MOST_NOISE
+    whole = any(h and not term.beside for h, term in zip(hidden, s.terms, strict=True))
+    free = _solved(s, np.ones(len(noise), bool), np.where(hidden, 0.0, noise), noise_range)
+    unclear = hidden | (free.error > free.lawful + free.doubt) | whole
+    held = unclear & np.array([term.quantity not in LEVELS for term in s.terms], bool)
+    told = _solved(s, ~held, noise, noise_range) if held.any() else free
+    moved = np.abs(told.inverse @ xx) * free.lawful  # (p, p): by the range of each that is held
+    for i, term in enumerate(s.terms):
+        by = free if held[i] else told
+        value, sigma, range_ = by.theta[i], by.error[i], by.lawful[i] + by.doubt[i]
         if term.delay is not None:
+            gain = by.theta[0] or 1.0
             value, sigma = term.delay - value / gain, sigma / abs(gain)
         numbers = value, sigma, term.expected, range_
-        yield _finding(check, channel, term.quantity, term.unit or unit_y, *numbers, whole or bool(buried))
-    rms, floor = np.sqrt(max(square, 0.0)), np.sqrt(noise)
-    range_ = np.sqrt(doubt * noise + CONFIDENCE**2 * allowed) - floor
+        others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
+        yield _finding(check, channel, term.quantity, term.unit or unit_y, *numbers, untested=held[i], instead=others)
+    rms, floor = np.sqrt(max(told.square, 0.0)), np.sqrt(told.noise)
+    range_ = np.sqrt((1 + noise_range) ** 2 * told.noise + CONFIDENCE**2 * told.allowed) - floor
     yield _finding(check, channel, "residual", unit_y, rms, floor / np.sqrt(2 * s.independent), floor, range_)
 
 
@@ -164,13 +212,13 @@ def _finding(
     error: float,
     expected: float,
     tolerance: float,
-    buried: bool = False,
+    *,
+    untested: bool = False,
+    instead: tuple[str, ...] = (),
 ) -> SensorFinding:
-    level = quantity in ("offset", "drift", "residual")  # which noise does not hide
-    verdict: Literal["ok", "suspicious", "untested"] = "ok"
-    if not level and (buried or error > tolerance):
-        verdict = "untested"
-    elif abs(estimate - expected) > np.hypot(CONFIDENCE * error, tolerance):
-        verdict = "suspicious"
+    """Suspicious is what is farther off than noise and its tolerance explain; a residual may be less than expected."""
+    off = estimate - expected if quantity == "residual" else abs(estimate - expected)
+    far = off > np.hypot(CONFIDENCE * error, tolerance)
+    verdict: Literal["ok", "suspicious", "untested"] = "untested" if untested else "suspicious" if far else "ok"
     numbers = float(estimate), float(error), float(expected), float(tolerance)
-    return SensorFinding(check, channel, quantity, unit, *numbers, verdict)
+    return SensorFinding(check, channel, quantity, unit, *numbers, verdict, instead)

@@ -41,6 +41,11 @@ class Term(NamedTuple):
     delay: float | None = None  # already taken out [s]; the coefficient is what is left, times minus the gain
     beside: bool = False  # where noise hides it, the others still tell
 
+    @property
+    def due(self) -> float:
+        """What its coefficient should be."""
+        return self.expected if self.delay is None else 0.0
+
 
 class Comparison(NamedTuple):
     """One y and its X in one record."""

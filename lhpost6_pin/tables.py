@@ -195,7 +195,7 @@ def print_sensor_findings(findings: "Sequence[SensorFinding]") -> None:
         table = Table(*names, title="Sensors that disagree")
         for f in sorted(suspicious, key=lambda one: -abs(one.significance)):
             numbers = f"{f.estimate:.5g}", f"{f.expected:.5g}", f"{f.tolerance:.2g}", f"{f.significance:+.1f}"
-            table.add_row(f.check, escape(f.channel), f.quantity, f.unit, *numbers)
+            table.add_row(f.check, escape(f.channel), f.named, f.unit, *numbers)
         console.print(table)
         console.print("A sensor is off, or the law or geometry that it is held against lacks something.")
     console.print(

@@ -78,6 +78,7 @@ def _third(column: int, factor: float, offset: float = 0.0):
     ("name", "change", "where"),
     [
         ("actuator_force", _third(2, 1.05), {"actuator_force[H3]"}),
+        ("actuator_force", _third(1, 0.97), {"actuator_force[H2]"}),
         ("actuator_force", _third(6, 1.0, 60e3), {"actuator_force[V3]"}),
         ("chamber_pressure_b", _third(0, 0.95), {"actuator_force[H1]"}),
         ("platen_velocity", _third(1, 1.05), {"platen_velocity[y]"}),
@@ -122,6 +123,47 @@ def test_what_hardly_moves_is_untested_rather_than_right(plant, campaign) -> Non
         add_noise(r[["platen_displacement", "platen_acceleration"]], SENSORS, np.random.default_rng(0)) for r in still
     ]
     assert find(check_sensors(plant, still, SENSORS), "platen_acceleration[roll]", "gain").verdict == "untested"
+
+
+@pytest.fixture(scope="module")
+def still_forces(plant):
+    """Records whose pressures and forces stay near their static values, each with noise of its own."""
+    record = measured(plant)[0]
+    names = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
+    means = {n: record[n].mean("time") for n in names}
+    still = record.assign({n: (m + 2e-4 * (record[n] - m)).transpose(*record[n].dims) for n, m in means.items()})
+    return [add_noise(still[[*names]], SENSORS, np.random.default_rng(seed)) for seed in range(5)]
+
+
+def test_a_force_that_hardly_varies_says_nothing_of_gains_and_offsets_are_not_made_of_noise(
+    plant, still_forces
+) -> None:
+    for record in still_forces:
+        lawful = with_change(
+            [record], "chamber_pressure_a", lambda p: 1.0045 * p + 2.7e4
+        )  # near the ends of the ranges
+        lawful = with_change(lawful, "actuator_force", lambda f: 0.9955 * f - 3600.0)
+        findings = check_sensors(plant, lawful, SENSORS)
+        assert suspicious(findings) == set()
+        assert {f.verdict for f in findings if f.quantity.startswith("gain")} == {"untested"}
+        assert all(f.standard_error > 0.0 for f in findings)
+
+
+def test_what_a_still_force_is_off_by_may_be_its_offset_or_its_gain(plant, still_forces) -> None:
+    wrong = with_change(still_forces[:1], "actuator_force", _third(6, 1.05))
+    findings = check_sensors(plant, wrong, SENSORS)
+    assert suspicious(findings) == {("actuator_force[V3]", "offset")}
+    found = find(findings, "actuator_force[V3]", "offset")
+    assert found.named == "offset or gain a" and found.named in str(found)
+    mean = float(still_forces[0]["actuator_force"][:, 6].mean())
+    assert found.estimate == pytest.approx(0.05 * mean, abs=10 * found.standard_error + 0.001 * mean)
+
+
+def test_sensors_that_agree_better_than_stated_are_not_suspected(plant) -> None:
+    findings = check_sensors(plant, [measured(plant)[0]], SENSORS)
+    residuals = [f for f in findings if f.quantity == "residual"]
+    assert min(f.estimate / f.expected for f in residuals) < 0.1
+    assert {f.verdict for f in residuals} == {"ok"}
 
 
 def test_a_machine_without_redundant_lengths_has_no_parity() -> None:

@@ -63,7 +63,7 @@ def lost_motion(
 
 def _play(parts: Sequence[tuple[Comparison, Array]]) -> tuple[float, float]:
     """Half the play and its standard deviation [m]: least squares, with errors of sensors and geometry in them."""
-    due = np.array([term.expected if term.delay is None else 0.0 for term in parts[0][0].terms])
+    due = np.array([term.due for term in parts[0][0].terms])
     rows, rest = [], []
     for c, side in parts:
         terms = np.stack([term.column for term in c.terms], axis=1)

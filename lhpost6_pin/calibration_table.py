@@ -5,7 +5,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from .calibration import Calibration
-from .calibration.verdicts import contradictions, far, verdict_on
+from .calibration.verdicts import contradictions, cut_strokes, far, verdict_on
 from .console import make_console
 from .residuals import RESIDUALS
 
@@ -16,6 +16,8 @@ def print_calibration(calibration: Calibration) -> None:
     """Print parameters, sensor errors that stand out, misfits, and whether the fit converged."""
     console = make_console()
     console.print(_parameters(calibration))
+    for said in cut_strokes(calibration):
+        console.print(escape(said))
     console.print(_sensors(calibration))
     console.print(_misfits(calibration))
     pairs, apart = len(calibration.alike()), len(contradictions(calibration))

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 
 from lhpost6_pin.calibration import Calibration, Subset, calibration_numbers, machine_knobs
 from lhpost6_pin.calibration.errors import SensorUnknown
-from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, verdict_on
+from lhpost6_pin.calibration.override import save_override
+from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, cut_strokes, verdict_on
 from lhpost6_pin.calibration_table import print_calibration
 from lhpost6_pin.campaign import Campaign, load_campaign
 from lhpost6_pin.cli import app
@@ -83,6 +84,28 @@ def test_what_went_as_far_as_it_may_is_said_to_be_at_its_bound(found) -> None:
     reach = found.numbers.number("fit.reach")
     far = replace(found, estimate=np.where(np.arange(7) == 1, -reach * found.prior, found.estimate))
     assert verdict_on(far, 1) == "at its bound"
+
+
+def test_a_knob_is_at_its_bound_where_no_machine_could_be_built_beyond(found) -> None:
+    leakage = replace(found.knobs[1], lowest=-0.1, highest=0.2)
+    for x, verdict in ((-0.1, "at its bound"), (-0.09, "unchanged"), (0.2, "at its bound")):
+        estimate = np.where(np.arange(7) == 1, x, found.estimate)
+        knobs = (found.knobs[0], leakage, *found.knobs[2:])
+        assert verdict_on(replace(found, knobs=knobs, estimate=estimate), 1) == verdict
+
+
+def test_a_stroke_that_gives_way_to_a_chamber_is_said_and_not_passed_off_as_measured(found, tmp_path, capsys) -> None:
+    assert cut_strokes(found) == []
+    (chamber,) = (k for k in machine_knobs(MACHINE, {"horizontal": 0.3}) if k.name == "horizontal.chamber_a")
+    short = replace(found, knobs=(*found.knobs[:1], chamber, *found.knobs[2:]))
+    short = replace(short, estimate=np.where(np.arange(7) == 1, chamber.coordinate(0.7), found.estimate))
+    (said,) = cut_strokes(short)
+    assert said.startswith("horizontal.stroke, stated as 0.75 m, is cut to 0.6993 m")
+    assert said in page_of(short, tmp_path)
+    print_calibration(short)
+    assert said in " ".join(capsys.readouterr().out.split())
+    stroke = load_machine("lhpost6", save_override(short, tmp_path / "o.toml")).parameters["horizontal.stroke"]
+    assert "not measured" in stroke.source and stroke.sd is None
 
 
 def test_a_group_contradicts_by_the_deviation_of_the_difference(found) -> None:

@@ -137,6 +137,28 @@ def test_a_chamber_is_not_turned_shorter_than_its_stroke(machine):
     with_knobs(machine, [k], np.array([k.lowest]))  # can still be built
 
 
+@pytest.mark.parametrize(
+    ("stated", "chamber_a", "chamber_b", "wanted"),
+    [
+        (0.75, 0.9, 0.9, 0.75),  # longer chambers leave it as stated
+        (0.75, 0.7503, 0.9, 0.75),  # as long as it fits
+        (0.75, 0.72, 0.7, 0.7 / 1.001),  # the shortest chamber cuts it
+        (0.6, 0.72, 0.7, 0.6),
+    ],
+)
+def test_a_stroke_stays_as_stated_unless_a_chamber_is_shorter(machine, stated, chamber_a, chamber_b, wanted):
+    machine = machine.with_params({"horizontal.stroke": stated})
+    knobs = [k for k in machine_knobs(machine, {"horizontal": 0.3}) if k.name.startswith("horizontal.chamber")]
+    turned = with_knobs(machine, knobs, np.array([chamber_a, chamber_b]) / 0.8 - 1.0)
+    assert (turned.actuators[0].chamber_a, turned.actuators[0].chamber_b) == pytest.approx((chamber_a, chamber_b))
+    assert [a.stroke for a in turned.actuators[:4]] == pytest.approx([wanted] * 4, rel=1e-12)
+
+
+def test_a_chamber_is_no_shorter_than_its_piston_was_seen_to_move(machine):
+    (k,) = (k for k in machine_knobs(machine, {"horizontal": 0.6}) if k.name == "horizontal.chamber_a")
+    assert k.at(k.lowest) == pytest.approx(0.6, rel=2e-3)
+
+
 def test_a_guided_machine_has_no_knobs_of_axes_that_it_has_not():
     names = {k.name for k in machine_knobs(load_machine("uniaxial"))}
     assert "platen.mass[x]" in names
@@ -495,6 +517,19 @@ def test_override_file_makes_the_calibrated_machine(found, machine, tmp_path):
         assert again.parameters[name].value == pytest.approx(quantity.value, rel=1e-12), name
     assert again.parameters["horizontal.flow"].source.startswith("calibrated from campaign two tests")
     assert again.parameters["horizontal.flow"].evidence == "calibrated"
+
+
+@pytest.mark.slow
+def test_chambers_shorter_than_the_stated_stroke_are_found_and_the_oil_stays_as_stiff(machine, sensors):
+    short = {"horizontal.chamber_a": 0.70, "horizontal.chamber_b": 0.72}
+    true = machine.with_params({**short, "horizontal.stroke": 0.65})
+    records = simulate_campaign(true, load_controller("lhpost6"), sensors, seed=4, tests=("TX", "WN")).records
+    again = calibrate(machine, records, sensors)
+    for name, value in {**short, "hydraulics.bulk_modulus": machine.hydraulics.bulk_modulus}.items():
+        i = again.names.index(name)
+        k = again.knobs[i]
+        assert again.estimate[i] == pytest.approx(k.coordinate(value), abs=4.0 * again.sd[i]), name
+        assert again.sd[i] < 0.1 * k.sd
 
 
 def test_numbers_of_an_earlier_override_stay_in_the_new_one(found, machine, tmp_path):

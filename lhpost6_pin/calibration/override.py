@@ -30,11 +30,13 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     source = f"calibrated from campaign {calibration.campaign}: {', '.join(calibration.tests)}"
     entries: dict[str, Quantity] = {}
     for name, value in values.items():
-        spread: tuple[float, ...] | float | None = None  # of a stroke that comes with a chamber
+        spread: tuple[float, ...] | float | None = None
+        origin = f"cut to leave oil in the chamber found, not measured itself; {source}"  # a stroke
         if name in deviations:
             spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
+            origin = source
         number = tuple(value) if isinstance(value, list) else value
-        entries[name] = Quantity(number, machine.parameters[name].unit, "calibrated", source, spread)
+        entries[name] = Quantity(number, machine.parameters[name].unit, "calibrated", origin, spread)
     for name, quantity in machine.parameters.items():
         earlier = quantity.evidence in ("override", "calibrated") and not name.endswith(".valves")  # those of the tests
         if earlier and name not in entries:

@@ -5,9 +5,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .knobs import knob_changes
 from .result import Calibration
 
-__all__ = ["Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "far", "verdict_on"]
+__all__ = ["Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "cut_strokes", "far", "verdict_on"]
 
 Array = NDArray[np.float64]
 Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
@@ -28,11 +29,15 @@ def beyond(calibration: Calibration) -> NDArray[np.bool_]:
 def verdict_on(calibration: Calibration, i: int) -> Verdict:
     """The verdict on unknown i; the first that holds.
 
-    At its bound: as far from nominal as the fit lets it go. Changed: `beyond`. Unchanged: the campaign has told
-    something of it, and it is nearer than that.
+    At its bound: as far from nominal as the fit lets it go, by its prior or by what can be built. Changed: `beyond`.
+    Unchanged: the campaign has told something of it, and it is nearer than that.
     """
-    reach = calibration.numbers.number("fit.reach") * calibration.prior[i]
-    if abs(calibration.estimate[i]) >= reach * (1.0 - 1e-6):
+    count, prior, x = len(calibration.knobs), calibration.prior[i], calibration.estimate[i]
+    reach = calibration.numbers.number("fit.reach" if i < count else "fit.sensor_reach") * prior
+    low, high = -reach, reach
+    if i < count:
+        low, high = max(low, calibration.knobs[i].lowest), min(high, calibration.knobs[i].highest)
+    if not low + 1e-6 * prior < x < high - 1e-6 * prior:
         return "at its bound"
     if beyond(calibration)[i]:
         return "changed"
@@ -43,6 +48,18 @@ def changed_knobs(calibration: Calibration) -> list[int]:
     """Knobs that differ from nominal (`beyond`), the clearest first."""
     distance, changed = np.abs(far(calibration))[: len(calibration.knobs)], beyond(calibration)
     return [int(i) for i in np.argsort(-distance, kind="stable") if changed[i]]
+
+
+def cut_strokes(calibration: Calibration) -> list[str]:
+    """A sentence on every stroke that had to give way to a chamber found shorter."""
+    machine, count = calibration.machine, len(calibration.knobs)
+    turned = {path for knob in calibration.knobs for path, _ in knob.paths}
+    said = []
+    for path, value in knob_changes(machine, calibration.knobs, calibration.estimate[:count]).items():
+        if path not in turned:
+            stated = machine.parameters.number(path)
+            said.append(f"{path}, stated as {stated:g} m, is cut to {value:.4g} m: a chamber was found to be shorter.")
+    return said
 
 
 class Contradiction(NamedTuple):

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..calibration import Calibration
-from ..calibration.verdicts import beyond, contradictions, far, verdict_on
+from ..calibration.verdicts import beyond, contradictions, cut_strokes, far, verdict_on
 from ..residuals import RESIDUALS
 from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
 from .page import Markup, details, number, paragraph, table
@@ -47,6 +47,7 @@ def knob_blocks(calibration: Calibration) -> list[Markup]:
             )
         )
     how = (
+        "At its bound: as far from nominal as the fit lets it go, by its prior or since no machine could be built. "
         f"Changed: farther from nominal than {calibration.limit:g} predicted deviations, and than {material:g} of the "
         "prior's. Unchanged: nearer, and the campaign "
         f"has told something of it, which is a predicted deviation below {informed:g} of the prior's. Not informed: "
@@ -55,7 +56,8 @@ def knob_blocks(calibration: Calibration) -> list[Markup]:
     )
     header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "In deviations")
     heads = (*header, "Predicted over prior", INTERVAL)
-    return [forest_block(calibration), paragraph(how), table("All parameters", heads, rows)]
+    cut = map(paragraph, cut_strokes(calibration))
+    return [forest_block(calibration), paragraph(how), table("All parameters", heads, rows), *cut]
 
 
 def sensor_blocks(calibration: Calibration) -> list[Markup]:

@@ -35,7 +35,8 @@ def _parameters(calibration: Calibration) -> Table:
     for i, knob in enumerate(calibration.knobs):
         low, high = calibration.interval(i)
         estimate = knob.at(float(calibration.estimate[i]))
-        numbers = f"{knob.value:.5g}", f"{estimate:.5g}", knob.unit, f"{low:.5g} to {high:.5g}"
+        interval = f"{low:.5g} to {high:.5g}" if calibration.converged else "none"
+        numbers = f"{knob.value:.5g}", f"{estimate:.5g}", knob.unit, interval
         table.add_row(escape(knob.name), *numbers, _share(calibration, i), verdict_on(calibration, i))
     return table
 

@@ -203,7 +203,7 @@ def calibration_entries(found: Calibration) -> Entries:
         one.name: {
             "value": found.estimate[first + i],
             "unit": one.unit,
-            "sd": found.sd[first + i],
+            "sd": found.sd[first + i] if found.converged else None,
             "verdict": verdict_on(found, first + i),
         }
         for i, one in enumerate(found.unknowns)

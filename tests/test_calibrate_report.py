@@ -18,6 +18,8 @@ from lhpost6_pin.cli import app
 from lhpost6_pin.errors import LhpostError, ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.report import write_calibrate_report
+from lhpost6_pin.residuals import RESIDUALS
+from lhpost6_pin.results import calibration_entries
 
 MACHINE = load_machine()
 NAMES = ("platen.mass[x]", "horizontal.leakage", "horizontal.viscous", "vertical.seal_shape", "hold_down.base_height")
@@ -25,6 +27,9 @@ UNKNOWNS = (
     SensorUnknown("gain actuator_force[H1]", "gain", "actuator_force", 0, 0.003, "1", ("gain actuator_force 0", -1)),
     SensorUnknown("delay spool_position", "delay", "spool_position", -1, 1e-4, "s", ("delay spool_position", -1)),
 )
+
+
+NONE = (np.nan,) * (len(RESIDUALS) - 3)  # misfits of kinds that were not compared
 
 
 @pytest.fixture
@@ -53,8 +58,8 @@ def found() -> Calibration:
         covariance=correlation * np.outer(sd, sd),
         alone=np.vstack([1.5 * sd, np.minimum(7 * sd, prior)]),
         subsets=(gas, wrench),
-        misfit_before=np.array([[181.0, 3480.0, 16900.0, np.nan], [180.0, 258.0, 16800.0, np.nan]]),
-        misfit_after=np.array([[0.95, 0.97, 1.02, np.nan], [1.03, 0.9, 1.07, np.nan]]),
+        misfit_before=np.array([[181.0, 3480.0, 16900.0, *NONE], [180.0, 258.0, 16800.0, *NONE]]),
+        misfit_after=np.array([[0.95, 0.97, 1.02, *NONE], [1.03, 0.9, 1.07, *NONE]]),
         rounds=3,
         converged=True,
         numbers=calibration_numbers(),
@@ -157,6 +162,23 @@ def test_a_misfit_above_noise_a_bound_and_a_failed_search_are_not_passed_over(fo
     far = replace(found, estimate=np.where(np.arange(7) == 1, 4.0 * found.prior, found.estimate))
     assert "something else is wrong: horizontal.leakage" in page_of(far, tmp_path)
     assert "did not converge in 3 rounds" in page_of(replace(found, converged=False), tmp_path)
+
+
+def test_a_failed_search_gives_no_intervals(found, tmp_path, capsys) -> None:
+    failed, (low, high) = replace(found, converged=False), found.interval(0)
+    assert np.isnan(failed.interval(0)).all()
+    shown = f"{low:.5g} to {high:.5g}"
+    print_calibration(found)
+    assert shown in capsys.readouterr().out
+    print_calibration(failed)
+    assert shown not in capsys.readouterr().out
+    page = page_of(failed, tmp_path)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "%{text}" in text and r"\u00b1 %{customdata" not in text  # nothing beside the dots either
+    assert "no intervals" in page and f"to {float(f'{high:.5g}'):,.10g}" not in page
+    entries = calibration_entries(failed)
+    assert np.isnan(entries["parameters"]["platen.mass[x]"]["ci90"]).all()
+    assert entries["sensors"]["delay spool_position"]["sd"] is None
 
 
 def test_a_campaign_that_tells_nothing_has_a_page_too(found, tmp_path) -> None:

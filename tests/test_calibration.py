@@ -519,6 +519,20 @@ def test_override_file_makes_the_calibrated_machine(found, machine, tmp_path):
     assert again.parameters["horizontal.flow"].evidence == "calibrated"
 
 
+def test_a_fit_that_did_not_converge_leaves_the_deviations_of_the_machine_file(found, machine, tmp_path):
+    path = save_override(replace(found, converged=False), tmp_path / "override.toml")
+    text = path.read_text(encoding="utf-8")
+    assert "did not converge" in text.split("[", 1)[0] and "no sd is given" in text.split("[", 1)[0]
+    again = load_machine("lhpost6", path)
+    for knob in found.knobs:
+        for name, _ in knob.paths:
+            stated, quantity = machine.parameters[name], again.parameters[name]
+            assert quantity.sd == stated.sd, name
+            assert "did not converge" in quantity.source
+    assert again.parameters["platen.mass"].value == found.calibrated.parameters["platen.mass"].value
+    assert save_override(found, path).read_text(encoding="utf-8").count("sd = ") > len(found.knobs) / 2
+
+
 @pytest.mark.slow
 def test_chambers_shorter_than_the_stated_stroke_are_found_and_the_oil_stays_as_stiff(machine, sensors):
     short = {"horizontal.chamber_a": 0.70, "horizontal.chamber_b": 0.72}

@@ -16,7 +16,8 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     """Write the calibrated numbers as a TOML file for `--override`, whole or not at all.
 
     Knobs that the campaign has told little of are written, too: they go together with those it has told much of; and
-    numbers that the machine had from an override before. A number's standard deviation is the predicted one.
+    numbers that the machine had from an override before. A number's standard deviation is the predicted one; of a fit
+    that did not converge none is written, which leaves the machine file's.
     """
     machine, count = calibration.machine, len(calibration.knobs)
     values = knob_changes(machine, calibration.knobs, calibration.estimate[:count])
@@ -27,14 +28,16 @@ def save_override(calibration: Calibration, path: Path) -> Path:
             stated = machine.parameters[name].sd
             known = stated if isinstance(stated, tuple) else (stated or 0.0,)
             deviations.setdefault(name, list(known))[max(component, 0)] = sd
-    source = f"calibrated from campaign {calibration.campaign}: {', '.join(calibration.tests)}"
+    tests = f"campaign {calibration.campaign}: {', '.join(calibration.tests)}"
+    source = f"calibrated from {tests}" if calibration.converged else f"fit that did not converge, from {tests}"
     entries: dict[str, Quantity] = {}
     for name, value in values.items():
         spread: tuple[float, ...] | float | None = None
         origin = f"cut to leave oil in the chamber found, not measured itself; {source}"  # a stroke
         if name in deviations:
-            spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
             origin = source
+            if calibration.converged:
+                spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
         number = tuple(value) if isinstance(value, list) else value
         entries[name] = Quantity(number, machine.parameters[name].unit, "calibrated", origin, spread)
     for name, quantity in machine.parameters.items():
@@ -46,7 +49,10 @@ def save_override(calibration: Calibration, path: Path) -> Path:
         section, key = section_of(machine, name)
         groups.setdefault(section, []).append(f"{key} = {quantity_toml(quantity)}")
     title = " ".join(f"Numbers of {machine.name}, {source}.".split())  # on one line
+    about = "sd is the predicted standard deviation."
+    if not calibration.converged:
+        about = "They are where the fit stopped; nothing says how far off they are, so no sd is given."
     with write_whole(path) as beside:
-        text = sections_toml([title, "sd is the predicted standard deviation."], groups)
+        text = sections_toml([title, about], groups)
         beside.write_text(text, encoding="utf-8")
     return path

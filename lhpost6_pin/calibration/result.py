@@ -78,9 +78,11 @@ class Calibration:
         return with_knobs(self.machine, self.knobs, self.estimate[: len(self.knobs)])
 
     def interval(self, i: int, probability: float = 0.9) -> tuple[float, float]:
-        """Confidence interval of knob i in its unit."""
+        """Confidence interval of knob i in its unit; NaN where the fit did not converge, which leaves none."""
         from scipy.stats import norm
 
+        if not self.converged:
+            return np.nan, np.nan
         reach = float(norm.ppf(0.5 + 0.5 * probability)) * self.sd[i]
         low, high = (self.knobs[i].at(self.estimate[i] + side * reach) for side in (-1.0, 1.0))
         return min(low, high), max(low, high)

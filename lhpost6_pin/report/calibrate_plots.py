@@ -45,6 +45,18 @@ def half_interval(sd: float) -> float:
     return NormalDist().inv_cdf(0.5 + 0.5 * PROBABILITY) * sd
 
 
+def _reach(calibration: Calibration) -> float:
+    """Half of a drawn interval in standard deviations; no length where the fit did not converge."""
+    return half_interval(1.0) if calibration.converged else 0.0
+
+
+def _drawn(calibration: Calibration) -> str:
+    """What estimates are drawn with."""
+    if calibration.converged:
+        return f"with {INTERVAL}s"
+    return "where the fit stopped without converging, so without intervals"
+
+
 def forest_block(calibration: Calibration) -> Markup:
     """Return every knob's estimate with its interval beside its prior."""
     count = len(calibration.knobs)
@@ -54,7 +66,7 @@ def forest_block(calibration: Calibration) -> Markup:
         "does not differ": ([i for i in range(count) if informed[i] and i not in changed], BLUE, "circle"),
         "not informed": ([i for i in range(count) if not informed[i] and i not in changed], "#6e7781", "circle-open"),
     }
-    where, reach = calibration.estimate / calibration.prior, half_interval(1.0) * calibration.sd / calibration.prior
+    where, reach = calibration.estimate / calibration.prior, _reach(calibration) * calibration.sd / calibration.prior
     names = [knob.name for knob in calibration.knobs]
     dots = [
         Dots(name, rows, where[rows].tolist(), reach[rows].tolist(), [names[i] for i in rows], color, symbol)
@@ -62,7 +74,7 @@ def forest_block(calibration: Calibration) -> Markup:
         if rows
     ]
     words = (
-        f"Estimates with {INTERVAL}s, in standard deviations of their priors from nominal; the band is "
+        f"Estimates {_drawn(calibration)}, in standard deviations of their priors from nominal; the band is "
         f"the {INTERVAL} of the prior, before the campaign."
     )
     return figure(_forest("forest", "Parameters beside their priors", words, names, dots, ROW))
@@ -86,7 +98,7 @@ def subset_block(calibration: Calibration) -> Markup:
 
     def dots_of(name: str, knobs: Sequence[int], estimate: Array, sd: Array, color: str, symbol: str) -> Dots:
         places, labels = [place(name, i) for i in knobs], [names[i] for i in knobs]
-        where, half = ([float(x[i] / prior[i]) for i in knobs] for x in (estimate, half_interval(1.0) * sd))
+        where, half = ([float(x[i] / prior[i]) for i in knobs] for x in (estimate, _reach(calibration) * sd))
         return Dots(name, places, where, half, labels, color, symbol)
 
     series = [dots_of(TOGETHER, told, calibration.estimate, calibration.sd, BLACK, "line-ns-open")]
@@ -100,10 +112,9 @@ def subset_block(calibration: Calibration) -> Markup:
         labels, half = [f"{names[i]}, {name}" for name, i in marked], [0.0] * len(marked)
         series.append(Dots("contradicts all together", places, where, half, labels, VERMILLION, "circle-open", 17))
     words = (
-        "Each group of residuals alone, and open-loop simulation from the recorded spools, with the same priors; a "
-        "group is left out where its predicted deviation is "
-        f"above {limit:g} of the prior's. {INTERVAL}s. Ringed: more than {calibration.limit:g} "
-        "deviations from all together. "
+        f"Estimates {_drawn(calibration)}: of each group of residuals alone, and of open-loop simulation from the "
+        "recorded spools, with the same priors; a group is left out where its predicted deviation is "
+        f"above {limit:g} of the prior's. Ringed: more than {calibration.limit:g} deviations from all together. "
         "Drag to zoom; a double click shows all."
     )
     shown = [names[i] for i in told]
@@ -157,7 +168,7 @@ def _trace(dots: Dots) -> dict[str, Any]:
         "y": list(dots.place),
         "text": [html.escape(label) for label in dots.labels],
         "customdata": list(dots.half),
-        "hovertemplate": "%{text}: %{x:.3f} ± %{customdata:.3f}",
+        "hovertemplate": "%{text}: %{x:.3f}" + " ± %{customdata:.3f}" * any(dots.half),
         "marker": {
             "color": dots.color,
             "symbol": dots.symbol,

@@ -57,7 +57,9 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
     informed = int(np.sum(calibration.informed[:knobs]))
     rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
     said = [
-        f"The fit converged after {rounds}." if calibration.converged else f"The fit did not converge in {rounds}.",
+        f"The fit converged after {rounds}."
+        if calibration.converged
+        else f"The fit did not converge in {rounds}: estimates are where it stopped, and have no intervals.",
         f"The campaign has told something of {informed} of {knobs} parameters.",
     ]
     if changed:

@@ -43,7 +43,7 @@ def knob_blocks(calibration: Calibration) -> list[Markup]:
                 change_of(calibration, i),
                 number(float(outside[i]), 2),
                 number(float(calibration.sd[i] / calibration.prior[i]), 2),
-                f"{_plain(low)} to {_plain(high)}",
+                f"{_plain(low)} to {_plain(high)}" if calibration.converged else "none",
             )
         )
     how = (
@@ -88,7 +88,7 @@ def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
     return (
         unknown.name,
         number(scale * float(calibration.estimate[i])),
-        number(scale * half_interval(float(calibration.sd[i])), 2),
+        number(scale * half_interval(float(calibration.sd[i])), 2) if calibration.converged else "none",
         unit,
         number(float(far(calibration)[i]), 2),
         number(float(calibration.sd[i] / calibration.prior[i]), 2),

@@ -5,7 +5,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from .calibration import Calibration
-from .calibration.verdicts import contradictions, cut_strokes, far, verdict_on
+from .calibration.verdicts import beyond, far, stated_range, verdict_on
+from .calibration.words import alike_words, contradiction_words, cut_strokes, range_words
 from .console import make_console
 from .residuals import RESIDUALS
 
@@ -16,12 +17,11 @@ def print_calibration(calibration: Calibration) -> None:
     """Print parameters, sensor errors that stand out, misfits, and whether the fit converged."""
     console = make_console()
     console.print(_parameters(calibration))
-    for said in cut_strokes(calibration):
-        console.print(escape(said))
     console.print(_sensors(calibration))
     console.print(_misfits(calibration))
-    pairs, apart = len(calibration.alike()), len(contradictions(calibration))
-    console.print(f"{pairs} pairs cannot be told apart; {apart} estimates by single groups contradict all together")
+    for said in (*cut_strokes(calibration), alike_words(calibration), contradiction_words(calibration)):
+        if said:
+            console.print(escape(said))
     rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
     console.print(
         f"converged after {rounds}"
@@ -44,12 +44,13 @@ def _parameters(calibration: Calibration) -> Table:
 def _sensors(calibration: Calibration) -> Table:
     first, distance = len(calibration.knobs), far(calibration)
     order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
-    title = f"Errors of the sensors beyond {calibration.limit:g} predicted deviations, of {len(order)}"
-    table = _table(title, "error", "estimate", "unit", "deviations", "sd/prior")
-    for i in (i for i in order if abs(distance[i]) > calibration.limit):
-        unknown = calibration.unknowns[i - first]
-        numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{distance[i]:+.1f}", _share(calibration, i)
-        table.add_row(escape(unknown.name), *numbers)
+    found = [i for i in order if beyond(calibration)[i]]
+    title = f"Errors of the sensors: {len(found)} of {len(order)} found, {range_words(calibration)}"
+    table = _table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
+    for i in found:
+        unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / stated_range(calibration)[i]
+        numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{share:.0%}", f"{distance[i]:+.1f}"
+        table.add_row(escape(unknown.name), *numbers, _share(calibration, i))
     return table
 
 

@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 from lhpost6_pin.calibration import Calibration, Subset, calibration_numbers, machine_knobs
 from lhpost6_pin.calibration.errors import SensorUnknown
 from lhpost6_pin.calibration.override import save_override
-from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, cut_strokes, verdict_on
+from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, out_of_range, verdict_on
+from lhpost6_pin.calibration.words import alike_words, contradiction_words, cut_strokes
 from lhpost6_pin.calibration_table import print_calibration
 from lhpost6_pin.campaign import Campaign, load_campaign
 from lhpost6_pin.cli import app
@@ -119,6 +120,49 @@ def test_a_group_contradicts_by_the_deviation_of_the_difference(found) -> None:
     assert one.deviations == pytest.approx(10.0 / np.sqrt(2.0**2 - 1.0))  # variance of the group less that of all
 
 
+def test_simulation_is_let_go_farther_since_the_spools_noise_biases_it(found) -> None:
+    own = found.numbers.number("simulation.deviations")
+    for distance, apart in ((own - 1.0, 0), (own + 1.0, 1)):
+        one = np.arange(7) == 1
+        estimate = found.estimate + distance * np.hypot(2.0, 1.0) * found.sd
+        second = Subset(
+            "simulation", np.where(one, estimate, np.nan), np.where(one, 2.0 * found.sd, np.nan), part=False
+        )
+        some = replace(found, subsets=(second, found.subsets[1]))
+        assert [c.subset for c in contradictions(some)] == ["simulation"] * apart
+        assert f"Of 1 by simulation {apart or 'none'} does" in contradiction_words(some)
+
+
+def test_contradictions_are_counted_beside_what_chance_makes(found) -> None:
+    assert contradiction_words(found).startswith("1 of 2 estimates by single groups of residuals contradicts")
+    assert "about 0.005 would by chance" in contradiction_words(found)  # two of 0.0027
+    assert contradiction_words(replace(found, subsets=found.subsets[1:])).startswith("None of 1 estimates")
+    assert contradiction_words(replace(found, subsets=())) == ""
+
+
+def test_errors_of_sensors_within_their_stated_ranges_are_no_cause_for_attention(found, tmp_path) -> None:
+    gain, delay = 5, 6
+    stated = np.sqrt(3.0) * found.prior
+    for x, wrong in ((0.99 * stated[gain], []), (2.0 * stated[gain], [gain])):
+        some = replace(found, estimate=np.where(np.arange(7) == gain, x, found.estimate))
+        assert out_of_range(some) == wrong
+        page = page_of(some, tmp_path)
+        assert ("all within their stated ranges" in page) != bool(wrong)
+        assert ("Sensor errors beyond their stated ranges: gain actuator_force[H1]." in page) == bool(wrong)
+    skewed = np.where(np.arange(7) == delay, 1.9 * stated, found.estimate)  # of its own and of the platen's channels
+    assert out_of_range(replace(found, estimate=skewed)) == []
+
+
+def test_pairs_of_sensors_that_are_alike_are_not_held_against_parameters(found) -> None:
+    assert alike_words(found).startswith("1 pair of a parameter with another")
+    correlation = np.eye(7)
+    correlation[5, 6] = correlation[6, 5] = 0.99
+    sensors = replace(found, covariance=correlation * np.outer(found.sd, found.sd))
+    assert alike_words(sensors).startswith("Parameters can be told apart")
+    assert "1 pair of errors of sensors cannot" in alike_words(sensors)
+    assert alike_words(replace(found, covariance=np.diag(found.sd**2))) == "All unknowns can be told apart."
+
+
 # ---------------------------------------------------------------------------------------- page
 def test_the_page_says_first_what_was_found(found, tmp_path) -> None:
     page = page_of(found, tmp_path)
@@ -128,7 +172,7 @@ def test_the_page_says_first_what_was_found(found, tmp_path) -> None:
     assert "2 differ from nominal: platen.mass[x] (+3.0" in summary
     assert "hold_down.base_height (−0.0200 m)" in summary
     assert "from 16,900 to 1.07: sensor noise is all that is left" in summary
-    assert "Sensor errors that differ from zero 1 of 2" in summary
+    assert "Sensor errors found 1 of 2" in summary
     assert "lhpost6 calibrate march" in page
 
 

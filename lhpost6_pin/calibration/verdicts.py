@@ -5,10 +5,19 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .knobs import knob_changes
 from .result import Calibration
 
-__all__ = ["Contradiction", "Verdict", "beyond", "changed_knobs", "contradictions", "cut_strokes", "far", "verdict_on"]
+__all__ = [
+    "Contradiction",
+    "Verdict",
+    "beyond",
+    "changed_knobs",
+    "contradictions",
+    "far",
+    "out_of_range",
+    "stated_range",
+    "verdict_on",
+]
 
 Array = NDArray[np.float64]
 Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
@@ -50,16 +59,19 @@ def changed_knobs(calibration: Calibration) -> list[int]:
     return [int(i) for i in np.argsort(-distance, kind="stable") if changed[i]]
 
 
-def cut_strokes(calibration: Calibration) -> list[str]:
-    """A sentence on every stroke that had to give way to a chamber found shorter."""
-    machine, count = calibration.machine, len(calibration.knobs)
-    turned = {path for knob in calibration.knobs for path, _ in knob.paths}
-    said = []
-    for path, value in knob_changes(machine, calibration.knobs, calibration.estimate[:count]).items():
-        if path not in turned:
-            stated = machine.parameters.number(path)
-            said.append(f"{path}, stated as {stated:g} m, is cut to {value:.4g} m: a chamber was found to be shorter.")
-    return said
+def out_of_range(calibration: Calibration) -> list[int]:
+    """Sensor errors that are larger than the sensors' file allows, by more than the limit; the farthest first."""
+    over = (np.abs(calibration.estimate) - stated_range(calibration)) / calibration.sd
+    return [int(i) for i in np.argsort(-over, kind="stable") if over[i] > calibration.limit]
+
+
+def stated_range(calibration: Calibration) -> Array:
+    """Largest errors (p,) that the sensors' file allows: sqrt(3) deviations of a uniform one; infinite for knobs.
+
+    A delay is against the platen's motion, which may be as late itself.
+    """
+    times = [2.0 if unknown.kind == "delay" else 1.0 for unknown in calibration.unknowns]
+    return np.append(np.full(len(calibration.knobs), np.inf), np.sqrt(3.0) * np.array(times)) * calibration.prior
 
 
 class Contradiction(NamedTuple):
@@ -74,14 +86,16 @@ def contradictions(calibration: Calibration) -> list[Contradiction]:
     """Estimates of single groups that differ from those of all by more than the limit, farthest first.
 
     The variance of the difference is that of the group less that of all (Hausman, Econometrica 46, 1978), since the
-    group is part of all; no less than what the search leaves open. Of simulation, which is no part, they add up.
+    group is part of all; no less than what the search leaves open. Of simulation, which is no part, they add up; it has
+    a limit of its own.
     """
     left_open = calibration.numbers.number("fit.converged") * calibration.sd
+    simulation = calibration.numbers.number("simulation.deviations")
     found = []
     for subset in calibration.subsets:
         sign = -1.0 if subset.part else 1.0
         variance = np.maximum(subset.sd**2 + sign * calibration.sd**2, left_open**2)  # NaN where it tells nothing
         distance = (subset.estimate - calibration.estimate) / np.sqrt(variance)
-        for i in np.flatnonzero(np.abs(distance) > calibration.limit):
+        for i in np.flatnonzero(np.abs(distance) > (calibration.limit if subset.part else simulation)):
             found.append(Contradiction(subset.name, int(i), float(distance[i])))
     return sorted(found, key=lambda one: -abs(one.deviations))

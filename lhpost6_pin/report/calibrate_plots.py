@@ -83,6 +83,7 @@ def forest_block(calibration: Calibration) -> Markup:
 def subset_block(calibration: Calibration) -> Markup:
     """Return what each group of residuals says of each knob by itself, beside all together."""
     count, prior, limit = len(calibration.knobs), calibration.prior, calibration.numbers.number("report.informed")
+    own = calibration.numbers.number("simulation.deviations")
     groups = [s for s in calibration.subsets if np.any(s.sd[:count] < limit * prior[:count])]
     if not groups:
         return paragraph("No group tells of a parameter by itself.")
@@ -114,7 +115,8 @@ def subset_block(calibration: Calibration) -> Markup:
     words = (
         f"Estimates {_drawn(calibration)}: of each group of residuals alone, and of open-loop simulation from the "
         "recorded spools, with the same priors; a group is left out where its predicted deviation is "
-        f"above {limit:g} of the prior's. Ringed: more than {calibration.limit:g} deviations from all together. "
+        f"above {limit:g} of the prior's. Ringed: {calibration.limit:g} deviations or more from all together, "
+        f"simulation {own:g}. "
         "Drag to zoom; a double click shows all."
     )
     shown = [names[i] for i in told]

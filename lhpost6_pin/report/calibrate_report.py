@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ..calibration import Calibration
-from ..calibration.verdicts import beyond, changed_knobs, contradictions, verdict_on
+from ..calibration.verdicts import beyond, changed_knobs, contradictions, out_of_range, verdict_on
+from ..calibration.words import chance, range_words
 from .calibrate_sections import (
     alike_blocks,
     change_of,
@@ -71,7 +72,7 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
         said.append("None differs from nominal.")
     before, after = (float(np.nanmax(m)) for m in (calibration.misfit_before, calibration.misfit_after))
     level: Level = "good"
-    bounded = _bounded(calibration)
+    bounded, wrong = _bounded(calibration), out_of_range(calibration)
     if after > calibration.noise_alone:
         level = "attention"
         said.append(
@@ -82,6 +83,9 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
         said.append(
             f"The worst misfit went from {number(before)} to {number(after)}: sensor noise is all that is left."
         )
+    if wrong:
+        level = "attention"
+        said.append(f"Sensor errors {range_words(calibration)}.")
     if bounded:
         level = "attention"
         said.append(f"As far off as the fit lets it go, so that something else is wrong: {', '.join(bounded)}.")
@@ -99,13 +103,17 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     good: Level = "good" if calibration.converged else "bad"
     fits: Level = "good" if after <= calibration.noise_alone else "attention"
     apart = len(contradictions(calibration))
+    by_chance = number(chance(calibration), 1)
+    wrong = len(out_of_range(calibration))
+    ranges = f"{wrong} beyond their stated ranges" if wrong else range_words(calibration)
+    trust: Level = "attention" if wrong else "good"
     return [
         Headline("yes" if calibration.converged else "no", "Converged", f"rounds: {calibration.rounds}", good),
         Headline(f"{np.sum(informed[:knobs])} of {knobs}", "Parameters informed", note),
         Headline(f"{np.sum(outside[:knobs])} of {knobs}", "Parameters that differ from nominal", differ),
-        Headline(f"{np.sum(outside[knobs:])} of {p - knobs}", "Sensor errors that differ from zero", differ),
+        Headline(f"{np.sum(outside[knobs:])} of {p - knobs}", "Sensor errors found", ranges, trust),
         Headline(number(after), "Worst misfit", f"1: noise alone; {number(before)} before", fits),
-        Headline(str(apart), "Contradictions", "groups of residuals against all together"),
+        Headline(str(apart), "Contradictions", f"groups against all together; by chance about {by_chance}"),
     ]
 
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..calibration import Calibration
-from ..calibration.verdicts import beyond, contradictions, cut_strokes, far, verdict_on
+from ..calibration.verdicts import beyond, contradictions, far, stated_range, verdict_on
+from ..calibration.words import alike_words, contradiction_words, cut_strokes, range_words
 from ..residuals import RESIDUALS
 from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
 from .page import Markup, details, number, paragraph, table
@@ -68,15 +69,15 @@ def sensor_blocks(calibration: Calibration) -> list[Markup]:
     differ = sum(bool(outside[i]) for i in order)
     how = paragraph(
         "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
-        "parameters are free of these errors; the override file does not hold them."
+        "parameters are free of these errors; the override file does not hold them. Every sensor is off by a little: "
+        f"{differ} of {len(order)} errors are large enough to be found, beyond {calibration.limit:g} predicted "
+        f"deviations from zero, {range_words(calibration)}."
     )
-    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "In deviations", "Predicted over prior")
-    caption = f"Errors beyond {calibration.limit:g} predicted deviations from zero, the clearest first"
+    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "In deviations", "Predicted over prior")
+    caption = "Errors found, the clearest first"
     blocks = [how]
     if differ:
         blocks.append(table(caption, header, rows[:differ]))
-    else:
-        blocks.append(paragraph(f"None is beyond {calibration.limit:g} predicted deviations from zero."))
     if differ < len(rows):
         blocks.append(details(f"The other {len(rows) - differ}", table("Other errors", header, rows[differ:])))
     return blocks
@@ -90,6 +91,7 @@ def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
         number(scale * float(calibration.estimate[i])),
         number(scale * half_interval(float(calibration.sd[i])), 2) if calibration.converged else "none",
         unit,
+        percent(abs(float(calibration.estimate[i])) / float(stated_range(calibration)[i])),
         number(float(far(calibration)[i]), 2),
         number(float(calibration.sd[i] / calibration.prior[i]), 2),
     )
@@ -137,14 +139,13 @@ def group_blocks(calibration: Calibration) -> list[Markup]:
         unit = calibration.knobs[i].unit if i < len(calibration.knobs) else _unit(calibration, i)
         alone, together = (_plain(_value(calibration, i, float(x[i]))) for x in (subset.estimate, calibration.estimate))
         rows.append((calibration.names[i], one.subset, alone, together, unit, number(one.deviations, 2)))
-    compared = sum(int(np.sum(np.isfinite(s.sd))) for s in calibration.subsets)
     how = paragraph(
-        f"Of {compared} estimates by single groups, {len(found)} differ from that of all together by more than "
-        f"{calibration.limit:g} deviations of the difference. If the equations hold and noise is all, about "
-        f"{number(0.0027 * compared, 1)} would; more says that an equation lacks something. Noise that residuals share "
-        "is taken off in the order wrench, flow, gas law, force: a later group holds a little of the earlier ones. "
+        f"{contradiction_words(calibration)} Many more than by chance say that an equation lacks something. Noise that "
+        "residuals share is taken off in the order wrench, flow, gas law, force: a later group holds a little of the "
+        "earlier ones. "
         "Simulation drives the plant by the recorded spools, in open loop, and compares platen velocity and chamber "
-        "pressures, with the errors of the sensors held at what all together say of them."
+        "pressures, with the errors of the sensors held at what all together say of them; noise of the recorded spools "
+        "biases it by more than its predicted deviations say, so it is let go farther."
     )
     header = ("Unknown", "Group", "Group alone", "All together", "Unit", "In deviations")
     blocks = [how]
@@ -161,27 +162,30 @@ def alike_blocks(calibration: Calibration) -> list[Markup]:
         return [paragraph(f"No two unknowns are correlated by {limit:g} or more.")]
     own = {knob.name for knob in calibration.knobs}
     how = paragraph(
-        f"Pairs correlated by {limit:g} or more: the campaign tells their sum (correlation negative) or difference "
-        "(positive), in prior deviations, much better than either; do not read one without the other."
+        f"{alike_words(calibration)} These are pairs correlated by {limit:g} or more: the campaign tells their sum "
+        "(correlation negative) or difference (positive), in prior deviations, much better than either; do not read "
+        "one without the other."
     )
     groups = (
-        ("Parameters with each other", [p for p in pairs if p[0] in own and p[1] in own]),
-        ("A parameter with a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)]),
-        ("Sensors with each other", [p for p in pairs if p[0] not in own and p[1] not in own]),
+        ("Parameters with each other", [p for p in pairs if p[0] in own and p[1] in own], LISTED),
+        ("A parameter with a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)], LISTED),
+        ("Sensors with each other", [p for p in pairs if p[0] not in own and p[1] not in own], 0),  # all folded away
     )
     blocks = [how]
-    for caption, found in groups:
+    for caption, found, listed in groups:
         rows = [(a, b, f"{r:+.4f}".replace("-", "−")) for a, b, r in found]
-        blocks += _folded(caption, ("One", "Other", "Correlation"), rows) if rows else []
+        blocks += _folded(caption, ("One", "Other", "Correlation"), rows, listed) if rows else []
     return blocks
 
 
-def _folded(caption: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> list[Markup]:
-    """A table, its later rows folded away."""
-    blocks = [table(caption, header, rows[:LISTED])]
-    if len(rows) > LISTED:
-        more = f"{len(rows) - LISTED} more"
-        blocks.append(details(more, table(f"{caption}, {more}", header, rows[LISTED:])))
+def _folded(
+    caption: str, header: Sequence[str], rows: Sequence[Sequence[object]], listed: int = LISTED
+) -> list[Markup]:
+    """A table, its rows after those listed folded away."""
+    blocks = [table(caption, header, rows[:listed])] if listed else []
+    if len(rows) > listed:
+        more = f"{len(rows) - listed} more" if listed else f"{caption}: {len(rows)} pairs"
+        blocks.append(details(more, table(f"{caption}, {more}" if listed else caption, header, rows[listed:])))
     return blocks
 
 

@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-__all__ = ["models_folder", "read_toml", "refuse_folder", "write_whole"]
+from .errors import UnknownNameError
+
+__all__ = ["find_shipped", "models_folder", "read_toml", "refuse_folder", "shipped", "write_whole"]
 
 
 def models_folder() -> Path:
@@ -17,6 +19,19 @@ def models_folder() -> Path:
     package = Path(__file__).parent
     installed = package / "models"
     return installed if installed.is_dir() else package.parent / "models"
+
+
+def shipped(folder: str = "", suffix: str = ".toml") -> dict[str, Path]:
+    """Files in a folder of the shipped data, by name."""
+    return {path.stem: path for path in sorted((models_folder() / folder).glob(f"*{suffix}"))}
+
+
+def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") -> Path:
+    """File of the shipped data by name; raises UnknownNameError for a `kind`, in words, that is not there."""
+    known = shipped(folder, suffix)
+    if name not in known:
+        raise UnknownNameError(kind, name, list(known))
+    return known[name]
 
 
 def read_toml(path: "Path | str") -> dict[str, Any]:

@@ -175,7 +175,7 @@ def test_motions_lists_every_motion_and_one_with_its_options(lhpost6):
             assert name in ended.words
     small, large = lhpost6("motions", "tx5"), lhpost6("motions", "TX5")
     assert small == large and "corner_acceleration" in small.words
-    assert refused(lhpost6("motions", "nonsense"), "no ground motion named 'nonsense'", "ridgecrest-ccc")
+    assert refused(lhpost6("motions", "nonsense"), "no ground motion named 'nonsense'", "`lhpost6 motions` lists")
 
 
 def test_motions_says_how_to_get_those_of_a_missing_package(lhpost6, monkeypatch):
@@ -327,7 +327,8 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
 @pytest.mark.parametrize(
     "arguments, phrases",
     [
-        (("nonsense",), ("no ground motion named 'nonsense'", "ridgecrest")),
+        (("nonsense",), ("no ground motion named 'nonsense'", "`lhpost6 motions` lists them")),
+        (("ridgecrest-cc",), ("did you mean", "'ridgecrest-ccc'")),
         (("absent.csv",), ("absent.csv", "No such file")),
         (("[red]absent.csv",), ("[red]absent.csv", "No such file")),
         (("[/red]absent.csv",), ("[/red]absent.csv",)),
@@ -350,6 +351,7 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--specimen", "absent.urdf"), ("absent.urdf", "no such URDF")),
         (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("fused", "pinocchio")),
         (("sine", "--machine", "absent"), ("no machine named 'absent'", "uniaxial")),
+        (("sine", "--machine", "unaxial"), ("did you mean 'uniaxial'? valid names: lhpost6, uniaxial",)),
         (("sine", "--machine", "absent.toml"), ("absent.toml",)),
         (("sine", "--override", "absent.toml"), ("absent.toml",)),
         (("sine", "--controller", "absent"), ("absent", "lhpost6")),

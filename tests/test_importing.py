@@ -502,7 +502,7 @@ GOOD_MAP = '[test]\nname = "EQ1"\n[channel]\nsupply_pressure = { column = "c1", 
     ("old", "new", "phrase"),
     [
         ("[test]", "[test", "not a TOML file"),
-        ("[test]", "[tests]", "unknown key 'tests'; valid are test, channel"),
+        ("[test]", "[tests]", "unknown key 'tests'; did you mean 'test'. valid names: test, channel"),
         ("name", "nmae", r"\[test\]: unknown key 'nmae'"),
         ('"EQ1"', "1", "name = 1 must be a text"),
         ('name = "EQ1"', "fill_gaps = 1.5", "fill_gaps = 1.5 must be a whole number"),
@@ -531,8 +531,8 @@ def test_a_bad_map_is_refused_with_file_and_key(tmp_path, old, new, phrase):
 @pytest.mark.parametrize(
     ("channels", "phrase"),
     [
-        ({"supply": Source("c1")}, r"\[channel\] supply: is no channel of a record; valid are platen_displacement"),
-        ({"strut_pressure[S9]": Source("c1")}, r"valid are strut_pressure\[S1\], strut_pressure\[S2\]"),
+        ({"supply": Source("c1")}, r"\[channel\] supply: is no channel of a record; valid names: platen_displacement"),
+        ({"strut_pressure[S9]": Source("c1")}, r"valid names: strut_pressure\[S1\], strut_pressure\[S2\]"),
         ({"strut_pressure[S1]": Source("c1")}, "has S1, but not S2, S3; map them too"),
         ({"supply_pressure": Source("c9")}, "no column 'c9' in 'run.csv'; columns are 'c1', 'c2', 'c3'"),
         ({"supply_pressure": Source("c*")}, "'c\\*' could be any of run.csv column 1 'c1', run.csv column 2"),

@@ -14,13 +14,13 @@ LAYERS = [
     {
         "",
         "errors",
-        "files",
         "compiled",
         "names",
         "plain",
         "progress",
         "console",
     },  # "" is the package itself: its version
+    {"files"},
     {"laws"},
     {"parameters", "specimen", "signals", "transfer", "distortion"},
     {"schema", "records", "motions", "conditioning", "urdf_numbers"},

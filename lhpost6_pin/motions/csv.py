@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import MotionError
+from ..errors import MotionError, instead_of
 from .motion import AXES, GroundMotion, make_motion
 from .text import read_text
 from .units import to_si
@@ -100,7 +100,7 @@ def _channels(
             if axis not in AXES:
                 raise MotionError(f"{where}: columns= names axis {axis!r}; axes are {', '.join(AXES)}")
             if column not in names:
-                raise MotionError(f"{where}: no column {column!r} for axis {axis}; columns are {', '.join(names)}")
+                raise MotionError(f"{where}: no column {column!r} for axis {axis}; {instead_of(column, names)}")
             match = _COLUMN.fullmatch(column)
             chosen.append(_Channel(axis, names.index(column), _unit(match, axis, units)))
     else:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import MotionError
+from ..errors import MotionError, instead_of
 from .at2 import is_at2, load_at2
 from .csv import load_csv
 from .motion import GroundMotion
@@ -45,7 +45,7 @@ def _call(reader: Any, paths: Any, options: dict[str, Any]) -> GroundMotion:
     if unknown:
         raise MotionError(
             f"{paths}: option {unknown[0]!r} does not apply to this kind of file; "
-            f"options are {', '.join(sorted(known))}"
+            f"{instead_of(unknown[0], sorted(known))}"
         )
     motion: GroundMotion = reader(paths, **options)
     return motion

@@ -16,14 +16,12 @@ import math
 import numpy as np
 
 from .compiled import compiled, compiled_inline
+from .names import SCHEMES
 from .ports import evaluate_ports, platen_pose
 from .stage import advance_states, apply_forces, state_rates, wrench_on_platen
 
 __all__ = ["DS", "FORCE", "SAMPLE_RATE", "SCHEMES", "SD", "A", "DQ", "S", "TAU", "V", "V_MID", "V_SEEN"]
 __all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "spool_windows", "staggered_stage"]
-
-SCHEMES = ("semi_implicit", "euler", "rk4")
-"""Scheme names; the first is the default."""
 
 SAMPLE_RATE = 2048
 """Rate of controller samples [Hz] (report, Chapter 5)."""

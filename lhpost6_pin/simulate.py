@@ -25,6 +25,7 @@ from .engine_fused import inertia_table, run_fused
 from .engine_pinocchio import make_stepper, settle
 from .equilibrium import Equilibrium, hydraulic_rows
 from .errors import SimulationError
+from .names import ENGINES
 from .plant import Plant, State
 from .schemes import SAMPLE_RATE, SCHEMES, A, V, spool_windows
 from .sight import EVERY, Watch, sight_of
@@ -38,9 +39,6 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 """Called now and then with the share of the run that is done, 0..1."""
-
-ENGINES = ("pinocchio", "fused")
-"""Engine names; the first is the default."""
 
 _CHUNK = 1024
 """Controller samples between two progress reports."""

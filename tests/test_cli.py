@@ -22,11 +22,14 @@ from machine_cases import DATA
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli, rehearse
 from lhpost6_pin.check import check_record
+from lhpost6_pin.cli import completion
 from lhpost6_pin.compiled import cache_folder
 from lhpost6_pin.drives import circumstances, save_drive
+from lhpost6_pin.files import shipped
 from lhpost6_pin.inverse import InverseFilter, save_inverse
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, list_motions, make_target
+from lhpost6_pin.names import AXES, ENGINES, SCHEMES
 from lhpost6_pin.records import load_record, save_record
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
@@ -623,6 +626,89 @@ def test_ctrl_c_while_writing_leaves_the_earlier_results(lhpost6, tmp_path, monk
     monkeypatch.setattr(Path, "write_bytes", half)
     assert lhpost6("run", *COARSE, "--scale", "0.5", "--out", "here").code == 130
     assert {name: (tmp_path / name).read_bytes() for name in everything(tmp_path)} == before  # nothing beside it either
+
+
+# Completion in the shell ----------------------------------------------------------------------------------------------
+
+KNOWN = {
+    "motion": [name for entry in list_motions() for name in (entry.name, *entry.aliases)],
+    "machine": list(shipped()),
+    "controller": list(shipped("controllers")),
+    "sensors": list(shipped("sensors")),
+    "specimen": list(shipped("specimens", ".urdf")),
+}
+
+
+def asking(typed: str) -> dict[str, str]:
+    """Environment in which bash asks what completes the last word typed."""
+    return {"_LHPOST6_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+
+
+@pytest.fixture
+def completed(lhpost6, monkeypatch):
+    """Complete the last word of what is typed."""
+
+    def complete(typed: str) -> list[str]:
+        for key, value in asking(typed).items():
+            monkeypatch.setenv(key, value)
+        ended = lhpost6()
+        assert ended.code == 0 and ended.err == ""
+        return ended.out.split()
+
+    return complete
+
+
+@pytest.mark.parametrize(
+    "typed, kind",
+    [
+        *[(f"lhpost6 {command} ", "motion") for command in ("run", "iterate", "link", "motions")],
+        *[(f"lhpost6 {command} --machine ", "machine") for command in ("run sine", "info", "check a.nc", "view a.nc")],
+        *[(f"lhpost6 {command} --controller ", "controller") for command in ("run sine", "tune", "validate folder")],
+        *[(f"lhpost6 {command} --sensors ", "sensors") for command in ("check a.nc", "campaign", "decompose a.nc")],
+        *[(f"lhpost6 {command} --specimen ", "specimen") for command in ("run sine", "serve", "export-fmu")],
+    ],
+)
+def test_the_shell_completes_every_name_that_is_shipped_and_no_other(completed, typed, kind):
+    assert sorted(completed(typed)) == sorted(KNOWN[kind])
+    first = KNOWN[kind][0]
+    assert completed(typed + first[:3]) == [name for name in completed(typed) if name.startswith(first[:3])]
+    assert completed(typed + "qq") == []
+
+
+@pytest.mark.parametrize(
+    "typed, names",
+    [
+        ("lhpost6 run sine --scheme ", SCHEMES),
+        ("lhpost6 open-loop a.nc --scheme r", ["rk4"]),
+        ("lhpost6 run --rate 4096 sine --engine ", ENGINES),
+        ("lhpost6 sine --axis ", AXES),
+        ("lhpost6 run sine ", []),  # files, which the shell completes where nothing else is known
+        ("lhpost6 run --nonsense 1 ridgecrest-cc", ["ridgecrest-ccc"]),
+    ],
+)
+def test_the_shell_completes_what_can_stand_there(completed, typed, names):
+    assert completed(typed) == list(names)
+
+
+def test_completion_of_damaged_data_is_silent(completed, monkeypatch, tmp_path):
+    (tmp_path / "ground_motions").mkdir()
+    (tmp_path / "ground_motions" / "index.toml").write_text("[records")
+    monkeypatch.setattr(completion, "models_folder", lambda: tmp_path)
+    assert completed("lhpost6 run ") == []
+
+
+def test_a_key_press_does_not_wait_for_the_simulator():
+    code = (
+        "import sys; from lhpost6_pin.cli import main\n"
+        "try:\n    sys.argv = ['lhpost6']; main()\n"
+        "finally:\n    print(*sys.modules)"
+    )
+    environment = {**os.environ, **asking("lhpost6 run ridgecrest-cl")}
+    command = [sys.executable, "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=environment)
+    name, modules = ended.stdout.splitlines()
+    assert name == "ridgecrest-clc" and ended.stderr == ""
+    assert not {"numpy", "numba", "pinocchio", "xarray", "pandas"} & set(modules.split())
 
 
 # A process of its own -------------------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ def main() -> None:
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     with _noting_ctrl_c():
         try:
-            app()
+            app(prog_name="lhpost6")
         except LhpostError as error:
             known = {"largest_scale": error.largest_scale} if isinstance(error, OutOfRangeError) else {}
             _fail(type(error).__name__, str(error), **known)

@@ -7,6 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import MotionError, ParameterError
+from .completion import (
+    complete_controller,
+    complete_engine,
+    complete_machine,
+    complete_motion,
+    complete_scheme,
+    complete_sensors,
+    complete_specimen,
+)
 
 if TYPE_CHECKING:
     from ..control import ControllerSettings
@@ -33,13 +42,26 @@ __all__ += [
 __all__ += ["find_controller", "find_machine", "find_settings", "find_target", "find_table", "folder_for"]
 __all__ += ["refuse_no_jobs"]
 
-MachineName = Annotated[str, typer.Option("--machine", help="Shipped machine name, or a TOML file.")]
+MachineName = Annotated[
+    str, typer.Option("--machine", help="Shipped machine name, or a TOML file.", autocompletion=complete_machine)
+]
 Override = Annotated[Path | None, typer.Option("--override", help="TOML file with parameters to replace.")]
-Scheme = Annotated[str, typer.Option(help="Integration scheme: semi_implicit, euler or rk4.")]
+Scheme = Annotated[
+    str,
+    typer.Option(help="Integration scheme: semi_implicit, euler or rk4.", autocompletion=complete_scheme),
+]
 Rate = Annotated[int, typer.Option(help="Model steps per second, a multiple of 2048.")]
-EngineName = Annotated[str, typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).")]
+EngineName = Annotated[
+    str,
+    typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).", autocompletion=complete_engine),
+]
 SpecimenName = Annotated[
-    str | None, typer.Option("--specimen", help="Specimen bolted to the platen: shipped name, or a URDF file.")
+    str | None,
+    typer.Option(
+        "--specimen",
+        help="Specimen bolted to the platen: shipped name, or a URDF file.",
+        autocompletion=complete_specimen,
+    ),
 ]
 SpecimenAt = Annotated[
     str | None,
@@ -47,14 +69,22 @@ SpecimenAt = Annotated[
 ]
 Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
 SensorsName = Annotated[
-    str, typer.Option("--sensors", help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.")
+    str,
+    typer.Option(
+        "--sensors",
+        help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.",
+        autocompletion=complete_sensors,
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
 Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
 ]
-Motion = Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).")]
+Motion = Annotated[
+    list[str],
+    typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).", autocompletion=complete_motion),
+]
 Scale = Annotated[float, typer.Option(help="Factor on the motion.")]
 Axes = Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")]
 HighPass = Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")]
@@ -62,10 +92,20 @@ LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the moti
 Set = Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion that is more than the table can give.")]
 SettingsName = Annotated[
-    str | None, typer.Option("--controller", help="Controller settings: name or TOML file; else the machine's.")
+    str | None,
+    typer.Option(
+        "--controller",
+        help="Controller settings: name or TOML file; else the machine's.",
+        autocompletion=complete_controller,
+    ),
 ]
 ControllerName = Annotated[
-    str | None, typer.Option("--controller", help="Controller settings: name or TOML file; or your own, FILE.py:NAME.")
+    str | None,
+    typer.Option(
+        "--controller",
+        help="Controller settings: name or TOML file; or your own, FILE.py:NAME.",
+        autocompletion=complete_controller,
+    ),
 ]
 
 

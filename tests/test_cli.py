@@ -111,6 +111,15 @@ def test_help_names_every_command(lhpost6):
     assert "--beyond-limits" in lhpost6("run", "--help").out
 
 
+def test_help_gives_flags_no_kind_of_value_and_says_where_results_go(lhpost6):
+    commands = [c.name or c.callback.__name__ for c in cli.app.registered_commands]
+    said = {name: lhpost6(name, "--help").words for name in commands} | {"": lhpost6("--help").words}
+    assert "<int>" in said["run"] and "--locked" in said["run"]
+    for name, words in said.items():
+        assert "bool" not in words.lower(), name
+        assert "Folder for the results" not in words or "without it out/NAME" in words, name
+
+
 def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6):
     ended = lhpost6("doctor")
     assert ended.code == 0

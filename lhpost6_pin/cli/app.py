@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from typer.core import TyperGroup
 
 from ..errors import LhpostError, OutOfRangeError
 
@@ -20,7 +21,29 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main", "progress_bar", "stderr", "tell"]
 
+
+class _Commands(TyperGroup):
+    """The commands, of which flags show no kind of value in `--help`: they take none."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return _without_kind(super().get_params(ctx))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            _without_kind(command.get_params(ctx))
+        return command
+
+
+def _without_kind(parameters: list[Any]) -> list[Any]:
+    for parameter in parameters:
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = ""
+    return parameters
+
+
 app = typer.Typer(
+    cls=_Commands,
     help="The UC San Diego LHPOST6 shake table, modelled from first principles on Pinocchio.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

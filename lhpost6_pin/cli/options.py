@@ -77,7 +77,9 @@ SensorsName = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
+Out = Annotated[
+    Path | None, typer.Option(help="Folder for the results; without it out/NAME, with the name of what is run.")
+]
 Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
 ]

@@ -229,7 +229,8 @@ def build_machine(
 def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:
     word = parameters.words.get(path)
     if word not in valid:
-        raise ParameterError(f"{parameters.origin}: {path} = {word!r}; it should be one of {', '.join(valid)}")
+        said = "is missing" if word is None else f"= {word!r}"
+        raise ParameterError(f"{parameters.origin}: {path} {said}; it should be one of {', '.join(valid)}")
     return str(word)
 
 

@@ -22,7 +22,7 @@ from machine_cases import DATA
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli, rehearse
 from lhpost6_pin.check import check_record
-from lhpost6_pin.cli import completion
+from lhpost6_pin.cli import completion, runs
 from lhpost6_pin.compiled import cache_folder
 from lhpost6_pin.drives import circumstances, save_drive
 from lhpost6_pin.files import shipped
@@ -353,7 +353,8 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--scale", "inf"), ("scale is inf",)),
         (("sine", "--scheme", "magic"), ("no scheme named 'magic'", "rk4")),
         (("sine", "--engine", "steam"), ("no engine named 'steam'", "fused")),
-        (("sine", "--rate", "3000"), ("3000 model steps", "multiple")),
+        (("sine", "--rate", "3000"), ("3000 model steps", "the nearest is 2048")),
+        (("sine", "--rate", "10000"), ("the nearest is 10240",)),
         (("sine", "--rate", "0"), ("0 model steps",)),
         (("sine", "--rate", "fast"), ("--rate", "integer")),
         (("sine", "--record-rate", "300"), ("--record-rate 300 does not divide 2048",)),
@@ -361,14 +362,14 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--valves", "3"), ("--valves", "2")),
         (("sine", "--locked"), ("--locked", "--specimen")),
         (("sine", "--specimen", "absent.urdf"), ("absent.urdf", "no such URDF")),
-        (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("fused", "pinocchio")),
+        (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("--engine pinocchio", "--locked")),
         (("sine", "--machine", "absent"), ("no machine named 'absent'", "uniaxial")),
         (("sine", "--machine", "unaxial"), ("did you mean 'uniaxial'? valid names: lhpost6, uniaxial",)),
         (("sine", "--machine", "absent.toml"), ("absent.toml",)),
         (("sine", "--override", "absent.toml"), ("absent.toml",)),
         (("sine", "--controller", "absent"), ("absent", "lhpost6")),
         (("ridgecrest", "--machine", "uniaxial"), ("largest scale that fits",)),
-        (("ridgecrest", "--high-pass", "40"), ("high_pass < low_pass",)),
+        (("ridgecrest", "--high-pass", "40"), ("high-pass < low-pass",)),
         ((), ("motion",)),
     ],
 )
@@ -424,10 +425,56 @@ def test_a_drive_and_an_inverse_of_another_machine_are_refused(lhpost6, tmp_path
     )
 
 
-@pytest.mark.parametrize("option", ["columns=x", "units=5", "time_step=slow", "colour=red"])
-def test_a_wrong_option_for_a_file_is_named(lhpost6, tmp_path, option):
+@pytest.mark.parametrize(
+    "option, advice",
+    [
+        ("columns=x", "name the axes in the file's header"),
+        ("units=5", "give a unit"),
+        ("time_step=slow", "give a number of seconds"),
+        ("name=3", "give a text"),
+        ("colour=red", "valid names: columns, name, time_step, units"),
+    ],
+)
+def test_a_wrong_option_for_a_file_is_named(lhpost6, tmp_path, option, advice):
     (tmp_path / "a.csv").write_text("time_s,x_m\n0,0\n0.1,0.001\n0.2,0\n")
-    assert refused(lhpost6("run", "a.csv", "--set", option), "a.csv", option.split("=")[0])
+    assert refused(lhpost6("run", "a.csv", "--set", option), "a.csv", option.split("=")[0], advice)
+
+
+def test_a_file_without_times_says_which_option_gives_them(lhpost6, tmp_path):
+    (tmp_path / "a.csv").write_text("x_m\n0\n0.001\n0\n")
+    ended = lhpost6("run", "a.csv")
+    assert refused(ended, "no time column")
+    advised = re.search(r"\((--set \S+)\)", ended.words)[1].split()
+    assert lhpost6("run", "a.csv", *advised, "--engine", "fused", "--rate", "2048").code == 0
+    assert float(load_record(tmp_path / "out" / "a" / "record.nc").time[-1]) > 8.0  # the padding of 4 s at both ends
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (("--rate", "1000"), "1000 model steps"),
+        (("--scheme", "magic"), "no scheme named 'magic'"),
+        (("--engine", "steam"), "no engine named 'steam'"),
+        (("--engine", "fused", "--specimen", PENDULUM), "--engine pinocchio"),
+    ],
+)
+def test_options_that_cannot_be_are_refused_before_a_page_or_a_bar_is_shown(
+    lhpost6, tmp_path, monkeypatch, options, message
+):
+    target = make_target(find_motion("sine", cycles=1, ramp_cycles=1))
+    save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
+    for shown in ("progress_bar", "watched"):
+        monkeypatch.setattr(runs, shown, lambda *_, **__: pytest.fail("something was shown"))
+    for command in (("run", "sine", "--live"), ("replay", "drive.nc"), ("open-loop", PRACTICE)):
+        assert refused(lhpost6(*command, *options), message)
+
+
+def test_a_command_that_is_refused_before_anything_is_done_leaves_no_bar(lhpost6, tmp_path):
+    for command in (("campaign", "--tests", "TQ"), ("iterate", "sine", "--gain", "0"), ("serve", "--mode", "loose")):
+        ended = lhpost6(*command)
+        assert refused(ended) and ended.err.lstrip().startswith("error: ") and ended.out == ""
+    ended = lhpost6("run", *COARSE, "--out", "here")
+    assert ended.code == 0 and "100%" in ended.err
 
 
 @pytest.mark.parametrize("name", ["[red]x", "[/red]y", "[bold]z[/bold]"])

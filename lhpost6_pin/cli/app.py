@@ -174,4 +174,8 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
                 raise KeyboardInterrupt
             bar.update(task, completed=share)
 
-        yield advance
+        try:
+            yield advance
+        except LhpostError:
+            bar.live.transient = not bar.tasks[task].completed  # nothing was begun: no bar is left above the error
+            raise

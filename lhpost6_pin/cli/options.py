@@ -40,7 +40,7 @@ __all__ += [
     "Valves",
 ]
 __all__ += ["find_controller", "find_machine", "find_settings", "find_target", "find_table", "folder_for"]
-__all__ += ["refuse_no_jobs"]
+__all__ += ["refuse_no_jobs", "refuse_stepping"]
 
 MachineName = Annotated[
     str, typer.Option("--machine", help="Shipped machine name, or a TOML file.", autocompletion=complete_machine)
@@ -193,6 +193,22 @@ def refuse_no_jobs(jobs: int, what: str = "threads") -> None:
         raise ParameterError(f"--jobs 0: give a number of {what}, or -1 for as many as there are cores")
 
 
+def refuse_stepping(
+    table: "Machine",
+    scheme: str,
+    rate: int,
+    engine: str,
+    controller: "ControllerSettings | UserController | None" = None,
+) -> None:
+    """Raise what `simulate` would for options that cannot be, before anybody waits for it."""
+    from ..control import ControllerSettings
+    from ..plant import make_plant
+    from ..simulate import check_options
+
+    plugged = controller is not None and not isinstance(controller, ControllerSettings)
+    check_options(make_plant(table), scheme=scheme, steps_per_second=rate, engine=engine, plugged=plugged)
+
+
 def folder_for(out: Path | None, name: str) -> Path:
     """Folder for results, out/NAME unless given; raises OSError at once if none can be written there."""
     from ..files import refuse_folder
@@ -215,10 +231,7 @@ def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
     first, *files = names
     if not _is_file(first) and files and not any(map(_is_file, files)):
         raise MotionError(f"one motion at a time; got {', '.join(names)}, none of which is a file")
-    try:
-        return load_motion(names, **options) if _is_file(first) else find_motion(first, files, **options)
-    except (AttributeError, TypeError, ValueError) as error:  # an option of the wrong kind
-        raise MotionError(f"{' '.join(names)}: --set {' --set '.join(settings)}: {error}") from error
+    return load_motion(names, **options) if _is_file(first) else find_motion(first, files, **options)
 
 
 def _is_file(name: str) -> bool:

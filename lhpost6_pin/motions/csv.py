@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import MotionError, instead_of
+from ..errors import MotionError, meant
 from .motion import AXES, GroundMotion, make_motion
 from .text import read_text
 from .units import to_si
@@ -98,9 +98,12 @@ def _channels(
     if columns is not None:
         for axis, column in columns.items():
             if axis not in AXES:
-                raise MotionError(f"{where}: columns= names axis {axis!r}; axes are {', '.join(AXES)}")
+                raise MotionError(f"{where}: option columns names axis {axis!r}; axes are {', '.join(AXES)}")
             if column not in names:
-                raise MotionError(f"{where}: no column {column!r} for axis {axis}; {instead_of(column, names)}")
+                asked = meant(column, names)
+                raise MotionError(
+                    f"{where}: no column {column!r} for axis {axis}; {asked}columns are {', '.join(names)}"
+                )
             match = _COLUMN.fullmatch(column)
             chosen.append(_Channel(axis, names.index(column), _unit(match, axis, units)))
     else:
@@ -176,7 +179,8 @@ def _time_step(
         return time_step
     if time_column is None:
         raise MotionError(
-            f"{where}: no time column (time_s, t) among {', '.join(names)[:200]}; add it or give time_step="
+            f"{where}: no time column (time_s, t) among {', '.join(names)[:200]}; add it, or give the option time_step "
+            "in seconds (--set time_step=0.01)"
         )
     match = _TIME.fullmatch(names[time_column])
     time = table[:, time_column] * (1e-3 if match and (match["unit"] or "").lower() == "ms" else 1.0)

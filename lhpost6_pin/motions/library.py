@@ -157,7 +157,8 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
         with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite
             return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **chosen})
     except (ArithmeticError, MemoryError, TypeError, ValueError) as error:
-        raise MotionError(f"{name}: options {options}: {error}") from error
+        said = ", ".join(f"{key} = {value}" for key, value in options.items())
+        raise MotionError(f"{name}: cannot be made with {said}: {error}") from error
 
 
 def _from_files(entry: MotionEntry, files: MotionFiles, options: Mapping[str, Any]) -> GroundMotion:

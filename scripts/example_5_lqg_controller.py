@@ -343,7 +343,7 @@ def main(
         for axis in asked
     }
     header, rows = summary(tests, found)
-    title = f"{motion} x {scale:g}: the 469D ({panel.name}) and LQG"
+    title = f"{motion} at scale {scale:g}: the 469D ({panel.name}) and LQG"
     shown = Table(*header, title=title)
     for row in rows:
         shown.add_row(*row)

@@ -104,7 +104,7 @@ def run(
     folder = folder_for(out, name)
     if not beyond:
         target_within_limits(make_plant(table), target)
-    title = f"{name} x {scale:g} on {table.name}"
+    title = f"{name} at scale {scale:g} on {table.name}"
     with (
         watched(live, table, title, amplify=amplify, change=force_change, open_it=not no_open, err=json) as watch,
         progress_bar(f"{name} on {table.name}") as progress,

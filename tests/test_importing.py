@@ -203,6 +203,25 @@ def test_a_bad_table_is_refused_with_line_and_column(tmp_path, text, phrase):
         load_raw(put(tmp_path, "run.csv", text))
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time [s],x [m]\n0,00,0,1\n0,01,0,2\n0,02,0,3\n",
+        "time [s],x [m]\n0,0\n1,1\n2,3\n3,0,05\n",
+        'time [s],x [m]\n"0,00","0,1"\n"0,01","0,2"\n',
+        "time [s];x [m]\n0.00;0.1\n0.01;0.2\n0.02;0,3\n",
+    ],
+    ids=["between commas", "one between commas", "in quotes", "one among points"],
+)
+def test_decimal_commas_that_cannot_be_told_from_separators_are_named(tmp_path, text):
+    with pytest.raises(
+        RecordError, match=r"write decimals with points, as 0\.01, or all of them with commas and semic"
+    ):
+        load_raw(put(tmp_path, "run.csv", text))
+    as_advised = put(tmp_path, "same.csv", "time [s];x [m]\n0,00;0,1\n0,01;0,2\n0,02;0,3\n")
+    np.testing.assert_array_equal(one(as_advised).values[:, 0], [0.1, 0.2, 0.3])
+
+
 def test_a_parquet_table_is_read_with_its_units(tmp_path):
     pd = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")

@@ -15,6 +15,7 @@ LAYERS = [
         "",
         "errors",
         "compiled",
+        "decimals",
         "names",
         "plain",
         "progress",

@@ -39,6 +39,7 @@ from rich.table import Table
 from scipy.linalg import block_diag
 from scipy.signal import cont2discrete
 
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.control.plug import Sensors, Wanted
 from lhpost6_pin.equilibrium import Equilibrium, find_equilibrium, hydraulic_rows, unloaded_speeds
@@ -431,4 +432,4 @@ def write_report(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

@@ -19,7 +19,7 @@ from ..errors import LhpostError, OutOfRangeError
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["app", "main", "progress_bar", "stderr", "tell"]
+__all__ = ["app", "main", "progress_bar", "run_script", "stderr", "tell"]
 
 
 class _Commands(TyperGroup):
@@ -59,15 +59,8 @@ def main() -> None:
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     with _noting_ctrl_c():
         try:
-            app(prog_name="lhpost6")
-        except LhpostError as error:
-            known = {"largest_scale": error.largest_scale} if isinstance(error, OutOfRangeError) else {}
-            _fail(type(error).__name__, str(error), **known)
-        except OSError as error:  # disk full, no permission, a file where a folder should be
-            path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
-            where = f"cannot read or write {path}" if path else "cannot read or write a file"
-            remedy = "; make room, or choose another folder with --out" * (error.errno in _NO_ROOM)
-            _fail("OSError", f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
+            with _without_traceback(2):
+                app(prog_name="lhpost6")
         except SystemExit as end:
             if end.code == _INTERRUPTED:
                 _say_interrupted()
@@ -77,6 +70,27 @@ def main() -> None:
                 raise
             _say_interrupted()
             sys.exit(_INTERRUPTED)
+
+
+def run_script(function: Callable[..., Any]) -> None:
+    """Run a script's function with options, as typer does; errors that a user can act on end it with 1, and a line."""
+    with _without_traceback(1):
+        typer.run(function)
+
+
+@contextmanager
+def _without_traceback(code: int) -> Iterator[None]:
+    """Print errors that a user can act on, and end with an exit code."""
+    try:
+        yield
+    except LhpostError as error:
+        known = {"largest_scale": error.largest_scale} if isinstance(error, OutOfRangeError) else {}
+        _fail(code, type(error).__name__, str(error), **known)
+    except OSError as error:  # disk full, no permission, a file where a folder should be
+        path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
+        where = f"cannot read or write {path}" if path else "cannot read or write a file"
+        remedy = "; make room, or choose another folder with --out" * (error.errno in _NO_ROOM)
+        _fail(code, "OSError", f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
 
 
 @contextmanager
@@ -115,7 +129,7 @@ _INTERRUPTED = 130
 """Exit code that typer gives to Ctrl-C."""
 
 
-def _fail(kind: str, message: str, **known: Any) -> None:
+def _fail(code: int, kind: str, message: str, **known: Any) -> None:
     """Say what is refused, as JSON, too, where that was asked for, and end."""
     from ..plain import as_json
 
@@ -123,7 +137,7 @@ def _fail(kind: str, message: str, **known: Any) -> None:
     stderr().print(message, markup=False, highlight=False)
     if "--json" in sys.argv[1:]:
         typer.echo(as_json({"error": {"kind": kind, "message": message, **known}}))
-    sys.exit(2)
+    sys.exit(code)
 
 
 @cache

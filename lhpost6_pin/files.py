@@ -5,7 +5,7 @@ import os
 import tempfile
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -59,11 +59,18 @@ def _refuse_long_numbers(value: object, key: str) -> None:
 def refuse_folder(folder: "Path | str") -> None:
     """Raise OSError naming the path that stands in the way if no file could be written below `folder`.
 
-    Nothing is made on disk: a long computation can ask first and make the folder when it has something to put there.
+    Nothing is left on disk: a long computation can ask first and make the folder when it has something to put there.
     """
     path = Path(folder).absolute()
+    with suppress(FileNotFoundError, NotADirectoryError):
+        os.lstat(path)  # raises for a name that is too long
     nearest = next(p for p in (path, *path.parents) if os.path.lexists(p))
-    reason = errno.ENOTDIR if not nearest.is_dir() else 0 if os.access(nearest, os.W_OK | os.X_OK) else errno.EACCES
+    reason = 0 if nearest.is_dir() else errno.ENOTDIR
+    if not reason:
+        try:
+            tempfile.TemporaryFile(dir=nearest).close()  # permissions alone do not tell: /proc takes no files of root's
+        except OSError as error:
+            reason = errno.EACCES if error.errno == errno.ENOENT else error.errno or errno.EACCES
     if reason:
         raise OSError(reason, os.strerror(reason), str(nearest))
 

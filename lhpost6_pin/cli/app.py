@@ -89,8 +89,8 @@ def _without_traceback(code: int) -> Iterator[None]:
     except OSError as error:  # disk full, no permission, a file where a folder should be
         path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
         where = f"cannot read or write {path}" if path else "cannot read or write a file"
-        remedy = "; make room, or choose another folder with --out" * (error.errno in _NO_ROOM)
-        _fail(code, "OSError", f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
+        said = os.strerror(error.errno) if error.errno else error
+        _fail(code, "OSError", f"{where}: {said}{_REMEDIES.get(error.errno or 0, '')}")
 
 
 @contextmanager
@@ -119,8 +119,10 @@ def _say_interrupted() -> None:
     stderr().print("interrupted; nothing half-written is left behind")
 
 
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-"""What is wrong with where results are to go, not with what is read."""
+_REMEDIES = dict.fromkeys(
+    (errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "; make room, or choose another folder with --out"
+) | {errno.EROFS: "; choose another folder with --out"}
+"""For what is wrong with where results are to go, not with what is read."""
 
 _PRESSED: list[int] = []
 """What Ctrl-C has sent since the command began."""

@@ -341,7 +341,7 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
     [
         (("nonsense",), ("no ground motion named 'nonsense'", "`lhpost6 motions` lists them")),
         (("ridgecrest-cc",), ("did you mean", "'ridgecrest-ccc'")),
-        (("absent.csv",), ("absent.csv", "No such file")),
+        (("absent.csv",), ("cannot read ground motion absent.csv: No such file or directory",)),
         (("[red]absent.csv",), ("[red]absent.csv", "No such file")),
         (("[/red]absent.csv",), ("[/red]absent.csv",)),
         (("sine", "triangle"), ("one motion at a time",)),
@@ -617,6 +617,8 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_simulation(lhpost
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setattr(rehearse, "simulate", lambda *a, **k: pytest.fail("it was simulated"))
     assert refused(lhpost6(*command, "--out", "file/below"), "file", "Not a directory")
+    if Path("/proc/self").is_dir():  # where not even root can write
+        assert refused(lhpost6(*command, "--out", "/proc/x"), "/proc", "Permission denied")
     assert everything(tmp_path) == ["file"]
 
 

@@ -26,7 +26,7 @@ from .schemes import (
     staggered_stage,
 )
 
-__all__ = ["INERTIA", "inertia_table", "platen_acceleration", "run_fused"]
+__all__ = ["INERTIA", "inertia_table", "platen_acceleration", "refuse_joints", "run_fused"]
 
 Array = NDArray[np.float64]
 
@@ -39,13 +39,18 @@ INERTIA = np.dtype(
 )
 
 
-def inertia_table(plant: Plant) -> NDArray[np.void]:
-    """Table (one row) of the rigid body; raises SimulationError for an articulated specimen."""
+def refuse_joints(plant: Plant) -> None:
+    """Raise SimulationError for a specimen with free joints."""
     if plant.articulated:
         raise SimulationError(
-            "the fused engine takes a platen with a rigid specimen at most; "
-            "use engine='pinocchio' for free joints, or mount the specimen with locked joints"
+            "the fused engine takes a platen with a rigid specimen at most; take the engine pinocchio for free joints "
+            "(--engine pinocchio), or lock them (--locked)"
         )
+
+
+def inertia_table(plant: Plant) -> NDArray[np.void]:
+    """Table (one row) of the rigid body; raises SimulationError for an articulated specimen."""
+    refuse_joints(plant)
     plain, full = platen_inertia(plant.model, plant.machine)
     table = np.zeros(1, INERTIA)
     table["plain"] = plain

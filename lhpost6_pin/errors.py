@@ -1,5 +1,8 @@
 """Errors that a user can act on: each message names the file, channel or key and says what to do."""
 
+from collections.abc import Sequence
+from difflib import get_close_matches
+
 __all__ = [
     "ControllerError",
     "LhpostError",
@@ -10,7 +13,12 @@ __all__ = [
     "RecordError",
     "SimulationError",
     "UnknownNameError",
+    "instead_of",
+    "meant",
 ]
+
+_FEW = 12
+"""So many names are listed even where the one that was meant is likely among the nearest."""
 
 
 class LhpostError(Exception):
@@ -51,8 +59,28 @@ class SimulationError(LhpostError):
 
 
 class UnknownNameError(LhpostError):
-    """A name is not one of those that exist; the message lists the valid ones."""
+    """A name is not one of those that exist; the message says which are near, and which are valid."""
 
-    def __init__(self, kind: str, name: str, valid: "list[str] | tuple[str, ...]") -> None:
-        """Say that `name` is no `kind` and list the `valid` names."""
-        super().__init__(f"no {kind} named {name!r}; valid names: {', '.join(sorted(valid))}")
+    def __init__(self, kind: str, name: str, valid: Sequence[str], listing: str = "") -> None:
+        """Say that `name` is no `kind`, and what to write `instead_of` it."""
+        super().__init__(f"no {kind} named {name!r}; {instead_of(name, sorted(valid), listing)}")
+
+
+def instead_of(name: str, valid: Sequence[str], listing: str = "") -> str:
+    """Say what to write instead of a name that is not `valid`: the nearest ones, and all unless they are many.
+
+    `listing` says where many are listed, as in "`lhpost6 motions` lists them".
+    """
+    if not valid:
+        return "there are none"
+    near, everything = meant(name, valid), f"valid names: {', '.join(valid)}"
+    if len(valid) <= _FEW or not (near or listing):
+        return near + everything
+    return (near + listing).rstrip()
+
+
+def meant(name: str, valid: Sequence[str]) -> str:
+    """Ask whether one of the `valid` names nearest to this one was meant; "" where none is near."""
+    spelled = {known.lower(): known for known in valid}
+    near = [repr(spelled[known]) for known in get_close_matches(name.lower(), spelled)]
+    return f"did you mean {' or '.join(near)}? " if near else ""

@@ -5,11 +5,13 @@ import os
 import tempfile
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-__all__ = ["models_folder", "read_toml", "refuse_folder", "write_whole"]
+from .errors import UnknownNameError
+
+__all__ = ["find_shipped", "models_folder", "read_toml", "refuse_folder", "shipped", "write_whole"]
 
 
 def models_folder() -> Path:
@@ -17,6 +19,19 @@ def models_folder() -> Path:
     package = Path(__file__).parent
     installed = package / "models"
     return installed if installed.is_dir() else package.parent / "models"
+
+
+def shipped(folder: str = "", suffix: str = ".toml") -> dict[str, Path]:
+    """Files in a folder of the shipped data, by name."""
+    return {path.stem: path for path in sorted((models_folder() / folder).glob(f"*{suffix}"))}
+
+
+def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") -> Path:
+    """File of the shipped data by name; raises UnknownNameError for a `kind`, in words, that is not there."""
+    known = shipped(folder, suffix)
+    if name not in known:
+        raise UnknownNameError(kind, name, list(known))
+    return known[name]
 
 
 def read_toml(path: "Path | str") -> dict[str, Any]:
@@ -44,11 +59,18 @@ def _refuse_long_numbers(value: object, key: str) -> None:
 def refuse_folder(folder: "Path | str") -> None:
     """Raise OSError naming the path that stands in the way if no file could be written below `folder`.
 
-    Nothing is made on disk: a long computation can ask first and make the folder when it has something to put there.
+    Nothing is left on disk: a long computation can ask first and make the folder when it has something to put there.
     """
     path = Path(folder).absolute()
+    with suppress(FileNotFoundError, NotADirectoryError):
+        os.lstat(path)  # raises for a name that is too long
     nearest = next(p for p in (path, *path.parents) if os.path.lexists(p))
-    reason = errno.ENOTDIR if not nearest.is_dir() else 0 if os.access(nearest, os.W_OK | os.X_OK) else errno.EACCES
+    reason = 0 if nearest.is_dir() else errno.ENOTDIR
+    if not reason:
+        try:
+            tempfile.TemporaryFile(dir=nearest).close()  # permissions alone do not tell: /proc takes no files of root's
+        except OSError as error:
+            reason = errno.EACCES if error.errno == errno.ENOENT else error.errno or errno.EACCES
     if reason:
         raise OSError(reason, os.strerror(reason), str(nearest))
 

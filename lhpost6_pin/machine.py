@@ -12,7 +12,7 @@ from typing import Any
 
 from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
 from .effects import Effect, standard_effects
-from .errors import ParameterError, RecordError, UnknownNameError
+from .errors import ParameterError, RecordError, UnknownNameError, instead_of
 from .law_table import LAWS
 from .library import effect_entry, make_named_effect
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
@@ -182,6 +182,7 @@ def build_machine(
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}
+    _check_names(parameters, components, kinds)
     actuators, struts = [], []
     for name in components:
         kind = str(words[f"{name}.kind"])
@@ -217,7 +218,6 @@ def build_machine(
         own_effects=added_effects,
         specimen=specimen,
     )
-    _check_names(parameters, components, kinds)
     _check_machine(machine)
     try:
         _ = machine.added_effects  # raises for an effect that cannot be
@@ -229,7 +229,8 @@ def build_machine(
 def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:
     word = parameters.words.get(path)
     if word not in valid:
-        raise ParameterError(f"{parameters.origin}: {path} = {word!r}; it should be one of {', '.join(valid)}")
+        said = "is missing" if word is None else f"= {word!r}"
+        raise ParameterError(f"{parameters.origin}: {path} {said}; it should be one of {', '.join(valid)}")
     return str(word)
 
 
@@ -263,9 +264,11 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str])
         if section in _COMPARISONS and path in parameters.quantities:
             continue
         if section not in known:
-            raise ParameterError(f"{parameters.origin}: {path} is in no known section: {', '.join(sorted(known))}")
+            said = instead_of(section, sorted(known))
+            raise ParameterError(f"{parameters.origin}: {path} is in no known section; {said}")
         if key not in known[section]:
-            raise ParameterError(f"{parameters.origin}: unknown key {path}; valid: {', '.join(sorted(known[section]))}")
+            said = instead_of(key, sorted(known[section]))
+            raise ParameterError(f"{parameters.origin}: unknown key {path}; {said}")
 
 
 def _check_actuator(actuator: Actuator, origin: str) -> None:

@@ -6,13 +6,13 @@ one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or `
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from .errors import ParameterError, UnknownNameError
-from .files import models_folder, read_toml
+from .errors import ParameterError, UnknownNameError, instead_of
+from .files import find_shipped, read_toml
 
 __all__ = [
     "EVIDENCE",
@@ -83,8 +83,7 @@ class Parameters(Mapping[str, Quantity]):
         try:
             return self.quantities[path]
         except KeyError:
-            near = [p for p in self.quantities if p.split(".")[0] == path.split(".")[0]]
-            raise UnknownNameError("parameter", path, near or list(self.quantities)) from None
+            raise _unknown_parameter(path, self.quantities) from None
 
     def number(self, path: str) -> float:
         """Scalar at `path`; raises UnknownNameError, or ParameterError if it is a vector."""
@@ -120,10 +119,7 @@ def load_parameters(name_or_path: str | Path) -> Parameters:
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
-        shipped = {p.stem: p for p in sorted(models_folder().glob("*.toml"))}
-        if str(name_or_path) not in shipped:
-            raise UnknownNameError("machine", str(name_or_path), list(shipped))
-        path = shipped[str(name_or_path)]
+        path = find_shipped("machine", str(name_or_path))
     return _flatten(_read_toml(path), path.name)
 
 
@@ -168,12 +164,17 @@ def _overridden(
             continue
         base = quantities.get(key) or quantities.get(inherited)
         if base is None:
-            near = [p for p in (*quantities, *words) if p.split(".")[0] == key.split(".")[0]]
-            raise UnknownNameError("parameter", key, near or list(quantities))
+            raise _unknown_parameter(key, (*quantities, *words))
         quantities[key] = _changed(base, entry, key, origin)
         if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
             raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
     return Parameters(quantities, words, f"{parameters.origin} + {origin}", effects)
+
+
+def _unknown_parameter(path: str, known: Iterable[str]) -> UnknownNameError:
+    """Error for a path that is not `known`, with those of its section if there is such a section."""
+    section = [p for p in known if p.split(".")[0] == path.split(".")[0]]
+    return UnknownNameError("parameter", path, section or list(known), "`lhpost6 info` lists all of a machine")
 
 
 def _override_effect(effects: dict[str, EffectEntry], key: str, entry: Any, origin: str) -> None:
@@ -325,9 +326,8 @@ def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
     for needed in ("value", "unit", "evidence", "source"):
         if needed not in entry:
             raise ParameterError(f"{key}: {needed} is missing")
-    unknown = set(entry) - _QUANTITY_KEYS
-    if unknown:
-        raise ParameterError(f"{key}: unknown {', '.join(sorted(unknown))}; valid: {', '.join(sorted(_QUANTITY_KEYS))}")
+    if unknown := sorted(set(entry) - _QUANTITY_KEYS):
+        raise ParameterError(f"{key}: unknown {unknown[0]}; {instead_of(unknown[0], sorted(_QUANTITY_KEYS))}")
     if entry["evidence"] not in EVIDENCE:
         raise ParameterError(f"{key}: evidence {entry['evidence']!r} is not one of {', '.join(EVIDENCE)}")
     for text in ("unit", "source", "printed"):

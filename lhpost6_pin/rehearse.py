@@ -90,7 +90,9 @@ def rehearse(
         drive = controller.drive_for(*motion) if drive is None else drive
         loop = ClosedLoop(controller, drive if inverse is None else apply_inverse(inverse, drive), rest)
     elif drive is not None or inverse is not None:
-        raise SimulationError("a drive or an inverse goes into the 469D's reference generators; leave --controller out")
+        raise SimulationError(
+            "a drive or an inverse goes into the 469D's reference generators, which a controller of your own has not"
+        )
     else:
         loop = PluggedLoop(settings, *motion, rest)
     run = simulate(plant, loop, samples=len(target.time), record_every=record_every, progress=progress, **options)

@@ -16,7 +16,7 @@ from .engine_pinocchio import make_stepper, settle
 from .equilibrium import Equilibrium, hydraulic_rows
 from .errors import SimulationError
 from .plant import Plant, State
-from .schemes import SAMPLE_RATE, SCHEMES, V, spool_windows
+from .schemes import SAMPLE_RATE, SCHEMES, V, spool_windows, steps_a_sample
 from .sight import Sight, sight_of
 from .simulate import diagnosis
 from .workspace import make_workspace
@@ -40,12 +40,10 @@ class RunningPlant:
         scheme: str = SCHEMES[0],
         steps_per_second: int = 4 * SAMPLE_RATE,
     ) -> None:
-        """Start at rest; raises SimulationError for a rate that does not divide the controller's sample."""
-        if steps_per_second < SAMPLE_RATE or steps_per_second % SAMPLE_RATE:
-            raise SimulationError(f"{steps_per_second} model steps a second are no multiple of {SAMPLE_RATE}")
+        """Start at rest; raises what `schemes.steps_a_sample` does."""
+        steps = steps_a_sample(scheme, steps_per_second)
         self.plant, self.scheme, self.steps_per_second = plant, scheme, steps_per_second
         self.sample = self.clipped = 0
-        steps = steps_per_second // SAMPLE_RATE
         self._advance = make_stepper(plant, scheme, 1.0 / steps_per_second)
         self._ws = make_workspace(plant, rest.state)
         self._window = np.zeros((steps, plant.spools))

@@ -16,14 +16,13 @@ import math
 import numpy as np
 
 from .compiled import compiled, compiled_inline
+from .errors import SimulationError, UnknownNameError
+from .names import SCHEMES
 from .ports import evaluate_ports, platen_pose
 from .stage import advance_states, apply_forces, state_rates, wrench_on_platen
 
 __all__ = ["DS", "FORCE", "SAMPLE_RATE", "SCHEMES", "SD", "A", "DQ", "S", "TAU", "V", "V_MID", "V_SEEN"]
-__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "spool_windows", "staggered_stage"]
-
-SCHEMES = ("semi_implicit", "euler", "rk4")
-"""Scheme names; the first is the default."""
+__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "spool_windows", "staggered_stage", "steps_a_sample"]
 
 SAMPLE_RATE = 2048
 """Rate of controller samples [Hz] (report, Chapter 5)."""
@@ -32,6 +31,19 @@ V, A, V_MID, V_SEEN, DQ, TAU = range(6)
 """Rows of `motion`: velocity, acceleration, velocity at mid-step and as forces see it, step of the pose, torque."""
 S, SD, DS, FORCE = range(4)
 """Rows of `port`: coordinate, rate, increment over the step, force."""
+
+
+def steps_a_sample(scheme: str, steps_per_second: int) -> int:
+    """Model steps in a controller sample; raises UnknownNameError or SimulationError for what no run can step by."""
+    if scheme not in SCHEMES:
+        raise UnknownNameError("scheme", scheme, SCHEMES)
+    if steps_per_second < SAMPLE_RATE or steps_per_second % SAMPLE_RATE:
+        nearest = max(1, round(steps_per_second / SAMPLE_RATE)) * SAMPLE_RATE
+        raise SimulationError(
+            f"{steps_per_second} model steps a second are no multiple of {SAMPLE_RATE}, the controller's samples; "
+            f"the nearest is {nearest}"
+        )
+    return steps_per_second // SAMPLE_RATE
 
 
 @compiled_inline

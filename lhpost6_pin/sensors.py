@@ -16,8 +16,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from .conditioning import resolution
-from .errors import ParameterError, UnknownNameError
-from .files import models_folder
+from .errors import ParameterError, UnknownNameError, instead_of
+from .files import find_shipped
 from .parameters import Parameters, load_parameters
 from .records import LAYOUT, channel_name, same_unit, sample_interval
 from .signals import Band
@@ -98,17 +98,16 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> Sensors:
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
-        shipped = {p.stem: p for p in sorted((models_folder() / "sensors").glob("*.toml"))}
-        if str(name_or_path) not in shipped:
-            raise UnknownNameError("sensors", str(name_or_path), list(shipped))
-        path = shipped[str(name_or_path)]
+        path = find_shipped("sensors", str(name_or_path), "sensors")
     given = load_parameters(path)
     tables: dict[str, dict[str, Array]] = {"noise": {}, "gain_range": {}, "offset_range": {}, "delay_range": {}}
     for key, quantity in given.items():
         section, _, channel = key.partition(".")
         if section not in tables:
-            if section != "sampling" or channel not in SAMPLING:
-                raise ParameterError(f"{given.origin}: {key} is unknown; sections: sampling, {', '.join(tables)}")
+            if section != "sampling":
+                raise ParameterError(f"{given.origin}: {key} is unknown; {instead_of(section, ('sampling', *tables))}")
+            if channel not in SAMPLING:
+                raise ParameterError(f"{given.origin}: {key} is unknown; {instead_of(channel, list(SAMPLING))}")
             if quantity.unit != SAMPLING[channel]:
                 raise ParameterError(f"{given.origin}: {key}: unit {quantity.unit!r} should be {SAMPLING[channel]!r}")
             continue

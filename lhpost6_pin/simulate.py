@@ -21,26 +21,24 @@ from numpy.typing import NDArray
 from .control import Controller
 from .control.loop import ACTUATOR, AXIS, CANCELLER, control_sample_flat, sense_flat
 from .control.plug import Sensors, UserController, start_plugged, step_plugged, wanted_from
-from .engine_fused import inertia_table, run_fused
+from .engine_fused import inertia_table, refuse_joints, run_fused
 from .engine_pinocchio import make_stepper, settle
 from .equilibrium import Equilibrium, hydraulic_rows
-from .errors import SimulationError
+from .errors import SimulationError, UnknownNameError
+from .names import ENGINES
 from .plant import Plant, State
-from .schemes import SAMPLE_RATE, SCHEMES, A, V, spool_windows
+from .schemes import SAMPLE_RATE, SCHEMES, A, V, spool_windows, steps_a_sample
 from .sight import EVERY, Watch, sight_of
 from .workspace import Workspace, make_workspace
 
 __all__ = ["ENGINES", "SAMPLE_RATE", "ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis"]
-__all__ += ["check_drive", "fastest_engine", "simulate"]
+__all__ += ["check_drive", "check_options", "fastest_engine", "simulate"]
 
 log = logging.getLogger(__name__)
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 """Called now and then with the share of the run that is done, 0..1."""
-
-ENGINES = ("pinocchio", "fused")
-"""Engine names; the first is the default."""
 
 _CHUNK = 1024
 """Controller samples between two progress reports."""
@@ -122,8 +120,8 @@ def simulate(
 
     `watch` is shown the plant 32 times a second of the run, beginning with its start.
 
-    Raises SimulationError for a scheme, engine, rate or drive that cannot be. A run that goes wrong on the way does
-    not raise: see `Run.trouble`.
+    Raises UnknownNameError or SimulationError for a scheme, engine, rate or drive that cannot be. A run that goes wrong
+    on the way does not raise: see `Run.trouble`.
     """
     steps = _check(plant, drive, samples, scheme, steps_per_second, engine, record_every)
     dt = 1.0 / steps_per_second
@@ -191,20 +189,31 @@ class _Log:
         self.spool[at] = spool
 
 
-def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, engine: str, record_every: int) -> int:
-    if scheme not in SCHEMES:
-        raise SimulationError(f"no scheme named {scheme!r}; valid names: {', '.join(SCHEMES)}")
+def check_options(plant: Plant, *, scheme: str, steps_per_second: int, engine: str, plugged: bool = False) -> None:
+    """Raise UnknownNameError or SimulationError if no run of a plant can have these options.
+
+    `plugged`: it is driven by a user's own controller.
+    """
+    steps_a_sample(scheme, steps_per_second)
     if engine not in ENGINES:
-        raise SimulationError(f"no engine named {engine!r}; valid names: {', '.join(ENGINES)}")
-    if rate < SAMPLE_RATE or rate % SAMPLE_RATE:
-        raise SimulationError(
-            f"{rate} model steps a second do not divide the controller's 1/{SAMPLE_RATE} s; use a multiple"
-        )
+        raise UnknownNameError("engine", engine, ENGINES)
+    if engine == "fused":
+        refuse_joints(plant)
+        if plugged:
+            raise SimulationError(
+                "the fused engine runs compiled controllers; take the engine pinocchio for your own "
+                "(--engine pinocchio)"
+            )
+
+
+def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, engine: str, record_every: int) -> int:
+    plugged = isinstance(drive, PluggedLoop)
+    check_options(plant, scheme=scheme, steps_per_second=rate, engine=engine, plugged=plugged)
     if samples < 1:
         raise SimulationError("nothing to simulate: the drive has no sample")
     if record_every < 1:
         raise SimulationError(f"every {record_every}-th sample cannot be recorded; give a number, one or more")
-    steps = rate // SAMPLE_RATE
+    steps = steps_a_sample(scheme, rate)
     if isinstance(drive, OpenLoop):
         if drive.spool.ndim != 2 or drive.spool.shape[1] != plant.spools:
             raise SimulationError(f"spool has shape {drive.spool.shape}; this machine takes (n, {plant.spools})")
@@ -216,8 +225,6 @@ def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, eng
         _check_state(plant, drive.start)
     else:
         check_drive(plant, drive, samples)
-        if isinstance(drive, PluggedLoop) and engine == "fused":
-            raise SimulationError("the fused engine runs compiled controllers; use engine='pinocchio' for your own")
     return steps
 
 
@@ -406,8 +413,11 @@ def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) ->
             f"stopped at {time:.4f} s: {leg} left its stroke of +-{stroke:g} m; "
             "scale the motion down, look at the controller, or start from the record's own pose and pressures"
         )
-    hint = "use --scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"
-    return f"stopped at {time:.4f} s: the run diverged with {scheme} at {rate} steps a second; {hint} or raise --rate"
+    hint = "take the scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"
+    return (
+        f"stopped at {time:.4f} s: the run diverged with {scheme} at {rate} steps a second; {hint}, or take more steps "
+        "(--rate)"
+    )
 
 
 def _accelerations(plant: Plant, q: Array, v: Array, z: Array) -> Array:

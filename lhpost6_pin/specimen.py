@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import UnknownNameError
-from .files import models_folder
+from .files import find_shipped
 
 __all__ = ["Specimen", "find_specimen"]
 
@@ -33,7 +32,4 @@ def find_specimen(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.suffix:
         return path
-    shipped = {p.stem: p for p in (models_folder() / "specimens").glob("*.urdf")}
-    if str(name_or_path) not in shipped:
-        raise UnknownNameError("specimen", str(name_or_path), list(shipped))
-    return shipped[str(name_or_path)]
+    return find_shipped("specimen", str(name_or_path), "specimens", ".urdf")

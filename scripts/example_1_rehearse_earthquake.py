@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.energy import energy_audit
 from lhpost6_pin.machine import load_machine
@@ -59,4 +60,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

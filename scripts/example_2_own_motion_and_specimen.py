@@ -13,8 +13,8 @@ import numpy as np
 import typer
 import xarray as xr
 
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.errors import OutOfRangeError
 from lhpost6_pin.files import write_whole
 from lhpost6_pin.machine import Machine, load_machine
 from lhpost6_pin.motions import Target, load_motion, make_target
@@ -35,11 +35,8 @@ def write_pulse(path: Path) -> Path:
 
 
 def what_it_needs(machine: Machine, target: Target) -> None:
-    """Say how much of each limit a target takes, or stop with the scale that fits."""
-    try:
-        needs = target_within_limits(make_plant(machine), target)
-    except OutOfRangeError as error:
-        raise SystemExit(f"error: {error}") from None
+    """Say how much of each limit a target takes; more than there is raises an error that says the scale that fits."""
+    needs = target_within_limits(make_plant(machine), target)
     for what, share in needs.utilisation.items():
         most = max(share, key=lambda name: share[name])
         print(f"{what}: {100 * share[most]:.0f} % of what {most} has")
@@ -84,4 +81,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

@@ -12,6 +12,7 @@ import numpy as np
 import typer
 import xarray as xr
 
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.decompose import decompose_record, find_agreement, find_work, save_ledger
 from lhpost6_pin.decompose.table import print_agreement
@@ -57,4 +58,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

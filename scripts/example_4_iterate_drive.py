@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.drives import circumstances, save_drive
 from lhpost6_pin.iterate import identify_inverse, iterate
@@ -62,4 +63,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

@@ -39,6 +39,7 @@ from rich.table import Table
 from scipy.linalg import block_diag
 from scipy.signal import cont2discrete
 
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.control.plug import Sensors, Wanted
 from lhpost6_pin.equilibrium import Equilibrium, find_equilibrium, hydraulic_rows, unloaded_speeds
@@ -343,7 +344,7 @@ def main(
         for axis in asked
     }
     header, rows = summary(tests, found)
-    title = f"{motion} x {scale:g}: the 469D ({panel.name}) and LQG"
+    title = f"{motion} at scale {scale:g}: the 469D ({panel.name}) and LQG"
     shown = Table(*header, title=title)
     for row in rows:
         shown.add_row(*row)
@@ -431,4 +432,4 @@ def write_report(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

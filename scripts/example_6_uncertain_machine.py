@@ -18,6 +18,7 @@ from rich.table import Table
 
 from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.calibration import drawn_coordinates, machine_knobs, with_knobs
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.equilibrium import find_equilibrium
 from lhpost6_pin.files import write_whole
@@ -99,4 +100,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from lhpost6_pin.campaign import save_campaign, simulate_campaign
+from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.discover import discover
 from lhpost6_pin.discovery_table import print_discovery
@@ -54,4 +55,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_script(main)

@@ -22,11 +22,14 @@ from machine_cases import DATA
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli, rehearse
 from lhpost6_pin.check import check_record
+from lhpost6_pin.cli import completion, runs
 from lhpost6_pin.compiled import cache_folder
 from lhpost6_pin.drives import circumstances, save_drive
+from lhpost6_pin.files import shipped
 from lhpost6_pin.inverse import InverseFilter, save_inverse
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.motions import find_motion, list_motions, make_target
+from lhpost6_pin.names import AXES, ENGINES, SCHEMES
 from lhpost6_pin.records import load_record, save_record
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
@@ -108,6 +111,15 @@ def test_help_names_every_command(lhpost6):
     assert "--beyond-limits" in lhpost6("run", "--help").out
 
 
+def test_help_gives_flags_no_kind_of_value_and_says_where_results_go(lhpost6):
+    commands = [c.name or c.callback.__name__ for c in cli.app.registered_commands]
+    said = {name: lhpost6(name, "--help").words for name in commands} | {"": lhpost6("--help").words}
+    assert "<int>" in said["run"] and "--locked" in said["run"]
+    for name, words in said.items():
+        assert "bool" not in words.lower(), name
+        assert "Folder for the results" not in words or "without it out/NAME" in words, name
+
+
 def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6):
     ended = lhpost6("doctor")
     assert ended.code == 0
@@ -175,7 +187,7 @@ def test_motions_lists_every_motion_and_one_with_its_options(lhpost6):
             assert name in ended.words
     small, large = lhpost6("motions", "tx5"), lhpost6("motions", "TX5")
     assert small == large and "corner_acceleration" in small.words
-    assert refused(lhpost6("motions", "nonsense"), "no ground motion named 'nonsense'", "ridgecrest-ccc")
+    assert refused(lhpost6("motions", "nonsense"), "no ground motion named 'nonsense'", "`lhpost6 motions` lists")
 
 
 def test_motions_says_how_to_get_those_of_a_missing_package(lhpost6, monkeypatch):
@@ -327,8 +339,9 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
 @pytest.mark.parametrize(
     "arguments, phrases",
     [
-        (("nonsense",), ("no ground motion named 'nonsense'", "ridgecrest")),
-        (("absent.csv",), ("absent.csv", "No such file")),
+        (("nonsense",), ("no ground motion named 'nonsense'", "`lhpost6 motions` lists them")),
+        (("ridgecrest-cc",), ("did you mean", "'ridgecrest-ccc'")),
+        (("absent.csv",), ("cannot read ground motion absent.csv: No such file or directory",)),
         (("[red]absent.csv",), ("[red]absent.csv", "No such file")),
         (("[/red]absent.csv",), ("[/red]absent.csv",)),
         (("sine", "triangle"), ("one motion at a time",)),
@@ -340,7 +353,8 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--scale", "inf"), ("scale is inf",)),
         (("sine", "--scheme", "magic"), ("no scheme named 'magic'", "rk4")),
         (("sine", "--engine", "steam"), ("no engine named 'steam'", "fused")),
-        (("sine", "--rate", "3000"), ("3000 model steps", "multiple")),
+        (("sine", "--rate", "3000"), ("3000 model steps", "the nearest is 2048")),
+        (("sine", "--rate", "10000"), ("the nearest is 10240",)),
         (("sine", "--rate", "0"), ("0 model steps",)),
         (("sine", "--rate", "fast"), ("--rate", "integer")),
         (("sine", "--record-rate", "300"), ("--record-rate 300 does not divide 2048",)),
@@ -348,13 +362,14 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--valves", "3"), ("--valves", "2")),
         (("sine", "--locked"), ("--locked", "--specimen")),
         (("sine", "--specimen", "absent.urdf"), ("absent.urdf", "no such URDF")),
-        (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("fused", "pinocchio")),
+        (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("--engine pinocchio", "--locked")),
         (("sine", "--machine", "absent"), ("no machine named 'absent'", "uniaxial")),
+        (("sine", "--machine", "unaxial"), ("did you mean 'uniaxial'? valid names: lhpost6, uniaxial",)),
         (("sine", "--machine", "absent.toml"), ("absent.toml",)),
         (("sine", "--override", "absent.toml"), ("absent.toml",)),
         (("sine", "--controller", "absent"), ("absent", "lhpost6")),
         (("ridgecrest", "--machine", "uniaxial"), ("largest scale that fits",)),
-        (("ridgecrest", "--high-pass", "40"), ("high_pass < low_pass",)),
+        (("ridgecrest", "--high-pass", "40"), ("high-pass < low-pass",)),
         ((), ("motion",)),
     ],
 )
@@ -410,10 +425,56 @@ def test_a_drive_and_an_inverse_of_another_machine_are_refused(lhpost6, tmp_path
     )
 
 
-@pytest.mark.parametrize("option", ["columns=x", "units=5", "time_step=slow", "colour=red"])
-def test_a_wrong_option_for_a_file_is_named(lhpost6, tmp_path, option):
+@pytest.mark.parametrize(
+    "option, advice",
+    [
+        ("columns=x", "name the axes in the file's header"),
+        ("units=5", "give a unit"),
+        ("time_step=slow", "give a number of seconds"),
+        ("name=3", "give a text"),
+        ("colour=red", "valid names: columns, name, time_step, units"),
+    ],
+)
+def test_a_wrong_option_for_a_file_is_named(lhpost6, tmp_path, option, advice):
     (tmp_path / "a.csv").write_text("time_s,x_m\n0,0\n0.1,0.001\n0.2,0\n")
-    assert refused(lhpost6("run", "a.csv", "--set", option), "a.csv", option.split("=")[0])
+    assert refused(lhpost6("run", "a.csv", "--set", option), "a.csv", option.split("=")[0], advice)
+
+
+def test_a_file_without_times_says_which_option_gives_them(lhpost6, tmp_path):
+    (tmp_path / "a.csv").write_text("x_m\n0\n0.001\n0\n")
+    ended = lhpost6("run", "a.csv")
+    assert refused(ended, "no time column")
+    advised = re.search(r"\((--set \S+)\)", ended.words)[1].split()
+    assert lhpost6("run", "a.csv", *advised, "--engine", "fused", "--rate", "2048").code == 0
+    assert float(load_record(tmp_path / "out" / "a" / "record.nc").time[-1]) > 8.0  # the padding of 4 s at both ends
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (("--rate", "1000"), "1000 model steps"),
+        (("--scheme", "magic"), "no scheme named 'magic'"),
+        (("--engine", "steam"), "no engine named 'steam'"),
+        (("--engine", "fused", "--specimen", PENDULUM), "--engine pinocchio"),
+    ],
+)
+def test_options_that_cannot_be_are_refused_before_a_page_or_a_bar_is_shown(
+    lhpost6, tmp_path, monkeypatch, options, message
+):
+    target = make_target(find_motion("sine", cycles=1, ramp_cycles=1))
+    save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
+    for shown in ("progress_bar", "watched"):
+        monkeypatch.setattr(runs, shown, lambda *_, **__: pytest.fail("something was shown"))
+    for command in (("run", "sine", "--live"), ("replay", "drive.nc"), ("open-loop", PRACTICE)):
+        assert refused(lhpost6(*command, *options), message)
+
+
+def test_a_command_that_is_refused_before_anything_is_done_leaves_no_bar(lhpost6, tmp_path):
+    for command in (("campaign", "--tests", "TQ"), ("iterate", "sine", "--gain", "0"), ("serve", "--mode", "loose")):
+        ended = lhpost6(*command)
+        assert refused(ended) and ended.err.lstrip().startswith("error: ") and ended.out == ""
+    ended = lhpost6("run", *COARSE, "--out", "here")
+    assert ended.code == 0 and "100%" in ended.err
 
 
 @pytest.mark.parametrize("name", ["[red]x", "[/red]y", "[bold]z[/bold]"])
@@ -556,6 +617,8 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_simulation(lhpost
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setattr(rehearse, "simulate", lambda *a, **k: pytest.fail("it was simulated"))
     assert refused(lhpost6(*command, "--out", "file/below"), "file", "Not a directory")
+    if Path("/proc/self").is_dir():  # where not even root can write
+        assert refused(lhpost6(*command, "--out", "/proc/x"), "/proc", "Permission denied")
     assert everything(tmp_path) == ["file"]
 
 
@@ -621,6 +684,89 @@ def test_ctrl_c_while_writing_leaves_the_earlier_results(lhpost6, tmp_path, monk
     monkeypatch.setattr(Path, "write_bytes", half)
     assert lhpost6("run", *COARSE, "--scale", "0.5", "--out", "here").code == 130
     assert {name: (tmp_path / name).read_bytes() for name in everything(tmp_path)} == before  # nothing beside it either
+
+
+# Completion in the shell ----------------------------------------------------------------------------------------------
+
+KNOWN = {
+    "motion": [name for entry in list_motions() for name in (entry.name, *entry.aliases)],
+    "machine": list(shipped()),
+    "controller": list(shipped("controllers")),
+    "sensors": list(shipped("sensors")),
+    "specimen": list(shipped("specimens", ".urdf")),
+}
+
+
+def asking(typed: str) -> dict[str, str]:
+    """Environment in which bash asks what completes the last word typed."""
+    return {"_LHPOST6_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+
+
+@pytest.fixture
+def completed(lhpost6, monkeypatch):
+    """Complete the last word of what is typed."""
+
+    def complete(typed: str) -> list[str]:
+        for key, value in asking(typed).items():
+            monkeypatch.setenv(key, value)
+        ended = lhpost6()
+        assert ended.code == 0 and ended.err == ""
+        return ended.out.split()
+
+    return complete
+
+
+@pytest.mark.parametrize(
+    "typed, kind",
+    [
+        *[(f"lhpost6 {command} ", "motion") for command in ("run", "iterate", "link", "motions")],
+        *[(f"lhpost6 {command} --machine ", "machine") for command in ("run sine", "info", "check a.nc", "view a.nc")],
+        *[(f"lhpost6 {command} --controller ", "controller") for command in ("run sine", "tune", "validate folder")],
+        *[(f"lhpost6 {command} --sensors ", "sensors") for command in ("check a.nc", "campaign", "decompose a.nc")],
+        *[(f"lhpost6 {command} --specimen ", "specimen") for command in ("run sine", "serve", "export-fmu")],
+    ],
+)
+def test_the_shell_completes_every_name_that_is_shipped_and_no_other(completed, typed, kind):
+    assert sorted(completed(typed)) == sorted(KNOWN[kind])
+    first = KNOWN[kind][0]
+    assert completed(typed + first[:3]) == [name for name in completed(typed) if name.startswith(first[:3])]
+    assert completed(typed + "qq") == []
+
+
+@pytest.mark.parametrize(
+    "typed, names",
+    [
+        ("lhpost6 run sine --scheme ", SCHEMES),
+        ("lhpost6 open-loop a.nc --scheme r", ["rk4"]),
+        ("lhpost6 run --rate 4096 sine --engine ", ENGINES),
+        ("lhpost6 sine --axis ", AXES),
+        ("lhpost6 run sine ", []),  # files, which the shell completes where nothing else is known
+        ("lhpost6 run --nonsense 1 ridgecrest-cc", ["ridgecrest-ccc"]),
+    ],
+)
+def test_the_shell_completes_what_can_stand_there(completed, typed, names):
+    assert completed(typed) == list(names)
+
+
+def test_completion_of_damaged_data_is_silent(completed, monkeypatch, tmp_path):
+    (tmp_path / "ground_motions").mkdir()
+    (tmp_path / "ground_motions" / "index.toml").write_text("[records")
+    monkeypatch.setattr(completion, "models_folder", lambda: tmp_path)
+    assert completed("lhpost6 run ") == []
+
+
+def test_a_key_press_does_not_wait_for_the_simulator():
+    code = (
+        "import sys; from lhpost6_pin.cli import main\n"
+        "try:\n    sys.argv = ['lhpost6']; main()\n"
+        "finally:\n    print(*sys.modules)"
+    )
+    environment = {**os.environ, **asking("lhpost6 run ridgecrest-cl")}
+    command = [sys.executable, "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=environment)
+    name, modules = ended.stdout.splitlines()
+    assert name == "ridgecrest-clc" and ended.stderr == ""
+    assert not {"numpy", "numba", "pinocchio", "xarray", "pandas"} & set(modules.split())
 
 
 # A process of its own -------------------------------------------------------------------------------------------------

@@ -32,6 +32,15 @@ def test_every_example_is_run_here():
         assert path.name.startswith(f"example_{k}_") and f"run({k}, " in here
 
 
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+def test_an_example_that_cannot_find_what_it_is_given_says_so_in_a_line(path):
+    if "control" in path.name:
+        pytest.importorskip("control")
+    ended = script(path.name, "absent")
+    assert ended.returncode == 1 and ended.stdout == ""
+    assert re.fullmatch(r"error: .*\babsent\b.*\n", ended.stderr)
+
+
 def test_1_a_motion_is_rehearsed(tmp_path):
     said = run(1, "sine", "--scale", "0.2", "--out", tmp_path)
     assert [f for f in check_record(tmp_path / "record.nc") if f.severity == "error"] == []

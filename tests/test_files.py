@@ -1,5 +1,6 @@
 """Files are written whole or not at all, and a folder that cannot take them is refused before the work."""
 
+import errno
 import os
 import stat
 from pathlib import Path
@@ -65,11 +66,28 @@ def test_a_link_to_nowhere_is_refused(tmp_path):
         refuse_folder(tmp_path / "link" / "out")
 
 
-def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(files.os, "access", lambda path, mode: False)  # root may write everywhere
-    with pytest.raises(PermissionError) as caught:
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="a folder in which not even root can write")
+def test_a_folder_that_takes_no_files_is_refused(tmp_path):
+    for path in (Path("/proc"), Path("/proc/x"), Path("/proc/far/below")):
+        with pytest.raises(PermissionError) as caught:
+            refuse_folder(path)
+        assert caught.value.filename == "/proc"
+
+
+def test_what_the_disk_says_of_a_folder_is_passed_on(tmp_path, monkeypatch):
+    def read_only(dir: Path) -> None:
+        raise OSError(errno.EROFS, "Read-only file system", str(dir / "some name"))
+
+    monkeypatch.setattr(files.tempfile, "TemporaryFile", read_only)
+    with pytest.raises(OSError, match="Read-only file system") as caught:
         refuse_folder(tmp_path / "out")
-    assert caught.value.filename == str(tmp_path)
+    assert caught.value.errno == errno.EROFS and caught.value.filename == str(tmp_path)
+
+
+def test_a_name_too_long_for_the_disk_is_refused(tmp_path):
+    with pytest.raises(OSError, match="File name too long"):
+        refuse_folder(tmp_path / ("a" * 300) / "out")
+    assert left_in(tmp_path) == []
 
 
 def test_shipped_data_is_where_the_package_looks_for_it():

@@ -203,6 +203,25 @@ def test_a_bad_table_is_refused_with_line_and_column(tmp_path, text, phrase):
         load_raw(put(tmp_path, "run.csv", text))
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time [s],x [m]\n0,00,0,1\n0,01,0,2\n0,02,0,3\n",
+        "time [s],x [m]\n0,0\n1,1\n2,3\n3,0,05\n",
+        'time [s],x [m]\n"0,00","0,1"\n"0,01","0,2"\n',
+        "time [s];x [m]\n0.00;0.1\n0.01;0.2\n0.02;0,3\n",
+    ],
+    ids=["between commas", "one between commas", "in quotes", "one among points"],
+)
+def test_decimal_commas_that_cannot_be_told_from_separators_are_named(tmp_path, text):
+    with pytest.raises(
+        RecordError, match=r"write decimals with points, as 0\.01, or all of them with commas and semic"
+    ):
+        load_raw(put(tmp_path, "run.csv", text))
+    as_advised = put(tmp_path, "same.csv", "time [s];x [m]\n0,00;0,1\n0,01;0,2\n0,02;0,3\n")
+    np.testing.assert_array_equal(one(as_advised).values[:, 0], [0.1, 0.2, 0.3])
+
+
 def test_a_parquet_table_is_read_with_its_units(tmp_path):
     pd = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
@@ -502,7 +521,7 @@ GOOD_MAP = '[test]\nname = "EQ1"\n[channel]\nsupply_pressure = { column = "c1", 
     ("old", "new", "phrase"),
     [
         ("[test]", "[test", "not a TOML file"),
-        ("[test]", "[tests]", "unknown key 'tests'; valid are test, channel"),
+        ("[test]", "[tests]", "unknown key 'tests'; did you mean 'test'. valid names: test, channel"),
         ("name", "nmae", r"\[test\]: unknown key 'nmae'"),
         ('"EQ1"', "1", "name = 1 must be a text"),
         ('name = "EQ1"', "fill_gaps = 1.5", "fill_gaps = 1.5 must be a whole number"),
@@ -531,8 +550,8 @@ def test_a_bad_map_is_refused_with_file_and_key(tmp_path, old, new, phrase):
 @pytest.mark.parametrize(
     ("channels", "phrase"),
     [
-        ({"supply": Source("c1")}, r"\[channel\] supply: is no channel of a record; valid are platen_displacement"),
-        ({"strut_pressure[S9]": Source("c1")}, r"valid are strut_pressure\[S1\], strut_pressure\[S2\]"),
+        ({"supply": Source("c1")}, r"\[channel\] supply: is no channel of a record; valid names: platen_displacement"),
+        ({"strut_pressure[S9]": Source("c1")}, r"valid names: strut_pressure\[S1\], strut_pressure\[S2\]"),
         ({"strut_pressure[S1]": Source("c1")}, "has S1, but not S2, S3; map them too"),
         ({"supply_pressure": Source("c9")}, "no column 'c9' in 'run.csv'; columns are 'c1', 'c2', 'c3'"),
         ({"supply_pressure": Source("c*")}, "'c\\*' could be any of run.csv column 1 'c1', run.csv column 2"),

@@ -69,6 +69,7 @@ def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6)
             server.kill()
     assert code == 0, told
     record = load_record(tmp_path / "out" / "record.nc")
+    assert record.attrs["title"] == "sine at scale 0.2 over the link"
     assert record.attrs["link_mode"] == "lock-step" and record.attrs["lost"] == 0
     assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in told.replace(" ", "")
 

@@ -262,7 +262,7 @@ def test_with_effect_adds_one_ledger_entry_and_leaves_the_machine_alone():
 
 
 def test_effect_on_a_port_that_is_not_there_lists_those_that_are():
-    with pytest.raises(UnknownNameError, match=r"no port named 'platen.w'.*platen.x"):
+    with pytest.raises(UnknownNameError, match=r"no port named 'platen.w'; did you mean .*'platen.y'"):
         make_plant(LHPOST6.with_effect(Effect("odd", "viscous", ("platen.w",), ((1.0,),), "assumed")))
 
 
@@ -291,7 +291,9 @@ def test_friction_of_zero_has_no_row_in_the_ledger():
 
 
 def test_machine_that_is_not_shipped_is_refused_with_the_list():
-    with pytest.raises(UnknownNameError, match=r"no machine named 'lhpost7'; valid names: lhpost6"):
+    with pytest.raises(
+        UnknownNameError, match=r"no machine named 'lhpost7'; did you mean 'lhpost6'. valid names: lhpost6"
+    ):
         load_machine("lhpost7")
 
 

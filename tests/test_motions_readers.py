@@ -148,6 +148,34 @@ def test_a_damaged_csv_is_refused_with_the_place_and_a_remedy(tmp_path, change, 
     assert "bad" in str(caught.value)
 
 
+@given(
+    st.lists(st.tuples(*[st.decimals(-9, 9, places=3)] * 2), min_size=2, max_size=5),
+    st.sampled_from([";", "\t", ",", ", "]),
+    st.sampled_from(["", '"']),
+)
+def test_decimal_commas_are_named_as_such_and_points_are_read(tmp_path_factory, rows, separator, quote):
+    folder = tmp_path_factory.mktemp("csv")
+    times = [f"{0.01 * k:.2f}" for k in range(len(rows))]
+    lines = [[t, *(f"{x:f}" for x in row)] for t, row in zip(times, rows, strict=True)]
+    head = separator.join(["time_s", "x_m", "y_m"])
+    points = [separator.join(line) for line in lines]
+    commas = [separator.join(f"{quote}{x.replace('.', ',')}{quote}" for x in line) for line in lines]
+    found = load_motion(written(folder, "points.csv", "\n".join([head, *points])))
+    np.testing.assert_array_equal(found.samples[:, :2], np.array(rows, float))
+    with pytest.raises(MotionError, match=r"commas.csv, line 2.*; decimal commas are not read: write points"):
+        load_motion(written(folder, "commas.csv", "\n".join([head, *commas])))
+
+
+def test_numbers_alone_have_no_header_whatever_their_decimal_mark(tmp_path):
+    with pytest.raises(MotionError, match="line 1: no header row"):
+        load_motion(written(tmp_path, "a.csv", "0,00;0,1\n0,01;0,2\n"))
+
+
+def test_a_field_too_many_is_not_taken_for_a_decimal_comma(tmp_path):
+    with pytest.raises(MotionError, match="line 3: 3 fields, the header has 2; correct it"):
+        load_motion(written(tmp_path, "a.csv", "t,x_m\n0,1\n1,2,3\n2,3\n"))
+
+
 def test_a_missing_column_asked_for_is_named(tmp_path):
     with pytest.raises(MotionError, match=r"no column 'up_g' for axis z; columns are time_s, ax_g"):
         load_motion(written(tmp_path, "m.csv", CSV), columns={"z": "up_g"})

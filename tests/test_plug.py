@@ -246,7 +246,7 @@ def test_the_469d_through_the_plug_point_is_the_compiled_loop_to_the_last_bit(pl
 
 
 def test_the_fused_engine_refuses_a_controller_in_python(plant, rest):
-    with pytest.raises(SimulationError, match="fused engine runs compiled controllers; use engine='pinocchio'"):
+    with pytest.raises(SimulationError, match="fused engine runs compiled controllers; take the engine pinocchio"):
         simulate(plant, PluggedLoop(Hold(), *standing(8), rest), samples=8, engine="fused")
 
 

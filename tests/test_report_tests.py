@@ -128,4 +128,4 @@ def test_a_test_runs_from_the_files_of_the_user_under_its_name(lhpost6, componen
     assert lhpost6("run", "TABAS", *components, *coarse)[0] == 0
     attrs = load_record(tmp_path / "out" / "tabas" / "record.nc").attrs
     assert attrs["test"] == "tabas" and "1978 Tabas M7.35" in attrs["source"]
-    assert "tabas x 1 on LHPOST6" in (tmp_path / "out" / "tabas" / "report.html").read_text()
+    assert "tabas at scale 1 on LHPOST6" in (tmp_path / "out" / "tabas" / "report.html").read_text()

@@ -13,7 +13,7 @@ from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.effects import Effect
 from lhpost6_pin.engine_pinocchio import make_stepper, settle
 from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import SimulationError
+from lhpost6_pin.errors import SimulationError, UnknownNameError
 from lhpost6_pin.machine import load_machine
 from lhpost6_pin.plant import make_plant
 from lhpost6_pin.pose import PlatenMotion, platen_motion
@@ -302,7 +302,7 @@ def test_run_that_diverges_stops_and_names_a_remedy(plant, rest, engine):
 )
 def test_what_cannot_be_run_is_refused(plant, rest, change, message):
     options = {"samples": 4, **change}
-    with pytest.raises(SimulationError, match=message):
+    with pytest.raises((SimulationError, UnknownNameError), match=message):
         simulate(plant, OpenLoop(np.zeros((4, 10)), rest.state), **options)
 
 

@@ -14,13 +14,14 @@ LAYERS = [
     {
         "",
         "errors",
-        "files",
         "compiled",
+        "decimals",
         "names",
         "plain",
         "progress",
         "console",
     },  # "" is the package itself: its version
+    {"files"},
     {"laws"},
     {"parameters", "specimen", "signals", "transfer", "distortion"},
     {"schema", "records", "motions", "conditioning", "urdf_numbers"},

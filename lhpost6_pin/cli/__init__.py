@@ -18,7 +18,7 @@ from . import (  # each adds its commands
     validation,
     view,
 )
-from .app import app, main
+from .app import app, main, run_script
 
 __all__ = [
     "app",
@@ -32,6 +32,7 @@ __all__ = [
     "forces",
     "look",
     "main",
+    "run_script",
     "runs",
     "validation",
     "view",

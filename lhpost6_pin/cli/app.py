@@ -12,15 +12,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from typer.core import TyperGroup
 
 from ..errors import LhpostError, OutOfRangeError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["app", "main", "progress_bar", "stderr", "tell"]
+__all__ = ["app", "main", "progress_bar", "run_script", "stderr", "tell"]
+
+
+class _Commands(TyperGroup):
+    """The commands, of which flags show no kind of value in `--help`: they take none."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return _without_kind(super().get_params(ctx))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        command = super().get_command(ctx, cmd_name)
+        if command is not None:
+            _without_kind(command.get_params(ctx))
+        return command
+
+
+def _without_kind(parameters: list[Any]) -> list[Any]:
+    for parameter in parameters:
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = ""
+    return parameters
+
 
 app = typer.Typer(
+    cls=_Commands,
     help="The UC San Diego LHPOST6 shake table, modelled from first principles on Pinocchio.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -36,15 +59,8 @@ def main() -> None:
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     with _noting_ctrl_c():
         try:
-            app()
-        except LhpostError as error:
-            known = {"largest_scale": error.largest_scale} if isinstance(error, OutOfRangeError) else {}
-            _fail(type(error).__name__, str(error), **known)
-        except OSError as error:  # disk full, no permission, a file where a folder should be
-            path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
-            where = f"cannot read or write {path}" if path else "cannot read or write a file"
-            remedy = "; make room, or choose another folder with --out" * (error.errno in _NO_ROOM)
-            _fail("OSError", f"{where}: {os.strerror(error.errno) if error.errno else error}{remedy}")
+            with _without_traceback(2):
+                app(prog_name="lhpost6")
         except SystemExit as end:
             if end.code == _INTERRUPTED:
                 _say_interrupted()
@@ -54,6 +70,27 @@ def main() -> None:
                 raise
             _say_interrupted()
             sys.exit(_INTERRUPTED)
+
+
+def run_script(function: Callable[..., Any]) -> None:
+    """Run a script's function with options, as typer does; errors that a user can act on end it with 1, and a line."""
+    with _without_traceback(1):
+        typer.run(function)
+
+
+@contextmanager
+def _without_traceback(code: int) -> Iterator[None]:
+    """Print errors that a user can act on, and end with an exit code."""
+    try:
+        yield
+    except LhpostError as error:
+        known = {"largest_scale": error.largest_scale} if isinstance(error, OutOfRangeError) else {}
+        _fail(code, type(error).__name__, str(error), **known)
+    except OSError as error:  # disk full, no permission, a file where a folder should be
+        path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
+        where = f"cannot read or write {path}" if path else "cannot read or write a file"
+        said = os.strerror(error.errno) if error.errno else error
+        _fail(code, "OSError", f"{where}: {said}{_REMEDIES.get(error.errno or 0, '')}")
 
 
 @contextmanager
@@ -82,8 +119,10 @@ def _say_interrupted() -> None:
     stderr().print("interrupted; nothing half-written is left behind")
 
 
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
-"""What is wrong with where results are to go, not with what is read."""
+_REMEDIES = dict.fromkeys(
+    (errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "; make room, or choose another folder with --out"
+) | {errno.EROFS: "; choose another folder with --out"}
+"""For what is wrong with where results are to go, not with what is read."""
 
 _PRESSED: list[int] = []
 """What Ctrl-C has sent since the command began."""
@@ -92,7 +131,7 @@ _INTERRUPTED = 130
 """Exit code that typer gives to Ctrl-C."""
 
 
-def _fail(kind: str, message: str, **known: Any) -> None:
+def _fail(code: int, kind: str, message: str, **known: Any) -> None:
     """Say what is refused, as JSON, too, where that was asked for, and end."""
     from ..plain import as_json
 
@@ -100,7 +139,7 @@ def _fail(kind: str, message: str, **known: Any) -> None:
     stderr().print(message, markup=False, highlight=False)
     if "--json" in sys.argv[1:]:
         typer.echo(as_json({"error": {"kind": kind, "message": message, **known}}))
-    sys.exit(2)
+    sys.exit(code)
 
 
 @cache
@@ -151,4 +190,8 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
                 raise KeyboardInterrupt
             bar.update(task, completed=share)
 
-        yield advance
+        try:
+            yield advance
+        except LhpostError:
+            bar.live.transient = not bar.tasks[task].completed  # nothing was begun: no bar is left above the error
+            raise

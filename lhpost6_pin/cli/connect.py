@@ -144,7 +144,7 @@ def link(
         counts = dict(client.close())
     counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
     counts["unanswered"] = int((~done.answered).sum())
-    attrs = {"test": name, "title": f"{moved} x {scale:g} over the link", "link_mode": client.mode.label}
+    attrs = {"test": name, "title": f"{moved} at scale {scale:g} over the link", "link_mode": client.mode.label}
     save_record(record_of_link_run(done, plant, {**attrs, **counts}), folder / "record.nc")
     times = {"command to sensors": client.round_trip}
     title = f"{name}, {client.mode.label}"

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from .app import app, progress_bar, tell
+from .completion import complete_axis
 from .options import (
     Axes,
     Beyond,
@@ -122,7 +123,7 @@ def iterate(
 def sine(
     amplitude: Annotated[float, typer.Option(min=0.0, help=r"Amplitude \[m, or rad].")] = 0.75,
     frequency: Annotated[float, typer.Option(min=0.0, help="Frequency [Hz].")] = 0.5,
-    axis: Annotated[str, typer.Option(help="Axis: x y z roll pitch or yaw.")] = "x",
+    axis: Annotated[str, typer.Option(help="Axis: x y z roll pitch or yaw.", autocompletion=complete_axis)] = "x",
     out: Out = None,
     machine: MachineName = "lhpost6",
     override: Override = None,

@@ -20,7 +20,10 @@ def import_(
     files: Annotated[list[Path], typer.Argument(help="Data file(s) of one test.")],
     map_: Annotated[Path | None, typer.Option("--map", help="Channel map (TOML).")] = None,
     guess: Annotated[bool, typer.Option("--guess", help="Write a first channel map to edit, and no record.")] = False,
-    out: Annotated[Path | None, typer.Option(help="Record to write, or with --guess the map.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Record to write, without it out/TEST.nc; with --guess the map, without it FILE_map.toml."),
+    ] = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
     json: Json = False,

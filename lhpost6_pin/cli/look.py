@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .app import app, tell
+from .completion import complete_motion
 from .options import Json, MachineName, Override, SensorsName, find_machine
 
 if TYPE_CHECKING:
@@ -53,7 +54,10 @@ def capacity(machine: MachineName = "lhpost6", override: Override = None, json: 
 
 @app.command()
 def motions(
-    name: Annotated[str | None, typer.Argument(help="One of them, to see its options.")] = None, json: Json = False
+    name: Annotated[
+        str | None, typer.Argument(help="One of them, to see its options.", autocompletion=complete_motion)
+    ] = None,
+    json: Json = False,
 ) -> None:
     """List the ground motions and tests known by name."""
     from ..results import motion_entries

@@ -7,6 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import MotionError, ParameterError
+from .completion import (
+    complete_controller,
+    complete_engine,
+    complete_machine,
+    complete_motion,
+    complete_scheme,
+    complete_sensors,
+    complete_specimen,
+)
 
 if TYPE_CHECKING:
     from ..control import ControllerSettings
@@ -31,15 +40,28 @@ __all__ += [
     "Valves",
 ]
 __all__ += ["find_controller", "find_machine", "find_settings", "find_target", "find_table", "folder_for"]
-__all__ += ["refuse_no_jobs"]
+__all__ += ["refuse_no_jobs", "refuse_stepping"]
 
-MachineName = Annotated[str, typer.Option("--machine", help="Shipped machine name, or a TOML file.")]
+MachineName = Annotated[
+    str, typer.Option("--machine", help="Shipped machine name, or a TOML file.", autocompletion=complete_machine)
+]
 Override = Annotated[Path | None, typer.Option("--override", help="TOML file with parameters to replace.")]
-Scheme = Annotated[str, typer.Option(help="Integration scheme: semi_implicit, euler or rk4.")]
+Scheme = Annotated[
+    str,
+    typer.Option(help="Integration scheme: semi_implicit, euler or rk4.", autocompletion=complete_scheme),
+]
 Rate = Annotated[int, typer.Option(help="Model steps per second, a multiple of 2048.")]
-EngineName = Annotated[str, typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).")]
+EngineName = Annotated[
+    str,
+    typer.Option("--engine", help="pinocchio (per step) or fused (one compiled loop).", autocompletion=complete_engine),
+]
 SpecimenName = Annotated[
-    str | None, typer.Option("--specimen", help="Specimen bolted to the platen: shipped name, or a URDF file.")
+    str | None,
+    typer.Option(
+        "--specimen",
+        help="Specimen bolted to the platen: shipped name, or a URDF file.",
+        autocompletion=complete_specimen,
+    ),
 ]
 SpecimenAt = Annotated[
     str | None,
@@ -47,14 +69,24 @@ SpecimenAt = Annotated[
 ]
 Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
 SensorsName = Annotated[
-    str, typer.Option("--sensors", help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.")
+    str,
+    typer.Option(
+        "--sensors",
+        help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.",
+        autocompletion=complete_sensors,
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-Out = Annotated[Path | None, typer.Option(help="Folder for the results.")]
+Out = Annotated[
+    Path | None, typer.Option(help="Folder for the results; without it out/NAME, with the name of what is run.")
+]
 Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
 ]
-Motion = Annotated[list[str], typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).")]
+Motion = Annotated[
+    list[str],
+    typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).", autocompletion=complete_motion),
+]
 Scale = Annotated[float, typer.Option(help="Factor on the motion.")]
 Axes = Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")]
 HighPass = Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")]
@@ -62,10 +94,20 @@ LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the moti
 Set = Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion that is more than the table can give.")]
 SettingsName = Annotated[
-    str | None, typer.Option("--controller", help="Controller settings: name or TOML file; else the machine's.")
+    str | None,
+    typer.Option(
+        "--controller",
+        help="Controller settings: name or TOML file; else the machine's.",
+        autocompletion=complete_controller,
+    ),
 ]
 ControllerName = Annotated[
-    str | None, typer.Option("--controller", help="Controller settings: name or TOML file; or your own, FILE.py:NAME.")
+    str | None,
+    typer.Option(
+        "--controller",
+        help="Controller settings: name or TOML file; or your own, FILE.py:NAME.",
+        autocompletion=complete_controller,
+    ),
 ]
 
 
@@ -151,6 +193,22 @@ def refuse_no_jobs(jobs: int, what: str = "threads") -> None:
         raise ParameterError(f"--jobs 0: give a number of {what}, or -1 for as many as there are cores")
 
 
+def refuse_stepping(
+    table: "Machine",
+    scheme: str,
+    rate: int,
+    engine: str,
+    controller: "ControllerSettings | UserController | None" = None,
+) -> None:
+    """Raise what `simulate` would for options that cannot be, before anybody waits for it."""
+    from ..control import ControllerSettings
+    from ..plant import make_plant
+    from ..simulate import check_options
+
+    plugged = controller is not None and not isinstance(controller, ControllerSettings)
+    check_options(make_plant(table), scheme=scheme, steps_per_second=rate, engine=engine, plugged=plugged)
+
+
 def folder_for(out: Path | None, name: str) -> Path:
     """Folder for results, out/NAME unless given; raises OSError at once if none can be written there."""
     from ..files import refuse_folder
@@ -173,10 +231,7 @@ def _motion(names: list[str], settings: list[str]) -> "GroundMotion":
     first, *files = names
     if not _is_file(first) and files and not any(map(_is_file, files)):
         raise MotionError(f"one motion at a time; got {', '.join(names)}, none of which is a file")
-    try:
-        return load_motion(names, **options) if _is_file(first) else find_motion(first, files, **options)
-    except (AttributeError, TypeError, ValueError) as error:  # an option of the wrong kind
-        raise MotionError(f"{' '.join(names)}: --set {' --set '.join(settings)}: {error}") from error
+    return load_motion(names, **options) if _is_file(first) else find_motion(first, files, **options)
 
 
 def _is_file(name: str) -> bool:

@@ -37,6 +37,7 @@ from .options import (
     find_table,
     find_target,
     folder_for,
+    refuse_stepping,
 )
 
 if TYPE_CHECKING:
@@ -93,6 +94,7 @@ def run(
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     target = find_target(motion, set_, table, scale=scale, axes=axes, high_pass=high_pass, low_pass=low_pass)
     chosen = find_controller(controller, table)
+    refuse_stepping(table, scheme, rate, engine, chosen)
     inverse = load_inverse(aic) if aic else None
     if inverse is not None:
         if not isinstance(chosen, ControllerSettings):
@@ -102,7 +104,7 @@ def run(
     folder = folder_for(out, name)
     if not beyond:
         target_within_limits(make_plant(table), target)
-    title = f"{name} x {scale:g} on {table.name}"
+    title = f"{name} at scale {scale:g} on {table.name}"
     with (
         watched(live, table, title, amplify=amplify, change=force_change, open_it=not no_open, err=json) as watch,
         progress_bar(f"{name} on {table.name}") as progress,
@@ -146,6 +148,7 @@ def replay(
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     settings = find_settings(controller, table)
+    refuse_stepping(table, scheme, rate, engine)
     found = load_drive(drive)
     check_circumstances(str(drive), found.attrs, table, settings.name)
     if found.mode != settings.mode:
@@ -189,6 +192,7 @@ def open_loop(
     from ..rehearse import replay as replay_spools
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
+    refuse_stepping(table, scheme, rate, engine)
     measured = load_record(record, {"actuator": table.actuator_names, "horizontal": table.double_acting})
     test = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record"))
     name = f"{test}_open_loop"

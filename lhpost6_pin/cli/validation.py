@@ -7,6 +7,7 @@ import typer
 
 from ..errors import ParameterError
 from .app import app, progress_bar, tell
+from .completion import complete_controller
 from .options import (
     Json,
     Locked,
@@ -38,7 +39,10 @@ def validate(
     sensors: SensorsName = "lhpost6",
     controller: Annotated[
         str | None,
-        typer.Option(help="Controller settings for phase 3: name or TOML file; else those that records name."),
+        typer.Option(
+            help="Controller settings for phase 3: name or TOML file; else those that records name.",
+            autocompletion=complete_controller,
+        ),
     ] = None,
     phases: Annotated[str, typer.Option(help="Some of 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
     jobs: Annotated[int, typer.Option(help="Tests at a time, in threads; -1: as many as there are cores.")] = -1,

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError
-from ..files import models_folder, write_whole
+from ..errors import ParameterError, instead_of
+from ..files import find_shipped, write_whole
 from ..parameters import Parameters, Quantity, load_parameters
 from ..schema import build_section, quantity_field
 from .filters import MODES, NOTCHES
@@ -68,14 +68,14 @@ _SECTIONS["feedback"] += ("reset_limit",)
 
 
 def load_controller(name_or_path: str | Path) -> ControllerSettings:
-    """Read controller settings by shipped name or path; raises ParameterError naming file and key."""
+    """Read controller settings by shipped name or path.
+
+    Raises UnknownNameError, or ParameterError naming file and key.
+    """
     path = Path(name_or_path)
     if path.suffix != ".toml":
-        path = models_folder() / "controllers" / f"{name_or_path}.toml"
-        if not path.is_file():
-            valid = ", ".join(sorted(p.stem for p in path.parent.glob("*.toml")))
-            raise ParameterError(f"no controller settings named {name_or_path!r}; valid names: {valid}")
-    elif not path.is_file():
+        path = find_shipped("controller settings", str(name_or_path), "controllers")
+    if not path.is_file():
         raise ParameterError(f"{path}: no such file of controller settings")
     stated = load_parameters(path)
     mode = str(stated.words.get("controller.mode", ""))
@@ -92,10 +92,11 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
     known = {f"{section}.{key}" for section, keys in _SECTIONS.items() for key in keys}
     known |= {f"{name}.{f.name}" for name in names for f in fields(Notch)} | {"controller.name", "controller.mode"}
     stray = sorted({*stated, *stated.words} - known)
+    if stray:
+        own = [key for key in sorted(known) if key.split(".")[0] == stray[0].split(".")[0]]
+        raise ParameterError(f"{stated.origin}: {stray[0]} is no setting of a controller; {instead_of(stray[0], own)}")
     for missing in sorted(known - {*stated, *stated.words, "controller.name"}):
         raise ParameterError(f"{stated.origin}: {missing} is missing")
-    if stray:
-        raise ParameterError(f"{stated.origin}: {stray[0]} is no setting of a controller; take it out or correct it")
     notches = tuple(build_section(Notch, stated, (name,)) for name in names)
     settings = build_section(
         ControllerSettings,

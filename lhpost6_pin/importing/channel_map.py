@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, get_args
 
-from ..errors import RecordError
+from ..errors import RecordError, instead_of, meant
 from ..files import read_toml, write_whole
 from ..names import AXES
 from ..records import FASTEST, LAYOUT, SLOWEST
@@ -129,7 +129,7 @@ def _toml(value: object) -> str:
 def _known(table: Mapping[str, Any], valid: Sequence[str], where: str) -> None:
     unknown = [key for key in table if key not in valid]
     if unknown:
-        raise RecordError(f"{where}: unknown key {unknown[0]!r}; valid are {', '.join(valid)}")
+        raise RecordError(f"{where}: unknown key {unknown[0]!r}; {instead_of(unknown[0], valid)}")
 
 
 def _typed(cls: type[Any], table: Mapping[str, Any], where: str) -> Any:
@@ -202,8 +202,9 @@ def check_map(channels: ChannelMap, labels: Labels) -> None:
         if name not in known:
             variable = name.split("[")[0]
             near = [other for other in known if other.split("[")[0] == variable]
-            valid = ", ".join(near) if near else ", ".join(dict.fromkeys(v for v, _ in known.values()))
-            raise RecordError(f"{channels.origin}, [channel] {name}: is no channel of a record; valid are {valid}")
+            valid = near or list(dict.fromkeys(v for v, _ in known.values()))
+            said = instead_of(name, valid)
+            raise RecordError(f"{channels.origin}, [channel] {name}: is no channel of a record; {said}")
         variable, label = known[name]
         mapped.setdefault(variable, []).append(label)
     for variable, have in mapped.items():
@@ -239,7 +240,9 @@ def find_column(source: Source, raws: Sequence[RawTest], where: str) -> tuple[in
         return found[0]
     if not found:
         named = shown([raws[k].source for k in files])
-        columns = shown([name for *_, name in every], 40)
-        raise RecordError(f"{where}: no column {wanted!r} in {named}; columns are {columns}")
+        names = [name for *_, name in every]
+        raise RecordError(
+            f"{where}: no column {wanted!r} in {named}; {meant(wanted, names)}columns are {shown(names, 40)}"
+        )
     places = ", ".join(f"{Path(raws[k].source).name} column {j + 1} {raws[k].names[j]!r}" for k, j in found[:6])
     raise RecordError(f'{where}: {wanted!r} could be any of {places}; give the column\'s number, or file = "..."')

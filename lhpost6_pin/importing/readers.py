@@ -42,7 +42,7 @@ def load_raw(path: Path | str) -> tuple[RawTest, ...]:
     except FileNotFoundError:
         raise RecordError(f"{source}: no such file") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
-        raise RecordError(f"{source}: cannot be read: {error}") from error
+        raise RecordError(f"{source}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
     if not content.strip():
         raise RecordError(f"{source}: is empty")
     found = _reader(content, path)(content, source)

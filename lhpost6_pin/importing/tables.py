@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..decimals import cut_at_decimal_commas, has_decimal_comma
 from ..errors import RecordError
 from .raw import Array, RawTest, make_raw, shown
 from .units import quantity_unit, si_factor, time_unit, unit_in_name
@@ -21,6 +22,7 @@ __all__ = ["read_parquet", "read_table"]
 _FACT = re.compile(r"[#%]\s*(?P<key>\w[\w .]{0,60}?)\s*[:=]\s*(?P<value>.*)")
 _SEPARATORS = (",", ";", "\t", "|", " ")  # a blank stands for any number of them
 _HOLES = frozenset(("", "nan", "na", "n/a", "null", "none", "-", "#n/a"))
+_COMMAS = "write decimals with points, as 0.01, or all of them with commas and semicolons between columns"
 _SAMPLE = 200  # lines that are looked at to find separator and header
 
 
@@ -35,6 +37,9 @@ class _Dialect(NamedTuple):
         if self.separator == " ":
             return line.split()
         return [field.strip() for field in next(csv.reader([line.strip(" \r\n")], delimiter=self.separator), [])]
+
+
+_BY_COMMAS = _Dialect(",", ".", 0, 0)
 
 
 # --------------------------------------------------------------------------------------------- text
@@ -88,7 +93,9 @@ def _sniff(lines: Sequence[str], source: str) -> _Dialect:
         if best is None or score > best[0]:
             best = score, _Dialect(separator, decimal, first, count)
     if best is None:
-        raise RecordError(f"{source}: no row of numbers found; give a header row of names, then one row per sample")
+        quoted = any(has_decimal_comma(field) for line in lines[:_SAMPLE] for field in _BY_COMMAS.split(line))
+        remedy = _COMMAS if quoted else "give a header row of names, then one row per sample"
+        raise RecordError(f"{source}: no row of numbers found; {remedy}")
     return best[1]
 
 
@@ -113,9 +120,12 @@ def _head(lines: Sequence[str], dialect: _Dialect, source: str) -> tuple[list[st
     plain = [line for line in lines[: dialect.first] if not _is_comment(line)]
     comments = [line.lstrip(" \t#%") for line in lines[: dialect.first] if line.strip() and _is_comment(line)]
     where = f"{source}, line {dialect.first + 1}"
-    rows = [row for line in (plain or comments)[-2:] if len(row := dialect.split(line)) == dialect.width]
+    above = [dialect.split(line) for line in (plain or comments)[-2:]]
+    rows = [row for row in above if len(row) == dialect.width]
     if not rows:
-        raise RecordError(f"{where}: no header row of {dialect.width} names above the numbers; add one, with units")
+        commas = above and _cut_decimals(lines[dialect.first], dialect, len(above[-1]))
+        remedy = _COMMAS if commas else "add one, with units"
+        raise RecordError(f"{where}: no header row of {dialect.width} names above the numbers; {remedy}")
     names = rows[-1]
     if len(rows) == 2 and _is_unit_row(names):
         return rows[0], [unit.strip("[]() ") or None for unit in names]
@@ -138,10 +148,8 @@ def _numbers(lines: Sequence[str], dialect: _Dialect, names: Sequence[str], sour
     for k, line in numbered:
         count = len(dialect.split(line)) if dialect.separator == " " or '"' in line else _fields(line, dialect)
         if count != dialect.width:
-            raise RecordError(
-                f"{source}, line {k + 1}: {count} fields, the header has {dialect.width}; correct it, or cut the "
-                "table there"
-            )
+            remedy = _COMMAS if _cut_decimals(line, dialect, dialect.width) else "correct it, or cut the table there"
+            raise RecordError(f"{source}, line {k + 1}: {count} fields, the header has {dialect.width}; {remedy}")
     try:
         table = pd.read_csv(
             StringIO("\n".join(line.strip(" \r\n") for _, line in numbered)),
@@ -172,6 +180,10 @@ def _fields(line: str, dialect: _Dialect) -> int:
     return line.strip(" \r\n").count(dialect.separator) + 1
 
 
+def _cut_decimals(line: str, dialect: _Dialect, columns: int) -> bool:
+    return dialect.separator == "," and cut_at_decimal_commas(dialect.split(line), columns)
+
+
 def _value(field: str, place: tuple[int, str], dialect: _Dialect, source: str) -> float:
     if field.lower() in _HOLES:
         return float("nan")
@@ -179,9 +191,9 @@ def _value(field: str, place: tuple[int, str], dialect: _Dialect, source: str) -
         return float(field.replace(",", ".") if dialect.decimal == "," else field)
     except ValueError:
         line, name = place
+        remedy = _COMMAS if has_decimal_comma(field) else "correct it, or leave it empty for a missing sample"
         raise RecordError(
-            f"{source}, line {line + 1}, column {name!r}: {field[:40]!r} is not a number; correct it, or leave it "
-            "empty for a missing sample"
+            f"{source}, line {line + 1}, column {name!r}: {field[:40]!r} is not a number; {remedy}"
         ) from None
 
 

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..effects import Effect
-from ..errors import ParameterError
+from ..errors import ParameterError, instead_of
 from ..parameters import EffectEntry, Quantity, to_unit
 from . import friction, motion, oil
-from .family import Family, find_family
+from .family import Family, Shape, find_family
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -66,8 +66,7 @@ def make_named_effect(machine: "Machine", name: str, entry: EffectEntry) -> Effe
 def effect_entry(family: str, components: Sequence[str], values: Mapping[str, float]) -> EffectEntry:
     """What a machine file would state for these values in SI; raises UnknownNameError or ParameterError."""
     shapes = {shape.name: shape for shape in find_family(family).shapes}
-    if unknown := [key for key in values if key not in shapes]:
-        raise ParameterError(f"{family}: has no {', '.join(unknown)}; its numbers are {', '.join(shapes)}")
+    _refuse_unknown(family, values, shapes)
     stated = {
         key: Quantity(float(values[key]), shape.unit, "override", "given by hand")
         if key in values
@@ -77,10 +76,15 @@ def effect_entry(family: str, components: Sequence[str], values: Mapping[str, fl
     return EffectEntry(family, tuple(components), stated)
 
 
+def _refuse_unknown(family: str, values: Mapping[str, float], shapes: Mapping[str, Shape]) -> None:
+    for key in values:
+        if key not in shapes:
+            raise ParameterError(f"{family}: has no number {key!r}; {instead_of(key, list(shapes))}")
+
+
 def _numbers(family: Family, values: Mapping[str, float]) -> dict[str, float]:
     shapes = {shape.name: shape for shape in family.shapes}
-    if unknown := [key for key in values if key not in shapes]:
-        raise ParameterError(f"{family.name}: has no {', '.join(unknown)}; its numbers are {', '.join(shapes)}")
+    _refuse_unknown(family.name, values, shapes)
     found = {}
     for key, shape in shapes.items():
         value = float(values.get(key, shape.typical))

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import MotionError
+from ..decimals import cut_at_decimal_commas, has_decimal_comma
+from ..errors import MotionError, meant
 from .motion import AXES, GroundMotion, make_motion
 from .text import read_text
 from .units import to_si
@@ -21,6 +22,7 @@ _COLUMN = re.compile(
     r"(?:[\s_]*[\[(](?P<bracketed>[^\])]*)[\])]|[_ ](?P<suffix>.+))?",
     re.I,
 )
+_COMMAS = "decimal commas are not read: write points, as 0.01"
 _UNIFORM = 0.01  # a step may differ from the mean by this part of it: room for times printed with few digits
 
 
@@ -56,7 +58,7 @@ def load_csv(
         raise MotionError(f"{where}: no header row; the first line that is no comment must name the columns")
     separator = next((mark for mark in ";\t" if mark in lines[start]), ",")
     names = [field.strip().strip('"') for field in lines[start].split(separator)]
-    if all(_is_number(name) for name in names):
+    if all(_is_number(name) or has_decimal_comma(name) for name in names):
         raise MotionError(f"{where}, line {start + 1}: no header row; the first must name the columns, as time_s,x_g")
     if len(set(names)) != len(names):
         twice = next(column for column in names if names.count(column) > 1)
@@ -98,9 +100,12 @@ def _channels(
     if columns is not None:
         for axis, column in columns.items():
             if axis not in AXES:
-                raise MotionError(f"{where}: columns= names axis {axis!r}; axes are {', '.join(AXES)}")
+                raise MotionError(f"{where}: option columns names axis {axis!r}; axes are {', '.join(AXES)}")
             if column not in names:
-                raise MotionError(f"{where}: no column {column!r} for axis {axis}; columns are {', '.join(names)}")
+                asked = meant(column, names)
+                raise MotionError(
+                    f"{where}: no column {column!r} for axis {axis}; {asked}columns are {', '.join(names)}"
+                )
             match = _COLUMN.fullmatch(column)
             chosen.append(_Channel(axis, names.index(column), _unit(match, axis, units)))
     else:
@@ -152,14 +157,16 @@ def _table(lines: list[str], start: int, separator: str, names: list[str], where
     for number, line in numbered:
         fields = line.split(separator)
         if len(fields) != len(names):
-            raise MotionError(f"{where}, line {number}: {len(fields)} fields, the header has {len(names)}; correct it")
+            commas = separator == "," and cut_at_decimal_commas(fields, len(names))
+            remedy = _COMMAS if commas else "correct it"
+            raise MotionError(f"{where}, line {number}: {len(fields)} fields, the header has {len(names)}; {remedy}")
         for column, field in zip(names, fields, strict=True):
             try:
                 value = float(field)
             except ValueError:
+                remedy = _COMMAS if has_decimal_comma(field) else "fill the gap or cut the record there"
                 raise MotionError(
-                    f"{where}, line {number}, column {column!r}: {field.strip()[:40]!r} is not a number; "
-                    "fill the gap or cut the record there"
+                    f"{where}, line {number}, column {column!r}: {field.strip()[:40]!r} is not a number; {remedy}"
                 ) from None
             if not np.isfinite(value):
                 raise MotionError(
@@ -176,7 +183,8 @@ def _time_step(
         return time_step
     if time_column is None:
         raise MotionError(
-            f"{where}: no time column (time_s, t) among {', '.join(names)[:200]}; add it or give time_step="
+            f"{where}: no time column (time_s, t) among {', '.join(names)[:200]}; add it, or give the option time_step "
+            "in seconds (--set time_step=0.01)"
         )
     match = _TIME.fullmatch(names[time_column])
     time = table[:, time_column] * (1e-3 if match and (match["unit"] or "").lower() == "ms" else 1.0)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import MotionError, UnknownNameError
+from ..errors import MotionError, UnknownNameError, instead_of
 from ..files import models_folder
 from .ac156 import ac156
 from .csv import load_csv
@@ -139,8 +139,7 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
         raise MotionError(entry.request)
     unknown = sorted(set(options) - set(entry.options))
     if unknown:
-        takes = ", ".join(entry.options) or "none"
-        raise MotionError(f"{name}: no option {unknown[0]!r}; options of this motion: {takes}")
+        raise MotionError(f"{name}: no option {unknown[0]!r}; {instead_of(unknown[0], entry.options)}")
     index, tests = _tables()
     if entry.kind == "record":
         record = index["records"][entry.name]
@@ -158,7 +157,8 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
         with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite
             return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **chosen})
     except (ArithmeticError, MemoryError, TypeError, ValueError) as error:
-        raise MotionError(f"{name}: options {options}: {error}") from error
+        said = ", ".join(f"{key} = {value}" for key, value in options.items())
+        raise MotionError(f"{name}: cannot be made with {said}: {error}") from error
 
 
 def _from_files(entry: MotionEntry, files: MotionFiles, options: Mapping[str, Any]) -> GroundMotion:
@@ -175,5 +175,5 @@ def motion_entry(name: str) -> MotionEntry:
     entries = {key: entry for entry in list_motions() for key in (entry.name, *entry.aliases)}
     entry = entries.get(name.lower())
     if entry is None:
-        raise UnknownNameError("ground motion", name, list(entries))
+        raise UnknownNameError("ground motion", name, list(entries), "`lhpost6 motions` lists them")
     return entry

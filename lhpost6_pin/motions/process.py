@@ -117,8 +117,8 @@ def make_target(
         raise MotionError(f"{motion.name}: scale is {scale}; give a finite number")
     if not (0 <= high_pass < low_pass < rate / 2 and pad > 0):
         raise MotionError(
-            f"{motion.name}: corners {high_pass} and {low_pass} Hz and pad {pad} s; "
-            f"need 0 <= high_pass < low_pass < {rate / 2:g} Hz and a positive pad"
+            f"{motion.name}: high-pass {high_pass:g} Hz, low-pass {low_pass:g} Hz and {pad:g} s of padding; "
+            f"need 0 <= high-pass < low-pass < {rate / 2:g} Hz and some padding"
         )
     if acceleration_given and high_pass <= 0:
         raise MotionError(f"{motion.name}: an acceleration needs a positive high-pass corner to integrate")

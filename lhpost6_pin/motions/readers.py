@@ -1,10 +1,11 @@
 """Reading a ground-motion file of any kind the package knows."""
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from ..errors import MotionError
+from ..errors import MotionError, instead_of
 from .at2 import is_at2, load_at2
 from .csv import load_csv
 from .motion import GroundMotion
@@ -38,6 +39,16 @@ def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
     return _call(load_csv, paths, options)
 
 
+_KINDS: dict[str, tuple[Any, str]] = {
+    "name": (str, "a text"),
+    "units": (str | Mapping, "a unit for all axes, such as g or mm, or from Python one by axis"),
+    "time_step": (Real, "a number of seconds"),
+    "columns": (Mapping, "columns by axis from Python, or name the axes in the file's header"),
+    "channels": (Mapping, "axes by channel from Python"),
+}
+"""What options of readers are, and what to give."""
+
+
 def _call(reader: Any, paths: Any, options: dict[str, Any]) -> GroundMotion:
     """Read, or say which options this kind of file takes."""
     known = set(reader.__kwdefaults__)
@@ -45,7 +56,11 @@ def _call(reader: Any, paths: Any, options: dict[str, Any]) -> GroundMotion:
     if unknown:
         raise MotionError(
             f"{paths}: option {unknown[0]!r} does not apply to this kind of file; "
-            f"options are {', '.join(sorted(known))}"
+            f"{instead_of(unknown[0], sorted(known))}"
         )
+    for key, value in options.items():
+        kind, wanted = _KINDS[key]
+        if value is not None and not isinstance(value, kind):
+            raise MotionError(f"{paths}: option {key} is {value!r}; give {wanted}")
     motion: GroundMotion = reader(paths, **options)
     return motion

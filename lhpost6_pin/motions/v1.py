@@ -32,6 +32,10 @@ _RATE = re.compile(r"at\s+(\d*\.?\d+)\s*pts/sec", re.I)
 _UNIT = re.compile(r"units\s*(?:of|=)\s*([^\s,(]+?)\.?(?=[\s,(]|$)", re.I)
 _CHANNEL = re.compile(r"Chan\s+(\d{1,9}):\s*(\d{1,4}\s*deg|up|down|[^()]*?)\s*(?:\(|Location|$)", re.I)
 _DIRECTIONS = {"90": ("x", 1), "270": ("x", -1), "0": ("y", 1), "360": ("y", 1), "180": ("y", -1)}
+_CHOOSE = (
+    "write the channels wanted to a CSV file with their axes in its header, or choose from Python, as in "
+    'channels={1: "x", 2: "y", 3: "z"}'
+)
 
 
 class V1Channel(NamedTuple):
@@ -88,10 +92,7 @@ def make_v1_motion(
         else:
             continue
         if axis in by_axis:
-            raise MotionError(
-                f"{where}, channel {channel.number}: a second channel for axis {axis}; choose with "
-                'channels={number: axis}, as in {1: "x", 2: "y", 3: "z"}'
-            )
+            raise MotionError(f"{where}, channel {channel.number}: a second channel for axis {axis}; {_CHOOSE}")
         by_axis[axis] = sign * channel.acceleration
     shortest = min(map(len, by_axis.values()))
     if any(len(channel) > shortest for channel in by_axis.values()):
@@ -204,5 +205,5 @@ def _axis(channel: V1Channel, where: str) -> tuple[str, int]:
         return _DIRECTIONS[channel.orientation]
     raise MotionError(
         f"{where}, channel {channel.number}: orientation {channel.orientation[:40]!r} is not along an axis "
-        '(90, 360, up); say which with channels={number: axis}, as in {1: "x", 2: "y", 3: "z"}'
+        f"(90, 360, up); {_CHOOSE}"
     )

@@ -1,0 +1,60 @@
+"""What the shell completes beyond commands and options: names, from the shipped data alone.
+
+A key press waits for these: nothing heavy is imported, and what goes wrong leaves nothing to complete.
+"""
+
+from collections.abc import Callable, Iterable
+
+import typer
+
+from ..files import models_folder, read_toml, shipped
+from ..names import AXES, ENGINES, SCHEMES
+
+__all__ = [
+    "complete_axis",
+    "complete_controller",
+    "complete_engine",
+    "complete_machine",
+    "complete_motion",
+    "complete_scheme",
+    "complete_sensors",
+    "complete_specimen",
+]
+
+
+def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Function that completes a word to some of these names."""
+
+    def complete(incomplete: str) -> list[str]:
+        try:
+            return [name for name in names() if name.startswith(incomplete)]
+        except Exception:  # a traceback in the middle of a command line helps nobody
+            return []
+
+    return complete
+
+
+def _motion_names() -> list[str]:
+    """Names and aliases of `motions.list_motions`, without the readers and generators that come with it."""
+    folder = models_folder() / "ground_motions"
+    index, tests = read_toml(folder / "index.toml"), read_toml(folder / "tests.toml")
+    tables = (index["records"], index["package"]["records"], index["wanted"])
+    records = [x for table in tables for name, entry in table.items() for x in (name, *entry.get("aliases", ()))]
+    return list(dict.fromkeys([*records, *(name for name in tests if name != "processing")]))
+
+
+_motion = _completing(_motion_names)
+
+
+def complete_motion(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Motions; behind the first word only files can stand, which the shell completes itself."""
+    return [] if ctx.params.get("motion") else _motion(incomplete)
+
+
+complete_axis = _completing(lambda: AXES)
+complete_controller = _completing(lambda: shipped("controllers"))
+complete_engine = _completing(lambda: ENGINES)
+complete_machine = _completing(shipped)
+complete_scheme = _completing(lambda: SCHEMES)
+complete_sensors = _completing(lambda: shipped("sensors"))
+complete_specimen = _completing(lambda: shipped("specimens", ".urdf"))

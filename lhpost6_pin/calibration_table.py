@@ -44,11 +44,12 @@ def _parameters(calibration: Calibration) -> Table:
 def _sensors(calibration: Calibration) -> Table:
     first, distance = len(calibration.knobs), far(calibration)
     order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
-    found = [i for i in order if beyond(calibration)[i]]
+    outside, allowed = beyond(calibration), stated_range(calibration)
+    found = [i for i in order if outside[i]]
     title = f"Errors of the sensors: {len(found)} of {len(order)} found, {range_words(calibration)}"
     table = _table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
     for i in found:
-        unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / stated_range(calibration)[i]
+        unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / allowed[i]
         numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{share:.0%}", f"{distance[i]:+.1f}"
         table.add_row(escape(unknown.name), *numbers, _share(calibration, i))
     return table

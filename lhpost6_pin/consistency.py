@@ -192,7 +192,8 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterato
         numbers = value, sigma, term.expected, range_
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
         yield _finding(check, channel, term.quantity, term.unit or unit_y, *numbers, untested=held[i], instead=others)
-    best = min(free, told, key=lambda by: by.square / by.noise)  # what cannot be told may be what explains most
+    # what cannot be told may be what explains most; a channel of nothing but zeros has no noise
+    best = min(free, told, key=lambda by: by.square / max(by.noise, 1e-300))
     rms, floor = np.sqrt(max(best.square, 0.0)), np.sqrt(best.noise)
     range_ = np.sqrt((1 + noise_range) ** 2 * best.noise + CONFIDENCE**2 * best.allowed) - floor
     yield _finding(check, channel, "residual", unit_y, rms, floor / np.sqrt(2 * s.independent), floor, range_)

@@ -11,7 +11,7 @@ from typing import Any
 
 from .errors import UnknownNameError
 
-__all__ = ["find_shipped", "models_folder", "read_toml", "refuse_folder", "shipped", "write_whole"]
+__all__ = ["find_shipped", "models_folder", "read_toml", "reason_of", "refuse_folder", "shipped", "write_whole"]
 
 
 def models_folder() -> Path:
@@ -54,6 +54,11 @@ def _refuse_long_numbers(value: object, key: str) -> None:
             _refuse_long_numbers(item, key)
     elif isinstance(value, int) and value.bit_length() > 63:
         raise ValueError(f"{key} is a whole number of more than 64 bits")
+
+
+def reason_of(error: Exception) -> str:
+    """What is wrong with a file, as the system says it, without Python's number of the error."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 def refuse_folder(folder: "Path | str") -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from .errors import ParameterError, UnknownNameError, instead_of
-from .files import find_shipped, read_toml
+from .files import find_shipped, read_toml, reason_of
 
 __all__ = [
     "EVIDENCE",
@@ -225,7 +225,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except ValueError as error:  # of TOML and of UTF-8
         raise ParameterError(f"{path}: not a TOML file: {error}") from None
     except OSError as error:
-        raise ParameterError(f"{path}: cannot be read: {error.strerror}") from None
+        raise ParameterError(f"{path}: cannot be read: {reason_of(error)}") from None
 
 
 def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:

@@ -1,5 +1,7 @@
 """Consistency: sensors that agree pass, each kind of error is found where it is, and only there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from machine_cases import plant_named
@@ -47,6 +49,15 @@ def test_sensors_that_agree_are_not_suspected(plant, campaign) -> None:
         "supply pressure against nominal",
         "spool against command",
     }
+
+
+def test_channels_that_stay_at_zero_without_noise_can_be_compared(plant, campaign) -> None:
+    still = [r.isel(time=slice(0, 512)) for r in campaign[:1]]
+    for name in ("platen_displacement", "platen_velocity", "platen_acceleration"):
+        still = with_change(still, name, np.zeros_like)
+    findings = check_sensors(plant, still, replace(SENSORS, noise={}))
+    residual = find(findings, "platen_velocity[x]", "residual")
+    assert (residual.estimate, residual.expected, residual.verdict) == (0.0, 0.0, "ok")
 
 
 def test_estimates_scatter_by_their_standard_errors(plant, campaign) -> None:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from ..errors import RecordError, instead_of, meant
-from ..files import read_toml, write_whole
+from ..files import read_toml, reason_of, write_whole
 from ..names import AXES
 from ..records import FASTEST, LAYOUT, SLOWEST
 from .raw import RawTest, shown
@@ -79,7 +79,7 @@ def load_map(path: Path | str) -> ChannelMap:
     try:
         tree = read_toml(path)
     except OSError as error:
-        raise RecordError(f"{origin}: cannot be read: {error.strerror or error}; --guess writes a first map") from None
+        raise RecordError(f"{origin}: cannot be read: {reason_of(error)}; --guess writes a first map") from None
     except ValueError as error:  # of TOML and of UTF-8
         raise RecordError(f"{origin}: not a TOML file: {error}") from None
     _known(tree, ("test", "channel"), origin)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import RecordError
+from ..files import reason_of
 from .hdf5 import read_hdf5, read_netcdf3
 from .matlab import read_mat, read_mat73
 from .mts469d import is_469d, read_469d
@@ -42,7 +43,7 @@ def load_raw(path: Path | str) -> tuple[RawTest, ...]:
     except FileNotFoundError:
         raise RecordError(f"{source}: no such file") from None
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
-        raise RecordError(f"{source}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        raise RecordError(f"{source}: cannot be read: {reason_of(error)}") from error
     if not content.strip():
         raise RecordError(f"{source}: is empty")
     found = _reader(content, path)(content, source)

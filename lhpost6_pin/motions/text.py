@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import MotionError
+from ..files import reason_of
 
 __all__ = ["parse_fixed_width", "parse_numbers", "read_text"]
 
@@ -15,7 +16,7 @@ def read_text(path: "Path | str") -> str:
     try:
         data = Path(path).read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
-        raise MotionError(f"cannot read ground motion {path}: {getattr(error, 'strerror', None) or error}") from error
+        raise MotionError(f"cannot read ground motion {path}: {reason_of(error)}") from error
     if b"\0" in data[:4096]:
         raise MotionError(f"{path}: not a text file; give PEER .AT2, CSV, or COSMOS/CSMIP V1")
     return data.decode("utf-8-sig", errors="replace")

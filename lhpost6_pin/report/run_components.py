@@ -23,8 +23,9 @@ __all__ = [
     "force_use",
     "kinds",
     "pressure_blocks",
-    "specimen_blocks",
     "share_of_limit",
+    "shares_of_limit",
+    "specimen_blocks",
     "strut_blocks",
 ]
 
@@ -129,24 +130,26 @@ def share_of_limit(peak: float, limits: Limits, name: str, k: int) -> float:
     return float(peak / bounds[k]) if k < len(bounds) else float("nan")
 
 
+def shares_of_limit(peak: NDArray[np.float64], limits: Limits, name: str) -> NDArray[np.float64]:
+    """Return the peaks (n,) over the limits of as many axes or actuators."""
+    return np.array([share_of_limit(value, limits, name, k) for k, value in enumerate(peak)])
+
+
 def force_use(record: xr.Dataset, limits: Limits) -> list[ForceUse]:
     """Return the use of the actuators' forces: push and pull apart where `actuator_pull` is given, else magnitude."""
     if "actuator_force" not in record:
         return []
     force = channel(record, "actuator_force", "actuator")
 
-    def used(peak: NDArray[np.float64], name: str) -> NDArray[np.float64]:
-        return np.array([share_of_limit(value, limits, name, k) for k, value in enumerate(peak)])
-
     if "actuator_pull" not in limits:
-        return [ForceUse("force", peaks(force), used(peaks(force), "actuator_force"))]
+        return [ForceUse("force", peaks(force), shares_of_limit(peaks(force), limits, "actuator_force"))]
     push, pull = peaks(np.maximum(force, 0.0)), peaks(np.maximum(-force, 0.0))
     allowed = np.pad(limits["actuator_pull"], (0, len(pull)), constant_values=np.nan)[: len(pull)]
     known = np.nan_to_num(np.pad(limits.get("actuator_force", np.array([])), (0, len(pull)))[: len(pull)])
     # what cannot pull at all is allowed the tolerance of its push
     none = np.where(pull > TOLERANCE * known, np.inf, np.where(np.isnan(pull), np.nan, 0.0))
     share = np.where(allowed == 0.0, none, pull / np.where(allowed == 0.0, np.nan, allowed))
-    return [ForceUse("push", push, used(push, "actuator_force")), ForceUse("pull", pull, share)]
+    return [ForceUse("push", push, shares_of_limit(push, limits, "actuator_force")), ForceUse("pull", pull, share)]
 
 
 def _with_force_limits(row: Row, record: xr.Dataset, limits: Limits) -> Row:
@@ -178,9 +181,8 @@ def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Markup:
         header.append(f"Peak displacement [{scale.unit}]")
         columns.append([number(peak * scale.factor) for peak in largest])
         if "actuator_stroke" in limits:
-            shares = [share_of_limit(peak, limits, "actuator_stroke", k) for k, peak in enumerate(largest)]
             header.append("of its stroke")
-            columns.append([bar(share, TOLERANCE) for share in shares])
+            columns.append([bar(share, TOLERANCE) for share in shares_of_limit(largest, limits, "actuator_stroke")])
     return table("Forces and strokes used", header, zip(*columns, strict=True))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .page import Markup, bar, number, paragraph, table
 from .plots import SCALES, Scale
-from .run_components import TOLERANCE, Limits, force_use, share_of_limit
+from .run_components import TOLERANCE, Limits, force_use, share_of_limit, shares_of_limit
 from .run_metrics import SpoolUse, Tracking, channel, peaks, sampling
 from .run_motion import axis_scale, shown_as
 
@@ -78,17 +78,15 @@ def _legs(record: xr.Dataset, limits: Limits) -> Iterator[LimitUse]:
     if "actuator_displacement" in record:
         moved = channel(record, "actuator_displacement", "actuator")
         stroke = peaks(moved)
-        yield from each("leg stroke", stroke, _shares(stroke, limits, "actuator_stroke"))
+        yield from each("leg stroke", stroke, shares_of_limit(stroke, limits, "actuator_stroke"))
         velocity = np.gradient(moved, sampling(record)[1], axis=0)
         out, back = peaks(np.maximum(velocity, 0.0)), peaks(np.maximum(-velocity, 0.0))
-        shares = _shares(out, limits, "actuator_extending"), _shares(back, limits, "actuator_retracting")
-        yield from each("leg velocity", np.where(shares[0] >= shares[1], out, back), np.maximum(*shares))
+        extending = shares_of_limit(out, limits, "actuator_extending")
+        retracting = shares_of_limit(back, limits, "actuator_retracting")
+        peak = np.where(extending >= retracting, out, back)
+        yield from each("leg velocity", peak, np.maximum(extending, retracting))
     for words, peak, share in force_use(record, limits):
         yield from each(words, peak, share)
-
-
-def _shares(peak: NDArray[np.float64], limits: Limits, name: str) -> NDArray[np.float64]:
-    return np.array([share_of_limit(value, limits, name, k) for k, value in enumerate(peak)])
 
 
 def _shown(use: LimitUse) -> str:

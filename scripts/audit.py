@@ -21,19 +21,19 @@ import numpy as np
 from docs.markdown import print_and_keep
 
 from lhpost6_pin import __version__
-from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.energy import energy_audit
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.report import write_run_report
-from lhpost6_pin.schemes import SAMPLE_RATE
-from lhpost6_pin.simulate import ClosedLoop, Run, simulate
-from lhpost6_pin.tables import machine_rows, report_limits
-from lhpost6_pin.viewer import show_record
+from lhpost6_pin.show.report import write_run_report
+from lhpost6_pin.show.tables import machine_rows, report_limits
+from lhpost6_pin.show.viewer import show_record
+from lhpost6_pin.simulation.batch import simulate_many
+from lhpost6_pin.simulation.energy import energy_audit
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulate import ClosedLoop, Run, simulate
 
 
 def noise(plant: Plant, seconds: float) -> ClosedLoop:

@@ -23,17 +23,17 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import refuse_folder, write_whole
-from lhpost6_pin.inverse_dynamics import inverse_dynamics
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.files import refuse_folder, write_whole
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.identification.inverse_dynamics import inverse_dynamics
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.schemes import SCHEMES
-from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, simulate
+from lhpost6_pin.simulation.batch import simulate_many
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate
 
 FIRST_RESULT = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {args!r}; main()"
 
@@ -154,9 +154,9 @@ class Bench:
         import pinocchio as pin
         from scipy.integrate import solve_ivp
 
-        from lhpost6_pin.engine_pinocchio import settle
-        from lhpost6_pin.schemes import A, V
-        from lhpost6_pin.workspace import make_workspace
+        from lhpost6_pin.mechanics.derivatives import settle
+        from lhpost6_pin.mechanics.schemes import A, V
+        from lhpost6_pin.mechanics.workspace import make_workspace
 
         plant, rest = self.plant, self.rest
         ws = make_workspace(plant, rest.state)

@@ -27,12 +27,12 @@ from battery.scoring import Share, families, named_what_is_there, reach, score, 
 from joblib import Parallel, delayed, parallel_config
 
 from lhpost6_pin import __version__
-from lhpost6_pin.campaign import load_campaign
-from lhpost6_pin.discover import discover, save_verdict
-from lhpost6_pin.errors import LhpostError
-from lhpost6_pin.files import write_whole
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.sensors import load_sensors
+from lhpost6_pin.core.errors import LhpostError
+from lhpost6_pin.core.files import write_whole
+from lhpost6_pin.data.campaign import load_campaign
+from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.discovery import discover, save_verdict
+from lhpost6_pin.machine.machine import load_machine
 
 RESULTS = Path(__file__).parent / "battery" / "results.md"
 """The latest published scores."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from docs.assemble import ROOT, assemble
 
-from lhpost6_pin.files import refuse_folder
+from lhpost6_pin.core.files import refuse_folder
 
 
 def build(out: Path) -> bool:

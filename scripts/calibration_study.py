@@ -19,12 +19,12 @@ from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
 
-from lhpost6_pin.calibration import calibrate, drawn_coordinates, machine_knobs, with_knobs
-from lhpost6_pin.campaign import simulate_campaign
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.files import write_whole
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.sensors import load_sensors
+from lhpost6_pin.core.files import write_whole
+from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.identification.calibration import calibrate, drawn_coordinates, machine_knobs, with_knobs
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 SIGMAS = 1.6448536269514722  # half width of a 90 % interval
 

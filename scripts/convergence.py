@@ -19,16 +19,15 @@ from rich.console import Console
 from rich.table import Table
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import refuse_folder, write_whole
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.files import refuse_folder, write_whole
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.names import AXES
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.schemes import SCHEMES
-from lhpost6_pin.simulate import SAMPLE_RATE, OpenLoop, simulate
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 REFERENCE_STEPS = 64
 """Model steps a controller sample of the converged run."""

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhpost6_pin.errors import MotionError
-from lhpost6_pin.files import models_folder, write_whole
+from lhpost6_pin.core.errors import MotionError
+from lhpost6_pin.core.files import models_folder, write_whole
 from lhpost6_pin.motions.v1 import make_v1_motion, parse_v1
 
 FOLDER = "gmprocess/data/demo/ci38457511/raw/"

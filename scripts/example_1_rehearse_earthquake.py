@@ -12,15 +12,15 @@ import typer
 
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.energy import energy_audit
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.records import save_record
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.names import AXES
-from lhpost6_pin.records import save_record
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.report import write_run_report
-from lhpost6_pin.signals import rrmse
-from lhpost6_pin.tables import report_limits
+from lhpost6_pin.show.report import write_run_report
+from lhpost6_pin.show.tables import report_limits
+from lhpost6_pin.simulation.energy import energy_audit
+from lhpost6_pin.simulation.rehearse import rehearse
 
 
 def main(

@@ -15,14 +15,14 @@ import xarray as xr
 
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.files import write_whole
-from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.core.files import write_whole
+from lhpost6_pin.data.records import save_record
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import Target, load_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import save_record
-from lhpost6_pin.rehearse import rehearse, target_within_limits
-from lhpost6_pin.signals import rrmse
-from lhpost6_pin.viewer import Look, show_record
+from lhpost6_pin.show.viewer import Look, show_record
+from lhpost6_pin.simulation.rehearse import rehearse, target_within_limits
 
 
 def write_pulse(path: Path) -> Path:

@@ -13,15 +13,15 @@ import typer
 
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.drives import circumstances, save_drive
-from lhpost6_pin.iterate import identify_inverse, iterate
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.records import sample_interval
+from lhpost6_pin.data.signals import align, delay, rrmse
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.names import AXES
-from lhpost6_pin.records import sample_interval
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.report import write_iterate_report
-from lhpost6_pin.signals import align, delay, rrmse
+from lhpost6_pin.show.report import write_iterate_report
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.tuning.drives import circumstances, save_drive
+from lhpost6_pin.tuning.iterate import identify_inverse, iterate
 
 
 def main(

@@ -42,21 +42,20 @@ from scipy.signal import cont2discrete
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.control.plug import Sensors, Wanted
-from lhpost6_pin.equilibrium import Equilibrium, find_equilibrium, hydraulic_rows, unloaded_speeds
-from lhpost6_pin.errors import ControllerError
-from lhpost6_pin.files import refuse_folder
-from lhpost6_pin.linearize import linearize
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import ControllerError
+from lhpost6_pin.core.files import refuse_folder
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE
+from lhpost6_pin.data.signals import align, delay, lowpass_zero_phase, rrmse
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import Equilibrium, find_equilibrium, hydraulic_rows, unloaded_speeds
+from lhpost6_pin.mechanics.linearize import linearize
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.pose import forward_kinematics, leg_displacements, platen_motion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.names import AXES
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.pose import forward_kinematics, leg_displacements, platen_motion
-from lhpost6_pin.rehearse import SimulatedTest, rehearse, target_within_limits
-from lhpost6_pin.report import page
-from lhpost6_pin.report.plots import ACHIEVED, RECORDED, TARGET, Row, Trace, time_figure
-from lhpost6_pin.report.run_motion import axis_scale
-from lhpost6_pin.signals import align, delay, lowpass_zero_phase, rrmse
-from lhpost6_pin.simulate import SAMPLE_RATE
+from lhpost6_pin.show.report import page
+from lhpost6_pin.show.report.plots import ACHIEVED, RECORDED, TARGET, Row, Trace, time_figure
+from lhpost6_pin.show.report.run_motion import axis_scale
+from lhpost6_pin.simulation.rehearse import SimulatedTest, rehearse, target_within_limits
 
 Array = NDArray[np.float64]
 STEP = 1.0 / SAMPLE_RATE

@@ -16,19 +16,19 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from lhpost6_pin.batch import simulate_many
-from lhpost6_pin.calibration import drawn_coordinates, machine_knobs, with_knobs
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import write_whole
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.files import write_whole
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.identification.calibration import drawn_coordinates, machine_knobs, with_knobs
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import PlatenMotion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import PlatenMotion
-from lhpost6_pin.signals import rrmse
-from lhpost6_pin.simulate import ClosedLoop
+from lhpost6_pin.simulation.batch import simulate_many
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.simulate import ClosedLoop
 
 
 def figures(record: xr.Dataset) -> dict[str, float]:

@@ -12,15 +12,16 @@ from typing import Annotated
 
 import typer
 
-from lhpost6_pin.campaign import save_campaign, simulate_campaign
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.discover import discover
-from lhpost6_pin.discovery_table import print_discovery
-from lhpost6_pin.library import find_family
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.report.discover_report import save_discovery
-from lhpost6_pin.sensors import load_sensors
+from lhpost6_pin.data.campaign import save_campaign
+from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.discovery import discover
+from lhpost6_pin.machine.library import find_family
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.discovery_table import print_discovery
+from lhpost6_pin.show.report.discover_report import save_discovery
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 
 def main(

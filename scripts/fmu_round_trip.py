@@ -13,12 +13,12 @@ import fmpy
 import numpy as np
 import typer
 
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.fmi import export_fmu
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.running import RunningPlant
-from lhpost6_pin.schemes import SAMPLE_RATE
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.interfaces.fmi import export_fmu
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.simulation.running import RunningPlant
 
 
 def main(

@@ -19,15 +19,16 @@ import numpy as np
 import typer
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import refuse_folder, write_whole
-from lhpost6_pin.link import LinkClient, Mode, ServedPlant, find_mode, open_socket, run_over_link, serve
-from lhpost6_pin.link.statistics import Histogram
-from lhpost6_pin.link.summary import print_link
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.files import refuse_folder, write_whole
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.interfaces.link import LinkClient, Mode, ServedPlant, find_mode, open_socket, run_over_link, serve
+from lhpost6_pin.interfaces.link.link_summary import print_link
+from lhpost6_pin.interfaces.link.statistics import Histogram
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.simulate import SAMPLE_RATE, ClosedLoop
+from lhpost6_pin.simulation.simulate import ClosedLoop
 
 
 def serve_table(mode: Mode, pipe: Connection) -> None:

@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from lhpost6_pin.errors import LhpostError
-from lhpost6_pin.files import models_folder, write_whole
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.urdf import urdf_text
+from lhpost6_pin.core.errors import LhpostError
+from lhpost6_pin.core.files import models_folder, write_whole
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.urdf import urdf_text
 
 
 def make(

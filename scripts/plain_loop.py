@@ -6,8 +6,8 @@ A yardstick for `bench.py`, and a readable account of one step. It shares no cod
 import numpy as np
 import pinocchio as pin
 
-from lhpost6_pin.machine import Machine
-from lhpost6_pin.rigid_body import make_model
+from lhpost6_pin.machine.machine import Machine
+from lhpost6_pin.mechanics.rigid_body import make_model
 
 
 class PlainPlant:

@@ -15,14 +15,14 @@ from typing import Annotated
 
 import typer
 
-from lhpost6_pin.campaign import simulate_campaign
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.discover import discover
-from lhpost6_pin.discovery_table import print_discovery
-from lhpost6_pin.errors import UnknownNameError
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.report.discover_report import save_discovery
-from lhpost6_pin.sensors import load_sensors
+from lhpost6_pin.core.errors import UnknownNameError
+from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.discovery import discover
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.discovery_table import print_discovery
+from lhpost6_pin.show.report.discover_report import save_discovery
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 HORIZONTAL = ("H1", "H2", "H3", "H4")
 EXAMPLES = {

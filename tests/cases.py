@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lhpost6_pin.effects import Effect, effect_table
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.table import effect_table
 from lhpost6_pin.laws import bouc_wen, chamber, orifice, strut, viscous
 
 PORTS = ("leg", "pad.x", "pad.y")

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from lhpost6_pin.bodies import load_bodies
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import make_plant
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.show.bodies import load_bodies
 
 settings.register_profile("fixed", derandomize=True, deadline=None, max_examples=50)
 settings.register_profile("explore", max_examples=1000, deadline=None)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lhpost6_pin.importing.raw import RawTest, make_raw
+from lhpost6_pin.data.importing.raw import RawTest, make_raw
 
 Channels = Sequence[tuple[str, str, np.ndarray]]  # description, unit, samples (n,)
 

@@ -22,25 +22,25 @@ from data_files import LABELS, binary_469d, header, sines, text_469d
 from hypothesis import strategies as st
 from motions_files import at2_text, cosmos_text, csmip_text
 
-from lhpost6_pin.campaign import tests_of
-from lhpost6_pin.check import check_record
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.drives import circumstances, load_drive, save_drive
-from lhpost6_pin.equilibrium import Equilibrium, find_equilibrium
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.importing import channel_units, guess_map, load_map, load_raw, make_imported_record, save_map
-from lhpost6_pin.importing.channel_map import Source, channels_of, si_unit
-from lhpost6_pin.importing.raw import make_raw
-from lhpost6_pin.inverse import InverseFilter, apply_inverse, load_inverse, save_inverse
-from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.control.inverse import InverseFilter, apply_inverse, load_inverse, save_inverse
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.check import check_record
+from lhpost6_pin.data.importing import channel_units, guess_map, load_map, load_raw, make_imported_record, save_map
+from lhpost6_pin.data.importing.channel_map import Source, channels_of, si_unit
+from lhpost6_pin.data.importing.raw import make_raw
+from lhpost6_pin.data.records import LAYOUT, load_record, make_record, sample_interval, save_record
+from lhpost6_pin.data.sensors import add_noise, load_sensors
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.parameters import load_parameters
+from lhpost6_pin.mechanics.equilibrium import Equilibrium, find_equilibrium
+from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.motions import find_motion, library, list_motions, load_motion, make_target, motion_options
-from lhpost6_pin.names import AXES
-from lhpost6_pin.parameters import load_parameters
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.records import LAYOUT, load_record, make_record, sample_interval, save_record
-from lhpost6_pin.sensors import add_noise, load_sensors
-from lhpost6_pin.urdf import urdf_text
-from lhpost6_pin.viewer import record_frames
+from lhpost6_pin.show.urdf import urdf_text
+from lhpost6_pin.show.viewer import record_frames
+from lhpost6_pin.simulation.simulated_campaign import tests_of
+from lhpost6_pin.tuning.drives import circumstances, load_drive, save_drive
 
 Breaks = st.SearchStrategy[bytes]
 

@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from lhpost6_pin.engine_pinocchio import make_stepper, settle
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.machine import Machine
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import PlatenMotion, platen_motion
-from lhpost6_pin.schemes import A, V
-from lhpost6_pin.simulate import Run
-from lhpost6_pin.workspace import make_workspace
+from lhpost6_pin.machine.machine import Machine
+from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import PlatenMotion, platen_motion
+from lhpost6_pin.mechanics.schemes import A, V
+from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.engine_pinocchio import make_stepper
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.simulate import Run
 
 RATE = 8192
 

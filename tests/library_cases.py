@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.machine import Machine
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import PlatenMotion
-from lhpost6_pin.residuals import Measured, make_measured
-from lhpost6_pin.simulate import OpenLoop, Run, simulate
+from lhpost6_pin.identification.residuals import Measured, make_measured
+from lhpost6_pin.machine.machine import Machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import PlatenMotion
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.simulate import OpenLoop, Run, simulate
 
 
 def record_at_model_steps(machine: Machine, samples: int) -> np.ndarray:

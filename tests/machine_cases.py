@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.pose import PlatenMotion
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.pose import PlatenMotion
 
 DATA = Path(__file__).parent / "data"
 FREE_MACHINES = ("lhpost6", "stewart")

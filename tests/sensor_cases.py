@@ -3,10 +3,10 @@
 import numpy as np
 import xarray as xr
 
-from lhpost6_pin.alignment import gas_pressure
-from lhpost6_pin.plant import Plant
-from lhpost6_pin.pose import PlatenMotion, leg_displacements
-from lhpost6_pin.records import make_record
+from lhpost6_pin.data.alignment import gas_pressure
+from lhpost6_pin.data.records import make_record
+from lhpost6_pin.mechanics.plant import Plant
+from lhpost6_pin.mechanics.pose import PlatenMotion, leg_displacements
 
 RATE = 512.0
 AMPLITUDE = np.array([0.1, 0.07, 0.02, 0.004, 0.004, 0.007])  # about, at 1 Hz; x y z roll pitch yaw

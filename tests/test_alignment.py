@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from sensor_cases import RATE, measured, waves
 
-from lhpost6_pin.alignment import Delay, align_record, combine_delays, group_delays, phase_delay, slow_delay
-from lhpost6_pin.sensors import GROUPS, add_noise, load_sensors
-from lhpost6_pin.signals import align, differentiate
+from lhpost6_pin.data.alignment import Delay, align_record, combine_delays, group_delays, phase_delay, slow_delay
+from lhpost6_pin.data.sensors import GROUPS, add_noise, load_sensors
+from lhpost6_pin.data.signals import align, differentiate
 
 DT = 1 / RATE
 T = np.arange(round(20 * RATE)) * DT

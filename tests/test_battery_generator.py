@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from battery import cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table
 
-from lhpost6_pin.records import load_record
+from lhpost6_pin.data.records import load_record
 
 
 def nominal() -> tuple[np.ndarray, np.ndarray]:

@@ -4,13 +4,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from lhpost6_pin.bodies import joint_positions, load_bodies
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import leg_displacements, rotation
-from lhpost6_pin.rigid_body import lumped_inertia
-from lhpost6_pin.urdf import drawing_sizes, legs, urdf_text
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import leg_displacements, rotation
+from lhpost6_pin.mechanics.rigid_body import lumped_inertia
+from lhpost6_pin.show.bodies import joint_positions, load_bodies
+from lhpost6_pin.show.urdf import drawing_sizes, legs, urdf_text
 
 
 @pytest.fixture(scope="module")

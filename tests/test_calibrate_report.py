@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from lhpost6_pin.calibration import Calibration, Subset, calibration_numbers, machine_knobs
-from lhpost6_pin.calibration.errors import SensorUnknown
-from lhpost6_pin.calibration.override import save_override
-from lhpost6_pin.calibration.verdicts import changed_knobs, contradictions, out_of_range, verdict_on
-from lhpost6_pin.calibration.words import alike_words, contradiction_words, cut_strokes
-from lhpost6_pin.calibration_table import print_calibration
-from lhpost6_pin.campaign import Campaign, load_campaign
 from lhpost6_pin.cli import app
-from lhpost6_pin.errors import LhpostError, ParameterError, RecordError, UnknownNameError
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.report import write_calibrate_report
-from lhpost6_pin.residuals import RESIDUALS
-from lhpost6_pin.results import calibration_entries
+from lhpost6_pin.core.errors import LhpostError, ParameterError, RecordError, UnknownNameError
+from lhpost6_pin.data.campaign import Campaign, load_campaign
+from lhpost6_pin.identification.calibration import Calibration, Subset, calibration_numbers, machine_knobs
+from lhpost6_pin.identification.calibration.calibration_summary import alike_words, contradiction_words, cut_strokes
+from lhpost6_pin.identification.calibration.override import save_override
+from lhpost6_pin.identification.calibration.sensor_errors import SensorUnknown
+from lhpost6_pin.identification.calibration.verdicts import changed_knobs, contradictions, out_of_range, verdict_on
+from lhpost6_pin.identification.residuals import RESIDUALS
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.calibration_table import print_calibration
+from lhpost6_pin.show.report import write_calibrate_report
+from lhpost6_pin.show.results import calibration_entries
 
 MACHINE = load_machine()
 NAMES = ("platen.mass[x]", "horizontal.leakage", "horizontal.viscous", "vertical.seal_shape", "hold_down.base_height")
@@ -253,8 +253,10 @@ def test_the_command_leaves_override_and_report_and_says_if_it_converged(
         asked.update(options, machine=machine.name, sensors=sensors.name)
         return replace(found, converged=converged)
 
-    monkeypatch.setattr("lhpost6_pin.campaign.load_campaign", lambda folder, machine: Campaign("march", ()))
-    monkeypatch.setattr("lhpost6_pin.calibration.calibrate", pretend)
+    monkeypatch.setattr(
+        "lhpost6_pin.simulation.simulated_campaign.load_campaign", lambda folder, machine: Campaign("march", ())
+    )
+    monkeypatch.setattr("lhpost6_pin.identification.calibration.calibrate", pretend)
     ended = CliRunner().invoke(app, ["calibrate", "march", "--out", str(tmp_path), "--seed", "3", "--jobs", "1"])
     assert ended.exit_code == code, ended.output
     assert sorted(p.name for p in tmp_path.iterdir()) == ["override.toml", "report.html"]

@@ -6,30 +6,45 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from lhpost6_pin.calibration import Calibration, calibrate, calibration_numbers, fit, machine_knobs, with_knobs
-from lhpost6_pin.calibration.errors import corrected, corrected_record, sensor_unknowns
-from lhpost6_pin.calibration.fit import solve
-from lhpost6_pin.calibration.knobs import Knob, plan_knobs, scatter_knobs
-from lhpost6_pin.calibration.normal import bounded_step, bounds_of
-from lhpost6_pin.calibration.override import save_override
-from lhpost6_pin.calibration.prepare import _ready
-from lhpost6_pin.calibration.problem import Base, Comparison, Problem
-from lhpost6_pin.calibration.simulation import by_simulation
-from lhpost6_pin.calibration.spectra import Whitener, excess, make_whitener, mean_squares, spectrum_of, surprise
-from lhpost6_pin.campaign import Campaign, load_campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.discover.discover import discovery_numbers
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.fusion import fuse_motion
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.parameters import load_parameters
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import sample_interval
-from lhpost6_pin.residuals import RESIDUALS, Measured, evaluate_residuals, make_measured
-from lhpost6_pin.sensors import Sensors, add_noise, load_sensors
-from lhpost6_pin.signals import align
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
+from lhpost6_pin.data.fusion import fuse_motion
+from lhpost6_pin.data.records import sample_interval
+from lhpost6_pin.data.sensors import Sensors, add_noise, load_sensors
+from lhpost6_pin.data.signals import align
+from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.identification.calibration import (
+    Calibration,
+    calibrate,
+    calibration_numbers,
+    fit,
+    machine_knobs,
+    with_knobs,
+)
+from lhpost6_pin.identification.calibration.fit import solve
+from lhpost6_pin.identification.calibration.free_parameters import Knob, plan_knobs, scatter_knobs
+from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
+from lhpost6_pin.identification.calibration.override import save_override
+from lhpost6_pin.identification.calibration.prepare import _ready
+from lhpost6_pin.identification.calibration.problem import Base, Comparison, Problem
+from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
+from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
+from lhpost6_pin.identification.calibration.whitened_residuals import (
+    Whitener,
+    excess,
+    make_whitener,
+    mean_squares,
+    spectrum_of,
+    surprise,
+)
+from lhpost6_pin.identification.residuals import RESIDUALS, Measured, evaluate_residuals, make_measured
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.parameters import load_parameters
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 TURNED = {
     "horizontal.seal_friction": 0.3,

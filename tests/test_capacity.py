@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from lhpost6_pin.capacity import capacity_table, leg_speeds, make_leg_check
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import OutOfRangeError
-from lhpost6_pin.linearize import linearize, oil_column_modes
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import OutOfRangeError
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.capacity import capacity_table, leg_speeds, make_leg_check
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import leg_displacements
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import leg_displacements
-from lhpost6_pin.rehearse import target_within_limits
-from lhpost6_pin.simulate import SAMPLE_RATE, OpenLoop, simulate
+from lhpost6_pin.simulation.rehearse import target_within_limits
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 
 @pytest.fixture(scope="module")

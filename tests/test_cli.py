@@ -20,17 +20,18 @@ import xarray as xr
 from machine_cases import DATA
 
 import lhpost6_pin.motions.library as library
-from lhpost6_pin import cli, rehearse
-from lhpost6_pin.check import check_record
+from lhpost6_pin import cli
 from lhpost6_pin.cli import completion, runs
-from lhpost6_pin.compiled import cache_folder
-from lhpost6_pin.drives import circumstances, save_drive
-from lhpost6_pin.files import shipped
-from lhpost6_pin.inverse import InverseFilter, save_inverse
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.control.inverse import InverseFilter, save_inverse
+from lhpost6_pin.core.compiled import cache_folder
+from lhpost6_pin.core.files import shipped
+from lhpost6_pin.core.names import AXES, ENGINES, SCHEMES
+from lhpost6_pin.data.check import check_record
+from lhpost6_pin.data.records import load_record, save_record
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, list_motions, make_target
-from lhpost6_pin.names import AXES, ENGINES, SCHEMES
-from lhpost6_pin.records import load_record, save_record
+from lhpost6_pin.simulation import rehearse
+from lhpost6_pin.tuning.drives import circumstances, save_drive
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
 PRACTICE = DATA / "records" / "practice_a_TX.nc"
@@ -130,9 +131,9 @@ def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6):
 
 
 def test_doctor_says_when_compiled_code_cannot_be_kept(lhpost6, monkeypatch):
-    import lhpost6_pin.doctor
+    import lhpost6_pin.cli.doctor
 
-    monkeypatch.setattr(lhpost6_pin.doctor, "cache_folder", lambda: None)
+    monkeypatch.setattr(lhpost6_pin.cli.doctor, "cache_folder", lambda: None)
     assert "every run compiles anew" in lhpost6("doctor").words
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import lhpost6_pin
-from lhpost6_pin import compiled as module
-from lhpost6_pin.compiled import cache_folder, compiled
+from lhpost6_pin.core import compiled as module
+from lhpost6_pin.core.compiled import cache_folder, compiled
 
 PACKAGE = Path(lhpost6_pin.__file__).parent
 POSIX = pytest.mark.skipif(not hasattr(os, "getuid"), reason="ownership and permission bits are POSIX")
@@ -23,8 +23,8 @@ print(flows_single(1.0, 1e6, 2.0, 2.0, 0.0, 5e6, 0.0, 1.0)[0])
 """
 """Calls through two modules: `flows_single` in chamber.py, `signed_root` in orifice.py."""
 
-WHERE = "from lhpost6_pin.compiled import cache_folder; print(cache_folder())"
-KEY = "from lhpost6_pin.compiled import source_key; print(source_key())"
+WHERE = "from lhpost6_pin.core.compiled import cache_folder; print(cache_folder())"
+KEY = "from lhpost6_pin.core.compiled import source_key; print(source_key())"
 
 
 @pytest.fixture
@@ -94,12 +94,15 @@ def test_compiled_code_is_kept_in_the_cache_and_nothing_beside_the_package(copy:
 
 def test_the_key_follows_what_compiled_code_is_made_of_and_nothing_else(copy: Path) -> None:
     keys = [run(KEY, copy)[0]]
-    for edited in ("laws/strut.py", "stage.py", "effects.py"):  # a law, a caller, the codes that callers read
+    for edited in ("laws/strut.py", "effects/evaluate.py", "effects/registry.py"):  # a law, a caller, constants
         with (copy / edited).open("a") as handle:
             handle.write("# edited\n")
         keys.append(run(KEY, copy)[0])
     assert len(set(keys)) == len(keys)
     (copy / "a_new_plain_module.py").write_text("x = 1\n")
+    for plain in ("core/errors.py", "mechanics/plant.py", "machine/machine.py"):  # imported by callers, no constants
+        with (copy / plain).open("a") as handle:
+            handle.write("# edited\n")
     assert run(KEY, copy)[0] == keys[-1]
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lhpost6_pin.conditioning import fill_gaps, integrate, resolution, without_offset
-from lhpost6_pin.errors import RecordError
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.conditioning import fill_gaps, integrate, resolution, without_offset
 
 DT = 1 / 512
 T = np.arange(4096) * DT

@@ -7,10 +7,10 @@ import pytest
 from machine_cases import plant_named
 from sensor_cases import RATE, measured
 
-from lhpost6_pin.consistency import SensorFinding, check_sensors
-from lhpost6_pin.records import make_record
-from lhpost6_pin.sensors import add_noise, load_sensors
-from lhpost6_pin.signals import align
+from lhpost6_pin.data.consistency import SensorFinding, check_sensors
+from lhpost6_pin.data.records import make_record
+from lhpost6_pin.data.sensors import add_noise, load_sensors
+from lhpost6_pin.data.signals import align
 
 SENSORS = load_sensors()
 

@@ -9,15 +9,16 @@ from scipy import signal
 from lhpost6_pin.control import Notch, load_controller, make_controller
 from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, cancel, control_step
 from lhpost6_pin.control.plug import Sensors
-from lhpost6_pin.equilibrium import hydraulic_rows, unloaded_speeds
-from lhpost6_pin.errors import ControllerError, SimulationError
+from lhpost6_pin.core.errors import ControllerError, SimulationError
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
+from lhpost6_pin.data.signals import align, delay, rrmse
 from lhpost6_pin.laws.orifice import opening, spool_for_opening
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import hydraulic_rows, unloaded_speeds
+from lhpost6_pin.mechanics.pose import leg_displacements, platen_motion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.pose import leg_displacements, platen_motion
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.signals import align, delay, rrmse
-from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, simulate
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate
 
 SIX = np.ones(6)
 NOTHING = tuple(np.zeros(6))

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.iterate import identify_inverse, iterate
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.margins import LoopModel, Margin
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.data.transfer import Transfer
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.report import write_iterate_report, write_sine_report, write_tune_report
-from lhpost6_pin.report.charts import Curve, Panel, XAxis, chart_figure, matrix_figure
-from lhpost6_pin.report.control_blocks import decibels, degrees
-from lhpost6_pin.report.iterate_plots import compare
-from lhpost6_pin.signals import rrmse
-from lhpost6_pin.sine import sine_test
-from lhpost6_pin.transfer import Transfer
-from lhpost6_pin.tuning import AxisTuning, Tuning, TuningStep
+from lhpost6_pin.show.report import write_iterate_report, write_sine_report, write_tune_report
+from lhpost6_pin.show.report.charts import Curve, Panel, XAxis, chart_figure, matrix_figure
+from lhpost6_pin.show.report.control_blocks import decibels, degrees
+from lhpost6_pin.show.report.iterate_plots import compare
+from lhpost6_pin.tuning.iterate import identify_inverse, iterate
+from lhpost6_pin.tuning.margins import LoopModel, Margin
+from lhpost6_pin.tuning.sine import sine_test
+from lhpost6_pin.tuning.tune import AxisTuning, Tuning, TuningStep
 
 DELAY = 0.006
 NO_NUMBER = re.compile(r"\b(nan|inf|none)\b", re.IGNORECASE)

@@ -11,7 +11,10 @@ from sensor_cases import measured
 from typer.testing import CliRunner
 
 from lhpost6_pin.cli import app
-from lhpost6_pin.decompose import (
+from lhpost6_pin.core.errors import RecordError, SimulationError
+from lhpost6_pin.data.records import load_record, open_record
+from lhpost6_pin.data.sensors import add_noise, load_sensors
+from lhpost6_pin.identification.decompose import (
     Agreement,
     Decomposed,
     decompose_record,
@@ -19,13 +22,10 @@ from lhpost6_pin.decompose import (
     find_work,
     save_ledger,
 )
-from lhpost6_pin.decompose.work import delivered_by
-from lhpost6_pin.errors import RecordError, SimulationError
-from lhpost6_pin.inverse_dynamics import leg_wrenches
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.records import load_record, open_record
-from lhpost6_pin.report import write_decompose_report
-from lhpost6_pin.sensors import add_noise, load_sensors
+from lhpost6_pin.identification.decompose.work import delivered_by
+from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
+from lhpost6_pin.show.report import write_decompose_report
+from lhpost6_pin.simulation.outputs import record_of_run
 
 PRACTICE = {name: DATA / "records" / f"practice_a_{name}.nc" for name in ("TX", "EQ_ridgecrest2019_ccc")}
 MACHINE = machine_named("lhpost6")

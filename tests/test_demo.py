@@ -7,9 +7,9 @@ import sys
 import pytest
 
 from lhpost6_pin import cli
-from lhpost6_pin.campaign import load_campaign
-from lhpost6_pin.demo import hidden_effect
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.data.campaign import load_campaign
+from lhpost6_pin.discovery.demonstration import hidden_effect
+from lhpost6_pin.machine.machine import load_machine
 
 
 def test_the_demonstration_finds_what_it_hides(tmp_path, monkeypatch, capsys):

@@ -11,40 +11,41 @@ import pytest
 from scipy.stats import multivariate_normal
 from typer.testing import CliRunner
 
-from lhpost6_pin.calibration import calibration_numbers
-from lhpost6_pin.calibration.errors import corrected_record
-from lhpost6_pin.calibration.prepare import Prepared, prepare_problem
-from lhpost6_pin.calibration.problem import Base
-from lhpost6_pin.calibration.spectra import real_bins
-from lhpost6_pin.campaign import Campaign, save_campaign, simulate_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.discover import Discovery, discover, verdict_entries
-from lhpost6_pin.discover.adding import _fit_jointly
-from lhpost6_pin.discover.candidates import Candidate, list_candidates, with_background, with_other_form
-from lhpost6_pin.discover.columns import columns_of
-from lhpost6_pin.discover.discover import discovery_numbers
-from lhpost6_pin.discover.left import Left, _hats
-from lhpost6_pin.discover.next_test import _trial
-from lhpost6_pin.discover.pairs import score_pairs
-from lhpost6_pin.discover.releases import block_of, list_releases
-from lhpost6_pin.discover.resume import make_bookmark
-from lhpost6_pin.discover.scores import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discover.screening import _by_rank, stand
-from lhpost6_pin.discover.search import _pruned, _without
-from lhpost6_pin.discover.state import Added, Contest, Scored, Standing
-from lhpost6_pin.discover.verdict import without_name
-from lhpost6_pin.discover.weighing import Lowered, Weighing, refusal, squares_by_column
-from lhpost6_pin.discover.where import gap_map, worst_spots
-from lhpost6_pin.discover.words import said
-from lhpost6_pin.errors import ParameterError, RecordError, UnknownNameError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.library import families, find_family
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.machine_toml import save_machine_toml
-from lhpost6_pin.parameters import load_parameters
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.sensors import Sensors, load_sensors
+from lhpost6_pin.core.errors import ParameterError, RecordError, UnknownNameError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.data.campaign import Campaign, save_campaign
+from lhpost6_pin.data.sensors import Sensors, load_sensors
+from lhpost6_pin.discovery import Discovery, discover, verdict_entries
+from lhpost6_pin.discovery.acceptance import Lowered, Weighing, refusal, squares_by_column
+from lhpost6_pin.discovery.add_effects import _fit_jointly
+from lhpost6_pin.discovery.candidate_columns import columns_of
+from lhpost6_pin.discovery.candidates import Candidate, list_candidates, with_background, with_other_form
+from lhpost6_pin.discovery.checkpoint import make_bookmark
+from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.localise import gap_map, worst_spots
+from lhpost6_pin.discovery.next_test import _trial
+from lhpost6_pin.discovery.pairs import score_pairs
+from lhpost6_pin.discovery.releases import block_of, list_releases
+from lhpost6_pin.discovery.residual_function import Left, _hats
+from lhpost6_pin.discovery.scores import Background, Block, Score, less_noise, make_block, score
+from lhpost6_pin.discovery.screening import _by_rank, stand
+from lhpost6_pin.discovery.search import _pruned, _without
+from lhpost6_pin.discovery.search_state import Added, Contest, Scored, Standing
+from lhpost6_pin.discovery.verdict import without_name
+from lhpost6_pin.discovery.verdict_summary import said
+from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration.prepare import Prepared, prepare_problem
+from lhpost6_pin.identification.calibration.problem import Base
+from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
+from lhpost6_pin.identification.calibration.whitened_residuals import real_bins
+from lhpost6_pin.machine.library import families, find_family
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.machine_toml import save_machine_toml
+from lhpost6_pin.machine.parameters import load_parameters
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 TESTS = ("TX", "TZ", "WN")
 

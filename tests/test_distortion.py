@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lhpost6_pin.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
+from lhpost6_pin.data.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
 
 RATE = 2048.0
 T = np.arange(round(12.3 * RATE)) / RATE

@@ -12,9 +12,9 @@ from doc_pages import PAGES, ROOT, Links, snippets
 
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.law_table import LAWS
-from lhpost6_pin.library import families
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.machine.library import families
+from lhpost6_pin.machine.machine import load_machine
 
 BY_HAND = sorted(PAGES.rglob("*.md"))
 RUN = ("bash", "python")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from lhpost6_pin.drives import check_circumstances, circumstances, load_drive, save_drive
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.tuning.drives import check_circumstances, circumstances, load_drive, save_drive
 
 
 @pytest.fixture(scope="module")

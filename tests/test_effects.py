@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from lhpost6_pin import stage
-from lhpost6_pin.effects import Effect, effect_table
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import ParameterError, UnknownNameError
-from lhpost6_pin.law_table import LAWS
-from lhpost6_pin.ledger import force_ledger
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.ports import PLATEN_PORTS
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.simulate import OpenLoop, Run, simulate
+from lhpost6_pin.core.errors import ParameterError, UnknownNameError
+from lhpost6_pin.effects import evaluate as stage
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.effects.table import effect_table
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.port_names import PLATEN_PORTS
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.simulation.ledger import force_ledger
+from lhpost6_pin.simulation.simulate import OpenLoop, Run, simulate
 
 DRAG = Effect("drag", "viscous", PLATEN_PORTS, tuple((1e3 * (k + 1),) for k in range(6)), "test")
 

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.engine_pinocchio import settle
-from lhpost6_pin.equilibrium import find_equilibrium, hydraulic_rows, rest_pressures
-from lhpost6_pin.errors import SimulationError
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.schemes import A
-from lhpost6_pin.simulate import ClosedLoop, simulate
-from lhpost6_pin.workspace import make_workspace
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium, hydraulic_rows, rest_pressures
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.mechanics.schemes import A
+from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
 
 MPA = 1e6
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 import pytest
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.errors import UnknownNameError
-from lhpost6_pin.files import shipped
-from lhpost6_pin.library import families, find_family
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import UnknownNameError
+from lhpost6_pin.core.files import shipped
+from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.machine.library import families, find_family
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.specimen import find_specimen
 from lhpost6_pin.motions import find_motion, list_motions
-from lhpost6_pin.sensors import load_sensors
-from lhpost6_pin.specimen import find_specimen
 
 LOOKED_UP = {
     "machine": (load_machine, list(shipped())),

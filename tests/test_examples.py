@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from test_scripts import PRACTICE, SCRIPTS, script
 
-from lhpost6_pin.check import check_record
-from lhpost6_pin.drives import load_drive
-from lhpost6_pin.library import find_family
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.records import load_record
+from lhpost6_pin.data.check import check_record
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.machine.library import find_family
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.tuning.drives import load_drive
 
 EXAMPLES = sorted(SCRIPTS.glob("example_*.py"))
 

@@ -8,9 +8,9 @@ from data_files import LABELS, binary_469d, header, sines, typical_channels
 from machine_cases import DATA
 
 from lhpost6_pin import cli
-from lhpost6_pin.errors import RecordError, UnknownNameError
-from lhpost6_pin.importing import export_record, guess_map, is_export, load_raw, make_imported_record
-from lhpost6_pin.records import LAYOUT, load_record, make_record
+from lhpost6_pin.core.errors import RecordError, UnknownNameError
+from lhpost6_pin.data.importing import export_record, guess_map, is_export, load_raw, make_imported_record
+from lhpost6_pin.data.records import LAYOUT, load_record, make_record
 
 PRACTICE = DATA / "records" / "practice_a_TX.nc"
 

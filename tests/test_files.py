@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from lhpost6_pin import files
-from lhpost6_pin.files import models_folder, refuse_folder, write_whole
+from lhpost6_pin.core import files
+from lhpost6_pin.core.files import models_folder, refuse_folder, write_whole
 
 
 def left_in(folder: Path) -> list[str]:

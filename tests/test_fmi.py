@@ -12,17 +12,16 @@ from machine_cases import machine_named
 from typer.testing import CliRunner
 
 from lhpost6_pin.cli import app
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import ParameterError, SimulationError
-from lhpost6_pin.fmi import export_fmu
-from lhpost6_pin.fmi.machine_file import load_machine_file, save_machine_file
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.names import AXES
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.running import RunningPlant
-from lhpost6_pin.schemes import SAMPLE_RATE
+from lhpost6_pin.core.errors import ParameterError, SimulationError
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.interfaces.fmi import export_fmu
+from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file, save_machine_file
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.simulation.running import RunningPlant
 
 builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu makes the FMU: pip install pythonfmu")
 fmpy = pytest.importorskip("fmpy", reason="FMPy runs the FMU: pip install fmpy")

@@ -5,15 +5,15 @@ import pytest
 from machine_cases import plant_named
 from sensor_cases import RATE, measured
 
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.fusion import fuse_motion, kinematic_jacobian
-from lhpost6_pin.inverse_dynamics import march_states
-from lhpost6_pin.kinematics import pose_jacobian
-from lhpost6_pin.port_path import ports_along
-from lhpost6_pin.pose import PlatenMotion, plant_motion
-from lhpost6_pin.records import make_record
-from lhpost6_pin.sensors import add_noise, load_sensors
-from lhpost6_pin.signals import Band
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.fusion import fuse_motion, kinematic_jacobian
+from lhpost6_pin.data.records import make_record
+from lhpost6_pin.data.sensors import add_noise, load_sensors
+from lhpost6_pin.data.signals import Band
+from lhpost6_pin.identification.inverse_dynamics import march_states
+from lhpost6_pin.mechanics.kinematics import pose_jacobian
+from lhpost6_pin.mechanics.port_path import ports_along
+from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
 
 SENSORS = load_sensors()
 DT = 1 / RATE

@@ -31,15 +31,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lhpost6_pin import cli
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import LhpostError
-from lhpost6_pin.importing import load_raw
-from lhpost6_pin.link import ServedPlant, client
-from lhpost6_pin.link.clock import SECOND
-from lhpost6_pin.link.protocol import Frame, Kind, Mode, Welcome, decode, encode
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import LhpostError
+from lhpost6_pin.data.importing import load_raw
+from lhpost6_pin.interfaces.link import ServedPlant, client
+from lhpost6_pin.interfaces.link.clock import SECOND
+from lhpost6_pin.interfaces.link.protocol import Frame, Kind, Mode, Welcome, decode, encode
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import load_motion, make_target
-from lhpost6_pin.plant import make_plant
 
 BY_NAME = {reader.name: reader for reader in READERS}
 CHECKS = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large, HealthCheck.large_base_example]

@@ -13,8 +13,8 @@ from data_files import LABELS, binary_469d, header, raw, sines, text_469d, typic
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from lhpost6_pin.errors import LhpostError, RecordError
-from lhpost6_pin.importing import (
+from lhpost6_pin.core.errors import LhpostError, RecordError
+from lhpost6_pin.data.importing import (
     ChannelMap,
     Source,
     TestFacts,
@@ -24,8 +24,8 @@ from lhpost6_pin.importing import (
     make_imported_record,
     save_map,
 )
-from lhpost6_pin.importing.units import quantity_unit, si_factor, unit_in_name
-from lhpost6_pin.records import load_record, save_record
+from lhpost6_pin.data.importing.channel_units import quantity_unit, si_factor, unit_in_name
+from lhpost6_pin.data.records import load_record, save_record
 
 SINGLE = 2.0**-24  # relative: the rounding of a float32
 VALUES = sines(400, 3)

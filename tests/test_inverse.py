@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.inverse import TAPER, InverseFilter, apply_inverse, load_inverse, make_inverse, save_inverse
-from lhpost6_pin.signals import align, rrmse
-from lhpost6_pin.transfer import Transfer, estimate_transfer
+from lhpost6_pin.control.inverse import TAPER, InverseFilter, apply_inverse, load_inverse, make_inverse, save_inverse
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.signals import align, rrmse
+from lhpost6_pin.data.transfer import Transfer, estimate_transfer
 
 RATE = 256.0
 LOW, HIGH = 0.5, 30.0

@@ -5,14 +5,14 @@ import pytest
 from inverse_cases import RATE, forces_of, friction_columns, motion_of, shaken
 from machine_cases import DATA, machine_named
 
-from lhpost6_pin.errors import RecordError, SimulationError
-from lhpost6_pin.inverse_dynamics import Decomposition, inverse_dynamics, leg_wrenches, march_states
-from lhpost6_pin.ledger import force_ledger
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.port_path import ports_along
-from lhpost6_pin.pose import PlatenMotion, plant_motion
-from lhpost6_pin.residuals import Measured, evaluate_residuals
-from lhpost6_pin.simulate import Run
+from lhpost6_pin.core.errors import RecordError, SimulationError
+from lhpost6_pin.identification.inverse_dynamics import Decomposition, inverse_dynamics, leg_wrenches, march_states
+from lhpost6_pin.identification.residuals import Measured, evaluate_residuals
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.port_path import ports_along
+from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
+from lhpost6_pin.simulation.ledger import force_ledger
+from lhpost6_pin.simulation.simulate import Run
 
 
 @pytest.fixture(scope="module")

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from lhpost6_pin import identify as identify_module
-from lhpost6_pin import iterate as module
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.errors import SimulationError
-from lhpost6_pin.identify import tuning_numbers
-from lhpost6_pin.iterate import Iteration, identify_inverse, iterate
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.parameters import override_parameters
+from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.parameters import override_parameters
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.simulate import ClosedLoop, simulate
+from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
+from lhpost6_pin.tuning import identify as identify_module
+from lhpost6_pin.tuning import iterate as module
+from lhpost6_pin.tuning.identify import tuning_numbers
+from lhpost6_pin.tuning.iterate import Iteration, identify_inverse, iterate
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from machine_cases import DATA
 
 from lhpost6_pin import cli
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plain import as_json, plain
+from lhpost6_pin.core.jsonable import as_json, plain
+from lhpost6_pin.machine.machine import load_machine
 
 PRACTICE = DATA / "records" / "practice_a_TX.nc"
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"

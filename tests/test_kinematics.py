@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from machine_cases import FREE_MACHINES, MACHINES, machine_named, platen_se3, random_poses
 
-from lhpost6_pin import kinematics as kin
-from lhpost6_pin.errors import SimulationError
-from lhpost6_pin.rigid_body import make_model
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics.rigid_body import make_model
 
 LHPOST6 = machine_named("lhpost6")
 POSES = random_poses(LHPOST6, 24)

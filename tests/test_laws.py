@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from lhpost6_pin.energy import row_power
-from lhpost6_pin.law_table import LAWS
+from lhpost6_pin.effects.evaluate import advance_states, apply_forces, state_rates
+from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.laws import bouc_wen, chamber, orifice, strut, viscous
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.stage import advance_states, apply_forces, state_rates
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.simulation.energy import row_power
 
 RNG_DRAWS = 200
 TIGHT = dict(rtol=1e-12, atol=1e-12, method="DOP853")

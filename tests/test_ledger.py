@@ -7,18 +7,20 @@ import pinocchio as pin
 import pytest
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.energy import CREATED, Audit, energy_audit
-from lhpost6_pin.engine_pinocchio import make_stepper, settle
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import UnknownNameError
-from lhpost6_pin.ledger import Ledger, force_ledger
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.ports import evaluate_ports, platen_pose
-from lhpost6_pin.schemes import A, V
-from lhpost6_pin.simulate import SAMPLE_RATE, ClosedLoop, OpenLoop, Run, simulate
-from lhpost6_pin.workspace import make_workspace
+from lhpost6_pin.core.errors import UnknownNameError
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.ports import evaluate_ports, platen_pose
+from lhpost6_pin.mechanics.schemes import A, V
+from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.energy import CREATED, Audit, energy_audit
+from lhpost6_pin.simulation.engine_pinocchio import make_stepper
+from lhpost6_pin.simulation.ledger import Ledger, force_ledger
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, Run, simulate
 
 CONSERVING = {
     "machine.thrust": "normal",

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from lhpost6_pin.discover.formula import sparse_formula
-from lhpost6_pin.discover.left import Left, _state, with_unnamed
-from lhpost6_pin.effects import Effect, effect_table
-from lhpost6_pin.law_table import NODES
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.machine_toml import save_machine_toml
-from lhpost6_pin.stage_added import advance_added, apply_added
+from lhpost6_pin.discovery.formula import sparse_formula
+from lhpost6_pin.discovery.residual_function import Left, _state, with_unnamed
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.evaluate_added import advance_added, apply_added
+from lhpost6_pin.effects.registry import NODES
+from lhpost6_pin.effects.table import effect_table
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.machine_toml import save_machine_toml
 
 X = np.linspace(-0.2, 0.3, NODES)
 

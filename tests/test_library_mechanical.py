@@ -15,24 +15,26 @@ from library_cases import measured_of, record_at_model_steps, rms, shaken
 from machine_cases import frame_array, machine_named, random_poses
 from scipy.integrate import solve_ivp
 
-from lhpost6_pin import stage_added
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.energy import row_power
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import ParameterError
-from lhpost6_pin.inverse_dynamics import inverse_dynamics
-from lhpost6_pin.law_table import LAWS, NODES
-from lhpost6_pin.law_table import PORTS as ROW_PORTS
-from lhpost6_pin.laws import backlash, ball, bouc_wen, dahl, friction, gas, oscillator, spring, strut, table
-from lhpost6_pin.ledger import force_ledger
-from lhpost6_pin.library import families, find_family
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.ports import SWIVEL_TURNS, evaluate_ports, port_names
-from lhpost6_pin.residuals import evaluate_residuals, follow
-from lhpost6_pin.rigid_body import platen_inertia
-from lhpost6_pin.simulate import OpenLoop, simulate
-from lhpost6_pin.stage import advance_states, apply_forces, state_rates
+from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.effects import evaluate_added as stage_added
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.evaluate import advance_states, apply_forces, state_rates
+from lhpost6_pin.effects.registry import LAWS, NODES
+from lhpost6_pin.effects.registry import PORTS as ROW_PORTS
+from lhpost6_pin.identification.inverse_dynamics import inverse_dynamics
+from lhpost6_pin.identification.residuals import evaluate_residuals, follow
+from lhpost6_pin.laws import backlash, ball, bouc_wen, dahl, friction, gas, oscillator, spring, strut
+from lhpost6_pin.laws import tabulated as table
+from lhpost6_pin.machine.library import families, find_family
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.port_names import SWIVEL_TURNS, port_names
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.ports import evaluate_ports
+from lhpost6_pin.mechanics.rigid_body import platen_inertia
+from lhpost6_pin.simulation.energy import row_power
+from lhpost6_pin.simulation.ledger import force_ledger
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 # ------------------------------------------------------------------------------------------------- laws
 GAS = (15e6, 0.15, 2.0, 1.7)
@@ -376,7 +378,7 @@ def with_family(family: str) -> Machine:
 def test_every_mechanical_family_is_tried_here() -> None:
     import tomllib
 
-    from lhpost6_pin.files import models_folder
+    from lhpost6_pin.core.files import models_folder
 
     stated = set()
     for file in ("mechanical.toml", "unnamed.toml"):
@@ -558,7 +560,7 @@ def test_friction_under_load_grows_with_the_measured_force() -> None:
 def test_swivels_turn_as_the_rod_does(name: str) -> None:
     """Rates of a unit vector along the rod, by differences, and the moment of a force across it."""
     machine = machine_named(name)
-    plant, names = make_plant(machine), port_names(machine)
+    plant, names = make_plant(machine), port_names(machine.actuators, machine.struts)
     h = 1e-6
     rng = np.random.default_rng(3)
     for pose in random_poses(machine, 8):

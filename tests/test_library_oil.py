@@ -11,28 +11,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from lhpost6_pin import oil
-from lhpost6_pin import supply as common
-from lhpost6_pin.alignment import due_spools
-from lhpost6_pin.alterations import supply_numbers
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.effects import Effect, effect_table, state_names
-from lhpost6_pin.energy import row_power
-from lhpost6_pin.equilibrium import find_equilibrium, hydraulic_rows
-from lhpost6_pin.errors import ParameterError
-from lhpost6_pin.law_table import HYDRAULIC_DOUBLE, LAWS
+from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.data.alignment import due_spools
+from lhpost6_pin.data.signals import lag
+from lhpost6_pin.effects import actuator as oil
+from lhpost6_pin.effects import supply as common
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.evaluate import advance_states, state_rates
+from lhpost6_pin.effects.modifiers import supply_numbers
+from lhpost6_pin.effects.registry import HYDRAULIC_DOUBLE, LAWS
+from lhpost6_pin.effects.table import effect_table, state_names
+from lhpost6_pin.identification.residuals import Measured, Residuals, evaluate_residuals
 from lhpost6_pin.laws import bulk, chamber, leaks, lines, orifice, play, spool
-from lhpost6_pin.library import families
-from lhpost6_pin.library.oil import BUILD
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.residuals import Measured, Residuals, evaluate_residuals
-from lhpost6_pin.schemes import spool_windows
-from lhpost6_pin.signals import lag
-from lhpost6_pin.simulate import ClosedLoop, OpenLoop, Run, simulate
-from lhpost6_pin.stage import advance_states, state_rates
+from lhpost6_pin.machine.library import families
+from lhpost6_pin.machine.library.oil_families import BUILD
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium, hydraulic_rows
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.mechanics.schemes import spool_windows
+from lhpost6_pin.simulation.energy import row_power
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, Run, simulate
 
 _P, _X, _PART = (-1e5, 22e6), (-1.0, 1.0), (0.0, 1.0)
 KERNELS = (

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from lhpost6_pin import cli
-from lhpost6_pin.link import Mode, ServedPlant, open_socket, serve
-from lhpost6_pin.records import load_record
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.interfaces.link import Mode, ServedPlant, open_socket, serve
 
 SERVE = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {!r}; main()"
 SHORT = (

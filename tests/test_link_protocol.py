@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lhpost6_pin.errors import LhpostError, LinkError, UnknownNameError
-from lhpost6_pin.link.protocol import (
+from lhpost6_pin.core.errors import LhpostError, LinkError, UnknownNameError
+from lhpost6_pin.interfaces.link.protocol import (
     COUNTS,
     Frame,
     Kind,

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.control.plug import Sensors
-from lhpost6_pin.link.protocol import COUNTS, Frame, Kind, Mode, PlantState, decode, encode
-from lhpost6_pin.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
-from lhpost6_pin.link.statistics import Counts, Histogram
+from lhpost6_pin.interfaces.link.protocol import COUNTS, Frame, Kind, Mode, PlantState, decode, encode
+from lhpost6_pin.interfaces.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
+from lhpost6_pin.interfaces.link.statistics import Counts, Histogram
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.running import RunningPlant
+from lhpost6_pin.simulation.running import RunningPlant
 
 SECOND = 10**9
 MODES = list(Mode)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import LinkError, SimulationError
-from lhpost6_pin.link import (
+from lhpost6_pin.core.errors import LinkError, SimulationError
+from lhpost6_pin.data.records import load_record, save_record
+from lhpost6_pin.interfaces.link import (
     HOST,
     Kind,
     LinkClient,
@@ -26,11 +26,11 @@ from lhpost6_pin.link import (
     run_over_link,
     serve,
 )
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import load_record, save_record
-from lhpost6_pin.simulate import ClosedLoop, PluggedLoop, simulate
+from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
 MODES = list(Mode)
 MOVING = [Mode.REAL_TIME, Mode.FREE]

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from machine_cases import DATA, MACHINES, machine_named, plant_named
 
-from lhpost6_pin import kinematics as kin
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import ParameterError, SimulationError, UnknownNameError
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import platen_motion
-from lhpost6_pin.schemes import SCHEMES
-from lhpost6_pin.simulate import ENGINES, OpenLoop, simulate
+from lhpost6_pin.core.errors import ParameterError, SimulationError, UnknownNameError
+from lhpost6_pin.core.names import ENGINES, SCHEMES
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 LHPOST6 = machine_named("lhpost6")
 G = 9.80665

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.identify import identify, noise_target
-from lhpost6_pin.linearize import oil_column_modes
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.margins import FREQUENCIES, _margin, expected_response, loop_gain, make_loop_model, margins
-from lhpost6_pin.names import AXES
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.transfer import band
-from lhpost6_pin.tuning import stays_stable
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.transfer import band
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.linearize import oil_column_modes
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.tuning.identify import identify, noise_target
+from lhpost6_pin.tuning.margins import FREQUENCIES, _margin, expected_response, loop_gain, make_loop_model, margins
+from lhpost6_pin.tuning.tune import stays_stable
 
 
 @pytest.fixture(scope="module")

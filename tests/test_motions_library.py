@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from motions_files import csmip_text
 
-from lhpost6_pin.errors import MotionError, UnknownNameError
-from lhpost6_pin.files import models_folder
+from lhpost6_pin.core.errors import MotionError, UnknownNameError
+from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.motions import (
     find_motion,
     list_motions,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lhpost6_pin.errors import MotionError, OutOfRangeError
+from lhpost6_pin.core.errors import MotionError, OutOfRangeError
 from lhpost6_pin.motions import (
     AXES,
     GroundMotion,

@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from motions_files import at2_text, cosmos_text, csmip_text
 
-from lhpost6_pin.errors import MotionError
+from lhpost6_pin.core.errors import MotionError
 from lhpost6_pin.motions import AXES, GroundMotion, load_at2, load_csv, load_motion, load_v1
-from lhpost6_pin.motions.units import to_si
+from lhpost6_pin.motions.motion_units import to_si
 
 GRAVITY = 9.80665
 WAVE = 0.3 * np.sin(np.arange(203) / 7)

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from machine_cases import DATA, machine_named
 
-from lhpost6_pin.check import check_dataset
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.kinematics import inverse_kinematics
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.records import layout_faults, load_record, save_record
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.kinematics import inverse_kinematics
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import layout_faults, load_record, save_record
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.simulate import SAMPLE_RATE, OpenLoop, simulate
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 
 @pytest.fixture(scope="module")

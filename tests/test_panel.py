@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lhpost6_pin.control import ControllerSettings, Notch, load_controller, save_controller
-from lhpost6_pin.errors import ParameterError, UnknownNameError
-from lhpost6_pin.files import models_folder
+from lhpost6_pin.core.errors import ParameterError, UnknownNameError
+from lhpost6_pin.core.files import models_folder
 
 PANELS = models_folder() / "controllers"
 TEXT = (PANELS / "lhpost6.toml").read_text(encoding="utf-8")

@@ -10,10 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from machine_cases import DATA
 
-from lhpost6_pin.errors import LhpostError, ParameterError, UnknownNameError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.parameters import EVIDENCE, Quantity, load_parameters, override_parameters, to_unit
+from lhpost6_pin.core.errors import LhpostError, ParameterError, UnknownNameError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.parameters import EVIDENCE, Quantity, load_parameters, override_parameters, to_unit
 
 SHIPPED = [p.stem for p in sorted(models_folder().glob("*.toml"))]
 FILES = [*SHIPPED, str(DATA / "stewart.toml")]

@@ -14,17 +14,17 @@ from typer.testing import CliRunner
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import Controller, load_controller, make_controller
 from lhpost6_pin.control.plug import checked_command, is_plugged, load_plugged
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import ControllerError, SimulationError
-from lhpost6_pin.linearize import oil_column_modes
-from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.core.errors import ControllerError, SimulationError
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.data.signals import align, delay, lowpass_zero_phase, rrmse
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.linearize import oil_column_modes
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.names import AXES
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import load_record
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.signals import align, delay, lowpass_zero_phase, rrmse
-from lhpost6_pin.simulate import SAMPLE_RATE, ClosedLoop, PluggedLoop, simulate
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 

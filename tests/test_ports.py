@@ -7,17 +7,22 @@ import pinocchio as pin
 import pytest
 from machine_cases import MACHINES, frame_array, machine_named, plant_named, random_poses
 
-from lhpost6_pin import kinematics as kin
-from lhpost6_pin import ports
-from lhpost6_pin.ports import PLATEN_PORTS, SWIVEL_TURNS, evaluate_ports, platen_pose, port_names
+from lhpost6_pin.machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics import ports
+from lhpost6_pin.mechanics.ports import evaluate_ports, platen_pose
 
 ROUNDING = 1e-13  # some ten operations on numbers below 10 in double precision
 CASES = [(name, thrust) for name in MACHINES for thrust in ("report", "normal")]
 
 
+def names_of(machine):
+    return port_names(machine.actuators, machine.struts)
+
+
 def ports_at(plant, pose, evaluate=evaluate_ports):
     """S (n,), J (n, 6), B (n, 6) of all ports at a pose."""
-    n = len(port_names(plant.machine))  # a plant's own arrays may leave the platen ports out
+    n = len(names_of(plant.machine))  # a plant's own arrays may leave the platen ports out
     s, J, B = np.full(n, np.nan), np.full((n, 6), np.nan), np.full((n, 6), np.nan)
     evaluate(frame_array(plant.machine, pose), plant.legs, plant.body, s, J, B)
     return s, J, B
@@ -25,7 +30,7 @@ def ports_at(plant, pose, evaluate=evaluate_ports):
 
 def platen_rows(machine):
     """Where the platen's six ports are."""
-    first = port_names(machine).index("platen.x")
+    first = names_of(machine).index("platen.x")
     return slice(first, first + 6)
 
 
@@ -36,13 +41,13 @@ def row_of_force(machine, pose, at, force):
 
 
 def test_port_names_are_legs_pads_platen_and_swivels_in_that_order():
-    names = port_names(machine_named("lhpost6"))
+    names = names_of(machine_named("lhpost6"))
     assert names[:13] == ("H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6", "S1", "S2", "S3")
     assert names[13:17] == ("V1.x", "V1.y", "V2.x", "V2.y")
     assert names[25:31] == PLATEN_PORTS
     assert names[31:] == tuple(f"H{i}.{turn}" for i in range(1, 5) for turn in SWIVEL_TURNS)
     legs = [f"L{i}" for i in range(1, 7)]
-    assert port_names(machine_named("stewart"))[:12] == (*legs, *PLATEN_PORTS)
+    assert names_of(machine_named("stewart"))[:12] == (*legs, *PLATEN_PORTS)
 
 
 @pytest.mark.parametrize("name, thrust", CASES)
@@ -67,7 +72,7 @@ def test_force_columns_are_motion_rows_but_for_the_reports_vertical_thrust_and_p
     machine, plant = machine_named(name, thrust), plant_named(name, thrust)
     for pose in random_poses(machine, 12):
         _, J, B = ports_at(plant, pose)
-        for port, row, column in zip(port_names(machine), J, B, strict=True):
+        for port, row, column in zip(names_of(machine), J, B, strict=True):
             bearing = port.split(".")[0] in {a.name for a in machine.actuators if a.mount == "bearing"}
             if not bearing or (thrust == "normal" and "." not in port):
                 assert np.allclose(row, column, rtol=0.0, atol=ROUNDING), port
@@ -86,7 +91,7 @@ def test_pad_rows_are_the_reports_slip_and_friction():
             slip = np.array([kin.slip_velocity(machine, pose, bearing, b_J @ unit) for unit in np.eye(6)]).T
             moved = frame.rotation.T @ (turn @ bearing.platen_point - at)
             for k, d in enumerate("xy"):
-                i = port_names(machine).index(f"{bearing.name}.{d}")
+                i = names_of(machine).index(f"{bearing.name}.{d}")
                 assert np.allclose(J[i], kin.to_pinocchio_order(slip[k]), rtol=0.0, atol=ROUNDING)
                 column = row_of_force(machine, pose, at, frame.rotation[:, k])
                 assert np.allclose(B[i], column, rtol=0.0, atol=ROUNDING)
@@ -133,7 +138,7 @@ def test_leg_coordinates_change_at_the_rate_of_their_rows(name):
             moved = placement * pin.exp6(pin.Motion(step * twist))
             there = frame.copy()
             there[:3], there[3] = moved.rotation, moved.translation
-            s = np.zeros(len(port_names(machine)))
+            s = np.zeros(len(names_of(machine)))
             evaluate_ports(there, plant.legs, plant.body, s, np.zeros((s.size, 6)), np.zeros((s.size, 6)))
             s_at.append(s)
         rate = (s_at[0] - s_at[1]) / (2.0 * h)

@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 from machine_cases import MACHINES, machine_named, plant_named, random_poses, smooth_motion
 
-from lhpost6_pin import kinematics as kin
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.pose import (
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics.pose import (
     PlatenMotion,
     forward_kinematics,
     frame_of_pose,

@@ -7,7 +7,7 @@ import pytest
 
 from lhpost6_pin import __version__
 from lhpost6_pin.cli import app
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.machine.machine import load_machine
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

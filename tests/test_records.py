@@ -10,10 +10,10 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lhpost6_pin import records
-from lhpost6_pin.check import check_record
-from lhpost6_pin.errors import RecordError, UnknownNameError
-from lhpost6_pin.records import (
+from lhpost6_pin.core.errors import RecordError, UnknownNameError
+from lhpost6_pin.data import records
+from lhpost6_pin.data.check import check_record
+from lhpost6_pin.data.records import (
     AXES,
     LAYOUT,
     channel_name,

@@ -8,16 +8,17 @@ import pytest
 from machine_cases import DATA, machine_named
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import ControllerError, OutOfRangeError, ParameterError, RecordError, SimulationError
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import ControllerError, OutOfRangeError, ParameterError, RecordError, SimulationError
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
+from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.schemes import spool_windows
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.records import load_record, make_record
-from lhpost6_pin.rehearse import rehearse, replay, target_within_limits
-from lhpost6_pin.schemes import spool_windows
-from lhpost6_pin.signals import rrmse
-from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
+from lhpost6_pin.simulation.rehearse import rehearse, replay, target_within_limits
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 RECORDS = DATA / "records"
 

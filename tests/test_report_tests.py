@@ -9,9 +9,9 @@ from motions_files import at2_text, csmip_text
 
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli
-from lhpost6_pin.errors import MotionError
+from lhpost6_pin.core.errors import MotionError
+from lhpost6_pin.data.records import load_record
 from lhpost6_pin.motions import find_motion, list_motions, load_motion
-from lhpost6_pin.records import load_record
 
 READY = ("ac156", "tx5", "ty4", "tz4", "sxh1")
 PACKAGE = ("tcu065", "rrs")

@@ -17,18 +17,18 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.special import ellipk
 
-from lhpost6_pin import kinematics as kin
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.engine_fused import inertia_table, platen_acceleration
-from lhpost6_pin.errors import ParameterError, SimulationError
-from lhpost6_pin.law_table import LAWS
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.platen_steps import integrate_platen, platen_difference
-from lhpost6_pin.ports import PLATEN_PORTS
-from lhpost6_pin.rigid_body import lumped_inertia, make_model, platen_inertia
-from lhpost6_pin.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
-from lhpost6_pin.stage import wrench_on_platen
-from lhpost6_pin.workspace import make_workspace
+from lhpost6_pin.core.errors import ParameterError, SimulationError
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.evaluate import wrench_on_platen
+from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.machine.port_names import PLATEN_PORTS
+from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.platen_steps import integrate_platen, platen_difference
+from lhpost6_pin.mechanics.rigid_body import lumped_inertia, make_model, platen_inertia
+from lhpost6_pin.mechanics.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
+from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.engine_fused import inertia_table, platen_acceleration
 
 PENDULUM = DATA / "pendulum.urdf"
 BOB, ARM, BOB_INERTIA, POST = 500.0, 2.0, 25.0, 200.0  # of pendulum.urdf: kg, m, kg m2 about Y, kg

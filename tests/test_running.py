@@ -5,14 +5,14 @@ import pytest
 from machine_cases import DATA, plant_named
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import SimulationError
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.names import SAMPLE_RATE, SCHEMES
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.running import RunningPlant
-from lhpost6_pin.schemes import SAMPLE_RATE, SCHEMES
-from lhpost6_pin.simulate import ClosedLoop, simulate
+from lhpost6_pin.simulation.running import RunningPlant
+from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
 
 N = 1024
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from machine_cases import DATA, machine_named
 
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.schemes import SCHEMES
-from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, OpenLoop, simulate
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 PRACTICE = DATA / "records" / "practice_a_TX.nc"

@@ -7,15 +7,15 @@ import pytest
 import xarray as xr
 from sensor_cases import measured
 
-from lhpost6_pin.campaign import simulate_campaign
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.discover.discover import discovery_numbers
-from lhpost6_pin.discover.lost_motion import LostMotion, _groups, lost_motion
-from lhpost6_pin.discover.sensing import put_right, wrong_sensors
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import Plant
-from lhpost6_pin.sensors import add_noise, load_sensors
-from lhpost6_pin.signals import align
+from lhpost6_pin.data.sensors import add_noise, load_sensors
+from lhpost6_pin.data.signals import align
+from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.lost_motion import LostMotion, _groups, lost_motion
+from lhpost6_pin.discovery.sensor_findings import put_right, wrong_sensors
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import Plant
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 SENSORS = load_sensors()
 

@@ -5,10 +5,10 @@ import pytest
 import xarray as xr
 from scipy.signal import welch
 
-from lhpost6_pin.errors import ParameterError, UnknownNameError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.records import LAYOUT, make_record
-from lhpost6_pin.sensors import GROUPS, add_noise, estimate_noise, find_rest, load_sensors, spectrum
+from lhpost6_pin.core.errors import ParameterError, UnknownNameError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.data.records import LAYOUT, make_record
+from lhpost6_pin.data.sensors import GROUPS, add_noise, estimate_noise, find_rest, load_sensors, spectrum
 
 SENSORS = load_sensors()
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from lhpost6_pin import cli
-from lhpost6_pin.cli import live
+from lhpost6_pin.cli import live_view as live
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.link.protocol import Frame, Kind, Mode, encode
-from lhpost6_pin.link.served import ServedPlant
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
+from lhpost6_pin.interfaces.link.protocol import Frame, Kind, Mode, encode
+from lhpost6_pin.interfaces.link.served import ServedPlant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.outputs import record_of_run
-from lhpost6_pin.schemes import SAMPLE_RATE
-from lhpost6_pin.sight import EVERY, Sight
-from lhpost6_pin.simulate import ENGINES, ClosedLoop, simulate
-from lhpost6_pin.viewer import LiveView
+from lhpost6_pin.show.viewer import LiveView
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
+from lhpost6_pin.simulation.snapshot import EVERY, Sight
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lhpost6_pin.signals import (
+from lhpost6_pin.data.signals import (
     Band,
     align,
     correlation,

@@ -8,21 +8,23 @@ import numpy as np
 import pytest
 from machine_cases import DATA
 
-from lhpost6_pin.batch import simulate_many
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.engine_pinocchio import make_stepper, settle
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.errors import SimulationError, UnknownNameError
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import make_plant
-from lhpost6_pin.pose import PlatenMotion, platen_motion
-from lhpost6_pin.records import load_record
-from lhpost6_pin.rehearse import replay
-from lhpost6_pin.schemes import SCHEMES, spool_windows
-from lhpost6_pin.signals import rrmse
-from lhpost6_pin.simulate import ENGINES, SAMPLE_RATE, ClosedLoop, OpenLoop, fastest_engine, simulate
-from lhpost6_pin.workspace import make_workspace
+from lhpost6_pin.core.errors import SimulationError, UnknownNameError
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import PlatenMotion, platen_motion
+from lhpost6_pin.mechanics.schemes import spool_windows
+from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.batch import simulate_many
+from lhpost6_pin.simulation.engine_pinocchio import make_stepper
+from lhpost6_pin.simulation.rehearse import replay
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate
 
 REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
 PENDULUM = DATA / "pendulum.urdf"

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lhpost6_pin import identify as identify_module
-from lhpost6_pin import sine as module
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.errors import SimulationError
-from lhpost6_pin.identify import tuning_numbers
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.parameters import override_parameters
-from lhpost6_pin.schemes import SAMPLE_RATE
-from lhpost6_pin.sine import sine_target, sine_test, with_cancellers
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.parameters import override_parameters
+from lhpost6_pin.tuning import identify as identify_module
+from lhpost6_pin.tuning import sine as module
+from lhpost6_pin.tuning.identify import tuning_numbers
+from lhpost6_pin.tuning.sine import sine_target, sine_test, with_cancellers
 
 QUICK = {"sine.time_constant": 1.5, "sine.harmonics": 15.0, "sine.settling": 6.0}
 

@@ -5,9 +5,9 @@ import pytest
 from typer.testing import CliRunner
 
 from lhpost6_pin.cli import app
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.plant import Plant, make_plant
-from lhpost6_pin.specimen_joints import joints_beyond, specimen_doubts, specimen_joints, specimen_positions
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import Plant, make_plant
+from lhpost6_pin.mechanics.specimen_joints import joints_beyond, specimen_doubts, specimen_joints, specimen_positions
 
 URDF = """<robot name="tower">
   <link name="base">

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from lhpost6_pin.errors import UnknownNameError
-from lhpost6_pin.names import AXES
-from lhpost6_pin.signals import align
-from lhpost6_pin.transfer import Transfer, band, band_within, delay_of, estimate_transfer
+from lhpost6_pin.core.errors import UnknownNameError
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.signals import align
+from lhpost6_pin.data.transfer import Transfer, band, band_within, delay_of, estimate_transfer
 
 RATE = 256.0
 DELAY = 5  # samples

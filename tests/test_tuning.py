@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from machine_cases import DATA
 
-from lhpost6_pin import identify, tuning
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.errors import SimulationError
-from lhpost6_pin.identify import noise_target, tuning_numbers
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.names import AXES
-from lhpost6_pin.parameters import override_parameters
-from lhpost6_pin.transfer import Transfer
-from lhpost6_pin.tuning import stays_stable, tune
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.transfer import Transfer
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.parameters import override_parameters
+from lhpost6_pin.tuning import identify
+from lhpost6_pin.tuning import tune as tuning
+from lhpost6_pin.tuning.identify import noise_target, tuning_numbers
+from lhpost6_pin.tuning.tune import stays_stable, tune
 
 SHORT = {"noise.duration": 32.0, "noise.slow_duration": 80.0, "feedforward_targets.rounds": 2.0}
 

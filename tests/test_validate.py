@@ -10,24 +10,25 @@ import xarray as xr
 from machine_cases import DATA
 from typer.testing import CliRunner
 
-from lhpost6_pin.campaign import Campaign, SensorErrors, as_sensed, load_campaign, save_campaign
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.errors import RecordError
-from lhpost6_pin.identify import noise_target
-from lhpost6_pin.linearize import oil_column_modes
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.data.signals import Band, align, resample_band_limited
+from lhpost6_pin.identification.validation import PHASES, Pair, metrics, validate
+from lhpost6_pin.identification.validation.metrics import validation_numbers
+from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
+from lhpost6_pin.identification.validation.resonance import find_peak
+from lhpost6_pin.identification.validation.valve_agreement import find_valves
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.records import load_record
-from lhpost6_pin.rehearse import rehearse
-from lhpost6_pin.report.validate_report import write_validate_report
-from lhpost6_pin.sensors import load_sensors
-from lhpost6_pin.signals import Band, align, resample_band_limited
-from lhpost6_pin.validation import PHASES, Pair, metrics, validate
-from lhpost6_pin.validation.agreement import MOTIONS, agree
-from lhpost6_pin.validation.numbers import validation_numbers
-from lhpost6_pin.validation.resonance import find_peak
-from lhpost6_pin.validation.valves import find_valves
+from lhpost6_pin.show.report.validate_report import write_validate_report
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulated_campaign import SensorErrors, as_sensed
+from lhpost6_pin.tuning.identify import noise_target
 
 
 def triangle(axis="x"):

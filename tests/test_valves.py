@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from lhpost6_pin.control.valves import flow_curves, per_actuator, per_valve, valve_counts, valve_names
 from lhpost6_pin.laws.orifice import opening, port_flow
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.machine.machine import load_machine
 
 ONE, TWO = (load_machine().with_valves(valves) for valves in (1, 2))
 COUNTS, CURVES = valve_counts(TWO), flow_curves(TWO)

@@ -22,12 +22,12 @@ from hypothesis import strategies as st
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin import cli
-from lhpost6_pin.bodies import body_name, body_poses, joint_positions, load_bodies
-from lhpost6_pin.errors import LhpostError, ParameterError, RecordError
-from lhpost6_pin.records import AXES, load_record, make_record
-from lhpost6_pin.specimen_bodies import load_specimen_bodies
-from lhpost6_pin.urdf import legs
-from lhpost6_pin.viewer import (
+from lhpost6_pin.core.errors import LhpostError, ParameterError, RecordError
+from lhpost6_pin.data.records import AXES, load_record, make_record
+from lhpost6_pin.show.bodies import body_name, body_poses, joint_positions, load_bodies
+from lhpost6_pin.show.specimen_bodies import load_specimen_bodies
+from lhpost6_pin.show.urdf import legs
+from lhpost6_pin.show.viewer import (
     Look,
     LoopbackWindow,
     Recorder,
@@ -36,10 +36,10 @@ from lhpost6_pin.viewer import (
     record_frames,
     show_record,
 )
-from lhpost6_pin.viewer.animation import draw_animation
-from lhpost6_pin.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
-from lhpost6_pin.viewer.frames import Ghost
-from lhpost6_pin.viewer.scene import draw_machine, draw_names
+from lhpost6_pin.show.viewer.animation import draw_animation
+from lhpost6_pin.show.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
+from lhpost6_pin.show.viewer.frames import Ghost
+from lhpost6_pin.show.viewer.scene import draw_machine, draw_names
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from browser import BROWSER, Tab, browse
 
-from lhpost6_pin.bodies import body_name, body_poses, joint_positions
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.records import load_record
-from lhpost6_pin.running import RunningPlant
-from lhpost6_pin.sight import EVERY
-from lhpost6_pin.viewer import LiveView, Look, live_animation, record_frames, show_record, view_apart
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.show.bodies import body_name, body_poses, joint_positions
+from lhpost6_pin.show.viewer import LiveView, Look, live_animation, record_frames, show_record, view_apart
+from lhpost6_pin.simulation.running import RunningPlant
+from lhpost6_pin.simulation.snapshot import EVERY
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")
 

@@ -4,20 +4,7 @@ Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the in
 read or written, 130 interrupted.
 """
 
-from . import (  # each adds its commands
-    calibration,
-    campaigns,
-    connect,
-    controllers,
-    data,
-    demo,
-    discovery,
-    forces,
-    look,
-    runs,
-    validation,
-    view,
-)
+from . import calibration, campaigns, connect, controllers, data, demo, discovery, forces, look, runs, validation, view
 from .app import app, main, run_script
 
 __all__ = [

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.core import TyperGroup
 
-from ..errors import LhpostError, OutOfRangeError
+from ..core.errors import LhpostError, OutOfRangeError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -133,7 +133,7 @@ _INTERRUPTED = 130
 
 def _fail(code: int, kind: str, message: str, **known: Any) -> None:
     """Say what is refused, as JSON, too, where that was asked for, and end."""
-    from ..plain import as_json
+    from ..core.jsonable import as_json
 
     stderr().print("[bold red]error:[/] ", end="")
     stderr().print(message, markup=False, highlight=False)
@@ -157,7 +157,7 @@ def tell(
     files: Sequence[Path] = (),
 ) -> None:
     """Say a result and the files that it left: as JSON and nothing else, or as `show` prints it."""
-    from ..plain import as_json as written
+    from ..core.jsonable import as_json as written
 
     if as_json:
         typer.echo(written({**entries(), "files": files} if files else entries()))

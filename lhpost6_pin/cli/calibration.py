@@ -39,13 +39,13 @@ def calibrate(
     json: Json = False,
 ) -> None:
     """Calibrate the machine and its sensors on measured tests; leaves override.toml and report.html."""
-    from ..calibration import calibrate as calibrate_machine
-    from ..calibration.override import save_override
-    from ..calibration_table import print_calibration
-    from ..campaign import load_campaign
-    from ..report import write_calibrate_report
-    from ..results import calibration_entries
-    from ..sensors import load_sensors
+    from ..data.campaign import load_campaign
+    from ..data.sensors import load_sensors
+    from ..identification.calibration import calibrate as calibrate_machine
+    from ..identification.calibration.override import save_override
+    from ..show.calibration_table import print_calibration
+    from ..show.report import write_calibrate_report
+    from ..show.results import calibration_entries
 
     refuse_no_jobs(jobs)
     table = find_table(machine, override, 0, specimen, specimen_at, locked)

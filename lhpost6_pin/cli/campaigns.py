@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
+from ..core.errors import ParameterError
 from .app import app, progress_bar, tell
 from .options import (
     Json,
@@ -41,8 +41,9 @@ def campaign(
     json: Json = False,
 ) -> None:
     """Rehearse a campaign of tests and record it as sensors would: to plan one, and to try what follows."""
-    from ..campaign import save_campaign, simulate_campaign
-    from ..sensors import load_sensors
+    from ..data.campaign import save_campaign
+    from ..data.sensors import load_sensors
+    from ..simulation.simulated_campaign import simulate_campaign
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     settings, known = find_settings(controller, table), load_sensors(sensors)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable
 
 import typer
 
-from ..files import models_folder, read_toml, shipped
-from ..names import AXES, ENGINES, SCHEMES
+from ..core.files import models_folder, read_toml, shipped
+from ..core.names import AXES, ENGINES, SCHEMES
 
 __all__ = [
     "complete_axis",

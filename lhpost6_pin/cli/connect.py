@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .app import app, progress_bar, stderr, tell
-from .live import Amplify, Change, NoOpen, watched
+from .live_view import Amplify, Change, NoOpen, watched
 from .options import (
     Axes,
     ControllerName,
@@ -42,7 +42,7 @@ def export_fmu(
     json: Json = False,
 ) -> None:
     """Export the plant as an FMU (FMI 2.0, co-simulation) for Simulink, Modelica and other tools."""
-    from ..fmi import export_fmu as write_fmu
+    from ..interfaces.fmi import export_fmu as write_fmu
 
     write_fmu(find_table(machine, override, valves, specimen, specimen_at, locked), out)
     tell(json, dict, lambda: None, [out])
@@ -71,11 +71,11 @@ def serve(
     """Let a controller in another process or on another computer drive the virtual table over UDP."""
     from dataclasses import asdict
 
-    from ..equilibrium import find_equilibrium
-    from ..link import ServedPlant, find_mode, open_socket
-    from ..link import serve as serve_link
-    from ..link.summary import link_entries, print_link
-    from ..plant import make_plant
+    from ..interfaces.link import ServedPlant, find_mode, open_socket
+    from ..interfaces.link import serve as serve_link
+    from ..interfaces.link.link_summary import link_entries, print_link
+    from ..mechanics.equilibrium import find_equilibrium
+    from ..mechanics.plant import make_plant
 
     chosen = find_mode(mode)
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
@@ -115,13 +115,13 @@ def link(
 ) -> None:
     """Run the virtual 469D, or your own controller, here and the table behind `lhpost6 serve`; leaves record.nc."""
     from ..control import ControllerSettings, make_controller
-    from ..equilibrium import find_equilibrium
-    from ..link import LinkClient, record_of_link_run, run_over_link
-    from ..link.summary import link_entries, print_link
-    from ..plant import make_plant
-    from ..records import save_record
-    from ..rehearse import target_within_limits
-    from ..simulate import ClosedLoop, PluggedLoop
+    from ..data.records import save_record
+    from ..interfaces.link import LinkClient, record_of_link_run, run_over_link
+    from ..interfaces.link.link_summary import link_entries, print_link
+    from ..mechanics.equilibrium import find_equilibrium
+    from ..mechanics.plant import make_plant
+    from ..simulation.rehearse import target_within_limits
+    from ..simulation.simulate import ClosedLoop, PluggedLoop
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     target = find_target(motion, set_, table, scale=scale, axes=axes)

@@ -49,10 +49,10 @@ def tune(
     from dataclasses import replace
 
     from ..control import save_controller
-    from ..control_tables import print_tuning
-    from ..report import write_tune_report
-    from ..results import tuning_entries
-    from ..tuning import tune as tune_controller
+    from ..show.control_tables import print_tuning
+    from ..show.report import write_tune_report
+    from ..show.results import tuning_entries
+    from ..tuning.tune import tune as tune_controller
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     settings = find_settings(controller, table)
@@ -93,14 +93,14 @@ def iterate(
     """Iterate on a motion until the table does what is wanted; leaves drive.nc, inverse.nc and report.html."""
     from dataclasses import replace
 
-    from ..control_tables import print_iterations
-    from ..drives import circumstances, save_drive
-    from ..inverse import save_inverse
-    from ..iterate import iterate as iterate_drive
-    from ..plant import make_plant
-    from ..rehearse import target_within_limits
-    from ..report import write_iterate_report
-    from ..results import iteration_entries
+    from ..control.inverse import save_inverse
+    from ..mechanics.plant import make_plant
+    from ..show.control_tables import print_iterations
+    from ..show.report import write_iterate_report
+    from ..show.results import iteration_entries
+    from ..simulation.rehearse import target_within_limits
+    from ..tuning.drives import circumstances, save_drive
+    from ..tuning.iterate import iterate as iterate_drive
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     target = find_target(motion, set_, table, scale=scale, axes=axes, high_pass=high_pass, low_pass=low_pass)
@@ -136,12 +136,12 @@ def sine(
     json: Json = False,
 ) -> None:
     """Run a sine without and with amplitude-phase control and harmonic cancellation; leaves report.html."""
-    from ..control_tables import print_sine
-    from ..plant import make_plant
-    from ..rehearse import target_within_limits
-    from ..report import write_sine_report
-    from ..results import sine_entries
-    from ..sine import axis_row, sine_target, sine_test
+    from ..mechanics.plant import make_plant
+    from ..show.control_tables import print_sine
+    from ..show.report import write_sine_report
+    from ..show.results import sine_entries
+    from ..simulation.rehearse import target_within_limits
+    from ..tuning.sine import axis_row, sine_target, sine_test
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     plant = make_plant(table)

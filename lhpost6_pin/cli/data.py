@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import RecordError
+from ..core.errors import RecordError
 from .app import app, tell
 from .options import Json, MachineName, Override, find_machine
 
@@ -29,8 +29,8 @@ def import_(
     json: Json = False,
 ) -> None:
     """Make a record from measured data: MTS 469D, CSV, MATLAB, HDF5, netCDF, TDMS or Parquet."""
-    from ..check import check_dataset
-    from ..importing import (
+    from ..data.check import check_dataset
+    from ..data.importing import (
         channel_units,
         described_sources,
         guess_map,
@@ -40,9 +40,9 @@ def import_(
         make_imported_record,
         save_map,
     )
-    from ..records import save_record
-    from ..results import finding_entries
-    from ..tables import print_findings
+    from ..data.records import save_record
+    from ..show.results import finding_entries
+    from ..show.tables import print_findings
 
     if guess and map_:
         raise RecordError("--guess writes a map, --map uses one; give one of them")
@@ -96,8 +96,8 @@ def export(
     json: Json = False,
 ) -> None:
     """Write a record as CSV, MATLAB v5 or Parquet, with the unit in every column's name."""
-    from ..importing import FORMATS, export_record
-    from ..records import load_record
+    from ..data.importing import FORMATS, export_record
+    from ..data.records import load_record
 
     dataset = load_record(record)
     path = out or record.with_suffix(FORMATS.get(to, ""))
@@ -112,8 +112,8 @@ def _print_channels(record: "xr.Dataset", sources: dict[str, str]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from ..console import make_console
-    from ..importing import channel_units
+    from ..core.console import make_console
+    from ..data.importing import channel_units
 
     rows = Table("channel", "from", "unit", "least", "most", title=escape(str(record.attrs["title"])))
     for name, unit, values in channel_units(record):

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from .app import app, progress_bar, tell
-from .live import NoOpen
+from .live_view import NoOpen
 from .options import Json, Out, folder_for, refuse_no_jobs
 from .runs import repeating_command
 
@@ -24,15 +24,15 @@ def demo(
     import webbrowser
     from functools import partial
 
-    from ..campaign import save_campaign
-    from ..demo import hidden_effect, measured_tests, open_loops, searched
-    from ..discover import verdict_entries
-    from ..discovery_table import print_discovery
-    from ..library import find_family
-    from ..machine import load_machine
-    from ..report.discover_report import save_discovery
-    from ..sensors import load_sensors
-    from ..viewer import Look, show_record
+    from ..data.campaign import save_campaign
+    from ..data.sensors import load_sensors
+    from ..discovery import verdict_entries
+    from ..discovery.demonstration import hidden_effect, measured_tests, open_loops, searched
+    from ..machine.library import find_family
+    from ..machine.machine import load_machine
+    from ..show.discovery_table import print_discovery
+    from ..show.report.discover_report import save_discovery
+    from ..show.viewer import Look, show_record
 
     refuse_no_jobs(jobs)
     machine, sensors = load_machine(), load_sensors()

@@ -34,12 +34,12 @@ def discover(
 
     Interrupted, the same command goes on where the search stood.
     """
-    from ..campaign import load_campaign
-    from ..discover import discover as search
-    from ..discover import verdict_entries
-    from ..discovery_table import print_discovery
-    from ..report.discover_report import save_discovery
-    from ..sensors import load_sensors
+    from ..data.campaign import load_campaign
+    from ..data.sensors import load_sensors
+    from ..discovery import discover as search
+    from ..discovery import verdict_entries
+    from ..show.discovery_table import print_discovery
+    from ..show.report.discover_report import save_discovery
 
     refuse_no_jobs(jobs)
     table = find_machine(machine, model)

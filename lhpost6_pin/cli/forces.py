@@ -38,12 +38,12 @@ def decompose(
     json: Json = False,
 ) -> None:
     """Find the forces behind a test by inverse dynamics; leaves ledger.nc and report.html."""
-    from ..decompose import decompose_record, find_agreement, find_work, save_ledger
-    from ..decompose.table import print_agreement
-    from ..records import load_record
-    from ..report import write_decompose_report
-    from ..results import agreement_entries
-    from ..sensors import load_sensors
+    from ..data.records import load_record
+    from ..data.sensors import load_sensors
+    from ..identification.decompose import decompose_record, find_agreement, find_work, save_ledger
+    from ..identification.decompose.ledger_table import print_agreement
+    from ..show.report import write_decompose_report
+    from ..show.results import agreement_entries
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     measured = load_record(record)

@@ -10,8 +10,8 @@ from .completion import complete_motion
 from .options import Json, MachineName, Override, SensorsName, find_machine
 
 if TYPE_CHECKING:
-    from ..consistency import SensorFinding
-    from ..machine import Machine
+    from ..data.consistency import SensorFinding
+    from ..machine.machine import Machine
 
 __all__ = ["capacity", "check", "doctor", "info", "motions"]
 
@@ -19,7 +19,7 @@ __all__ = ["capacity", "check", "doctor", "info", "motions"]
 @app.command()
 def doctor(json: Json = False) -> None:
     """Say what is installed, whether compiled code is kept, and which optional parts are there."""
-    from ..doctor import examine, print_doctor
+    from .doctor import examine, print_doctor
 
     found = examine()
     tell(json, found._asdict, lambda: print_doctor(found))
@@ -28,8 +28,8 @@ def doctor(json: Json = False) -> None:
 @app.command()
 def info(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
     """Print a machine as a table: every number with unit and source, assumed values marked."""
-    from ..results import machine_entries
-    from ..tables import print_machine
+    from ..show.results import machine_entries
+    from ..show.tables import print_machine
 
     table = find_machine(machine, override)
     tell(json, lambda: machine_entries(table), lambda: print_machine(table))
@@ -38,9 +38,9 @@ def info(machine: MachineName = "lhpost6", override: Override = None, json: Json
 @app.command()
 def capacity(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
     """Compare what the model can give with Table 2.2, and print the oil-column modes."""
-    from ..capacity import has_printed_capacity
-    from ..results import capacity_entries
-    from ..tables import print_capacity, print_modes
+    from ..mechanics.capacity import has_printed_capacity
+    from ..show.results import capacity_entries
+    from ..show.tables import print_capacity, print_modes
 
     table = find_machine(machine, override)
 
@@ -60,8 +60,8 @@ def motions(
     json: Json = False,
 ) -> None:
     """List the ground motions and tests known by name."""
-    from ..results import motion_entries
-    from ..tables import print_motions
+    from ..show.results import motion_entries
+    from ..show.tables import print_motions
 
     tell(json, lambda: motion_entries(name), lambda: print_motions(name))
 
@@ -75,9 +75,9 @@ def check(
     json: Json = False,
 ) -> None:
     """Say what is in records and what is wrong with them, and whether the sensors of measured ones agree."""
-    from ..check import check_record
-    from ..results import finding_entries
-    from ..tables import print_findings, print_sensor_findings
+    from ..data.check import check_record
+    from ..show.results import finding_entries
+    from ..show.tables import print_findings, print_sensor_findings
 
     table = find_machine(machine, override)
     areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
@@ -99,10 +99,10 @@ def check(
 
 def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> "list[SensorFinding] | None":
     """Compare the sensors of measured records of this machine; what was simulated without noise has none."""
-    from ..consistency import check_sensors
-    from ..plant import make_plant
-    from ..records import is_measured, load_record
-    from ..sensors import load_sensors
+    from ..data.consistency import check_sensors
+    from ..data.records import is_measured, load_record
+    from ..data.sensors import load_sensors
+    from ..mechanics.plant import make_plant
 
     records = [load_record(path) for path in files]
     labels = {"actuator": table.actuator_names, "strut": table.strut_names}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import MotionError, ParameterError
+from ..core.errors import MotionError, ParameterError
 from .completion import (
     complete_controller,
     complete_engine,
@@ -20,7 +20,7 @@ from .completion import (
 if TYPE_CHECKING:
     from ..control import ControllerSettings
     from ..control.plug import UserController
-    from ..machine import Machine
+    from ..machine.machine import Machine
     from ..motions import GroundMotion, Target
 
 log = logging.getLogger(__name__)
@@ -113,7 +113,7 @@ ControllerName = Annotated[
 
 def find_machine(name: str, override: Path | None) -> "Machine":
     """Machine by shipped name or file, with the numbers of an override file."""
-    from ..machine import load_machine
+    from ..machine.machine import load_machine
 
     return load_machine(name, override)
 
@@ -122,8 +122,8 @@ def find_table(
     machine: str, override: Path | None, valves: int, specimen: str | None, at: str | None, locked: bool
 ) -> "Machine":
     """Machine with its open valves, and the specimen that the options name, if any; its doubts are logged."""
-    from ..plant import make_plant
-    from ..specimen_joints import specimen_doubts
+    from ..mechanics.plant import make_plant
+    from ..mechanics.specimen_joints import specimen_doubts
 
     table = find_machine(machine, override).with_valves(valves)
     if specimen is None:
@@ -177,8 +177,8 @@ def find_target(
     low_pass: float | None = None,
 ) -> "Target":
     """Target at the controller's rate from a motion by name, file(s), or name and file(s)."""
+    from ..core.names import SAMPLE_RATE
     from ..motions import make_target
-    from ..schemes import SAMPLE_RATE
 
     ground = _motion(names, settings or [])
     own = None if table.motion == "free" else table.motion
@@ -202,8 +202,8 @@ def refuse_stepping(
 ) -> None:
     """Raise what `simulate` would for options that cannot be, before anybody waits for it."""
     from ..control import ControllerSettings
-    from ..plant import make_plant
-    from ..simulate import check_options
+    from ..mechanics.plant import make_plant
+    from ..simulation.simulate import check_options
 
     plugged = controller is not None and not isinstance(controller, ControllerSettings)
     check_options(make_plant(table), scheme=scheme, steps_per_second=rate, engine=engine, plugged=plugged)
@@ -211,7 +211,7 @@ def refuse_stepping(
 
 def folder_for(out: Path | None, name: str) -> Path:
     """Folder for results, out/NAME unless given; raises OSError at once if none can be written there."""
-    from ..files import refuse_folder
+    from ..core.files import refuse_folder
 
     folder = out or Path("out") / name
     refuse_folder(folder)

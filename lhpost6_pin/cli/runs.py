@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import RecordError, SimulationError
+from ..core.errors import RecordError, SimulationError
 from .app import app, progress_bar, tell
-from .live import Amplify, Change, Live, NoOpen, watched
+from .live_view import Amplify, Change, Live, NoOpen, watched
 from .options import (
     Axes,
     Beyond,
@@ -43,8 +43,8 @@ from .options import (
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..machine import Machine
-    from ..simulate import Run
+    from ..machine.machine import Machine
+    from ..simulation.simulate import Run
 
 log = logging.getLogger(__name__)
 
@@ -83,11 +83,11 @@ def run(
 ) -> None:
     """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
     from ..control import ControllerSettings
-    from ..drives import check_circumstances
-    from ..inverse import load_inverse
-    from ..plant import make_plant
-    from ..rehearse import rehearse, target_within_limits
-    from ..schemes import SAMPLE_RATE
+    from ..control.inverse import load_inverse
+    from ..core.names import SAMPLE_RATE
+    from ..mechanics.plant import make_plant
+    from ..simulation.rehearse import rehearse, target_within_limits
+    from ..tuning.drives import check_circumstances
 
     if record_rate < 1 or SAMPLE_RATE % record_rate:
         raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
@@ -143,8 +143,8 @@ def replay(
     json: Json = False,
 ) -> None:
     """Replay a drive file in closed loop; leaves record.nc and report.html against the motion it is for."""
-    from ..drives import check_circumstances, load_drive
-    from ..rehearse import rehearse
+    from ..simulation.rehearse import rehearse
+    from ..tuning.drives import check_circumstances, load_drive
 
     table = find_table(machine, override, valves, specimen, specimen_at, locked)
     settings = find_settings(controller, table)
@@ -188,8 +188,8 @@ def open_loop(
     json: Json = False,
 ) -> None:
     """Drive the plant with a record's spools from its first sample's pressures; leaves record.nc."""
-    from ..records import load_record
-    from ..rehearse import replay as replay_spools
+    from ..data.records import load_record
+    from ..simulation.rehearse import replay as replay_spools
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     refuse_stepping(table, scheme, rate, engine)
@@ -227,10 +227,10 @@ def _save(
     against: "xr.Dataset | None" = None,
 ) -> None:
     """Leave a run's record, and its report unless it is held `against` a measured test; say how it went."""
-    from ..records import save_record
-    from ..results import run_entries
-    from ..specimen_joints import joints_beyond, specimen_doubts
-    from ..tables import compare, machine_rows, print_comparison, print_run, report_limits
+    from ..data.records import save_record
+    from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
+    from ..show.results import run_entries
+    from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
 
     save_record(record, folder / "record.nc")
     files, summary = [folder / "record.nc"], None
@@ -238,7 +238,7 @@ def _save(
     for word in beyond:
         log.warning("%s", word)
     if against is None:
-        from ..report import write_run_report
+        from ..show.report import write_run_report
 
         summary = write_run_report(
             record,

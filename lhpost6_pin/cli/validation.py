@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
+from ..core.errors import ParameterError
 from .app import app, progress_bar, tell
 from .completion import complete_controller
 from .options import (
@@ -49,12 +49,12 @@ def validate(
     json: Json = False,
 ) -> None:
     """Validate the model on measured tests in three phases; leaves report.html and metrics.json."""
-    from ..campaign import load_campaign
-    from ..report.validate_report import write_validate_report
-    from ..sensors import load_sensors
-    from ..validation import metrics, save_metrics
-    from ..validation import validate as validate_campaign
-    from ..validation.table import print_validation
+    from ..data.campaign import load_campaign
+    from ..data.sensors import load_sensors
+    from ..identification.validation import metrics, save_metrics
+    from ..identification.validation import validate as validate_campaign
+    from ..identification.validation.phase_table import print_validation
+    from ..show.report.validate_report import write_validate_report
 
     refuse_no_jobs(jobs, "tests at a time")
     wanted = _phases(phases)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .app import app, tell
-from .live import Amplify, Change, NoOpen, show_address
+from .live_view import Amplify, Change, NoOpen, show_address
 from .options import Json, Locked, MachineName, Override, SpecimenAt, SpecimenName, find_table
 
 __all__ = ["view"]
@@ -34,8 +34,8 @@ def view(
     """Play a test: platen, actuators, struts and forces follow the record in a browser, or in one HTML file."""
     import threading
 
-    from ..records import load_record
-    from ..viewer import Look, live_animation, show_record
+    from ..data.records import load_record
+    from ..show.viewer import Look, live_animation, show_record
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     test, over = load_record(record), [load_record(path) for path in others or []]

@@ -5,14 +5,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
-from ..errors import ControllerError
-from ..law_table import HYDRAULIC_DOUBLE
+from ..core.errors import ControllerError
+from ..core.names import SAMPLE_RATE
+from ..effects.registry import HYDRAULIC_DOUBLE
 from ..laws.orifice import opening
-from ..plant import Plant
-from ..pose import leg_jacobian
-from ..rigid_body import platen_inertia
-from ..schemes import SAMPLE_RATE
+from ..mechanics.equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
+from ..mechanics.plant import Plant
+from ..mechanics.pose import leg_jacobian
+from ..mechanics.rigid_body import platen_inertia
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
 from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, control_step_flat
 from .plug import Sensors, Wanted

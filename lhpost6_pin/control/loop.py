@@ -18,11 +18,11 @@ For sine tests a canceller adds harmonics to the drive before the reference gene
 
 import numpy as np
 
-from ..compiled import compiled, compiled_inline
+from ..core.compiled import compiled, compiled_inline
 from ..laws.orifice import spool_for_opening
-from ..ports import BODY, LEG
-from ..pose import gauss_newton_step, leg_jacobian, pose_acceleration
-from ..schemes import A, S, V, spool_windows
+from ..mechanics.ports import BODY, LEG
+from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
+from ..mechanics.schemes import A, S, V, spool_windows
 from .filters import NOTCHES
 
 __all__ = ["ACTUATOR", "AXIS", "CANCELLER", "MEMORY_ROWS"]

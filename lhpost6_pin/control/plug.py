@@ -20,9 +20,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..equilibrium import Equilibrium
-from ..errors import ControllerError, LhpostError
-from ..plant import Plant
+from ..core.errors import ControllerError, LhpostError
+from ..mechanics.equilibrium import Equilibrium
+from ..mechanics.plant import Plant
 
 __all__ = ["Sensors", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
 __all__ += ["start_plugged", "step_plugged", "wanted_from"]

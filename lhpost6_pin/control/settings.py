@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from ..errors import ParameterError, instead_of
-from ..files import find_shipped, write_whole
-from ..parameters import Parameters, Quantity, load_parameters
-from ..schema import build_section, quantity_field
+from ..core.errors import ParameterError, instead_of
+from ..core.files import find_shipped, write_whole
+from ..machine.parameters import Parameters, Quantity, load_parameters
+from ..machine.schema import build_section, quantity_field
 from .filters import MODES, NOTCHES
 
 __all__ = ["ControllerSettings", "Notch", "load_controller", "save_controller"]

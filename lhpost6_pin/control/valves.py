@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..laws.orifice import opening, spool_for_opening
-from ..machine import Machine
+from ..machine.machine import Machine
 
 __all__ = ["flow_curves", "names_of_valves", "per_actuator", "per_valve", "valve_counts", "valve_names"]
 

@@ -8,7 +8,7 @@ then crosses 2 g without any force. With g = 0 it is an elastic, perfectly plast
 Stored energy: F dz^2 / (2 Y). Source: play and dead zone in series with Coulomb friction, elementary.
 """
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["advance_offset", "backlash_energy", "backlash_force", "offset_rate"]
 

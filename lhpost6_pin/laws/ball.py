@@ -11,7 +11,7 @@ m = -T w / sqrt(w.w + w_0^2),  w_0 [rad/s] the speed at which it slides
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 from .bouc_wen import advance as bouc_wen_advance
 
 __all__ = ["advance_ball", "ball_rate", "smooth_share"]

@@ -10,7 +10,7 @@ as recoverable: Z.v = d/dt (Y |Z|^2 / 2) + H |Z|^2.)
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["advance", "advance_1d", "friction_force", "rate"]
 

@@ -12,7 +12,7 @@ Source: Merritt (1967), Section 2.2; energy derived here.
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["ATMOSPHERE", "air_modulus", "enthalpy_of", "void_share"]
 

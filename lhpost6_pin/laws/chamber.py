@@ -12,7 +12,7 @@ dE/dt = h(P) Q - P A dL_c/dt exactly. Source: report Section 4.1.3; energy deriv
 
 import math
 
-from ..compiled import compiled, compiled_inline
+from ..core.compiled import compiled, compiled_inline
 from .orifice import port_flow
 
 __all__ = [

@@ -9,7 +9,7 @@ Dahl (1968), exponent one; in two dimensions as the LuGre model of Velenis, Tsio
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["advance_dahl", "dahl_rate"]
 

@@ -12,7 +12,7 @@ Armstrong-Helouvry et al. (1994); the others are the simplest forms linear in th
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = [
     "advance_mean_speed",

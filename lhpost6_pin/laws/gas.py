@@ -11,7 +11,7 @@ stroke without heat, T dh/dt from Newton's law of cooling; derived here.
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["advance_heat", "heat_rate", "pressure_change", "slow_heat"]
 

@@ -10,7 +10,7 @@ Stored energy: none; leaks dissipate. Source: Merritt (1967), Sections 3.4 and 5
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 from .orifice import signed_root
 
 __all__ = ["null_leak", "turbulent_leak"]

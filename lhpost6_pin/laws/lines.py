@@ -8,7 +8,7 @@ y, q, u are flows [m3/s] here, but any unit does. Stored energy: none that is co
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["filter_shares", "line_step"]
 

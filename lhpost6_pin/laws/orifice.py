@@ -9,7 +9,7 @@ Stored energy: none; an orifice dissipates. Source: report Section 4.1.2, after 
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["opening", "port_flow", "signed_root", "spool_for_opening", "width_ratios"]
 

@@ -11,7 +11,7 @@ damper takes 2 d w m u^2.) One step is exact for a foot at constant velocity.
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["advance_oscillator", "oscillator_force", "oscillator_rate"]
 

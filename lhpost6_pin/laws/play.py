@@ -11,7 +11,7 @@ Source: derived here; contact of a pin in a bush, rod without mass.
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["play_energy", "play_slope", "play_travel"]
 

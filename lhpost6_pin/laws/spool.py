@@ -9,7 +9,7 @@ Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); the curve's 
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 from .chamber import side_shares
 
 __all__ = ["corrected_opening", "dead_zone"]

@@ -10,7 +10,7 @@ with p = 2 the drag is quadratic, with p = 1 viscous. Stored energy: the springs
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["drag_force", "end_stop_energy", "end_stop_force", "spring_energy", "spring_force"]
 

@@ -9,7 +9,7 @@ Stored energy: potential U(dL) with f = -dU/dL, zero at dL = 0. Source: report S
 
 import math
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["gas_pressure", "strut_energy", "strut_force"]
 

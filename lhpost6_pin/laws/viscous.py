@@ -1,6 +1,6 @@
 """Linear viscous damping (Eq. 4-19): f = -C_v v, C_v [N s/m], v [m/s]. Stored energy: none; dissipates C_v v^2."""
 
-from ..compiled import compiled
+from ..core.compiled import compiled
 
 __all__ = ["viscous_force"]
 

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import MotionError
+from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
 from .process import smooth_step
-from .spectra import response_spectrum
+from .response_spectra import response_spectrum
 
 __all__ = ["ac156", "required_spectrum"]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import MotionError
+from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
+from .motion_units import to_si
 from .text import parse_numbers, read_text
-from .units import to_si
 
 __all__ = ["is_at2", "load_at2"]
 

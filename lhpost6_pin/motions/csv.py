@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..decimals import cut_at_decimal_commas, has_decimal_comma
-from ..errors import MotionError, meant
+from ..core.decimals import cut_at_decimal_commas, has_decimal_comma
+from ..core.errors import MotionError, meant
 from .motion import AXES, GroundMotion, make_motion
+from .motion_units import to_si
 from .text import read_text
-from .units import to_si
 
 __all__ = ["load_csv"]
 

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import MotionError, UnknownNameError, instead_of
-from ..files import models_folder
+from ..core.errors import MotionError, UnknownNameError, instead_of
+from ..core.files import models_folder
 from .ac156 import ac156
 from .csv import load_csv
 from .motion import GroundMotion
-from .options import MotionOption, checked_options, options_of
+from .motion_options import MotionOption, checked_options, options_of
 from .pulse_records import INSTALL, load_pulse_record, missing_package
 from .readers import MotionFiles, load_motion
 from .synthetic import sine, six_axial, triangle, white_noise

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import OutOfRangeError
+from ..core.errors import OutOfRangeError
 from .motion import AXES
 from .process import Target
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import MotionError
-from ..names import AXES
+from ..core.errors import MotionError
+from ..core.names import AXES
 
 __all__ = ["AXES", "QUANTITIES", "GroundMotion", "make_motion"]
 

@@ -14,8 +14,8 @@ from functools import cache
 
 import numpy as np
 
-from ..errors import MotionError
-from ..files import models_folder
+from ..core.errors import MotionError
+from ..core.files import models_folder
 from .motion import AXES, GroundMotion
 from .toml import load_toml, values_of
 

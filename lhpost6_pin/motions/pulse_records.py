@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import MotionError
+from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
-from .units import to_si
+from .motion_units import to_si
 
 __all__ = ["INSTALL", "load_pulse_record", "missing_package"]
 

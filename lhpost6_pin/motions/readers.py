@@ -5,7 +5,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from ..errors import MotionError, instead_of
+from ..core.errors import MotionError, instead_of
 from .at2 import is_at2, load_at2
 from .csv import load_csv
 from .motion import GroundMotion

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import MotionError
+from ..core.errors import MotionError
 from .motion import AXES, GroundMotion, make_motion
 from .process import smooth_step
 

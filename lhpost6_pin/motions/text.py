@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import MotionError
-from ..files import reason_of
+from ..core.errors import MotionError
+from ..core.files import reason_of
 
 __all__ = ["parse_fixed_width", "parse_numbers", "read_text"]
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from ..errors import MotionError
-from ..files import read_toml
+from ..core.errors import MotionError
+from ..core.files import read_toml
 
 __all__ = ["load_toml", "si_unit", "values_of"]
 

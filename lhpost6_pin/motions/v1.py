@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import MotionError
+from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
+from .motion_units import to_si
 from .text import parse_fixed_width, read_text
-from .units import to_si
 
 __all__ = ["V1Channel", "is_v1", "load_v1", "make_v1_motion", "parse_v1"]
 

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from lhpost6_pin.calibration import calibration_numbers
-from lhpost6_pin.calibration.prepare import prepare_problem
-from lhpost6_pin.calibration.problem import Base
-from lhpost6_pin.discover.candidates import list_candidates
-from lhpost6_pin.discover.columns import columns_of
+from lhpost6_pin.discovery.candidate_columns import columns_of
+from lhpost6_pin.discovery.candidates import list_candidates
+from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration.prepare import prepare_problem
+from lhpost6_pin.identification.calibration.problem import Base
 
 __all__ = ["baselines"]
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 from lhpost6_pin.control import make_controller
 from lhpost6_pin.control.settings import load_controller
-from lhpost6_pin.equilibrium import find_equilibrium
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.machine import load_machine
-from lhpost6_pin.margins import make_loop_model
-from lhpost6_pin.margins import margins as margins_of
-from lhpost6_pin.names import AXES
-from lhpost6_pin.parameters import Parameters, Quantity, load_parameters
-from lhpost6_pin.plant import make_plant
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.parameters import Parameters, Quantity, load_parameters
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.tuning.margins import make_loop_model
+from lhpost6_pin.tuning.margins import margins as margins_of
 
 from .docstrings import as_markdown
 from .markdown import cell, code_cell, table

@@ -11,12 +11,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Polygon, Rectangle
 
-from lhpost6_pin import kinematics
-from lhpost6_pin.components import Actuator, Strut
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.files import write_whole
-from lhpost6_pin.machine import Machine, load_machine
-from lhpost6_pin.urdf import drawing_colour, legs
+from lhpost6_pin.core.files import write_whole
+from lhpost6_pin.machine.components import Actuator, Strut
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics import kinematics
+from lhpost6_pin.show.urdf import drawing_colour, legs
 
 __all__ = ["FIGURES", "draw_all"]
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from lhpost6_pin.files import write_whole
+from lhpost6_pin.core.files import write_whole
 
 __all__ = ["cell", "code_cell", "number", "print_and_keep", "table"]
 

@@ -7,17 +7,17 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lhpost6_pin.capacity import capacity_table
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.errors import ParameterError
-from lhpost6_pin.files import models_folder
-from lhpost6_pin.law_table import LAWS
-from lhpost6_pin.library import Family, Shape, families, make_effect
-from lhpost6_pin.linearize import oil_column_modes
-from lhpost6_pin.machine import Machine, load_machine
+from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.data.records import LAYOUT
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.machine.library import Family, Shape, families, make_effect
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.parameters import EVIDENCE
+from lhpost6_pin.mechanics.capacity import capacity_table
+from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.motions import MotionEntry, list_motions
-from lhpost6_pin.parameters import EVIDENCE
-from lhpost6_pin.records import LAYOUT
 
 from .markdown import cell, code_cell, number, table
 from .theory import page_of_law

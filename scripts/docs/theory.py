@@ -8,11 +8,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
-from lhpost6_pin.effects import Effect
-from lhpost6_pin.errors import ParameterError
-from lhpost6_pin.law_table import LAWS
-from lhpost6_pin.library import families, make_effect
-from lhpost6_pin.machine import load_machine
+from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.machine.library import families, make_effect
+from lhpost6_pin.machine.machine import load_machine
 
 from .markdown import cell, code_cell, table
 

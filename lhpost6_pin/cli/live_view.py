@@ -1,0 +1,66 @@
+"""A page that shows a table while a command moves it."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ..machine.machine import Machine
+    from ..simulation.snapshot import Watch
+
+__all__ = ["Amplify", "Change", "Live", "NoOpen", "show_address", "watched"]
+
+Amplify = Annotated[float, typer.Option(help="Draw the motion this many times as large.")]
+Change = Annotated[
+    bool, typer.Option("--force-change", help="Draw forces less what they are at the start: weight, preload.")
+]
+Live = Annotated[bool, typer.Option("--live", help="Show the table in a browser as it moves, no faster than it would.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the page's address, open no browser.")]
+
+PATIENCE = 20.0
+"""Longest wait [s] for somebody to look before a run begins."""
+
+
+@contextmanager
+def watched(
+    live: bool,
+    table: "Machine",
+    title: str,
+    *,
+    amplify: float,
+    change: bool,
+    open_it: bool,
+    err: bool = False,
+    apart: bool = False,
+) -> "Iterator[Watch | None]":
+    """Yield what shows a running plant in a browser, or None if nobody asked to see it.
+
+    A view `apart` is drawn by another process and holds nothing up; else the run begins when somebody looks.
+    """
+    if not live:
+        yield None
+        return
+    from ..show.viewer import LiveView, Look, view_apart
+
+    look, what = Look(amplify=amplify, change=change), f"{title} on this computer only"
+    if apart:
+        with view_apart(table, title, look) as (url, show):
+            show_address(url, what, open_it, err)
+            yield show
+        return
+    with LiveView(table, title, look) as view:
+        show_address(view.url, what, open_it, err)
+        if not view.wait(PATIENCE):
+            typer.echo(f"nobody has looked for {PATIENCE:g} s: it goes on", err=True)
+        yield view.show
+
+
+def show_address(url: str, what: str, open_it: bool, err: bool = False) -> None:
+    """Print where something is to be seen (as an error if `err`), and open a browser there if one can be had."""
+    import webbrowser
+
+    typer.echo(f"{url} shows {what}", err=err)
+    if open_it and not webbrowser.open(url):
+        typer.echo("no browser could be opened here: open this address in one", err=True)

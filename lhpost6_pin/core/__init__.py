@@ -1,0 +1,1 @@
+"""Foundations without physics: errors, names, files, compiling, progress, the console."""

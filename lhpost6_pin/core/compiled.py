@@ -1,0 +1,160 @@
+"""The `compiled` decorator: numba with a disk cache that is private, always fresh and optional.
+
+The cache folder is keyed by the text of every module with a compiled function, of those whose constants they import,
+and by the versions of numba and Python, so an edit never meets stale machine code, not even in a function that calls
+the edited one; an edit of other modules, an error message say, leaves the key as it is. It belongs to one
+user (numba's cache is pickles: reading another user's would run his code). Where none can be written, functions
+compile in memory and a warning says so.
+"""
+
+import hashlib
+import logging
+import os
+import platform
+import re
+import shutil
+import stat
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+__all__ = ["cache_folder", "compiled", "compiled_inline"]
+
+log = logging.getLogger(__name__)
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+_CONSTANT_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+_KEEP = 4
+"""Cache folders of older sources that are kept, newest first."""
+_ROOM = 50e6
+"""Bytes that must be free where compiled code is kept: four times what all of it takes."""
+
+
+@cache
+def source_key() -> str:
+    """Digest of the source that compiled code is made of, and of the compiler's and interpreter's versions."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for source in sorted(_compiled_sources(package)):
+        digest.update(source.relative_to(package).as_posix().encode())
+        digest.update(source.read_bytes())
+    digest.update(f"{numba.__version__} {platform.python_version()} {platform.machine()}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _compiled_sources(package: Path) -> set[Path]:
+    """Modules with a compiled function, and those whose constants (names in capitals) they import."""
+    found: set[Path] = set()
+    remaining = [p for p in package.rglob("*.py") if b"@compiled" in p.read_bytes()]
+    while remaining:
+        source = remaining.pop()
+        if source in found:
+            continue
+        found.add(source)
+        for dots, module, names in _CONSTANT_IMPORT.findall(source.read_text(encoding="utf-8")):
+            if any(name.isupper() for name in re.findall(r"\w+", names)):
+                stem = source.parents[len(dots) - 1].joinpath(*filter(None, module.split(".")))
+                remaining += [p for p in (stem.with_suffix(".py"), stem / "__init__.py") if p.is_file()]
+    return found
+
+
+@cache
+def cache_folder() -> Path | None:
+    """Folder that holds compiled code for this source, or None where nothing private can be written.
+
+    Tried in turn: $LHPOST6_CACHE_DIR, $XDG_CACHE_HOME, ~/.cache, and a folder named after the user in the
+    temporary directory.
+    """
+    for base in _candidates():
+        folder = base / source_key()
+        try:
+            base.mkdir(parents=True, exist_ok=True, mode=0o700)  # in two steps: parents=True gives the mode to the last
+            folder.mkdir(exist_ok=True, mode=0o700)
+            if not (_private(base) and _writable(folder) and shutil.disk_usage(folder).free > _ROOM):
+                continue
+        except OSError:
+            continue
+        _drop_old(base, folder)
+        return folder
+    log.warning(
+        "no private folder with 50 MB free for compiled code can be written: this run compiles anew (about half a "
+        "minute); set LHPOST6_CACHE_DIR to a folder of your own to keep it"
+    )
+    return None
+
+
+def compiled(function: _F) -> _F:
+    """Compile a function with numba (no Python objects, GIL released), cached on disk.
+
+    Multiply-adds may fuse and divisions become products with a reciprocal: rounding differs from ``.py_func``'s.
+
+    The pure Python original stays at ``.py_func`` and is the reference in tests.
+    """
+    return _jit(function, inline=False)
+
+
+def compiled_inline(function: _F) -> _F:
+    """As `compiled`, and put into every compiled caller: for pieces of a step that take many arrays.
+
+    An array is seven words to pass: handing a dozen to a function called once a step costs as much as its work.
+    """
+    return _jit(function, inline=True)
+
+
+def _jit(function: _F, *, inline: bool) -> _F:
+    folder = cache_folder()
+    config = cast(Any, numba.config)
+    before = config.CACHE_DIR
+    config.CACHE_DIR = "" if folder is None else str(folder)
+    options: Any = {
+        "error_model": "numpy",
+        "nogil": True,
+        "fastmath": {"contract", "nsz", "arcp"},
+        "forceinline": inline,
+    }
+    try:
+        return cast(_F, numba.njit(cache=folder is not None, **options)(function))
+    finally:
+        config.CACHE_DIR = before
+
+
+def _candidates() -> list[Path]:
+    user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+    found = []
+    if chosen := os.environ.get("LHPOST6_CACHE_DIR"):
+        found.append(Path(chosen) / f"user-{user}")
+    if xdg := os.environ.get("XDG_CACHE_HOME"):
+        found.append(Path(xdg) / "lhpost6_pin")
+    home = os.path.expanduser("~")
+    if home not in ("~", "/"):
+        found.append(Path(home) / ".cache" / "lhpost6_pin")
+    found.append(Path(tempfile.gettempdir()) / f"lhpost6_pin-{user}")
+    return found
+
+
+def _private(folder: Path) -> bool:
+    """True if the folder is a real folder of this user that no one else may write."""
+    if not hasattr(os, "getuid"):
+        return True
+    info = folder.lstat()
+    others = stat.S_IWGRP | stat.S_IWOTH
+    return stat.S_ISDIR(info.st_mode) and info.st_uid == os.getuid() and not info.st_mode & others
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def _drop_old(base: Path, current: Path) -> None:
+    """Remove the caches of sources long gone, so that a developer's folder does not grow without end."""
+    others = [p for p in base.iterdir() if p.is_dir() and p != current]
+    for old in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[_KEEP:]:
+        shutil.rmtree(old, ignore_errors=True)

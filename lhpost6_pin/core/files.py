@@ -1,0 +1,105 @@
+"""Where shipped data lives, reading TOML, and writing files whole or not at all."""
+
+import errno
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from .errors import UnknownNameError
+
+__all__ = ["find_shipped", "models_folder", "read_toml", "reason_of", "refuse_folder", "shipped", "write_whole"]
+
+
+def models_folder() -> Path:
+    """Folder of machine files, URDFs and ground motions: inside the installed package, else beside it."""
+    package = Path(__file__).parents[1]
+    installed = package / "models"
+    return installed if installed.is_dir() else package.parent / "models"
+
+
+def shipped(folder: str = "", suffix: str = ".toml") -> dict[str, Path]:
+    """Files in a folder of the shipped data, by name."""
+    return {path.stem: path for path in sorted((models_folder() / folder).glob(f"*{suffix}"))}
+
+
+def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") -> Path:
+    """File of the shipped data by name; raises UnknownNameError for a `kind`, in words, that is not there."""
+    known = shipped(folder, suffix)
+    if name not in known:
+        raise UnknownNameError(kind, name, list(known))
+    return known[name]
+
+
+def read_toml(path: "Path | str") -> dict[str, Any]:
+    """Content of a TOML file; raises OSError, or ValueError that says what is wrong with it."""
+    try:
+        tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        _refuse_long_numbers(tree, "")
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    return tree
+
+
+def _refuse_long_numbers(value: object, key: str) -> None:
+    """TOML's whole numbers have 64 bits; Python's have no end, and the longest cannot even be put in a message."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            _refuse_long_numbers(item, f"{key}.{name}".lstrip("."))
+    elif isinstance(value, list):
+        for item in value:
+            _refuse_long_numbers(item, key)
+    elif isinstance(value, int) and value.bit_length() > 63:
+        raise ValueError(f"{key} is a whole number of more than 64 bits")
+
+
+def reason_of(error: Exception) -> str:
+    """What is wrong with a file, as the system says it, without Python's number of the error."""
+    return getattr(error, "strerror", None) or str(error)
+
+
+def refuse_folder(folder: "Path | str") -> None:
+    """Raise OSError naming the path that stands in the way if no file could be written below `folder`.
+
+    Nothing is left on disk: a long computation can ask first and make the folder when it has something to put there.
+    """
+    path = Path(folder).absolute()
+    with suppress(FileNotFoundError, NotADirectoryError):
+        os.lstat(path)  # raises for a name that is too long
+    nearest = next(p for p in (path, *path.parents) if os.path.lexists(p))
+    reason = 0 if nearest.is_dir() else errno.ENOTDIR
+    if not reason:
+        try:
+            tempfile.TemporaryFile(dir=nearest).close()  # permissions alone do not tell: /proc takes no files of root's
+        except OSError as error:
+            reason = errno.EACCES if error.errno == errno.ENOENT else error.errno or errno.EACCES
+    if reason:
+        raise OSError(reason, os.strerror(reason), str(nearest))
+
+
+@contextmanager
+def write_whole(path: "Path | str") -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it to `path` only if the block succeeds.
+
+    An interrupted or failed write leaves whatever stood at `path` before, never half a file.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
+    os.close(handle)
+    beside = Path(name)
+    try:
+        yield beside
+        umask = os.umask(0)
+        os.umask(umask)
+        beside.chmod(0o666 & ~umask)  # mkstemp makes private files; results get the ordinary permissions
+        beside.replace(target)
+    except OSError as error:
+        if error.errno and error.filename is None:  # a disk that is full does not say whose
+            error.filename = str(target)
+        raise
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,1 @@
+"""Measured and simulated tests: records, sensors, import, alignment, fusion, checks."""

@@ -1,0 +1,212 @@
+"""Platen motion from all that was measured of it: displacement, velocity and acceleration sensors in one.
+
+As in a composite feedback generator, displacement sensors give the low frequencies and accelerometers the high ones;
+offline it can be done without phase. With weights W that are real functions of frequency and add up to one,
+
+    x = W_x x_s + W_v v_s / s + W_a a_s / s^2,   v = s x,   a = s^2 x
+
+By default each weight is the inverse of its sensor's noise spectrum, S_x, S_v / w^2 and S_a / w^4, over their sum: no
+other linear combination has less noise. For white displacement and acceleration noise that is
+
+    W_x = c^4 / (c^4 + w^4),   W_a = w^4 / (c^4 + w^4),   c^4 = S_a / S_x
+
+a second-order Butterworth pair run both ways; a crossover c that is given takes the place of the optimum.
+The integrals are formed in time and only the sensors' differences are filtered, so that a record may begin and end
+in motion. Sensors are taken as calibrated and aligned: their gains and skews are not noise.
+"""
+
+import logging
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..core.errors import RecordError
+from ..mechanics.plant import Plant
+from ..mechanics.pose import PlatenMotion, forward_kinematics, leg_displacements
+from .conditioning import WIDTHS, integrate, quieted
+from .records import channel_name, sample_interval
+from .sensors import Sensors, spectrum
+from .signals import Band, differentiate
+
+__all__ = ["FusedMotion", "fuse_motion", "kinematic_jacobian"]
+
+Array = NDArray[np.float64]
+log = logging.getLogger(__name__)
+
+NO_NOISE = 1e-60  # least density [unit2/Hz], so that sensors free of noise can be weighed against each other
+
+
+class FusedMotion(NamedTuple):
+    """Motion of C in {s} with Euler angles; standard deviation (6,) of its noise; the channels it was made of."""
+
+    motion: PlatenMotion  # displacement, velocity, acceleration (n, 6)
+    noise: PlatenMotion  # (6,) each
+    path: Array  # (n, 6) displacement, still where it rests: for friction, whose memory noise would shake out of it
+    used: tuple[str, ...]
+
+
+class _Sensor(NamedTuple):
+    """One kind of sensor: signal (n, 6) and noise spectrum (f, 6), from frequency zero up."""
+
+    signal: Array
+    spectrum: Array
+
+    @property
+    def density(self) -> Array:
+        """Noise spectrum (6,) below the low-pass, which all sensors share and so does not matter to weights."""
+        return np.maximum(self.spectrum[0], NO_NOISE)
+
+
+def fuse_motion(
+    plant: Plant,
+    record: xr.Dataset,
+    sensors: Sensors,
+    *,
+    crossover: float | None = None,
+    band: Band | None = None,
+) -> FusedMotion:
+    """Platen motion from actuator lengths, platen displacement, velocity and acceleration, whichever there are.
+
+    Lengths come in by forward kinematics; with platen displacement as well, the two are averaged by their noise.
+    `crossover` [Hz] replaces the optimum weights (platen velocity then only serves where there is no acceleration).
+    All three results are filtered by `band`, by default the sensors' own low-pass; without accelerometers give a
+    narrower one, since differentiated noise grows with frequency. v and a are the derivatives of x within it.
+
+    Raises RecordError if there is neither displacement nor length, or a channel that is used is not finite.
+    """
+    time = record["time"].values
+    dt = sample_interval(record)
+    f = np.asarray(np.fft.rfftfreq(2 * (len(time) - 1), dt), np.float64)
+    displacement, used = _displacement(plant, record, sensors, f)
+    velocity, acceleration = (_sensor(record, sensors, f, n) for n in ("platen_velocity", "platen_acceleration"))
+    if crossover is not None and acceleration is not None:
+        velocity = None
+    used += [n for n, s in (("platen_velocity", velocity), ("platen_acceleration", acceleration)) if s is not None]
+    log.info("platen motion from %s", ", ".join(used))
+    band = sensors.band if band is None else band
+    weights = _weights(f, displacement, velocity, acceleration, crossover)
+    raw = _composite(f, displacement, velocity, acceleration, weights, dt)
+    motion = PlatenMotion(*(band.apply(x, dt) for x in raw))
+    power = _noise(f, (displacement, velocity, acceleration), weights, band)
+    omega = 2 * np.pi * f[:, None]
+    noise = PlatenMotion(*(_deviation(f, power * omega ** (2 * k)) for k in range(3)))
+    gains = [np.exp(-((omega * width) ** 2) / 2) for width in (0.0, *WIDTHS)]
+    lost = [_deviation(f, power * (wider - narrower) ** 2) for narrower, wider in pairwise(gains)]
+    return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), tuple(used))
+
+
+def kinematic_jacobian(plant: Plant) -> Array:
+    """Rates of the actuators' lengths per rate of the pose (n_actuators, 6) in the control zero-position (Eq. 3-33)."""
+    _, columns = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))
+    return columns[:, : plant.spools].T
+
+
+def _displacement(plant: Plant, record: xr.Dataset, sensors: Sensors, f: Array) -> tuple[_Sensor, list[str]]:
+    """Displacement by all sensors that measure it, each axis weighted by the inverse of their noise."""
+    found: dict[str, _Sensor] = {}
+    if "actuator_displacement" in record:
+        pose, _ = forward_kinematics(plant, record["actuator_displacement"].values)
+        inverse = np.zeros((6, plant.spools))
+        inverse[plant.axes] = np.linalg.pinv(kinematic_jacobian(plant)[:, plant.axes])
+        noise = spectrum(sensors, record, "actuator_displacement", f) @ (inverse**2).T
+        found["actuator_displacement"] = _Sensor(pose, noise)
+    name = "platen_displacement"
+    platen = _sensor(record, sensors, f, name)
+    if platen is not None:
+        found[name] = platen
+    if not found:
+        where = record.encoding.get("source", "the record")
+        raise RecordError(f"{where}: has neither actuator_displacement nor platen_displacement; give one of them")
+    if len(found) == 1:
+        return next(iter(found.values())), list(found)
+    one, two = found.values()
+    weight = two.density / (one.density + two.density)  # of the first
+    signal = weight * one.signal + (1 - weight) * two.signal
+    return _Sensor(signal, weight**2 * one.spectrum + (1 - weight) ** 2 * two.spectrum), list(found)
+
+
+def _sensor(record: xr.Dataset, sensors: Sensors, f: Array, name: str) -> _Sensor | None:
+    """Platen channel with its noise; None if the record does not have it."""
+    if name not in record:
+        return None
+    values = record[name].values
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        sample, column = bad[0]
+        raise RecordError(f"{channel_name(record[name], column)} at sample {sample} is not finite; mend or cut it")
+    return _Sensor(values, spectrum(sensors, record, name, f))
+
+
+def _weights(
+    f: Array, x: _Sensor, v: _Sensor | None, a: _Sensor | None, crossover: float | None
+) -> tuple[Array, Array, Array]:
+    """Weights (f, 6) of displacement, velocity and acceleration; they add up to one."""
+    omega = 2 * np.pi * f[:, None]
+    c = None if crossover is None else 2 * np.pi * crossover
+    by_v = np.zeros((len(f), 6)) if v is None else omega**2 * (x.density / v.density if c is None else c**-2)
+    by_a = np.zeros((len(f), 6)) if a is None else omega**4 * (x.density / a.density if c is None else c**-4)
+    total = 1 + by_v + by_a
+    return 1 / total, by_v / total, by_a / total
+
+
+def _composite(
+    f: Array, x: _Sensor, v: _Sensor | None, a: _Sensor | None, weights: tuple[Array, Array, Array], dt: float
+) -> PlatenMotion:
+    """Motion by the sensor of highest order, integrated, and the weighted differences of the others from it."""
+    once = None if v is None else integrate(v.signal, dt)[0]
+    if a is not None:
+        speed, base = integrate(a.signal, dt)
+        motion = [base, speed, a.signal]
+    elif v is not None and once is not None:
+        base, motion = once, [once, v.signal, differentiate(v.signal, dt)]
+    else:
+        rate = differentiate(x.signal, dt)
+        return PlatenMotion(x.signal, rate, differentiate(rate, dt))
+    differences = [(x.signal - base, weights[0])]
+    if a is not None and once is not None:
+        differences.append((once - base, weights[1]))
+    return PlatenMotion(*(m + c for m, c in zip(motion, _weighted(differences, f, dt), strict=True)))
+
+
+def _weighted(differences: list[tuple[Array, Array]], f: Array, dt: float) -> PlatenMotion:
+    """Sum of differences (n, 6) between sensors, each times its weight (f, 6), and its derivatives.
+
+    The parabola in each, of offsets and starting values, passes with the weight at zero frequency; what is left is
+    continued by odd reflection about the ends, as in `signals`.
+    """
+    from scipy import fft
+
+    n = len(differences[0][0])
+    t = dt * (np.arange(n) - (n - 1) / 2)
+    basis = np.stack([np.ones(n), t / t[-1], (t / t[-1]) ** 2], axis=1)
+    spectra, slow = np.zeros((len(f), 6), complex), np.zeros((3, 6))
+    for difference, weight in differences:
+        parabola = np.linalg.solve(basis.T @ basis, basis.T @ difference)
+        rest = difference - basis @ parabola
+        middle, half = (rest[-1] + rest[0]) / 2, (rest[-1] - rest[0]) / 2
+        rest = rest - middle - np.outer(basis[:, 1], half)
+        spectra += weight * fft.rfft(np.concatenate([rest, -rest[-2:0:-1]]), axis=0)
+        slow += weight[0] * (parabola + np.stack([middle, half, np.zeros(6)]))
+    s = 2j * np.pi * f[:, None]
+    x, v, a = (fft.irfft(spectra * s**k, 2 * (n - 1), axis=0)[:n] for k in range(3))
+    speed = (slow[1] + 2 * np.outer(basis[:, 1], slow[2])) / t[-1]
+    return PlatenMotion(x + basis @ slow, v + speed, a + 2 * slow[2] / t[-1] ** 2)
+
+
+def _noise(f: Array, kinds: tuple[_Sensor | None, ...], weights: tuple[Array, Array, Array], band: Band) -> Array:
+    """Spectrum (f, 6) of the fused displacement's noise."""
+    omega = 2 * np.pi * f[:, None]
+    power = np.zeros((len(f), 6))
+    for order, (kind, weight) in enumerate(zip(kinds, weights, strict=True)):
+        if kind is not None:
+            over = np.divide(weight, omega**order, out=np.zeros_like(weight), where=omega > 0) if order else weight
+            power += over**2 * kind.spectrum
+    return power * band.gain(f)[:, None] ** 2
+
+
+def _deviation(f: Array, power: Array) -> Array:
+    """Standard deviation (6,) of noise with a spectrum (f, 6)."""
+    return np.asarray(np.sqrt(np.trapezoid(power, f, axis=0)))

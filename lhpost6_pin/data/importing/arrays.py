@@ -1,0 +1,147 @@
+"""From named arrays, as MATLAB, HDF5 and TDMS files hold them, to channels: one `RawTest` for each sampling."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import RecordError
+from .channel_units import si_factor, time_unit, unit_in_name
+from .raw import Array, RawTest, make_raw
+
+__all__ = ["Leaf", "leaves_of", "raws_of_leaves"]
+
+_STEPS = ("dt", "delta_t", "time_step", "sample_interval", "sampling_interval", "ts")
+_RATES = ("fs", "rate", "sample_rate", "sample_rate_hz", "sampling_rate", "sampling_frequency")
+_NAMES, _UNITS = ("columns", "names", "channels", "labels", "label", "desc", "name"), ("units", "unit")
+
+
+class Leaf(NamedTuple):
+    """An array of a file: where it is, what it says of itself, and its columns (n,) or (n, k)."""
+
+    group: tuple[str, ...]
+    name: str
+    values: NDArray[Any]
+    unit: str | None = None
+    step: float | None = None  # [s], where the array has its own
+    columns: tuple[str, ...] = ()
+
+
+def leaves_of(tree: Mapping[str, Any], group: tuple[str, ...] = ()) -> tuple[list[Leaf], dict[str, str]]:
+    """Arrays in a tree of named values, with the step, names and units that stand beside them; and its texts."""
+    leaves: list[Leaf] = []
+    facts: dict[str, str] = {}
+    step, names, units = _step(tree), _texts(tree, _NAMES), _texts(tree, _UNITS)
+    arrays = {name: value for name, value in tree.items() if _is_array(value) and time_unit(name) is None}
+    named = [name for name, value in arrays.items() if value.size // max(value.shape) == len(names)]
+    for name, value in tree.items():
+        if isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value):
+            value = {f"{k + 1}": item for k, item in enumerate(value)}
+        if isinstance(value, Mapping):
+            found, said = leaves_of(value, (*group, name))
+            leaves += [leaf._replace(step=leaf.step or step) for leaf in found]
+            facts |= said
+        elif isinstance(value, str):
+            facts[name] = value
+        elif _is_array(value):
+            own = names if named == [name] else []  # names beside several arrays could be those of any
+            if len(units) == len(own) > 1:
+                own = [f"{column} [{unit}]" for column, unit in zip(own, units, strict=True)]
+            unit = units[0] if len(units) == 1 and [*arrays] == [name] else None
+            leaves.append(Leaf(group, name, value, unit, step, tuple(own)))
+    return leaves, facts
+
+
+def raws_of_leaves(leaves: Iterable[Leaf], source: str, form: str, facts: Mapping[str, str]) -> tuple[RawTest, ...]:
+    """Put arrays of one length and one time together.
+
+    Time is an array named so, in the array's own group or the nearest above, or else its step. Raises RecordError if
+    there are no channels.
+    """
+    leaves = list(leaves)
+    times = [leaf for leaf in leaves if time_unit(leaf.name, leaf.unit) and np.squeeze(leaf.values).ndim == 1]
+    together: dict[tuple[Any, int], list[tuple[str, str | None, Array]]] = {}
+    clocks: dict[Any, Array | None] = {}
+    for leaf in leaves:
+        if any(leaf is time for time in times):
+            continue
+        clock = _clock(leaf, times)
+        shape = np.squeeze(leaf.values).shape
+        if len(shape) not in (1, 2):
+            continue
+        length = clock.values.size if clock is not None else max(shape)
+        key = (clock.group if clock is not None else leaf.step, length)
+        if key not in clocks:
+            with np.errstate(over="ignore", invalid="ignore"):  # times without end are refused with their sample
+                steps = None if leaf.step is None else leaf.step * np.arange(length)
+            clocks[key] = steps if clock is None else _seconds(clock, source)
+        together.setdefault(key, []).extend(_columns(leaf, length))
+    if not together:
+        raise RecordError(f"{source}: holds no array of samples; a test is one or more arrays along time")
+    return tuple(
+        make_raw(source, form, [c[0] for c in cols], [c[1] for c in cols], _beside(cols), clocks[key], facts)
+        for key, cols in together.items()
+    )
+
+
+def _beside(columns: Sequence[tuple[str, str | None, Array]]) -> Array:
+    return np.column_stack([values for _, _, values in columns])
+
+
+def _columns(leaf: Leaf, length: int) -> list[tuple[str, str | None, Array]]:
+    values = np.squeeze(leaf.values).astype(float)
+    path = ".".join((*leaf.group, leaf.name))
+    if values.ndim == 1:
+        name = leaf.columns[0] if leaf.columns else path
+        return [(name, leaf.unit or unit_in_name(name), values)]
+    table = values if values.shape[0] == length else values.T
+    numbered = tuple(f"{path}_{k + 1}" for k in range(table.shape[1]))
+    names = leaf.columns if len(leaf.columns) == len(numbered) else numbered
+    units = (leaf.unit or "").split(",")  # "m, rad" are two units for equal shares of the columns
+    each = [units[k * len(units) // len(names)] or unit_in_name(name) for k, name in enumerate(names)]
+    return [(name, each[k], table[:, k]) for k, name in enumerate(names)]
+
+
+def _clock(leaf: Leaf, times: Sequence[Leaf]) -> Leaf | None:
+    """Time of an array: the time vector in the nearest group around it that has as many samples."""
+    shape = np.squeeze(leaf.values).shape
+    fitting = [t for t in times if t.values.size in shape and leaf.group[: len(t.group)] == t.group]
+    return max(fitting, key=lambda t: len(t.group), default=None)
+
+
+def _seconds(clock: Leaf, source: str) -> Array:
+    unit = time_unit(clock.name, clock.unit) or "s"
+    try:
+        with np.errstate(over="ignore"):
+            return np.squeeze(clock.values).astype(float) * si_factor(unit, "s")
+    except RecordError as error:
+        raise RecordError(f"{source}, {clock.name}: {error}") from None
+
+
+def _is_array(value: object) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size > 1
+
+
+def _step(tree: Mapping[str, Any]) -> float | None:
+    """Sample interval [s] that stands as a single number among other values: dt, or a rate [Hz]."""
+    for name, value in tree.items():
+        number = np.asarray(value) if isinstance(value, int | float | np.generic | np.ndarray) else np.zeros(0)
+        if number.size != 1 or number.dtype.kind not in "fiu" or not float(number.item()) > 0:
+            continue
+        word = re.sub(r"[\s_]+", "_", name.strip().lower())
+        if word in _STEPS:
+            return float(number.item())
+        if word in _RATES:
+            return 1.0 / float(number.item())
+    return None
+
+
+def _texts(tree: Mapping[str, Any], keys: Sequence[str]) -> list[str]:
+    """Texts under the first of `keys` that holds any: one, or a list or array of them."""
+    for value in (v for wanted in keys for k, v in tree.items() if k.lower() == wanted):
+        items = [value] if isinstance(value, str) else list(np.ravel(value)) if np.size(value) else []
+        if items and all(isinstance(item, str) for item in items):
+            return [item.strip() for item in items]
+    return []

@@ -1,0 +1,248 @@
+"""The channel map: a TOML file that says which column of a data file is which channel of a record.
+
+[test]
+name = "EQ1"
+valves_per_horizontal_actuator = 1
+
+[channel]
+"platen_displacement[x]" = { column = "Long Displ fbk", unit = "in" }
+"actuator_force[H1]" = { column = "H1 Force", unit = "kip", sign = -1, gain = 1.002, offset = 3.5 }
+"""
+
+import fnmatch
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, get_args
+
+from ...core.errors import RecordError, instead_of, meant
+from ...core.files import read_toml, reason_of, write_whole
+from ...core.names import AXES
+from ..records import FASTEST, LAYOUT, SLOWEST
+from .raw import RawTest, shown
+
+__all__ = ["ChannelMap", "Source", "TestFacts", "channels_of", "check_map", "find_column", "load_map", "save_map"]
+__all__ += ["si_unit"]
+
+_KINDS = {str: "a text", int: "a whole number", float: "a finite number"}
+
+Labels = Mapping[str, Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a channel comes from: a column, or a number that it is known to be.
+
+    Its value in SI is sign · gain · (column + offset), offset in the column's unit. `column` is a name, a pattern
+    (`Long*fbk`) or the column's number from 1; `file` a pattern for the file's name. Without `unit` the file's holds.
+    """
+
+    column: str | int | None = None
+    unit: str | None = None
+    sign: int = 1
+    gain: float = 1.0
+    offset: float = 0.0
+    file: str | None = None
+    constant: float | None = None  # in `unit`, instead of a column
+
+
+@dataclass(frozen=True)
+class TestFacts:
+    """What the files do not say about a test."""
+
+    name: str | None = None  # else the first file's name
+    kind: str = "measured"
+    valves_per_horizontal_actuator: int = 1
+    specimen: str = "none"
+    rate: float | None = None  # [Hz] of the record; else the highest of the files
+    file_rate: float | None = None  # [Hz] of files that do not say theirs
+    fill_gaps: int = 0  # longest run of missing samples that is interpolated
+
+    __test__ = False  # no test of pytest's
+
+
+@dataclass(frozen=True)
+class ChannelMap:
+    """Sources by channel, as in `platen_displacement[x]`; `origin` is the map's file, for messages."""
+
+    origin: str
+    test: TestFacts
+    channels: Mapping[str, Source]
+
+
+# --------------------------------------------------------------------------------------------- disk
+def load_map(path: Path | str) -> ChannelMap:
+    """Read a channel map; raises RecordError naming file and key of what cannot be understood."""
+    origin = str(path)
+    try:
+        tree = read_toml(path)
+    except OSError as error:
+        raise RecordError(f"{origin}: cannot be read: {reason_of(error)}; --guess writes a first map") from None
+    except ValueError as error:  # of TOML and of UTF-8
+        raise RecordError(f"{origin}: not a TOML file: {error}") from None
+    _known(tree, ("test", "channel"), origin)
+    for section in ("test", "channel"):
+        if not isinstance(tree.get(section, {}), dict):
+            raise RecordError(f"{origin}: {section} must be a section [{section}]")
+    if not tree.get("channel"):
+        raise RecordError(f"{origin}: [channel] names no channel; --guess writes a first map")
+    test = _typed(TestFacts, tree.get("test", {}), f"{origin}, [test]")
+    channels = {}
+    for name, entry in tree["channel"].items():
+        where = f"{origin}, [channel] {name}"
+        if not isinstance(entry, dict):
+            raise RecordError(f'{where}: write {{ column = "...", unit = "..." }}')
+        channels[name] = _typed(Source, entry, where)
+        _check_source(channels[name], where)
+    _check_test(test, f"{origin}, [test]")
+    return ChannelMap(origin, test, channels)
+
+
+def save_map(channels: ChannelMap, path: Path | str, remarks: Sequence[str] = ()) -> None:
+    """Write a channel map to edit; `remarks` become comment lines at its end."""
+    test = {f.name: getattr(channels.test, f.name) for f in fields(TestFacts)}
+    lines = [
+        "# Which column of the data files is which channel of a record. A channel's value in SI is",
+        "# sign * gain * (column + offset), offset in the column's unit; constant = 0 instead of a column for what is",
+        "# known and was not measured. column is a name, a pattern (Long*fbk) or a number from 1.",
+        "",
+        "[test]",
+        *(f"{key} = {_toml(value)}" for key, value in test.items() if value is not None),
+        "",
+        "[channel]",
+    ]
+    for name, source in channels.channels.items():
+        said = {f.name: getattr(source, f.name) for f in fields(Source) if getattr(source, f.name) != f.default}
+        lines.append(f"{_toml(name)} = {{ {', '.join(f'{key} = {_toml(value)}' for key, value in said.items())} }}")
+    lines += ["", *(f"# {' '.join(remark.split())}" for remark in remarks)]
+    with write_whole(path) as beside:
+        beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _toml(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+# --------------------------------------------------------------------------------------------- checks
+def _known(table: Mapping[str, Any], valid: Sequence[str], where: str) -> None:
+    unknown = [key for key in table if key not in valid]
+    if unknown:
+        raise RecordError(f"{where}: unknown key {unknown[0]!r}; {instead_of(unknown[0], valid)}")
+
+
+def _typed(cls: type[Any], table: Mapping[str, Any], where: str) -> Any:
+    """Fill a dataclass from a TOML table, each value of its field's type."""
+    _known(table, [f.name for f in fields(cls)], where)
+    values = {}
+    for spec in fields(cls):
+        if spec.name not in table:
+            continue
+        value, kinds = table[spec.name], get_args(spec.type) or (spec.type,)
+        if isinstance(value, int) and not isinstance(value, bool) and int not in kinds:
+            value = float(value) if float in kinds else value
+        endless = isinstance(value, float) and not math.isfinite(value)
+        if isinstance(value, bool) or not isinstance(value, kinds) or endless:
+            wanted = " or ".join(text for kind, text in _KINDS.items() if kind in kinds)
+            raise RecordError(f"{where}: {spec.name} = {value!r} must be {wanted}")
+        values[spec.name] = value
+    return cls(**values)
+
+
+def _check_source(source: Source, where: str) -> None:
+    if (source.column is None) == (source.constant is None):
+        raise RecordError(f"{where}: give a column, or else a constant")
+    if source.constant is not None and source.unit is None:
+        raise RecordError(f"{where}: a constant needs a unit")
+    if source.sign not in (-1, 1):
+        raise RecordError(f"{where}: sign = {source.sign} must be 1 or -1")
+    if source.gain == 0:
+        raise RecordError(f"{where}: gain = 0 leaves nothing; give constant = 0 for a channel that is known to be zero")
+
+
+def _check_test(test: TestFacts, where: str) -> None:
+    rates = f"must be positive, from {SLOWEST:g} to {FASTEST:g} Hz"
+    faults = {
+        "kind": test.kind not in ("measured", "simulated") and "must be measured or simulated",
+        "valves_per_horizontal_actuator": test.valves_per_horizontal_actuator not in (1, 2) and "must be 1 or 2",
+        "rate": test.rate is not None and not SLOWEST <= test.rate <= FASTEST and rates,
+        "file_rate": test.file_rate is not None and not SLOWEST <= test.file_rate <= FASTEST and rates,
+        "fill_gaps": test.fill_gaps < 0 and "must be 0 or more samples",
+    }
+    for key, fault in faults.items():
+        if fault:
+            raise RecordError(f"{where}: {key} = {getattr(test, key)!r} {fault}")
+
+
+# --------------------------------------------------------------------------------------------- meaning
+def channels_of(labels: Labels) -> dict[str, tuple[str, str | None]]:
+    """All channels that a record of a machine can have, in order: variable and label by name."""
+    known = {"axis": AXES, **labels}
+    found: dict[str, tuple[str, str | None]] = {}
+    for variable, channel in LAYOUT.items():
+        if len(channel.dims) == 1:
+            found[variable] = variable, None
+        else:
+            found |= {f"{variable}[{label}]": (variable, label) for label in known.get(channel.dims[1], ())}
+    return found
+
+
+def si_unit(variable: str, label: str | None) -> str:
+    """Unit of a channel in a record, as in `m/s2`."""
+    units = LAYOUT[variable].units.split(", ")
+    return units[-1] if label in AXES[3:] else units[0]
+
+
+def check_map(channels: ChannelMap, labels: Labels) -> None:
+    """Raise RecordError for a channel that no record of the machine has, or a variable with a channel missing."""
+    known = channels_of(labels)
+    mapped: dict[str, list[str | None]] = {}
+    for name in channels.channels:
+        if name not in known:
+            variable = name.split("[")[0]
+            near = [other for other in known if other.split("[")[0] == variable]
+            valid = near or list(dict.fromkeys(v for v, _ in known.values()))
+            said = instead_of(name, valid)
+            raise RecordError(f"{channels.origin}, [channel] {name}: is no channel of a record; {said}")
+        variable, label = known[name]
+        mapped.setdefault(variable, []).append(label)
+    for variable, have in mapped.items():
+        missing = [label for v, label in known.values() if v == variable and label not in have]
+        if missing:
+            said = f"{variable} has {', '.join(map(str, have))}, but not {', '.join(map(str, missing))}"
+            unit = si_unit(variable, missing[0])
+            raise RecordError(
+                f'{channels.origin}, [channel]: {said}; map them too, or give {{ constant = 0, unit = "{unit}" }} for '
+                f"what is known to be zero, or leave {variable} out"
+            )
+
+
+def find_column(source: Source, raws: Sequence[RawTest], where: str) -> tuple[int, int]:
+    """File and column that a source means; raises RecordError if there is none, or more than one."""
+    called = [Path(raw.source).name for raw in raws]
+    wanted_file = source.file or "*"
+    files = [k for k, name in enumerate(called) if name == wanted_file or fnmatch.fnmatchcase(name, wanted_file)]
+    if not files:
+        raise RecordError(f"{where}: no file is called {source.file!r}; files are {shown([r.source for r in raws])}")
+    if isinstance(source.column, int):
+        if len(files) > 1:
+            raise RecordError(f'{where}: column {source.column} of which file? add file = "..."')
+        count = len(raws[files[0]].names)
+        if not 1 <= source.column <= count:
+            raise RecordError(f"{where}: no column {source.column}; {raws[files[0]].source} has 1 to {count}")
+        return files[0], source.column - 1
+    every = [(k, j, name) for k in files for j, name in enumerate(raws[k].names)]
+    wanted = str(source.column)
+    found = [(k, j) for k, j, name in every if name == wanted]
+    found = found or [(k, j) for k, j, name in every if fnmatch.fnmatchcase(name, wanted)]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        named = shown([raws[k].source for k in files])
+        names = [name for *_, name in every]
+        raise RecordError(
+            f"{where}: no column {wanted!r} in {named}; {meant(wanted, names)}columns are {shown(names, 40)}"
+        )
+    places = ", ".join(f"{Path(raws[k].source).name} column {j + 1} {raws[k].names[j]!r}" for k, j in found[:6])
+    raise RecordError(f'{where}: {wanted!r} could be any of {places}; give the column\'s number, or file = "..."')

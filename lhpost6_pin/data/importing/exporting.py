@@ -1,0 +1,89 @@
+"""Records as CSV, MATLAB v5 and Parquet: a column a channel, its unit in its name, and the attributes beside them."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...core.errors import RecordError, UnknownNameError
+from ...core.files import write_whole
+from ...core.names import AXES
+from ..records import LAYOUT_VERSION, channel_name, layout_faults
+from .raw import Array
+
+__all__ = ["FORMATS", "channel_units", "export_record"]
+
+FORMATS = {"csv": ".csv", "mat": ".mat", "parquet": ".parquet"}
+"""Formats and their suffixes."""
+
+
+def channel_units(record: xr.Dataset) -> Iterator[tuple[str, str, Array]]:
+    """Every numeric column along time: its channel, as in `platen_displacement[x]`, unit, and values (n,)."""
+    for variable in record.data_vars.values():
+        if variable.dims[:1] != ("time",) or variable.ndim > 2 or variable.dtype.kind not in "fiu":
+            continue
+        table = variable.values.reshape(len(variable), -1).astype(float)
+        units = [unit.strip() or "-" for unit in str(variable.attrs.get("units", "-")).split(",")]
+        for k, values in enumerate(table.T):
+            channel = channel_name(variable, k)
+            rotation = channel.endswith(tuple(f"[{axis}]" for axis in AXES[3:]))  # "m, rad": translations, rotations
+            yield channel, units[-1] if rotation else units[0], values
+
+
+def export_record(record: xr.Dataset, path: Path | str, form: str) -> None:
+    """Write a record as `csv`, `mat` or `parquet`, whole or not at all; all three import again without a map.
+
+    In a `.mat` file a column is a variable `platen_displacement_x_m`, as a MATLAB name can hold no brackets, and the
+    attributes are the struct `facts`. Variables that are not along time are left out. Raises RecordError for a
+    dataset that is no record, UnknownNameError for another format.
+    """
+    if form not in FORMATS:
+        raise UnknownNameError("format to export to", form, list(FORMATS))
+    if faults := layout_faults(record):
+        raise RecordError(f"{path}: cannot export what is no record: {faults[0]}")
+    columns = {"time [s]": record["time"].values.astype(float)}
+    for channel, unit, values in channel_units(record):
+        columns[f"{channel.replace('[', '_').rstrip(']')} [{unit}]"] = values
+    facts = {"layout_version": str(LAYOUT_VERSION)}
+    facts |= {str(key): " ".join(str(value).split()) for key, value in record.attrs.items()}
+    with write_whole(path) as beside:
+        {"csv": _write_csv, "mat": _write_mat, "parquet": _write_parquet}[form](columns, facts, beside)
+
+
+def _write_csv(columns: dict[str, Array], facts: dict[str, str], path: Path) -> None:
+    rows = np.column_stack(list(columns.values())).tolist()
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(f"# {key}: {value}\n" for key, value in facts.items())
+        file.write(",".join(columns) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)  # digits enough to give every bit back
+
+
+def _write_parquet(columns: dict[str, Array], facts: dict[str, str], path: Path) -> None:
+    try:
+        import pyarrow  # noqa: F401  # what pandas writes Parquet with
+    except ModuleNotFoundError as error:
+        raise RecordError(f"{path}: writing Parquet needs pyarrow: pip install 'lhpost6-pin[formats]'") from error
+    import pandas as pd
+
+    table = pd.DataFrame(columns)
+    table.attrs = facts
+    table.to_parquet(path, index=False)
+
+
+def _write_mat(columns: dict[str, Array], facts: dict[str, str], path: Path) -> None:
+    from scipy.io import savemat
+
+    named: dict[str, Any] = {_matlab_name(name): values.reshape(-1, 1) for name, values in columns.items()}
+    long = next((name for name in named if len(name) > 63), None)
+    if long:
+        raise RecordError(f"{path}: {long} is longer than the 63 characters of a MATLAB name; export to csv or parquet")
+    savemat(path, named | {"facts": facts}, long_field_names=True)
+
+
+def _matlab_name(name: str) -> str:
+    """`platen_acceleration_x [m/s2]` as `platen_acceleration_x_m_s2`; what has no unit is a `_fraction`."""
+    stem, unit = name.removesuffix("]").rsplit(" [", 1)
+    tail = "".join(c if c.isalnum() else "_" for c in unit).strip("_") if unit != "1" else "fraction"
+    return f"{stem}_{tail}"

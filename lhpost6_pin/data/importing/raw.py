@@ -1,0 +1,55 @@
+"""What a data file holds before anybody says what it means: named columns, their units as written, time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import RecordError
+
+__all__ = ["Array", "RawTest", "make_raw", "shown"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RawTest:
+    """Columns of one file that were sampled together.
+
+    `names` and `units` (k,) are as written in the file, a unit is None where the file gives none. `values` (n, k) are
+    in those units, NaN where the file has a hole. `time` (n,) [s] is None where the file does not tell. `facts` are
+    what else the file says about itself.
+    """
+
+    source: str
+    form: str
+    names: tuple[str, ...]
+    units: tuple[str | None, ...]
+    values: Array
+    time: Array | None
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+
+def make_raw(
+    source: str,
+    form: str,
+    names: Sequence[str],
+    units: Sequence[str | None],
+    values: Array,
+    time: Array | None,
+    facts: Mapping[str, str] | None = None,
+) -> RawTest:
+    """Make a `RawTest`; raises RecordError if there is no channel, or fewer than two samples."""
+    if not names:
+        raise RecordError(f"{source}: holds no channel; a test needs at least one column beside time")
+    if len(values) < 2:
+        raise RecordError(f"{source}: holds {len(values)} sample(s); a test needs at least two")
+    tidy = tuple(unit.strip() or None if unit else None for unit in units)
+    return RawTest(source, form, tuple(name.strip() for name in names), tidy, values, time, dict(facts or {}))
+
+
+def shown(names: Sequence[str], most: int = 12) -> str:
+    """Return the first few names for a message."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(repr(name[:60]) for name in names[:most]) + more

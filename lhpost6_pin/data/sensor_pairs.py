@@ -1,0 +1,340 @@
+"""Quantities that a record holds twice: what is compared with what, and what may lawfully differ.
+
+`comparisons` turns a record into regressions y = X theta + noise, filtered by one band, for `consistency` to solve.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..core.names import AXES
+from ..mechanics.plant import Plant
+from ..mechanics.pose import forward_kinematics, leg_displacements
+from .alignment import due_spools, gas_pressure
+from .conditioning import resolution
+from .fusion import kinematic_jacobian
+from .records import sample_interval
+from .sensors import Sensors, spectrum
+from .signals import Band, differentiate
+
+__all__ = ["Comparison", "Term", "comparisons", "loose_lengths"]
+
+Array = NDArray[np.float64]
+
+BAND = Band(high=20.0)  # Hz: where motion is strong against noise
+TRIM = 0.1  # s: left out at both ends, where filtered records say little
+FAST = 0.3  # of the sampling rate: above it a command is fast
+
+
+class Term(NamedTuple):
+    """One column of X: what its coefficient is called, and what it should be; `delay` turns it into one."""
+
+    quantity: str
+    unit: str
+    expected: float
+    column: Array  # (n,)
+    variance: float = 0.0  # of its noise
+    delay: float | None = None  # already taken out [s]; the coefficient is what is left, times minus the gain
+    beside: bool = False  # where noise hides it, the others still tell
+
+    @property
+    def due(self) -> float:
+        """What its coefficient should be."""
+        return self.expected if self.delay is None else 0.0
+
+
+class Comparison(NamedTuple):
+    """One y and its X in one record."""
+
+    check: str
+    channel: str
+    y: Array  # (n,)
+    variance: float  # of its noise
+    terms: tuple[Term, ...]
+    errors: Array  # (n, k), one standard deviation each
+    independent: float  # number of independent samples
+
+
+class _View:
+    """A record as the comparisons see it: filtered, trimmed and thinned, with the noise that is left."""
+
+    def __init__(self, plant: Plant, record: xr.Dataset, sensors: Sensors) -> None:
+        self.plant, self.record, self.sensors = plant, record, sensors
+        time = record["time"].values
+        self.dt = sample_interval(record)
+        self.step = max(1, int(1 / (8 * BAND.high * self.dt)))
+        self.trim = round(TRIM / (self.step * self.dt))
+        self.independent = 2 * BAND.high * (len(time) * self.dt - 2 * TRIM)
+        self.f = np.linspace(0.0, min(0.5 / self.dt, 4 * BAND.high), 1025)
+
+    def has(self, *names: str) -> bool:
+        """Whether the record has these channels."""
+        return all(name in self.record for name in names)
+
+    def values(self, name: str) -> Array:
+        """Columns (n, k) of a channel at the record's rate."""
+        return self.record[name].values.astype(float).reshape(self.record.sizes["time"], -1)
+
+    def signals(self, x: Array, *orders: int) -> list[Array]:
+        """Derivatives of these orders of x (n, k) in the band, thinned and trimmed."""
+        x = BAND.apply(x, self.dt)[:: self.step]  # nothing is left to fold at 8 times the band
+        derivatives = [x]
+        for _ in range(max(orders)):
+            derivatives.append(differentiate(derivatives[-1], self.step * self.dt))
+        return [derivatives[k][self.trim : len(x) - self.trim] for k in orders]
+
+    def signal(self, x: Array) -> Array:
+        """Columns x (n, k) in the band, thinned and trimmed."""
+        return self.signals(x, 0)[0]
+
+    def variance(self, name: str, order: int = 0) -> Array:
+        """Noise variance (k,) of that derivative of a channel."""
+        shape = (BAND.gain(self.f) * (2 * np.pi * self.f) ** order) ** 2
+        power = spectrum(self.sensors, self.record, name, self.f) * shape[:, None]
+        return np.asarray(np.trapezoid(power, self.f, axis=0))
+
+    def sd(self, name: str) -> tuple[float, float, float]:
+        """Calibration of a channel, one standard deviation: gain [1], offset [unit], delay [s].
+
+        What holds still within a digital step is off by a part of it, which is an offset, too.
+        """
+        group = "chamber_pressure" if name.startswith("chamber_pressure") else name
+        s, step = self.sensors, resolution(self.values(name)) if self.has(name) else 0.0
+        return s.gain_sd(name), float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0))), s.delay_sd(group)
+
+
+def comparisons(plant: Plant, record: xr.Dataset, sensors: Sensors) -> Iterator[Comparison]:
+    """All comparisons that a record has the channels for."""
+    view = _View(plant, record, sensors)
+    for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools):
+        yield from compare(view)
+
+
+def loose_lengths(
+    plant: Plant, record: xr.Dataset, sensors: Sensors, closing: float
+) -> Iterator[tuple[str, Comparison, Array]]:
+    """Lengths of double-acting actuators against the platen's pose, each with the side (n,) that a loose pin bears on.
+
+    The side, -1 to 1, is by the measured force, of which `closing` [N] presses most of the play out (`laws.play`).
+    """
+    view = _View(plant, record, sensors)
+    if not view.has("actuator_force"):
+        return
+    force = view.values("actuator_force")
+    side = view.signal(force / np.sqrt(force**2 + closing**2))
+    each = zip(plant.machine.actuator_names, _lengths(view), side.T, strict=False)  # no lengths: none
+    yield from (one for one in each if one[0] in plant.machine.double_acting)
+
+
+def _compared(
+    view: _View, check: str, channel: str, y: Array, variance: float, terms: list[Term], errors: Sequence[Array]
+) -> Comparison:
+    columns = np.stack(errors, axis=1)
+    return Comparison(check, channel, y, float(variance), tuple(terms), columns, view.independent)
+
+
+def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Term:
+    return Term("delay", "s", nominal, rate, float(variance), delay=nominal)
+
+
+def _offset_term(n: int, expected: float = 0.0) -> Term:
+    return Term("offset", "", expected, np.ones(n))
+
+
+def _forces(view: _View) -> Iterator[Comparison]:
+    """actuator_force = P_A A_1 - P_B A_2."""
+    if not view.has("actuator_force", "chamber_pressure_a"):
+        return
+    machine = view.plant.machine
+    force = view.signal(view.values("actuator_force"))
+    a, rate_a = view.signals(view.values("chamber_pressure_a"), 0, 1)
+    noise = {n: (view.variance(n), view.variance(n, 1)) for n in ("actuator_force", "chamber_pressure_a")}
+    both = view.has("chamber_pressure_b")
+    if both:
+        names = [str(n) for n in view.record["horizontal"].values]
+        b, rate_b = view.signals(view.values("chamber_pressure_b"), 0, 1)
+        noise["chamber_pressure_b"] = view.variance("chamber_pressure_b"), view.variance("chamber_pressure_b", 1)
+    (gain_f, offset_f, delay_f), (gain_a, offset_a, delay_p) = map(view.sd, ("actuator_force", "chamber_pressure_a"))
+    gain_b, offset_b, _ = view.sd("chamber_pressure_b")
+    for i, actuator in enumerate(machine.actuators):
+        area_a, area_b = actuator.area_a, actuator.area_b
+        one = np.ones(len(force))
+        push, rate = area_a * a[:, i], area_a * rate_a[:, i]
+        still = area_a**2 * noise["chamber_pressure_a"][1][i]
+        terms = [Term("gain a", "1", 1.0, push, area_a**2 * noise["chamber_pressure_a"][0][i])]
+        errors = [gain_f * force[:, i], offset_f * one, gain_a * push, area_a * offset_a * one]
+        if area_b is not None:
+            if not (both and actuator.name in names):
+                continue
+            j = names.index(actuator.name)
+            pull, rate = -area_b * b[:, j], rate - area_b * rate_b[:, j]
+            still += area_b**2 * noise["chamber_pressure_b"][1][j]
+            terms.append(Term("gain b", "1", 1.0, pull, area_b**2 * noise["chamber_pressure_b"][0][j]))
+            errors += [gain_b * pull, area_b * offset_b * one]
+        errors += [delay_f * rate, delay_p * rate]
+        terms += [_delay_term(rate, still), _offset_term(len(force))]
+        channel = f"actuator_force[{actuator.name}]"
+        variance = noise["actuator_force"][0][i]
+        yield _compared(view, "force against pressures", channel, force[:, i], variance, terms, errors)
+
+
+def _geometry(view: _View, pose: Array) -> list[Array]:
+    """Changes of the actuators' elongations (n, actuators) by one standard deviation of each coordinate."""
+    plant, parameters = view.plant, view.plant.machine.parameters
+
+    def elongations(legs: NDArray[np.void]) -> Array:
+        """From the zero-position of these legs."""
+        lengths, _ = leg_displacements(replace(plant, legs=legs), np.vstack([np.zeros(6), pose]))
+        return lengths[1:, : plant.spools] - lengths[0, : plant.spools]
+
+    nominal, changes = elongations(plant.legs), []
+    for field, key in (("rho", "platen_point"), ("base_point", "base_point")):
+        for axis in range(3):
+            legs = plant.legs.copy()
+            for row, component in zip(legs, plant.machine.components, strict=True):
+                sd = parameters[f"{component.name}.{key}"].sd
+                row[field][axis] += sd[axis] if isinstance(sd, tuple) else 0.0
+            changes.append(elongations(legs) - nominal)
+    return changes
+
+
+def _lengths(view: _View) -> Iterator[Comparison]:
+    """actuator_displacement against that of the measured platen pose; it may drift by its noise within a record."""
+    if not view.has("actuator_displacement", "platen_displacement"):
+        return
+    plant = view.plant
+    pose = view.values("platen_displacement")
+    legs = leg_displacements(plant, pose)[0][:, : plant.spools]
+    measured, (due, rate) = view.signal(view.values("actuator_displacement")), view.signals(legs, 0, 1)
+    slow = view.signal(pose)
+    jacobian = kinematic_jacobian(plant)
+    noise = [jacobian**2 @ view.variance("platen_displacement", k) for k in (0, 1)]
+    variance = view.variance("actuator_displacement")
+    geometry = _geometry(view, slow)
+    (gain_l, offset_l, delay_l), (gain_x, offset_x, delay_x) = map(
+        view.sd, ("actuator_displacement", "platen_displacement")
+    )
+    one = np.ones(len(slow))
+    time = view.step * view.dt * (np.arange(len(slow), dtype=np.float64) - 0.5 * (len(slow) - 1))
+    for i, name in enumerate(plant.machine.actuator_names):
+        terms = [Term("gain", "1", 1.0, due[:, i], noise[0][i]), _delay_term(rate[:, i], noise[1][i])]
+        terms += [_offset_term(len(slow)), Term("drift", "m/s", 0.0, time, 0.0, beside=True)]
+        errors = [gain_l * due[:, i], offset_l * one, delay_l * rate[:, i], delay_x * rate[:, i]]
+        errors.append(np.sqrt(variance[i]) * time / max(time[-1] - time[0], view.dt))
+        errors += [jacobian[i, k] * (gain_x * slow[:, k] + offset_x) for k in range(6)]
+        errors += [change[:, i] for change in geometry]
+        channel = f"actuator_displacement[{name}]"
+        yield _compared(view, "length against platen pose", channel, measured[:, i], variance[i], terms, errors)
+
+
+def _parity(view: _View) -> Iterator[Comparison]:
+    """What no pose explains of the actuators' lengths: as many combinations as there are more of them than axes."""
+    plant = view.plant
+    if not view.has("actuator_displacement"):
+        return
+    left, _, _ = np.linalg.svd(kinematic_jacobian(plant)[:, plant.axes])
+    null = left[:, plant.axes.size :]  # (actuators, combinations)
+    if not null.shape[1]:
+        return
+    lengths = view.signal(view.values("actuator_displacement"))
+    pose, _ = forward_kinematics(plant, lengths)
+    rest = lengths - leg_displacements(plant, pose)[0][:, : plant.spools]
+    gain, offset, _ = view.sd("actuator_displacement")
+    errors = [*_geometry(view, pose), gain * lengths, np.full_like(lengths, offset)]
+    variance = view.variance("actuator_displacement")
+    for k, combination in enumerate(null.T):
+        signals = [c * e[:, i] for i, c in enumerate(combination) for e in errors]
+        channel = f"actuator_displacement[parity {k + 1}]"
+        y = rest @ combination
+        yield _compared(view, "kinematic parity", channel, y, combination**2 @ variance, [], signals)
+
+
+def _rates(view: _View) -> Iterator[Comparison]:
+    """platen_velocity and platen_acceleration against derivatives of platen_displacement.
+
+    An accelerometer may feel the two axes across its own, too; as much as its gain may be off is lawful.
+    """
+    base = "platen_displacement"
+    for order, name in ((1, "platen_velocity"), (2, "platen_acceleration")):
+        if not view.has(base, name):
+            continue
+        measured = view.signal(view.values(name))
+        due, rate = view.signals(view.values(base), order, order + 1)
+        variance, noise = view.variance(name), [view.variance(base, order + k) for k in (0, 1)]
+        (gain_m, offset_m, delay_m), (gain_x, _, delay_x) = map(view.sd, (name, base))
+        for j in view.plant.axes:
+            terms = [Term("gain", "1", 1.0, due[:, j], noise[0][j]), _delay_term(rate[:, j], noise[1][j])]
+            terms.append(_offset_term(len(due)))
+            errors = [gain_m * due[:, j], gain_x * due[:, j], delay_m * rate[:, j], delay_x * rate[:, j]]
+            errors.append(offset_m * np.ones(len(due)))
+            across = [k for k in view.plant.axes if k < 3 and k != j] if order == 2 and j < 3 else []
+            terms += [Term(f"cross {AXES[k]}", "1", 0.0, due[:, k], noise[0][k], beside=True) for k in across]
+            errors += [gain_m * due[:, k] for k in across]
+            check = f"{name.split('_')[1]} against displacement"
+            yield _compared(view, check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
+
+
+def _struts(view: _View) -> Iterator[Comparison]:
+    """strut_pressure against P_0 (1 + dL / L_c0)^-n of the platen's pose; the offset is that level, P_0."""
+    plant, machine = view.plant, view.plant.machine
+    if not view.has("strut_pressure") or not view.has("platen_displacement"):
+        return
+    elongation = leg_displacements(plant, view.values("platen_displacement"))[0][:, plant.spools :]
+    level = np.array([s.pressure for s in machine.struts])
+    due = gas_pressure(machine, elongation) - level
+    measured, (swing, rate) = view.signal(view.values("strut_pressure")), view.signals(due, 0, 1)
+    variance = view.variance("strut_pressure")
+    (gain_p, offset_p, delay_p), (gain_x, _, delay_x) = map(view.sd, ("strut_pressure", "platen_displacement"))
+    one = np.ones(len(swing))
+    for k, strut in enumerate(machine.struts):
+        terms = [Term("gain", "1", 1.0, swing[:, k]), _delay_term(rate[:, k], 0.0), _offset_term(len(one), level[k])]
+        spread = {key: _relative_sd(view, strut, key) for key in ("pressure", "polytropic_index")}
+        whole = level[k] + swing[:, k]
+        errors = [gain_p * whole, offset_p * one, gain_x * swing[:, k], delay_p * rate[:, k], delay_x * rate[:, k]]
+        errors += [spread["pressure"] * whole, spread["polytropic_index"] * whole * np.log(whole / level[k])]
+        channel = f"strut_pressure[{strut.name}]"
+        yield _compared(view, "strut pressure against gas law", channel, measured[:, k], variance[k], terms, errors)
+
+
+def _relative_sd(view: _View, component: Any, key: str) -> float:
+    parameters = view.plant.machine.parameters
+    path = f"{component.name}.{key}" if f"{component.name}.{key}" in parameters else f"{component.kind}.{key}"
+    sd = parameters[path].sd
+    return float(sd) / parameters.number(path) if isinstance(sd, float) else 0.0
+
+
+def _supply(view: _View) -> Iterator[Comparison]:
+    """supply_pressure against the nominal one."""
+    if view.has("supply_pressure"):
+        nominal = view.plant.machine.hydraulics.supply_pressure
+        y = view.signal(view.values("supply_pressure"))[:, 0]
+        gain, offset, _ = view.sd("supply_pressure")
+        errors = [gain * y, offset * np.ones(len(y))]
+        terms = [_offset_term(len(y), nominal)]
+        variance = view.variance("supply_pressure")[0]
+        yield _compared(view, "supply pressure against nominal", "supply_pressure", y, variance, terms, errors)
+
+
+def _spools(view: _View) -> Iterator[Comparison]:
+    """spool_position against the command, late by the valve's delay.
+
+    Commands are recorded as they are, without a low-pass: what is fast in them says how much may have folded down.
+    """
+    if not view.has("spool_command", "spool_position"):
+        return
+    delays = view.plant.delays
+    command = due_spools(view.plant, view.values("spool_command"), view.dt)
+    measured, (due, rate) = view.signal(view.values("spool_position")), view.signals(command, 0, 1)
+    fast = command - Band(high=FAST / view.dt).apply(command, view.dt)
+    folded = fast[:: view.step][view.trim :][: len(due)] * np.sqrt(2 * BAND.high * view.dt)
+    variance = view.variance("spool_position")
+    gain, offset, delay = view.sd("spool_position")
+    for i, name in enumerate(view.plant.machine.actuator_names):
+        terms = [Term("gain", "1", 1.0, due[:, i]), _delay_term(rate[:, i], 0.0, delays[i]), _offset_term(len(due))]
+        errors = [gain * due[:, i], offset * np.ones(len(due)), delay * rate[:, i], folded[:, i]]
+        channel = f"spool_position[{name}]"
+        yield _compared(view, "spool against command", channel, measured[:, i], variance[i], terms, errors)

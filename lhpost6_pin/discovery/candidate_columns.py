@@ -1,0 +1,101 @@
+"""Columns: by how much the residuals change per unit of a candidate's amplitudes, in the frequency domain, whitened.
+
+Candidates of one family and shape that sit on different components are evaluated together where that is the same: what
+makes forces on legs has one wrench a leg, what alters the oil of an actuator acts on its own chambers.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..effects.registry import LAWS
+from ..identification.calibration.problem import Base, Problem
+from ..identification.inverse_dynamics import with_loads
+from ..identification.residuals import RESIDUALS, Residuals, follow
+from ..identification.wrench_residuals import row_wrenches
+from ..machine.machine import Machine
+from ..mechanics.plant import make_plant
+from .candidates import Candidate
+
+__all__ = ["Columns", "columns_of", "side_by_side"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Columns = list[Complex]
+"""Whitened bins (m, c, k) of every test."""
+
+
+def columns_of(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> tuple[Columns, list[Array]]:
+    """Columns of candidates alike but for their components; and how (k, q) each candidate's add up from them."""
+    first = candidates[0]
+    effect = first.on(base.plant.machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1]
+    legs = {c.name for c in base.plant.machine.components}
+    alone = sorted({name for c in candidates for name in c.components})
+    together = set(alone) <= legs and len(first.amplitudes) == 1
+    if together and first.family.shows_in == ("wrench",) and not LAWS[effect.law].alters:
+        columns = _by_force(problem, base, [first.at((name,)) for name in alone])
+    elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].alters == "oil":
+        columns = _by_oil(problem, base, first.at(tuple(alone)))
+    else:
+        columns = side_by_side([_by_difference(problem, base, c) for c in candidates])
+        ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
+        whole = np.eye(ends[-1])
+        return columns, [whole[:, a:b] for a, b in pairwise(ends)]
+    return columns, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
+
+
+def side_by_side(parts: Sequence[Columns]) -> Columns:
+    """Columns (m, c, k) of every test, all that these have."""
+    return [np.concatenate(bins, axis=-1) for bins in zip(*parts, strict=True)]
+
+
+def _by_difference(problem: Problem, base: Base, candidate: Candidate) -> Columns:
+    kinds = tuple(k for k in candidate.family.shows_in if k in RESIDUALS)
+    typical = [s.typical for s in candidate.amplitudes]
+    parts = []
+    for i, size in enumerate(typical):
+        machine = candidate.on(base.plant.machine, tuple(size * (k == i) for k in range(len(typical))))
+        changes = problem.change(base, make_plant(machine), kinds)
+        parts.append([c / size for c in changes])
+    return _whitened(problem, [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)])
+
+
+def _by_force(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> Columns:
+    """Wrench of each candidate's force, all in one machine; what it gives, the actuators need not."""
+    size = candidates[0].amplitudes[0].typical
+    machine: Machine = base.plant.machine
+    known = len(machine.effects)
+    for candidate in candidates:
+        machine = candidate.on(machine, (size,))
+    plant = make_plant(machine)
+    rows = plant.rows[plant.rows["effect"] >= known]
+    found: Columns = []
+    for test, there in zip(base.tests, base.paths, strict=True):
+        path = follow(plant, test, (base.plant, there))
+        z = path.z if test.actuator_force is None else with_loads(plant, path.z, test.actuator_force)
+        wrench = row_wrenches(plant, path.ports, z, rows)
+        changes = []
+        for i in range(len(candidates)):
+            own = wrench[:, rows["effect"] == known + i].sum(axis=1)
+            change = Residuals(-own / size, *(np.zeros((test.samples, 0)) for _ in RESIDUALS[1:]))
+            changes.append(problem.bins(change, test.dt)[0])
+        found.append(np.stack(changes, axis=-1))
+    return _whitened(problem, found)
+
+
+def _by_oil(problem: Problem, base: Base, candidate: Candidate) -> Columns:
+    """Flows of all actuators of a candidate at once, one by one."""
+    size = candidate.amplitudes[0].typical
+    changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), ("flow",))
+    places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]
+    rows = np.stack([problem.rows_of_actuator(place) for place in places], axis=-1)
+    return _whitened(problem, [c[..., None] * rows / size for c in changes])
+
+
+def _whitened(problem: Problem, bins: Sequence[Complex]) -> Columns:
+    return [
+        problem.whitener.apply(t, np.asarray(b, np.complex128), f)
+        for t, (b, f) in enumerate(zip(bins, problem.frequency, strict=True))
+    ]

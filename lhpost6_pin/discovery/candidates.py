@@ -1,0 +1,139 @@
+"""Candidates: effects of the library as a search tries them, each a family on some components with some shape."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identification.calibration import Knob
+from ..identification.residuals import RESIDUALS
+from ..machine.library import Family, Shape, families
+from ..machine.machine import Machine
+from ..machine.parameters import Parameters
+
+__all__ = ["Candidate", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A family on a group of components, with its shapes at given values; or an unknown that is set free."""
+
+    family: Family
+    components: tuple[str, ...]
+    shape: tuple[tuple[str, float], ...]  # (name, value) of what is no amplitude
+    release: str = ""  # the parameter or sensor error that is free of its prior; empty where an effect is added
+
+    @property
+    def name(self) -> str:
+        """Name of the effect in a machine, or of what is free."""
+        return self.release or f"{self.family.name}_{'_'.join(self.components)}"
+
+    @property
+    def amplitudes(self) -> tuple[Shape, ...]:
+        """Numbers with which the effect vanishes."""
+        return tuple(s for s in self.family.shapes if s.amplitude)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest amplitudes (q,)."""
+        shapes = self.amplitudes
+        return np.array([s.low for s in shapes]), np.array([s.high for s in shapes])
+
+    def spread(self, numbers: Parameters) -> Array:
+        """Prior deviations (q,) of amplitudes; `numbers` are those of `models/procedures/discovery.toml`."""
+        return numbers.number("fit.spread") * np.array([s.typical for s in self.amplitudes])
+
+    def at(self, components: tuple[str, ...]) -> "Candidate":
+        """The same on other components."""
+        return replace(self, components=components)
+
+    def of_one_form(self, other: "Candidate") -> bool:
+        """Whether only their shapes differ."""
+        return replace(self, shape=()) == replace(other, shape=())
+
+    def on(self, machine: Machine, amplitudes: tuple[float, ...]) -> Machine:
+        """The machine with this effect, amplitudes in the order of `amplitudes`."""
+        values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
+        return machine.with_effect(self.family.name, self.components, name=self.name, **values)
+
+    def knobs(self, amplitudes: tuple[float, ...], spread: float, factor: float = 0.0) -> tuple[Knob, ...]:
+        """Unknowns of a fit that starts here: amplitudes within `spread` typical ones.
+
+        Logarithms of shapes are within `factor`; without one shapes are left out.
+        """
+        values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
+        found = []
+        for s in self.family.shapes:
+            value = values[s.name]
+            relative = not s.amplitude and s.low > 0.0
+            if not s.amplitude and factor == 0.0:
+                continue
+            knob = Knob(
+                name=f"{self.name}.{s.name}",
+                paths=((f"effect.{self.name}.{s.name}", -1),),
+                unit=s.unit,
+                value=value,
+                sd=spread * s.typical if s.amplitude else factor if relative else s.scale,
+                form="log" if relative else "shift",
+                shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
+                step=s.typical if s.amplitude else None,
+            )
+            found.append(knob.within(s.low, s.high))
+        return tuple(found)
+
+
+def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[Knob, ...]]:
+    """The machine with the library's effects of the background, absent as yet, alike for each kind; and their knobs.
+
+    spread is the standard deviation of an amplitude in typical ones.
+    """
+    knobs: list[Knob] = []
+    for one in _of_background(machine):
+        absent = tuple(0.0 for _ in one.amplitudes)
+        machine = one.on(machine, absent)
+        knobs += one.knobs(absent, spread)
+    return machine, tuple(knobs)
+
+
+def with_other_form(machine: Machine, size: float) -> Machine:
+    """The machine with every effect of the library's background, `size` of the typical one."""
+    for one in _of_background(machine):
+        machine = one.on(machine, tuple(size * s.typical for s in one.amplitudes))
+    return machine
+
+
+def with_warm_oil(machine: Machine, share: float) -> Machine:
+    """The machine with oil that is softer and thinner by a share."""
+    paths = ["hydraulics.bulk_modulus", *dict.fromkeys(f"{a.kind}.viscous" for a in machine.actuators)]
+    return machine.with_params({path: (1.0 - share) * machine.parameters.number(path) for path in paths})
+
+
+def _of_background(machine: Machine) -> list["Candidate"]:
+    """Effects of the library's background, on all of each kind that rubs."""
+    found = []
+    for family in families().values():
+        names = family.components(machine) if family.search == "background" else ()
+        for kind in dict.fromkeys(c.kind for c in machine.components):
+            members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
+            one = Candidate(family, members, tuple((s.name, s.start[0]) for s in family.shapes if not s.amplitude))
+            typical = tuple(s.typical for s in one.amplitudes)
+            if members and any(p[0] for p in one.on(machine, typical).added_effects[-1].params):
+                found.append(one)
+    return found
+
+
+def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
+    """All candidates of the library for a machine: each family at each start of its shapes, on each group together."""
+    found = []
+    for family in families().values():
+        if family.search != "named":
+            continue
+        shapes = [s for s in family.shapes if not s.amplitude]
+        names = [s.name for s in shapes]
+        for values in product(*(s.start for s in shapes)):
+            shape = tuple(zip(names, values, strict=True))
+            found.append(tuple(Candidate(family, group, shape) for group in family.groups(machine)))
+    return tuple(group for group in found if group)

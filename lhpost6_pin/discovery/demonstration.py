@@ -1,0 +1,74 @@
+"""A real earthquake on a table that has what its model lacks, and the search for it: what `lhpost6 demo` goes through.
+
+The hidden effect and the tests are those of `models/procedures/demo.toml`; the search is the one of `discover`, told
+nothing of them.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from ..control import load_controller
+from ..data.campaign import Campaign
+from ..data.sensors import Sensors
+from ..machine.machine import Machine
+from ..simulation.rehearse import replay
+from ..simulation.simulated_campaign import load_procedure, simulate_campaign
+from . import Discovery, discover
+
+__all__ = ["EARTHQUAKE", "OpenLoops", "hidden_effect", "measured_tests", "open_loops", "searched"]
+
+Progress = Callable[[float], None]
+
+PROCEDURE = "demo"
+EARTHQUAKE = "EQ"
+"""The test that is not searched."""
+
+
+class OpenLoops(NamedTuple):
+    """The earthquake as measured, and as two models say that its spools would move the table."""
+
+    measured: xr.Dataset
+    delivered: xr.Dataset
+    found: xr.Dataset
+
+    def apart(self) -> tuple[float, float]:
+        """How far C ends up from where it was measured [m], with the model as delivered and with what was found."""
+        ends = [r["platen_displacement"].values[-1, :3] for r in self]
+        return float(np.linalg.norm(ends[1] - ends[0])), float(np.linalg.norm(ends[2] - ends[0]))
+
+
+def hidden_effect() -> tuple[str, str, dict[str, float]]:
+    """Family, component and numbers of what the demonstration hides."""
+    known = load_procedure(PROCEDURE)
+    numbers = {k.removeprefix("hidden."): known.number(k) for k in known if k.startswith("hidden.")}
+    return str(known.words["hidden.family"]), str(known.words["hidden.component"]), numbers
+
+
+def measured_tests(machine: Machine, sensors: Sensors, *, seed: int, progress: Progress | None = None) -> Campaign:
+    """Tests of a table that has the hidden effect, under the virtual 469D, as its sensors show them."""
+    family, component, numbers = hidden_effect()
+    table = machine.with_effect(family, (component,), name="", **numbers)
+    settings = load_controller(machine.controller)
+    return simulate_campaign(table, settings, sensors, seed=seed, name="demo", procedure=PROCEDURE, progress=progress)
+
+
+def searched(
+    machine: Machine, tests: Campaign, sensors: Sensors, *, seed: int, jobs: int = -1, progress: Progress | None = None
+) -> Discovery:
+    """What the search says of tests when all it knows is the machine without the effect; see `discover`."""
+    return discover(
+        machine, tests, sensors, hold_out=[EARTHQUAKE], phases=(1, 2), seed=seed, jobs=jobs, progress=progress
+    )
+
+
+def open_loops(machine: Machine, found: Machine, tests: Campaign) -> OpenLoops:
+    """The earthquake's measured spools, let loose on the model as delivered and on the one with what was found."""
+    measured = next(r for r in tests.records if r.attrs["test"] == EARTHQUAKE)
+    delivered, after = (
+        replay(model, measured, attrs={"test": EARTHQUAKE, "title": title}, engine="fused").record
+        for model, title in ((machine, "model as delivered"), (found, "model with what was found"))
+    )
+    return OpenLoops(measured, delivered, after)

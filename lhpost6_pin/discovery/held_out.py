@@ -1,0 +1,101 @@
+"""The proof: how far the model stands from tests that were not used, before and after.
+
+Four models: as delivered; refitted, with known parameters and sensor errors as the search without any effect finds
+them; after, with the effects; and the floor, what sensor noise alone leaves. The gap of a phase of a test is the root
+mean square, over everything that moves, of the model's error in standard deviations of that noise, so that the floor is
+one; closure = (refitted - after) / (refitted - floor).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from ..data.campaign import Campaign
+from ..data.sensors import Sensors
+from ..identification.calibration.sensor_errors import corrected_record
+from ..identification.validation import PHASES, Phase, Validation, validate
+from ..machine.machine import Machine
+from .search_state import Search, fitted_machine
+
+__all__ = ["FLOOR", "Gap", "Proof", "prove"]
+
+FLOOR = 1.0
+"""Gap that noise alone leaves."""
+
+_COMPARED = {
+    1: ("wrench", "struts"),
+    2: ("velocity", "acceleration", "wrench", "chamber_pressure_a"),
+    3: ("acceleration",),
+}
+
+
+@dataclass(frozen=True)
+class Gap:
+    """The gap of one phase of one test."""
+
+    phase: str
+    test: str
+    delivered: float
+    refitted: float
+    after: float
+
+    @property
+    def closure(self) -> float:
+        """Share of what is more than noise that the effects have closed; nan where next to nothing was open."""
+        open_ = self.refitted - FLOOR
+        return (self.refitted - self.after) / open_ if open_ > 0.1 else float("nan")
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Gaps on tests that were not used, and the validations that they come from."""
+
+    gaps: tuple[Gap, ...]
+    delivered: Validation
+    refitted: Validation
+    after: Validation
+
+
+def prove(
+    machine: Machine,
+    found: Search,
+    records: Sequence[xr.Dataset],
+    sensors: Sensors,
+    *,
+    phases: Sequence[int],
+    jobs: int,
+    progress: Callable[[float], None],
+) -> Proof:
+    """Validate the three models on held-out records; `machine` is the one delivered."""
+    first = found.refit.normal.problem
+    knobs = len(first.knobs)
+    before, after = fitted_machine(found.refit), fitted_machine(found.solution)
+    errors = found.refit.x[knobs:], found.solution.x[len(found.problem.knobs) :]
+    models = (
+        (machine, list(records)),
+        (before, [corrected_record(r, first.unknowns, errors[0]) for r in records]),
+        (after, [corrected_record(r, first.unknowns, errors[1]) for r in records]),
+    )
+    done = []
+    for i, (model, some) in enumerate(models):
+        campaign = Campaign("held out", tuple(some))
+        done.append(validate(model, campaign, sensors=sensors, phases=phases, jobs=jobs, progress=None))
+        progress((i + 1) / len(models))
+    gaps = []
+    for test in done[0].tests:
+        for number in phases:
+            sizes = [_size(v.phase(test, number)) for v in done]
+            if np.all(np.isfinite(sizes)):
+                gaps.append(Gap(PHASES[number], test, *sizes))
+    return Proof(tuple(gaps), *done)
+
+
+def _size(phase: Phase | None) -> float:
+    """Root mean square of the errors of a phase in deviations of noise; nan where it could not be compared."""
+    if phase is None or phase.reason:
+        return float("nan")
+    found = [a.error_to_noise for a in phase.agreement if a.quantity in _COMPARED[phase.number] and a.moves]
+    found = [x for x in found if np.isfinite(x)]
+    return float(np.sqrt(np.mean(np.square(found)))) if found else float("nan")

@@ -1,0 +1,69 @@
+"""Where a gap is: the misfit of every column of residuals in groups of bands of frequency."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.names import AXES
+from ..identification.calibration.problem import Problem
+from ..identification.residuals import RESIDUALS
+from ..machine.machine import Machine
+
+__all__ = ["Spot", "gap_map", "worst_spots"]
+
+Complex = NDArray[np.complex128]
+
+_GROUPS = (0, 2, 4, 6)  # first bands of groups
+_MOST = 4  # spots that are said
+
+
+class Spot(NamedTuple):
+    """A column of residuals in a group of bands, over all tests."""
+
+    kind: str  # of residuals
+    label: str  # axis, chamber, strut or actuator
+    band: tuple[float, float]  # [Hz]
+    misfit: float  # mean square of whitened bins: 1 is noise alone; nan without bins
+    excess: float  # squares beyond noise
+
+    @property
+    def words(self) -> str:
+        """As in ``flow H3 A, 3 to 12 Hz``."""
+        return f"{self.kind} {self.label}, {self.band[0]:g} to {self.band[1]:g} Hz"
+
+
+def gap_map(problem: Problem, rest: Sequence[Complex]) -> list[list[Spot]]:
+    """Of every column of a problem's residuals its spots by rising frequency; rest are whitened bins (m, c) by test."""
+    edges = problem.whitener.edges
+    bands = list(pairwise(float(edges[k]) for k in (*_GROUPS, len(edges) - 1)))
+    ends = [*(high for _, high in bands[:-1]), np.inf]
+    inside = [[(f >= low) & (f < end) for f in problem.frequency] for (low, _), end in zip(bands, ends, strict=True)]
+    found = []
+    for kind in RESIDUALS:
+        columns = np.flatnonzero(problem.rows(kind))
+        for label, column in zip(_labels(problem.machine, kind), columns.tolist(), strict=False):
+            spots = []
+            for band, tests in zip(bands, inside, strict=True):
+                squares = np.concatenate([np.abs(r[i, column]) ** 2 for r, i in zip(rest, tests, strict=True)])
+                mean = float(squares.mean()) if squares.size else float("nan")
+                spots.append(Spot(kind, label, band, mean, float(np.sum(squares - 1.0))))
+            found.append(spots)
+    return found
+
+
+def worst_spots(problem: Problem, rest: Sequence[Complex]) -> list[Spot]:
+    """Where most of what is more than noise is, by falling share; few of them."""
+    spots = [spot for row in gap_map(problem, rest) for spot in row if spot.excess > 0.0]
+    spots.sort(key=lambda spot: -spot.excess)
+    least = 0.1 * sum(spot.excess for spot in spots)
+    return [spot for spot in spots if spot.excess >= least][:_MOST] or spots[:1]
+
+
+def _labels(machine: Machine, kind: str) -> Sequence[str]:
+    """Names of the columns of a kind of residuals."""
+    chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
+    named = {"wrench": AXES, "flow": chambers, "gas": machine.strut_names, "supply": ("pressure",)}
+    return named.get(kind, machine.actuator_names)

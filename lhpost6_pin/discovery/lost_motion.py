@@ -1,0 +1,131 @@
+"""Play that the lengths of actuators show: it is in the model before the library is searched.
+
+No equation of forces or oil tells play as plainly as a length sensor on the rod beside the platen's pose does: the rod
+changes sides with the sign of its force. Lengths are regressed on that sign together with all that sensors and geometry
+may be off by, each with its prior. What they say is the prior of the play; the rest is fitted about it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..core.progress import Progress, between
+from ..data.consistency import scaled_inverse
+from ..data.sensor_pairs import Comparison, loose_lengths
+from ..data.sensors import Sensors
+from ..identification.calibration.fit import solve
+from ..machine.library import find_family
+from ..machine.parameters import Parameters
+from ..mechanics.plant import Plant
+from .acceptance import squares_by_column
+from .add_effects import joined
+from .candidates import Candidate
+from .search_state import Added, Contest, Search, fitted_machine
+
+__all__ = ["LostMotion", "lost_motion", "with_lost_motion"]
+
+Array = NDArray[np.float64]
+
+_REWEIGHED = 3
+"""Times that what is left is taken for noise of its own power."""
+
+
+class LostMotion(NamedTuple):
+    """A rod that the lengths show ahead of the platen by its force's sign."""
+
+    component: str
+    half_play: float  # [m]
+    deviation: float  # standard
+
+    @property
+    def gain(self) -> float:
+        """Log-likelihood of the lengths."""
+        return 0.5 * (self.half_play / self.deviation) ** 2
+
+
+def lost_motion(
+    plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors, numbers: Parameters
+) -> tuple[LostMotion, ...]:
+    """Play that the lengths of all records together tell beyond doubt; numbers are those of `models/procedures`."""
+    closing = dict(_shape())["closing_force"]
+    parts: dict[str, list[tuple[Comparison, Array]]] = {}
+    for record in records:
+        for name, comparison, side in loose_lengths(plant, record, sensors, closing):
+            parts.setdefault(name, []).append((comparison, side))
+    found = [LostMotion(name, *_play(some)) for name, some in parts.items()]
+    least, size = numbers.number("accept.mimicked"), numbers.number("lengths.play")
+    return tuple(one for one in found if one.half_play >= size and one.gain >= least)
+
+
+def _play(parts: Sequence[tuple[Comparison, Array]]) -> tuple[float, float]:
+    """Half the play and its standard deviation [m]: least squares, with errors of sensors and geometry in them."""
+    due = np.array([term.due for term in parts[0][0].terms])
+    rows, rest = [], []
+    for c, side in parts:
+        terms = np.stack([term.column for term in c.terms], axis=1)
+        rows.append(np.hstack([side[:, None], terms, c.errors]))
+        rest.append(c.y - terms @ due)
+    x, y = np.vstack(rows), np.concatenate(rest)
+    prior = np.zeros(x.shape[1])
+    prior[1 + len(due) :] = 1.0
+    thinned = len(y) / sum(c.independent for c, _ in parts)
+    stated = float(np.mean([c.variance for c, _ in parts]))
+    variance = stated
+    for _ in range(_REWEIGHED):
+        matrix = x.T @ x / (variance * thinned) + np.diag(prior)
+        inverse = scaled_inverse(matrix, np.diag(matrix))
+        theta = inverse @ (x.T @ y) / (variance * thinned)
+        variance = max(stated, float(np.mean((y - x @ theta) ** 2)))
+    return float(theta[0]), float(np.sqrt(inverse[0, 0]))
+
+
+def _shape() -> tuple[tuple[str, float], ...]:
+    """Where a search for play starts, but for its size."""
+    return tuple((s.name, s.start[0]) for s in find_family("swivel_play").shapes if not s.amplitude)
+
+
+def with_lost_motion(
+    found: Search, lost: Sequence[LostMotion], calibration: Parameters, numbers: Parameters, progress: Progress
+) -> Search:
+    """The search with the play that the lengths tell; alike where all that may have it do."""
+    groups = _groups(lost, found)
+    for i, group in enumerate(groups):
+        share = between(progress, i / len(groups), (i + 1) / len(groups))
+        found = _with_play(found, group, calibration, numbers, share)
+    progress(1.0)
+    return found
+
+
+def _groups(lost: Sequence[LostMotion], found: Search) -> list[tuple[LostMotion, ...]]:
+    """All together if all double-acting actuators have play, none twice as much as another."""
+    if {one.component for one in lost} == set(found.problem.machine.double_acting):
+        sizes = np.array([one.half_play for one in lost])
+        if len(sizes) > 1 and sizes.max() < 2.0 * sizes.min():
+            return [tuple(lost)]
+    return [(one,) for one in lost]
+
+
+def _with_play(
+    found: Search, group: Sequence[LostMotion], calibration: Parameters, numbers: Parameters, progress: Progress
+) -> Search:
+    candidate = Candidate(find_family("swivel_play"), tuple(one.component for one in group), _shape())
+    weight = np.array([one.deviation**-2.0 for one in group])
+    size = float(weight @ [one.half_play for one in group] / weight.sum())
+    sd = float(weight.sum() ** -0.5)  # no wider: oil that a pin hammers tells of play, but wrongly
+    own = tuple(
+        replace(knob, sd=sd) if knob.name.endswith(".half_play") else knob
+        for knob in candidate.knobs((size,), numbers.number("fit.spread"), numbers.number("fit.factor"))
+    )
+    ready, start = joined(found, candidate, (size,), own, found.solution.x)
+    solution = solve(ready.problem, ready.replicas, calibration, start, progress, found.solution.normal, frugal=True)
+    more = Search(ready, solution, found.refit, list(found.added), found.rounds)
+    told = sum(one.gain for one in group)
+    contest = (Contest(candidate, 0.0, fitted_machine(solution)),)
+    fall = squares_by_column(found.rest) - squares_by_column(more.rest)
+    tried = len(found.problem.machine.double_acting)
+    more.added.append(Added(candidate, told + found.objective - more.objective, 0, tried, contest, fall, 0.0, told))
+    return more

@@ -1,0 +1,236 @@
+"""Screening: what each candidate would explain, with all known parameters and sensor errors refitted.
+
+Everything is linear here: the residuals' derivatives by knobs, sensor errors and scatter between twins (the
+background), and by a candidate's amplitudes. The gain is the log-likelihood that the candidate adds to a refit without
+it; held out is what it adds to the prediction of each test, its amplitudes fitted on the others.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import lsq_linear
+
+from ..identification.calibration.whitened_residuals import real_bins
+
+__all__ = ["Background", "Block", "Score", "less_noise", "make_block", "score"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Columns = Sequence[Complex]
+
+WORTH = 0.5
+"""Log-likelihood below which it is not worth while to see what else moves."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Normal equations of a candidate's amplitudes with themselves and with the background, by test."""
+
+    cross: Array  # (t, p, q)
+    own: Array  # (t, q, q)
+    side: Array  # (t, q)
+
+    def select(self, parts: Array) -> "Block":
+        """Block of amplitudes each of which is a sum of these, parts (k, q)."""
+        return Block(self.cross @ parts, parts.T @ self.own @ parts, self.side @ parts)
+
+
+@dataclass(frozen=True)
+class Background:
+    """Normal equations of everything that is refitted in every comparison, by test; x in units of the priors.
+
+    Bins are real here: real parts, then imaginary parts, times the root of two over that of the power left in them.
+    """
+
+    slope: Sequence[Array]  # (n, p) of every test
+    rest: Sequence[Array]  # (n,)
+    root: Sequence[Array]  # (m, c) roots of power
+    matrix: Array  # (t, p, p)
+    side: Array  # (t, p)
+    place: Array  # (p,) where the background stands, in units of the priors
+    inward: Array  # (p,) zero; at its lowest +1, at its highest -1: what may move that way alone
+    noise: Sequence[tuple[Sequence[Array], Sequence[Array]]] = ()  # by replica, test: changes of slope, of rest
+
+    @property
+    def free(self) -> Array:
+        """One, or zero for what is at a bound (p,)."""
+        return (self.inward == 0.0).astype(float)
+
+    @cached_property
+    def summed(self) -> list["_Summed"]:
+        """Its equations with the priors: of all tests, then of all but each."""
+        found, both, bound = [], np.outer(self.free, self.free), self.inward != 0.0
+        for without in range(-1, len(self.matrix)):
+            keep = np.arange(len(self.matrix)) != without
+            matrix, side = self.matrix[keep].sum(axis=0), self.side[keep].sum(axis=0) + self.place
+            factor = cho_factor(matrix * both + np.eye(len(self.place)))
+            cross = matrix[:, bound] * self.free[:, None]
+            through = cho_solve(factor, cross)
+            own = matrix[np.ix_(bound, bound)] - cross.T @ through + np.eye(int(bound.sum()))
+            found.append(_Summed(keep, factor, side * self.free, side[bound], cross, through, own))
+        return found
+
+    @cached_property
+    def _still(self) -> tuple[Array, Array]:
+        tests, p, none = len(self.matrix), len(self.place), np.zeros(0)
+        empty = Block(np.zeros((tests, p, 0)), np.zeros((tests, 0, 0)), np.zeros((tests, 0)))
+        profiles = [_profile(self, empty, none, without) for without in range(-1, tests)]
+        best = [one.best(none, none) for one in profiles]
+        gains = np.array([one.gain(theta) for one, theta in zip(profiles, best, strict=True)])
+        return gains, profiles[0].change(best[0])
+
+    def explained(self, columns: Columns, amplitude: Array) -> list[Array]:
+        """Real bins (n,) of every test that columns (m, c, k) explain with amplitudes (k,)."""
+        return [real_bins(c, root) @ amplitude for c, root in zip(columns, self.root, strict=True)]
+
+    @property
+    def gains(self) -> Array:
+        """Log-likelihood that what is at a bound gains by itself, of all tests and of all but each (1 + t,)."""
+        return self._still[0]
+
+    @property
+    def alone(self) -> Array:
+        """What it changes (p,) where nothing is added."""
+        return self._still[1]
+
+
+def make_block(background: Background, columns: Sequence[Complex]) -> Block:
+    """Block of columns (m, c, k) by test."""
+    cross, own, side = [], [], []
+    for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
+        c = real_bins(column, root)
+        cross.append(slope.T @ c)
+        own.append(c.T @ c)
+        side.append(c.T @ rest)
+    return Block(np.array(cross), np.array(own), np.array(side))
+
+
+def less_noise(background: Background, block: Block, columns: Sequence[Complex], noisy: Sequence[Columns]) -> Block:
+    """The block without what noise adds to it: columns of the replicas differ by what noise makes of a candidate.
+
+    Where noise is most of a column, as much of it is taken off as leaves half of its square.
+    """
+    cross, own, side = block.cross.copy(), block.own.copy(), block.side.copy()
+    for t, (column, root) in enumerate(zip(columns, background.root, strict=True)):
+        changes = [real_bins(seen[t] - column, root) for seen in noisy]
+        added = sum(c.T @ c for c in changes) / len(noisy)
+        most = np.max(np.diag(added) / np.maximum(np.diag(own[t]), 1e-300))
+        share = min(1.0, 0.5 / max(most, 1e-300)) / len(noisy)
+        own[t] -= share * len(noisy) * added
+        for change, (slopes, rests) in zip(changes, background.noise, strict=True):
+            cross[t] -= share * slopes[t].T @ change
+            side[t] -= share * change.T @ rests[t]
+    return Block(cross, own, side)
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a candidate explains."""
+
+    gain: float  # of log-likelihood
+    amplitude: Array  # (q,)
+    sd: Array  # (q,)
+    held_out: Array  # (t,) gain on each test, amplitudes fitted on the others
+    change: Array  # (p,) of the background with it, in units of the priors
+
+
+def score(background: Background, block: Block, low: Array, high: Array, spread: Array) -> Score:
+    """Score a candidate whose amplitudes (q,) are within low and high, with normal priors of deviations `spread`.
+
+    Held out on a test is by how much the candidate raises the log-probability of that test given the others, whatever
+    the background, with amplitudes as well as the others tell them: the gain of all tests less that of the others, and
+    less what it costs to have been unsure, half the logarithm by which the test narrows the amplitudes. What one test
+    alone excites costs little there; what tests contradict, much.
+    """
+    whole, still = _profile(background, block, spread, -1), background.gains
+    theta = whole.best(low, high)
+    gain = whole.gain(theta) - float(still[0])
+    held_out = []
+    for t in range(len(block.own) if gain > WORTH else 0):
+        others = _profile(background, block, spread, t)
+        narrowed = 0.5 * (whole.information - others.information)
+        without = others.gain(others.best(low, high)) - float(still[1 + t])
+        held_out.append(gain - without - narrowed)
+    count = len(low)
+    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:count, :count], hermitian=True)), 0.0))
+    return Score(gain, theta[:count], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta))
+
+
+class _Summed(NamedTuple):
+    """Equations of the background over some tests: of what is free, and of what is at a bound."""
+
+    keep: NDArray[np.bool_]  # (t,)
+    factor: tuple[Array, bool]  # of what is free
+    right: Array  # (p,)
+    side: Array  # (f,) of what is at a bound
+    cross: Array  # (p, f)
+    through: Array  # (p, f)
+    own: Array  # (f, f), what is free refitted
+
+
+class _Profile(NamedTuple):
+    """Log-likelihood by a candidate's amplitudes and what is at a bound, theta (q + f,), the rest refitted for each."""
+
+    schur: Array  # (q + f, q + f), priors in it
+    side: Array  # (q + f,)
+    factor: tuple[Array, bool]  # of the background
+    right: Array  # (p,)
+    cross: Array  # (p, q + f)
+    inward: Array  # (p,)
+
+    def best(self, low: Array, high: Array) -> Array:
+        """What gains most: amplitudes between low and high (q,), and what is at a bound moved inward or not at all."""
+        count = len(low)
+        way = self.inward[self.inward != 0.0]
+        theta = np.zeros(len(self.side))
+        inverse = np.linalg.pinv(self.schur[:count, :count], rcond=1e-10, hermitian=True)
+        theta[:count] = np.clip(-inverse @ self.side[:count], low, high)
+        slope = (self.side + self.schur @ theta)[count:]
+        own = np.maximum(np.diag(self.schur), 1e-12)  # rounding, where the background explains a column
+        if not np.any((slope * way < 0.0) & (0.5 * slope**2 > WORTH * own[count:])):
+            return theta
+        scale = 1.0 / np.sqrt(own)
+        least = np.concatenate([low, np.where(way > 0.0, 0.0, -np.inf)]) / scale
+        most = np.concatenate([high, np.where(way > 0.0, np.inf, 0.0)]) / scale
+        value, vector = np.linalg.eigh(self.schur * np.outer(scale, scale))
+        root = np.sqrt(np.maximum(value, 1e-9))
+        wanted = -(vector.T @ (self.side * scale)) / root
+        # by active sets: few numbers, of which some tell nothing
+        found = lsq_linear(root[:, None] * vector.T, wanted, bounds=(least, most), method="bvls")
+        return np.asarray(found.x * scale)
+
+    def gain(self, theta: Array) -> float:
+        """What theta gains over none."""
+        return -float(0.5 * theta @ self.schur @ theta + self.side @ theta)
+
+    @property
+    def information(self) -> float:
+        """Logarithm of the determinant of the amplitudes' normal matrix."""
+        count = len(self.side) - int(np.count_nonzero(self.inward))
+        return float(np.linalg.slogdet(self.schur[:count, :count])[1])
+
+    def change(self, theta: Array) -> Array:
+        """By how much the background moves (p,) with theta."""
+        moved = -cho_solve(self.factor, self.right + self.cross @ theta)
+        bound = self.inward != 0.0
+        moved[bound] = theta[len(theta) - np.count_nonzero(bound) :]
+        return np.asarray(moved)
+
+
+def _profile(background: Background, block: Block, spread: Array, without: int) -> _Profile:
+    """Profile of all tests but one, or of all (-1)."""
+    some, bound = background.summed[without + 1], background.inward != 0.0
+    candidate = block.cross[some.keep].sum(axis=0)
+    cross = candidate * background.free[:, None]
+    through = cho_solve(some.factor, cross)
+    own = block.own[some.keep].sum(axis=0) - cross.T @ through + np.diag(spread**-2.0)
+    between = candidate[bound] - some.through.T @ cross
+    schur = np.block([[own, between.T], [between, some.own]])
+    side = np.concatenate([block.side[some.keep].sum(axis=0), some.side])
+    both, gone = np.hstack([cross, some.cross]), np.hstack([through, some.through])
+    return _Profile(schur, side - gone.T @ some.right, some.factor, some.right, both, background.inward)

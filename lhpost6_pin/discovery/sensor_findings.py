@@ -1,0 +1,111 @@
+"""Sensors that other sensors contradict: found before any force law is asked, and put right.
+
+Only quantities measured twice are asked here (`consistency`), where neither oil nor friction has a say: velocities and
+accelerations against the displacement, lengths against the pose, the skew of forces against pressures. What joins a
+force and a pressure is left to the search.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import xarray as xr
+
+from ..core.names import AXES
+from ..data.alignment import align_record
+from ..data.consistency import SensorFinding, check_sensors
+from ..data.sensors import Sensors
+from ..mechanics.plant import Plant
+
+__all__ = ["Fault", "put_right", "wrong_sensors"]
+
+_CHECKS = ("velocity against displacement", "acceleration against displacement", "length against platen pose")
+_SKEWED = (*_CHECKS, "force against pressures")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A sensor that is off beyond its stated range: measured = (1 + gain) true + cross-talk + offset, and late."""
+
+    kind: str  # "gain", "offset", "drift", "delay", or "cross x": of the acceleration along x
+    channel: str
+    column: str  # label within the channel; empty: all of it
+    value: float
+    unit: str
+    deviation: float  # standard, of noise and of what calibration leaves open
+    stated: float  # largest error that the sensors' file allows
+
+    @property
+    def name(self) -> str:
+        """As unknowns of a search are called."""
+        return f"{self.kind} {self.channel}[{self.column}]" if self.column else f"{self.kind} {self.channel}"
+
+    @property
+    def family(self) -> str:
+        """Family of the library."""
+        if self.kind == "delay":
+            return "channel_delay"
+        return "length_sensor_error" if self.channel == "actuator_displacement" else "accelerometer_error"
+
+
+def wrong_sensors(
+    plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors, loose: Sequence[str] = ()
+) -> tuple[Fault, ...]:
+    """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does.
+
+    Play of actuators that are `loose` shifts the means of their lengths, by how long a rod bears on either side.
+    """
+    findings = check_sensors(plant, records, sensors)
+    late = _late(findings, sensors)
+    if late:  # a large delay looks like a gain as well
+        behind = {f.channel: f.value for f in late}
+        findings = check_sensors(plant, [align_record(r, behind) for r in records], sensors)
+    shifted = {f"actuator_displacement[{name}]" for name in loose}
+    wrong = [f for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
+    faults = [_fault(f, sensors) for f in wrong if f.quantity != "offset" or f.channel not in shifted]
+    return (*(f for f in faults if f is not None), *late)
+
+
+def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
+    """The gain, offset or cross-talk that a finding is of."""
+    channel, _, column = finding.channel.rstrip("]").partition("[")
+    kind, error = finding.quantity, finding.estimate - finding.expected
+    if kind == "gain" or kind.startswith("cross"):
+        stated = sensors.gain_range.get(channel, 0.0)
+    elif kind == "drift":
+        stated = 0.0
+    elif kind == "offset" and not channel.startswith("platen"):
+        stated = sensors.offset_range.get(channel, 0.0)
+    else:
+        return None
+    return Fault(kind, channel, column, error, finding.unit, finding.deviation, stated)
+
+
+def _late(findings: Sequence[SensorFinding], sensors: Sensors) -> list[Fault]:
+    """Groups of channels of which most columns that can tell are late."""
+    faults = []
+    for check in _SKEWED:
+        told = [f for f in findings if f.check == check and f.quantity == "delay" and f.verdict != "untested"]
+        off = [f for f in told if f.verdict == "suspicious"]
+        if 2 * len(off) > len(told):
+            group = told[0].channel.partition("[")[0]  # of one channel, all that are asked here
+            middle = sorted(off, key=lambda f: f.estimate)[len(off) // 2]
+            error, stated = middle.estimate - middle.expected, sensors.delay_range.get(group, 0.0)
+            faults.append(Fault("delay", group, "", error, "s", middle.deviation, stated))
+    return faults
+
+
+def put_right(records: Sequence[xr.Dataset], faults: Sequence[Fault]) -> list[xr.Dataset]:
+    """Records without the gains and cross-talk of these faults of the platen's sensors; delays are aligned later."""
+    mended = []
+    for record in records:
+        out = record.copy(deep=True) if faults else record
+        for fault in faults:
+            if fault.kind == "delay" or fault.channel not in out or not fault.channel.startswith("platen"):
+                continue
+            values, k = out[fault.channel].values, AXES.index(fault.column)
+            if fault.kind == "gain":
+                values[:, k] /= 1.0 + fault.value
+            elif fault.kind.startswith("cross"):
+                values[:, k] -= fault.value * values[:, AXES.index(fault.kind.split()[1])]
+        mended.append(out)
+    return mended

@@ -1,0 +1,1 @@
+"""Inverse dynamics, residuals, decomposition, calibration and validation against measured tests."""

@@ -1,0 +1,233 @@
+"""Weighted least squares of a machine's knobs and its sensors' errors on the residuals of a campaign.
+
+    minimise  2 sum |W r(x)|^2 + sum (x / prior)^2
+
+r are the residuals in the frequency domain (real and imaginary parts, hence the 2 for unit power), W whitens the noise
+that sensors leave in them. Noise is in the derivatives J of r, too, since every term of an equation is measured; then
+the sum of squares is least for an equation that is scaled down. The expectations of what noise adds to J^T r and J^T J
+are known from draws of simulated noise, and taken off (corrected normal equations, Fuller: Measurement Error Models,
+Wiley 1987, chapter 3). Where more than noise is left at the end (in a column of a test's residuals, in a band),
+the rest counts as noise, too: it is weighed less, and predicted deviations grow. The inverse of the normal matrix is
+the predicted covariance, with a floor under its deviations.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...core.names import AXES
+from ...core.progress import Progress, between
+from ...data.sensors import Sensors
+from ...machine.machine import Machine
+from ...machine.parameters import Parameters
+from ..residuals import RESIDUALS
+from .normal_equations import Bias, Normal, bounded_step, positive
+from .prepare import prepare_problem
+from .problem import Problem
+from .result import Calibration, Subset, calibration_numbers
+from .simulated_residuals import by_simulation
+from .whitened_residuals import mean_squares, surprise
+
+__all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+OVERSHOT = 1000.0
+"""Log-likelihood by which a step must have made things worse to be taken back: corrections for noise cost hundreds."""
+
+
+def calibrate(
+    machine: Machine,
+    records: Sequence[xr.Dataset],
+    sensors: Sensors,
+    *,
+    campaign: str = "campaign",
+    seed: int = 0,
+    jobs: int = -1,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Calibrate a machine by the tests of a campaign, all at once.
+
+    Records are of one machine in one state, with the same channels; each may have its own sample rate. Servovalves are
+    open as in the first. Deterministic for a seed (of the simulated noise), whatever the number of `jobs` (threads; -1:
+    one a core). `progress` is called with the share done.
+
+    Raises RecordError for a record that breaks the layout, is of another machine, or was made with a specimen that the
+    machine has not; that lacks platen_displacement, or both forces and pressures; that differs from the others in its
+    channels; that is too short or too slowly sampled. SimulationError for a specimen with joints.
+    """
+    numbers = calibration_numbers()
+    report = progress or (lambda share: None)
+    ready = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
+    problem, noisy = ready.problem, ready.noisy
+    report(0.1)
+    found = solve(problem, ready.replicas, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
+    normal, x = found.normal, found.x
+    floor = numbers.number("fit.floor") * problem.prior
+    covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64)
+    told_below = numbers.number("report.told")
+    simulated = by_simulation(
+        problem,
+        noisy[: int(numbers.number("simulation.draws")) * len(records)],
+        x,
+        band=numbers.vector("simulation.bands"),
+        floor=numbers.number("simulation.floor"),
+        told_below=told_below,
+        progress=between(report, 0.8, 1.0),
+    )
+    report(1.0)
+    return Calibration(
+        machine=problem.machine,
+        campaign=campaign,
+        tests=tuple(str(r.attrs.get("test", i)) for i, r in enumerate(records)),
+        knobs=problem.knobs,
+        unknowns=problem.unknowns,
+        prior=problem.prior,
+        estimate=x,
+        covariance=covariance,
+        alone=np.hypot(normal.alone(problem.prior), floor),
+        subsets=(*_subsets(problem, normal, found.at, floor, told_below), *([] if simulated is None else [simulated])),
+        misfit_before=found.misfit_before,
+        misfit_after=misfit(problem, found.rest),
+        rounds=found.rounds,
+        converged=found.converged,
+        numbers=numbers,
+    )
+
+
+class Solution(NamedTuple):
+    """Where a search has ended."""
+
+    x: Array  # (p,) the unknowns
+    at: Array  # (p,) where the normal equations are from
+    normal: Normal
+    rest: list[Complex]  # what is left at x: whitened bins (m, c) of every test
+    misfit_before: Array  # (n_tests, n_kinds), at the start
+    rounds: int
+    converged: bool
+
+
+def solve(
+    problem: Problem,
+    replicas: Sequence[Problem],
+    numbers: Parameters,
+    start: Array,
+    progress: Progress,
+    known: Normal | None = None,
+    *,
+    first: Normal | None = None,
+    frugal: bool = False,
+    settled: bool = False,
+    near: Mask | bool = False,
+) -> Solution:
+    """Search from `start` (p,) by Gauss-Newton steps.
+
+    Noise in the derivatives is corrected for from the second on, where they are `known` from the first.
+
+    Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
+    the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and
+    evaluates derivatives by gains, offsets and what hardly bends the equations there alone, all others as long as steps
+    gain much, or with `known` there alone; a settled one only those that `known` lacks, and those that are `near` (p,)
+    to them. A step that went too far is taken again, a quarter as long.
+    """
+    x, at, step = start.copy(), start, np.zeros(len(start))
+    rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
+    fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
+    bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
+    again = bent if frugal and not settled else fresh | near
+    gain = np.inf  # of the last step, of log-likelihood and log-prior
+    bias: Bias | None = None
+    normal: Normal | None = None
+    held: Normal | None = None  # that of `at`, from where the last step went
+    least = np.inf
+    converged = False
+    shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
+    for done in range(1, rounds + 1):
+        part = done - 1 if done == 1 else done - 1 + len(replicas)
+        share = between(progress, shares[part], shares[part + 1])
+        if normal is None:
+            normal = first or Normal(problem, x, share, known, None if settled else fresh | again)
+            before = misfit(problem, normal.rest)
+        else:
+            renewed = not frugal or (
+                (settled or known is None)
+                and gain > numbers.number("fit.renew")
+                and done <= int(numbers.number("fit.renewals"))
+            )
+            normal = Normal(problem, x, share, normal, again if renewed else np.zeros_like(again))
+        if done == (1 if frugal else 2):  # near enough to the end, and the same from there on
+            parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
+            bias = Bias(normal, replicas, x, parts, known)
+        if bias is not None and (done > 1 or known is not None):
+            normal = normal.less(bias)
+        value = objective(problem, normal.rest, x)
+        if held is not None and value > least + OVERSHOT:
+            step, normal = 0.25 * step, held
+            x = at + step
+            continue
+        least, held, at = value, normal, x
+        posterior = normal.posterior(problem.prior)
+        step = bounded_step(normal, posterior, x, problem, numbers)
+        slope = normal.whole[1] + x / problem.prior**2
+        gain = -float(slope @ step + 0.5 * step @ posterior @ step)
+        x = x + step
+        sd = np.sqrt(np.diag(np.linalg.inv(posterior)) + floor**2)
+        still = np.max(np.abs(step) / sd) < numbers.number("fit.converged")
+        if done > 1 and (still or (frugal and gain < numbers.number("fit.still"))):
+            converged = True
+            break
+    assert held is not None
+    rest = problem.whitened(x)
+    if objective(problem, rest, x) > least + OVERSHOT:
+        x, rest = at, held.rest
+    return Solution(x, at, held, rest, before, done, converged)
+
+
+def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:
+    """Negative log-likelihood and log-prior."""
+    pairs = zip(rest, problem.frequency, strict=True)
+    likely = sum(float(surprise(*mean_squares(problem.whitener, np.abs(r) ** 2, f)).sum()) for r, f in pairs)
+    return likely + 0.5 * float(np.sum((x / problem.prior) ** 2))
+
+
+def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
+    """Mean square (n_tests, n_kinds) of whitened residuals; NaN for kinds that have no columns."""
+    out = np.full((len(whitened), len(RESIDUALS)), np.nan)
+    for t, bins in enumerate(whitened):
+        for k, kind in enumerate(RESIDUALS):
+            if problem.widths[k]:
+                out[t, k] = np.mean(np.abs(bins[:, problem.rows(kind)]) ** 2)
+    return out
+
+
+def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array, told_below: float) -> tuple[Subset, ...]:
+    """What wrench along each axis, flows of each kind of actuator and gas law say by themselves, about normal's x (p,).
+
+    Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
+    """
+    machine, groups = problem.machine, []
+    names, double = machine.actuator_names, machine.double_acting
+    for k, axis in enumerate(AXES):
+        groups.append((f"wrench, {axis}", problem.rows("wrench", k)))
+    for kind in dict.fromkeys(a.kind for a in machine.actuators):
+        places = [i for i, a in enumerate(machine.actuators) if a.kind == kind]
+        places += [len(names) + double.index(names[i]) for i in list(places) if names[i] in double]
+        groups.append((f"flow, {kind}", problem.rows("flow", *places)))
+    groups.append(("gas law", problem.rows("gas")))
+    found = []
+    for name, columns in groups:
+        if not columns.any():
+            continue
+        h, g = normal.of(range(len(normal.rest)), columns)
+        h = positive(h, problem.prior)
+        covariance = np.linalg.inv(h + np.diag(problem.prior**-2.0))
+        sd = np.sqrt(np.diag(covariance))
+        estimate = x - covariance @ (g + x / problem.prior**2)
+        told = sd < told_below * problem.prior
+        found.append(Subset(name, np.where(told, estimate, np.nan), np.where(told, np.hypot(sd, floor), np.nan)))
+    return tuple(found)

@@ -1,0 +1,275 @@
+"""Knobs: the coordinates in which a machine is calibrated, each with its prior.
+
+A knob turns one number of the machine file, or several together where only their sum means anything (the heights of a
+kind's platen points). It is worth a coordinate: the share by which what is positive grows, a shift for the rest; zero
+is the machine as given, and its prior is normal with the stated standard deviation.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...machine.machine import Machine
+from ...machine.parameters import Quantity
+from ..residuals import RESIDUALS
+
+__all__ = ["Knob", "drawn_coordinates", "machine_knobs", "plan_knobs", "scatter_knobs", "with_knobs"]
+
+Array = NDArray[np.float64]
+
+_OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus")
+_GAS = ("pressure", "polytropic_index")
+_GEOMETRY = ("wrench", "flow", "gas")
+_MECHANICAL = (
+    *("mass", "inertia", "viscous"),
+    *("seal_friction", "seal_yield", "seal_shape"),
+    *("pad_friction", "pad_yield", "pad_shape"),
+)
+
+_LEAST = 0.05
+"""Of its nominal value, what is positive has at least."""
+
+_ROOM = 1.001
+"""Length of a chamber over the stroke that it leaves at least."""
+
+_SCATTER: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("flow", "flow_curve", "leakage"), ("flow",)),
+    **dict.fromkeys(("viscous", "seal_friction", "pad_friction"), ("wrench",)),
+}
+"""Numbers in which twins differ: parts that wear and are adjusted; and the residuals that can tell of each."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One coordinate of the machine; `sd` is its prior standard deviation."""
+
+    name: str  # such as "horizontal.flow", "platen.mass[x]", "horizontal.platen_height"
+    paths: tuple[tuple[str, int], ...]  # what it turns: path in the machine file, and component of a vector or -1
+    unit: str
+    value: float  # nominal, in `unit`
+    sd: float  # of the coordinate: in `unit` for a shift, else relative
+    form: Literal["shift", "factor", "log"]  # coordinate value - nominal, value / nominal - 1, or ln(value / nominal)
+    shows_in: tuple[str, ...]  # residuals that can tell of it
+    lowest: float = -math.inf  # coordinate below which no machine can be built
+    highest: float = math.inf
+    step: float | None = None  # of the coordinate, for derivatives; None: the comparison's share of sd
+    of: str = ""  # the kind's number that a component's own is a factor of
+    place: int = -1  # actuator on whose residuals alone it acts; -1: on all
+    mirrored: bool = False  # points move away from the axis they are beside, those on it stay
+
+    @property
+    def bends(self) -> bool:
+        """Whether the equations bend with it within its range: shifts in plan do not."""
+        return not self.mirrored
+
+    def at(self, coordinate: float) -> float:
+        """Value in `unit` at a coordinate."""
+        if self.form == "shift":
+            return self.value + coordinate
+        return self.value * (1.0 + coordinate if self.form == "factor" else math.exp(coordinate))
+
+    def within(self, low: float, high: float) -> "Knob":
+        """The same knob with its values between low and high, where its coordinate can say so."""
+        bounds = (-math.inf if self.form == "log" and v <= 0.0 else self.coordinate(v) for v in (low, high))
+        lowest, highest = bounds
+        return replace(self, lowest=lowest, highest=highest)
+
+    def coordinate(self, value: float) -> float:
+        """Coordinate of a value in `unit`."""
+        if self.form == "shift":
+            return value - self.value
+        return value / self.value - 1.0 if self.form == "factor" else math.log(value / self.value)
+
+
+def machine_knobs(machine: Machine, travel: Mapping[str, float] | None = None) -> tuple[Knob, ...]:
+    """Knobs of all numbers of a machine that state an uncertainty: platen, oil, kinds, and heights of each kind.
+
+    Numbers that a single component overrides stay with the component; other geometry is left alone. A chamber is no
+    shorter than the `travel` [m] of its kind, how far it was seen to move either way; without that, than its stroke.
+    """
+    parameters = machine.parameters
+    kinds = list(dict.fromkeys(c.kind for c in machine.components))
+    sections = ("platen", "hydraulics", *kinds)
+    found: list[Knob] = []
+    for path, quantity in parameters.items():
+        section, _, name = path.partition(".")
+        if section not in sections or quantity.sd is None or name == "bearing_plane":
+            continue
+        found += _knobs_of(path, name, quantity)
+    for kind in kinds:
+        found += _heights(machine, kind)
+    free = "xyz" if machine.motion == "free" else machine.motion
+    return tuple(_with_room(k, machine, travel or {}) for k in found if _felt(k, free))
+
+
+def _with_room(knob: Knob, machine: Machine, travel: Mapping[str, float]) -> Knob:
+    """A chamber must hold oil where its piston has been."""
+    kind, _, name = knob.name.partition(".")
+    if not name.startswith("chamber_"):
+        return knob
+    stroke = max(a.stroke for a in machine.actuators if a.kind == kind)
+    return replace(knob, lowest=max(knob.lowest, min(0.0, knob.coordinate(_ROOM * travel.get(kind, stroke)))))
+
+
+def _felt(knob: Knob, free: str) -> bool:
+    """False for a mass or inertia about an axis in which a guided platen cannot move, and for its geometry."""
+    if len(free) == 3:
+        return True
+    if knob.name.startswith("platen."):
+        return knob.name == f"platen.mass[{free}]"
+    return not knob.name.endswith("_height")
+
+
+def _knobs_of(path: str, name: str, quantity: Quantity) -> list[Knob]:
+    shows_in: tuple[str, ...] = ("flow",) if name in _OIL else ("wrench", "gas") if name in _GAS else ("wrench",)
+    if name not in _OIL + _GAS + _MECHANICAL:
+        shows_in = RESIDUALS
+    values = quantity.value if isinstance(quantity.value, tuple) else (quantity.value,)
+    assert quantity.sd is not None
+    sds = quantity.sd if isinstance(quantity.sd, tuple) else (quantity.sd,) * len(values)
+    found = []
+    for i, (value, sd) in enumerate(zip(values, sds, strict=True)):
+        if sd <= 0.0:
+            continue
+        vector = isinstance(quantity.value, tuple)
+        label = f"{path}[{'xyz'[i]}]" if vector else path
+        at = ((path, i if vector else -1),)
+        if value > 0.0 and name != "centre_of_gravity":
+            found.append(Knob(label, at, quantity.unit, value, sd / value, "factor", shows_in, lowest=_LEAST - 1.0))
+        else:
+            found.append(Knob(label, at, quantity.unit, value, sd, "shift", shows_in))
+    return found
+
+
+def _heights(machine: Machine, kind: str) -> list[Knob]:
+    """Height of the platen points and of the base points of a kind, its components moved together."""
+    members = [c for c in machine.components if c.kind == kind]
+    bearing = getattr(members[0], "mount", "swivel") == "bearing"
+    found = []
+    for end in ("platen_point", "base_point"):
+        if bearing and end == "base_point":
+            continue  # the leg is measured from its zero length: where its foot stands says nothing
+        paths = [(f"{c.name}.{end}", 2) for c in members]
+        if bearing:
+            paths.append(("platen.bearing_plane", 2))
+        heights = [getattr(c, end)[2] for c in members]
+        sd = _mean_sd(machine, paths[: len(members)])
+        if sd is None:
+            continue
+        name = f"{kind}.{end.split('_')[0]}_height"
+        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, "shift", _GEOMETRY))
+    return found
+
+
+def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None:
+    """Mean stated deviation of components of vectors; None where one states none."""
+    stated = [machine.parameters[path].sd for path, _ in paths]
+    known = [sd[i] if isinstance(sd, tuple) else sd for sd, (_, i) in zip(stated, paths, strict=True) if sd is not None]
+    return float(np.mean(known)) if len(known) == len(paths) else None
+
+
+def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
+    """Knobs of where, in plan, the points of each kind's components are: mirror images of each other, moved alike.
+
+    A bearing and its foot move together.
+    """
+    if machine.motion != "free":
+        return ()
+    found = []
+    for kind in dict.fromkeys(c.kind for c in machine.components):
+        members = [c for c in machine.components if c.kind == kind]
+        bearing = getattr(members[0], "mount", "swivel") == "bearing"
+        ends: tuple[tuple[str, ...], ...] = (("platen_point",), ("base_point",))
+        for points in (("platen_point", "base_point"),) if bearing else ends:
+            for i in range(2):
+                beside = [c for c in members if getattr(c, points[0])[i] != 0.0]
+                paths = tuple((f"{c.name}.{point}", i) for c in beside for point in points)
+                if len(beside) < 2 or (sd := _mean_sd(machine, paths)) is None:
+                    continue
+                value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
+                name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
+                found.append(Knob(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=True))
+    return tuple(found)
+
+
+def scatter_knobs(machine: Machine, share: float, reach: float) -> tuple[Knob, ...]:
+    """Knobs of twins that are not quite alike: factors, about one, of numbers that components of a kind share.
+
+    share is their standard deviation, reach how many of it they may go. Components with numbers of their own are left
+    out, and kinds of which there is one.
+    """
+    found = []
+    kinds = [c.kind for c in machine.components]
+    for name, shows_in in _SCATTER.items():
+        for i, component in enumerate(machine.components):
+            kind, own = f"{component.kind}.{name}", f"{component.name}.{name}"
+            known = machine.parameters.quantities
+            if kind not in known or own in known or not known[kind].value or kinds.count(component.kind) == 1:
+                continue
+            most, place = share * reach, i if shows_in == ("flow",) else -1
+            found.append(
+                Knob(own, ((own, -1),), "1", 1.0, share, "factor", shows_in, -most, most, of=kind, place=place)
+            )
+    return tuple(found)
+
+
+def drawn_coordinates(knobs: Sequence[Knob], rng: np.random.Generator) -> Array:
+    """Coordinates (k,) drawn from the priors: normal within three deviations, no knob below its lowest."""
+    sd, lowest = np.array([k.sd for k in knobs]), np.array([k.lowest for k in knobs])
+    drawn = np.full(len(knobs), np.nan)
+    while not np.all(drawn > lowest):
+        drawn = np.where(drawn > lowest, drawn, sd * np.clip(rng.standard_normal(len(knobs)), -3.0, 3.0))
+    return drawn
+
+
+def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> Machine:
+    """Copy of a machine with its knobs turned to coordinates (k,); raises ParameterError for what cannot be."""
+    return machine.with_params(knob_changes(machine, knobs, coordinates))
+
+
+def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> dict[str, float | list[float]]:
+    """New values by path for coordinates (k,), as `Machine.with_params` takes them."""
+    values: dict[str, float | list[float]] = {}
+    turned = list(zip(knobs, coordinates, strict=True))
+    for knob, x in turned:
+        for path, i in knob.paths if not knob.of else ():
+            if i < 0:
+                values[path] = knob.at(float(x))
+                continue
+            now = machine.parameters[path].value
+            vector = values.setdefault(path, list(now) if isinstance(now, tuple) else [now])
+            assert isinstance(vector, list)
+            # points of a kind may stand at different heights: each is shifted
+            side = math.copysign(1.0, vector[i]) * bool(vector[i]) if knob.mirrored else 1.0
+            vector[i] = knob.at(float(x)) if len(knob.paths) == 1 else vector[i] + side * float(x)
+    for knob, x in turned:
+        if knob.of:
+            shared = values.get(knob.of, machine.parameters[knob.of].value)
+            assert isinstance(shared, float)
+            values[knob.paths[0][0]] = shared * knob.at(float(x))
+    return values | _cut_strokes(machine, values)
+
+
+def _cut_strokes(machine: Machine, values: Mapping[str, float | list[float]]) -> dict[str, float]:
+    """Strokes that a chamber among new values is too short for, cut so that it holds oil; all others stay as stated.
+
+    Residuals tell how long a chamber is; nothing tells a stroke, and the shipped one is assumed. Chambers kept longer
+    than it would pass their error on to the oil: 0.70 m in truth beside 0.75 m stated made it 7 % stiffer, with little
+    more than noise left. So the bound of a chamber is where its piston has been (`machine_knobs`), and a stroke that no
+    machine could have with the chamber found is what gives way.
+    """
+    cut: dict[str, float] = {}
+    for path, length in values.items():
+        kind, _, name = path.partition(".")
+        stroke = f"{kind}.stroke"
+        if not name.startswith("chamber_") or stroke not in machine.parameters or not isinstance(length, float):
+            continue
+        stated = values.get(stroke, machine.parameters.number(stroke))
+        assert isinstance(stated, float)
+        if length <= cut.get(stroke, stated):
+            cut[stroke] = length / _ROOM
+    return cut

@@ -1,0 +1,202 @@
+"""Normal equations of a calibration: summed by test and column as wanted, corrected for noise, solved within bounds."""
+
+from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.progress import Progress
+from ...machine.parameters import Parameters
+from .problem import Base, Problem, Slopes
+from .whitened_residuals import excess, real_bins, real_rows
+
+__all__ = ["Bias", "Normal", "bounded_step", "bounds_of", "positive", "squares"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+
+class Normal:
+    """Normal equations at x, H dx = -g: by test and column of the residuals, so that they can be summed as wanted."""
+
+    def __init__(
+        self, problem: Problem, x: Array, report: Progress, known: "Normal | None" = None, again: Mask | None = None
+    ) -> None:
+        """Evaluate residuals and their derivatives at x (p,).
+
+        Derivatives by unknowns of `known` are taken from there, but for those to evaluate `again` (p,).
+        """
+        self.problem = problem
+        base = Base(problem, x)
+        self.rest = problem.rest(base)
+        shared, fresh = _shared(problem, known, again)
+        before = [] if known is None else known.slope
+        found = problem.slopes(base, fresh, report)
+        self.slope: list[list[Complex]] = _together(found, before, shared)  # (m, c) by test and unknown
+        self.power = [np.ones(r.shape) for r in self.rest]
+        self.bias: Bias | None = None
+
+    def only(self, places: Sequence[int]) -> "Normal":
+        """The same of some of the tests, not corrected."""
+        other = copy(self)
+        other.problem = self.problem.only(places)
+        for name in ("rest", "slope", "power"):
+            setattr(other, name, [getattr(self, name)[i] for i in places])
+        return other
+
+    def scaled(self, problem: Problem, scale: Array) -> "Normal":
+        """The same of a problem whose whitened residuals are (t, b, c) times larger, corrected as this."""
+        times = [s[problem.whitener.band(f)] for s, f in zip(scale, problem.frequency, strict=True)]
+        other = copy(self)
+        other.problem = problem
+        other.rest = [r * s for r, s in zip(self.rest, times, strict=True)]
+        other.slope = [[j * s for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
+        other.__dict__.pop("whole", None)
+        return other if self.bias is None else other.less(self.bias.scaled(times))
+
+    def less(self, bias: "Bias") -> "Normal":
+        """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
+        self.bias = bias
+        self.power = excess(self.problem.whitener, self.rest, self.problem.frequency)
+        return self
+
+    def of(self, tests: Sequence[int], columns: slice | Mask = slice(None)) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of some tests and columns."""
+        count = len(self.slope[0])
+        matrix, right = np.zeros((count, count)), np.zeros(count)
+        for t in tests:
+            power = self.power[t][:, columns]
+            more, side = squares([j[:, columns] for j in self.slope[t]], self.rest[t][:, columns], power)
+            matrix, right = matrix + more, right + side
+            if self.bias is not None:
+                more, side = self.bias.of(t, columns, power)
+                matrix, right = matrix - more, right - side
+        return matrix, right
+
+    @cached_property
+    def whole(self) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of all tests."""
+        return self.of(range(len(self.rest)))
+
+    def posterior(self, prior: Array) -> Array:
+        """Matrix (p, p) of all tests with the priors (p,) in it."""
+        return positive(self.whole[0], prior) + np.diag(prior**-2.0)
+
+    def alone(self, prior: Array) -> Array:
+        """Predicted deviations (n_tests, p) from each test by itself."""
+        found = []
+        for t in range(len(self.rest)):
+            matrix = positive(self.of([t])[0], prior) + np.diag(prior**-2.0)
+            found.append(np.sqrt(np.diag(np.linalg.inv(matrix))))
+        return np.array(found)
+
+
+class Bias:
+    """What noise adds to the normal equations: the mean product of its changes in slopes and residuals."""
+
+    def __init__(
+        self,
+        normal: Normal,
+        replicas: Sequence[Problem],
+        x: Array,
+        reports: Sequence[Progress],
+        known: Normal | None = None,
+    ) -> None:
+        """Evaluate the same at x with more noise in the tests, as often as there are replicas.
+
+        Changes of derivatives by unknowns of `known`, which is corrected, are taken from there.
+        """
+        shared, fresh = _shared(normal.problem, known)
+        self.rest: list[list[Complex]] = []  # by replica and test
+        self.slope: list[list[list[Complex]]] = []
+        for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
+            base = Base(replica, x)
+            self.rest.append([r - r0 for r, r0 in zip(replica.rest(base), normal.rest, strict=True)])
+            noisy = zip(replica.slopes(base, fresh, report), normal.slope, strict=True)
+            changes = [{k: j - clean[k] for k, j in slopes.items()} for slopes, clean in noisy]
+            before = [] if known is None or known.bias is None else known.bias.slope[i]
+            self.slope.append(_together(changes, before, shared))
+
+    def scaled(self, times: Sequence[Array]) -> "Bias":
+        """The same where whitened bins (m, c) of each test are so many times larger."""
+        other = copy(self)
+        other.rest = [[r * s for r, s in zip(rest, times, strict=True)] for rest in self.rest]
+        other.slope = [
+            [[j * s for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
+        ]
+        return other
+
+    def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
+        pairs = zip(self.slope, self.rest, strict=True)
+        added = [squares([j[:, columns] for j in s[test]], r[test][:, columns], power) for s, r in pairs]
+        matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
+        return matrix, right
+
+
+def _shared(problem: Problem, known: Normal | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:
+    """Places in `known` by places in the problem, of unknowns to take from there; and which (p,) to evaluate.
+
+    Those to evaluate again, if `again` says which; else those that `known` lacks.
+    """
+    names = problem.names
+    place = {} if known is None else {name: i for i, name in enumerate(known.problem.names)}
+    fresh = np.array([name not in place for name in names]) if again is None else again
+    return {i: place[name] for i, name in enumerate(names) if name in place and not fresh[i]}, fresh
+
+
+def _together(
+    fresh: Sequence[Slopes], known: Sequence[Sequence[Complex]], shared: dict[int, int]
+) -> list[list[Complex]]:
+    """Derivatives of every test by all unknowns, in order: fresh, or from those known."""
+    found = []
+    for t, slopes in enumerate(fresh):
+        both = slopes | {i: known[t][k] for i, k in shared.items()}
+        found.append([both[i] for i in sorted(both)])
+    return found
+
+
+def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
+    """Normal matrix (p, p) and right side (p,) of bins (m, c) and their p derivatives (m, c) over a power (m, c)."""
+    root = np.sqrt(power)
+    rows = real_rows(slope, root)
+    return rows @ rows.T, rows @ real_bins(rest, root)
+
+
+def positive(matrix: Array, prior: Array) -> Array:
+    """A normal matrix without negative directions, which are left where noise is all that a derivative has."""
+    value, vector = np.linalg.eigh(matrix * np.outer(prior, prior))
+    return (vector * np.maximum(value, 0.0)) @ vector.T / np.outer(prior, prior)
+
+
+def bounds_of(problem: Problem, numbers: Parameters) -> tuple[Array, Array]:
+    """How far down and up every unknown may go (p,): within its own bounds, and the reach of its prior."""
+    known = np.arange(len(problem.prior)) < len(problem.knobs)
+    reach = np.where(known, numbers.number("fit.reach"), numbers.number("fit.sensor_reach")) * problem.prior
+    return np.maximum(-reach, problem.lowest), np.minimum(reach, problem.highest)
+
+
+def bounded_step(normal: Normal, posterior: Array, x: Array, problem: Problem, numbers: Parameters) -> Array:
+    """Gauss-Newton step (p,) from x (p,) within the trust region and the reach of every unknown.
+
+    `posterior` (p, p) is `normal`'s matrix with the prior's share.
+    """
+    from scipy.optimize import lsq_linear
+
+    prior = problem.prior
+    known = np.arange(len(prior)) < len(problem.knobs)
+    trust = np.where(known, numbers.number("fit.trust"), numbers.number("fit.sensor_trust"))
+    right = normal.whole[1]
+    factor = np.linalg.cholesky(posterior * np.outer(prior, prior))
+    wanted = np.linalg.solve(factor, -(right + x / prior**2) * prior)
+    place = x / prior
+    least, most = (bound / prior for bound in bounds_of(problem, numbers))
+    low, high = np.maximum(-trust, np.minimum(least - place, 0.0)), np.minimum(trust, np.maximum(most - place, 0.0))
+    low, high = low - 1e-9, high + 1e-9  # no empty interval
+    freely = np.linalg.solve(factor.T, wanted)
+    if np.all((freely >= low) & (freely <= high)):
+        return np.asarray(freely * prior)
+    return np.asarray(lsq_linear(factor.T, wanted, bounds=(low, high)).x * prior)

@@ -1,0 +1,181 @@
+"""A campaign made ready to be fitted: aligned, fused, with noisier copies of every test."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...core.errors import RecordError, SimulationError
+from ...data.alignment import align_record, group_delays
+from ...data.fusion import fuse_motion
+from ...data.records import channel_name, layout_faults, sample_interval
+from ...data.sensors import Sensors, add_noise
+from ...data.signals import Band
+from ...machine.machine import Machine
+from ...machine.parameters import Parameters
+from ...mechanics.plant import Plant, make_plant
+from ...mechanics.pose import PlatenMotion
+from ..residuals import Measured, make_measured
+from .free_parameters import Knob
+from .problem import KINDS, Comparison, Problem
+from .sensor_errors import CHANNELS
+from .whitened_residuals import spectrum_of
+
+__all__ = ["Prepared", "prepare_problem"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A problem, and the same tests with more noise."""
+
+    problem: Problem
+    replicas: tuple[Problem, ...]  # each with all tests once more
+    noisy: tuple[Measured, ...]  # the tests in order, as often as the whitener has draws
+
+    def only(self, places: Sequence[int]) -> "Prepared":
+        """The same with some of the tests."""
+        count = len(self.problem.tests)
+        noisy = tuple(t for i, t in enumerate(self.noisy) if i % count in places)
+        return Prepared(self.problem.only(places), tuple(r.only(places) for r in self.replicas), noisy)
+
+    def scaled(self, scale: Array) -> "Prepared":
+        """The same with whitened residuals (t, b, c) times larger."""
+        return self._each(lambda problem: problem.scaled(scale))
+
+    def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Prepared":
+        """The same tests and noise with another machine, or other knobs."""
+        return self._each(lambda problem: problem.with_machine(machine, knobs))
+
+    def with_free(self, name: str, share: float) -> "Prepared":
+        """The same with one more unknown free of its prior."""
+        return self._each(lambda problem: problem.with_free(name, share))
+
+    def without_free(self, name: str) -> "Prepared":
+        """The same with an unknown's prior as stated again."""
+        return self._each(lambda problem: problem.without_free(name))
+
+    def _each(self, change: Callable[[Problem], Problem]) -> "Prepared":
+        return Prepared(change(self.problem), tuple(map(change, self.replicas)), self.noisy)
+
+
+def prepare_problem(
+    machine: Machine,
+    records: Sequence[xr.Dataset],
+    sensors: Sensors,
+    numbers: Parameters,
+    *,
+    kinds: tuple[str, ...] = KINDS,
+    others: Callable[[Machine], Sequence[Machine]] = lambda machine: (),
+    preload: float = 0.0,
+    seed: int = 0,
+    jobs: int = -1,
+) -> Prepared:
+    """Make a campaign ready; `numbers` are those of `models/procedures/calibration.toml`. Raises what `calibrate` does.
+
+    others are what the machine may as well be, for all that is known: by how much they differ is noise, and so is what
+    friction may hold when a test begins, a share `preload` of it. Deterministic for a seed (of the simulated noise).
+    """
+    comparison = Comparison(
+        bands=numbers.vector("comparison.bands"),
+        edge=numbers.number("comparison.edge"),
+        step=numbers.number("fit.step"),
+    )
+    _refuse(machine, records, comparison)
+    machine = machine.as_tested(records[0].attrs, "the first test")
+    plant = make_plant(machine)
+    records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
+    skews = group_delays(plant, records)
+    skews.pop("strut_pressure", None)  # heat that leaves the gas would pass for a delay of its pressure
+    records = [align_record(r, skews) for r in records]
+    rng = np.random.default_rng(seed)
+    tests = [_ready(plant, r, sensors, numbers) for r in records]
+    count, draws, again = len(tests), int(numbers.number("fit.draws")), int(numbers.number("fit.corrections"))
+    noisy = [
+        _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
+    ]
+    more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
+    problem = Problem(
+        machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, others=others(machine), preload=preload
+    )
+    replicas = tuple(problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again))
+    return Prepared(problem, replicas, tuple(noisy))
+
+
+def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Comparison) -> None:
+    """Raise what `calibrate` says, naming the test."""
+    if not records:
+        raise RecordError("no record to calibrate by")
+    if make_plant(machine).articulated:
+        raise SimulationError("calibration takes a platen with a rigid specimen at most; lock its joints (--locked)")
+    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
+    names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
+    for test, record in zip(names, records, strict=True):
+        if faults := layout_faults(record, labels):
+            raise RecordError(f"{test}: {faults[0]}")
+        machine.refuse_unmounted(record.attrs, test)
+        _refuse_channels(test, record, double_acting=bool(machine.double_acting))
+        _refuse_short(test, record, comparison)
+        if lacking := [c for c in CHANNELS if c not in record and any(c in other for other in records)]:
+            what = f"{test} has no {', '.join(lacking)}, which other tests have"
+            raise RecordError(f"{what}; take that test out of the campaign, or the channel out of all")
+
+
+def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> None:
+    if "platen_displacement" not in record:
+        why = "lengths do not replace it, as the geometry behind them is to be calibrated"
+        raise RecordError(f"{test}: has no platen_displacement; {why}")
+    if "actuator_force" not in record and "chamber_pressure_a" not in record:
+        raise RecordError(f"{test}: has neither actuator_force nor chamber_pressure_a; give one of them or both")
+    if double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):
+        raise RecordError(f"{test}: has pressures of one side only; give chamber_pressure_a and chamber_pressure_b")
+    if "strut_pressure" in record:
+        below = np.argwhere(record["strut_pressure"].values <= 0.0)
+        for sample, column in below[:1]:
+            what = f"{channel_name(record['strut_pressure'], int(column))} is not above zero at sample {sample}"
+            raise RecordError(f"{test}: {what}; give absolute pressures, or take the channel out of all tests")
+
+
+def _refuse_short(test: str, record: xr.Dataset, comparison: Comparison) -> None:
+    n, bands = record.sizes["time"], comparison.bands
+    length = float(record["time"][-1] - record["time"][0])
+    dt = length / (n - 1)
+    f = np.zeros(0)
+    if n > 2 * round(comparison.edge / dt):
+        f = spectrum_of(np.zeros((n, 1)), dt, bands[0], bands[-1], comparison.edge)[1]
+    for low, high in pairwise(bands):
+        if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
+            what = f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
+            raise RecordError(f"{test}: {what}; take it out of the campaign")
+
+
+def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Parameters, *, shares: bool = True) -> Measured:
+    """A record with its motion fused, and each platen channel's share in it.
+
+    Fusion is linear in its channels: a share is what doubling a channel adds. Lengths stay out: the geometry that turns
+    them into a pose is to be calibrated.
+    """
+    record = _slower(record, numbers.number("comparison.rate"))
+    channels = [n for n in ("platen_displacement", "platen_velocity", "platen_acceleration") if n in record]
+    fused = fuse_motion(plant, record, sensors)
+    ready = make_measured(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
+    share = {}
+    for name in channels if shares else ():
+        more = fuse_motion(plant, record.assign({name: 2.0 * record[name]}), sensors).motion
+        share[name] = PlatenMotion(*(a - b for a, b in zip(more, fused.motion, strict=True)))
+    return replace(ready, share=share)
+
+
+def _slower(record: xr.Dataset, rate: float) -> xr.Dataset:
+    """The record at a whole fraction of its rate, as near above `rate` [Hz] as can be, without what would fold."""
+    dt = sample_interval(record)
+    every = int(1.0 / (rate * dt) + 1e-6)
+    if every < 2:
+        return record
+    band = Band(high=0.4 / (every * dt), order=16)
+    timed = {name: x.copy(data=band.apply(x.values, dt)) for name, x in record.items() if "time" in x.dims}
+    return record.assign(timed).isel(time=slice(None, None, every))

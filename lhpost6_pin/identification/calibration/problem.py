@@ -1,0 +1,327 @@
+"""A campaign made ready to be fitted: residuals of all tests and their derivatives by every unknown, whitened.
+
+Unknowns are the machine's knobs and the sensors' errors, in this order: x (p,), zero where nothing is off.
+"""
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from ...data.sensors import Sensors
+from ...effects.registry import BOUC_WEN_1D, BOUC_WEN_2D
+from ...machine.machine import Machine
+from ...mechanics.plant import Plant, make_plant
+from ...mechanics.pose import leg_displacements
+from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow, states_of
+from .free_parameters import Knob, machine_knobs, with_knobs
+from .sensor_errors import corrected, sensor_unknowns
+from .whitened_residuals import make_whitener, mean_squares, spectrum_of
+
+__all__ = ["KINDS", "Base", "Comparison", "Problem", "Slopes", "Term"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Slopes = dict[int, Complex]
+"""Derivatives (m, c) of a test's whitened bins, by the unknown's place in x."""
+
+KINDS = ("wrench", "flow", "gas", "force")
+"""Kinds of residuals that are compared unless others are asked for."""
+
+
+class Comparison(NamedTuple):
+    """How residuals are compared."""
+
+    bands: tuple[float, ...]  # edges [Hz] of bands of frequency, each with its own noise
+    edge: float  # cut off at both ends of a test [s]
+    step: float  # of an unknown, for its derivative, in prior standard deviations
+
+
+class Term(NamedTuple):
+    """What is evaluated at once: unknowns that act on different rows."""
+
+    members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut whose rows it acts on; -1: all rows
+    residuals: tuple[str, ...]  # kinds that it shows in
+
+
+_SHOWS_IN = {
+    "actuator_force": ("wrench", "force"),
+    "chamber_pressure": ("flow", "force"),
+    "chamber_pressure_a": ("flow", "force"),
+    "chamber_pressure_b": ("flow", "force"),
+    "strut_pressure": ("gas",),
+    "spool_position": ("flow", "servo"),
+    "supply_pressure": ("supply",),
+    "spool_command": ("servo",),
+    "platen_displacement": ("wrench", "flow", "gas"),
+    "platen_velocity": ("wrench", "flow", "gas"),
+    "platen_acceleration": ("wrench", "flow", "gas"),
+}
+
+
+class Problem:
+    """Tests, unknowns with their priors, and the whitener of the sensors' noise."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        tests: Sequence[Measured],
+        noisy: Sequence[Measured],
+        sensors: Sensors,
+        comparison: Comparison,
+        *,
+        jobs: int = -1,
+        kinds: tuple[str, ...] = KINDS,
+        others: Sequence[Machine] = (),
+        preload: float = 0.0,
+    ) -> None:
+        """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added.
+
+        By how much residuals of `others` differ is noise, too: machines of which nobody knows which is right; and what
+        friction may hold when a test begins, a share `preload` of it. All tests have the same channels. Raises
+        RecordError where they are too short together.
+        """
+        self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
+        unknowns = sensor_unknowns(machine, sensors, tests[0])
+        told = {"supply_pressure": "supply", "spool_command": "servo"}  # by one kind of residual alone
+        self.unknowns = tuple(u for u in unknowns if told.get(u.channel, kinds[0]) in kinds)
+        self.free: dict[str, float] = {}  # share of the stated deviation that priors of unknowns have, but for one
+        plant = make_plant(machine)
+        self._turn(machine, machine_knobs(machine, _travel(plant, tests)))
+        clean = [evaluate_residuals(plant, t, kinds) for t in tests]
+        self.widths = tuple(x.shape[1] for x in clean[0])
+        self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
+        noise = self._noise(plant, noisy, clean)
+        instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
+        for found, test, base in zip(noise, tests, clean, strict=True):
+            # what friction remembers is not known better than by its memory along the path as measured, and quieted;
+            # that counts as much as all draws together, and so do what it held before and each of the others
+            more = [evaluate_residuals(plant, replace(test, path=None), kinds)]
+            if preload > 0.0:
+                held = follow(plant, test, start=_held(plant, preload, rng))
+                more.append(evaluate_residuals(plant, test, kinds, path=held))
+            more += [evaluate_residuals(one, test, kinds) for one in instead]
+            draws = len(found)
+            found += [self.bins(_less(one, base), test.dt)[0] * np.sqrt(draws) for one in more]
+            found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
+        self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
+
+    def _turn(self, machine: Machine, knobs: tuple[Knob, ...]) -> None:
+        self.machine, self.knobs = machine, knobs
+        self.names = (*(k.name for k in knobs), *(u.name for u in self.unknowns))
+        self.stated = np.array([*(k.sd for k in knobs), *(u.sd for u in self.unknowns)])
+        self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
+        share = self.comparison.step
+        self.step = np.array([*(k.step or share * k.sd for k in knobs), *(share * u.sd for u in self.unknowns)])
+        self.lowest = np.array([*(k.lowest for k in knobs), *(-np.inf for _ in self.unknowns)])
+        self.highest = np.array([*(k.highest for k in knobs), *(np.inf for _ in self.unknowns)])
+        self.terms = self._terms()
+
+    def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Problem":
+        """The same tests and noise with another machine, or other knobs."""
+        other = copy(self)
+        other._turn(machine, knobs)
+        return other
+
+    def with_free(self, name: str, share: float) -> "Problem":
+        """The same with one more unknown free of its prior, whose deviation is `share` of the stated one now."""
+        other = copy(self)
+        other.free = {**self.free, name: share}
+        other._turn(self.machine, self.knobs)
+        return other
+
+    def without_free(self, name: str) -> "Problem":
+        """The same with an unknown's prior as stated again."""
+        other = copy(self)
+        other.free = {free: share for free, share in self.free.items() if free != name}
+        other._turn(self.machine, self.knobs)
+        return other
+
+    def with_tests(self, tests: Sequence[Measured]) -> "Problem":
+        """The same problem, weighed by the same noise, with the same tests seen another time."""
+        other = copy(self)
+        other.tests = tuple(tests)
+        return other
+
+    def scaled(self, scale: Array) -> "Problem":
+        """The same problem, its whitened residuals in each test and band (t, b, c) times larger."""
+        other = copy(self)
+        other.whitener = self.whitener.scaled(scale)
+        return other
+
+    def noise_at(self, noisy: Sequence[Measured], x: Array) -> Array:
+        """Mean squares (t, b, c) of whitened noise with the unknowns at x; `noisy` as when the problem was made."""
+        plant = self.plant_at(x)
+        noise = self._noise(plant, noisy, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
+        found = np.zeros((len(self.tests), len(self.whitener.edges) - 1, sum(self.widths)))
+        for t, (draws, f) in enumerate(zip(noise, self.frequency, strict=True)):
+            squares = np.mean([np.abs(self._whitened(t, bins)) ** 2 for bins in draws], axis=0)
+            found[t, np.unique(self.whitener.band(f))] = mean_squares(self.whitener, squares, f)[0]
+        return found
+
+    def _noise(self, plant: Plant, noisy: Sequence[Measured], clean: Sequence[Residuals]) -> list[list[Complex]]:
+        """Bins (m, c) by which residuals of every test differ, each time that it is seen with more noise."""
+        found: list[list[Complex]] = [[] for _ in clean]
+        for i, test in enumerate(noisy):
+            at = i % len(clean)
+            found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0])
+        return found
+
+    def only(self, places: Sequence[int]) -> "Problem":
+        """The same problem with some of its tests; noise is weighed as with all."""
+        other = copy(self)
+        other.tests = tuple(self.tests[t] for t in places)
+        other.frequency = [self.frequency[t] for t in places]
+        other.whitener = self.whitener._replace(factor=self.whitener.factor[list(places)])
+        return other
+
+    def rows(self, kind: str, *places: int) -> NDArray[np.bool_]:
+        """Columns of the stacked residuals that are of a kind, all or those at some places."""
+        at = RESIDUALS.index(kind)
+        first, width = sum(self.widths[:at]), self.widths[at]
+        mask = np.zeros(sum(self.widths), bool)
+        mask[[first + p for p in (places or range(width)) if p < width]] = True
+        return mask
+
+    def whitened(self, x: Array) -> list[Complex]:
+        """Whitened bins (m, c) of every test with the unknowns at x."""
+        return self.rest(Base(self, x))
+
+    def rest(self, base: "Base") -> list[Complex]:
+        """Whitened bins (m, c) of every test where everything has been evaluated."""
+        pairs = zip(base.residuals, base.tests, strict=True)
+        return [self._whitened(i, self.bins(r, test.dt)[0]) for i, (r, test) in enumerate(pairs)]
+
+    def _whitened(self, test: int, bins: Complex) -> Complex:
+        return np.asarray(self.whitener.apply(test, bins[..., None], self.frequency[test])[..., 0])
+
+    def slopes(self, base: "Base", free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Slopes]:
+        """Derivatives of the whitened bins of every test by the unknowns that are free, by differences from a base."""
+        terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
+        out: list[Slopes] = [{} for _ in self.tests]
+        with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
+            for done, found in enumerate(parallel(delayed(self._difference)(base, term, free) for term in terms)):
+                for i, changes in found:
+                    for slopes, change in zip(out, changes, strict=True):
+                        slopes[i] = change
+                progress((done + 1) / len(terms))
+        return out
+
+    def _difference(self, base: "Base", term: Term, free: NDArray[np.bool_]) -> list[tuple[int, list[Complex]]]:
+        x, knobs = base.x, len(self.knobs)
+        step = np.where(x + self.step > self.highest, -self.step, self.step)
+        more = np.zeros(len(x))
+        for i, _ in term.members:
+            more[i] = step[i]
+        if term.members[0][0] < knobs:
+            changes = self.change(base, self.plant_at(x + more), term.residuals)
+        else:  # what is left of an error after correction is as good as the error itself
+            tests = [corrected(t, self.unknowns, more[knobs:]) for t in base.tests]
+            changes = self.change(base, base.plant, term.residuals, tests)
+        out = []
+        for i, place in term.members:
+            if not free[i]:
+                continue
+            rows = np.ones(sum(self.widths), bool)
+            if place >= 0:
+                rows = self.rows("gas", place) if term.residuals == ("gas",) else self.rows_of_actuator(place)
+            slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
+            out.append((i, [self._whitened(t, slope) for t, slope in enumerate(slopes)]))
+        return out
+
+    def change(
+        self, base: "Base", plant: Plant, residuals: tuple[str, ...], tests: Sequence[Measured] | None = None
+    ) -> list[Complex]:
+        """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
+        kinds = tuple(k for k in residuals if k in self.kinds)
+        changes = []
+        for k, test in enumerate(tests or base.tests):
+            path = None
+            if test.motion is base.tests[k].motion:
+                path = follow(plant, test, (base.plant, base.paths[k]))
+            after = evaluate_residuals(plant, test, kinds, path=path)
+            changes.append(self.bins(_less(after, base.residuals[k]), test.dt)[0])
+        return changes
+
+    def plant_at(self, x: Array) -> Plant:
+        """Plant with its knobs turned to x (p,)."""
+        return make_plant(with_knobs(self.machine, self.knobs, x[: len(self.knobs)]))
+
+    def _corrected(self, x: Array) -> list[Measured]:
+        return [corrected(t, self.unknowns, x[len(self.knobs) :]) for t in self.tests]
+
+    def bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
+        """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
+        c = self.comparison
+        bins, f = spectrum_of(residuals.stacked(), dt, c.bands[0], c.bands[-1], c.edge)
+        if bins.shape[1] == sum(self.widths):
+            return bins, f
+        out = np.zeros((len(f), sum(self.widths)), np.complex128)
+        at = 0
+        for kind, part in zip(RESIDUALS, residuals, strict=True):
+            if part.shape[1]:
+                out[:, self.rows(kind)] = bins[:, at : at + part.shape[1]]
+                at += part.shape[1]
+        return out, f
+
+    def rows_of_actuator(self, place: int) -> NDArray[np.bool_]:
+        """Columns of the stacked residuals that are of one actuator's chambers."""
+        names, double = self.machine.actuator_names, self.machine.double_acting
+        rows = self.rows("flow", place) | self.rows("force", place) | self.rows("servo", place)
+        if names[place] in double:
+            rows |= self.rows("flow", len(names) + double.index(names[place]))
+        return rows
+
+    def _terms(self) -> tuple[Term, ...]:
+        twins: dict[str, list[tuple[int, int]]] = {}
+        for i, knob in enumerate(self.knobs):
+            alone = knob.of.partition(".")[2] if knob.place >= 0 else knob.name
+            twins.setdefault(alone, []).append((i, knob.place))
+        terms = [Term(tuple(members), self.knobs[members[0][0]].shows_in) for members in twins.values()]
+        together: dict[str, list[tuple[int, int]]] = {}
+        for i, unknown in enumerate(self.unknowns):
+            together.setdefault(unknown.alone[0], []).append((len(self.knobs) + i, unknown.alone[1]))
+        for members in together.values():
+            channel = self.unknowns[members[0][0] - len(self.knobs)].channel
+            shows_in = _SHOWS_IN[channel]
+            if self.tests[0].actuator_force is None and channel.startswith("chamber_pressure"):
+                shows_in = ("wrench", *shows_in)  # pressures stand in for forces
+            terms.append(Term(tuple(members), shows_in))
+        return tuple(terms)
+
+
+class Base:
+    """What differences are taken from: everything evaluated once at x."""
+
+    def __init__(self, problem: Problem, x: Array) -> None:
+        """Evaluate a problem's tests at x (p,)."""
+        self.x, self.plant, self.tests = x, problem.plant_at(x), problem._corrected(x)
+        self.paths = [follow(self.plant, t) for t in self.tests]
+        pairs = zip(self.tests, self.paths, strict=True)
+        self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
+
+
+def _travel(plant: Plant, tests: Sequence[Measured]) -> dict[str, float]:
+    """How far legs of each kind move either way in any test, and a little more [m]."""
+    moved = [np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests]
+    kinds = [c.kind for c in plant.machine.components]
+    most = np.max(moved, axis=0)
+    return {kind: 1.05 * float(max(m for m, k in zip(most, kinds, strict=True) if k == kind)) for kind in kinds}
+
+
+def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
+    """Hidden states (n_states,) of friction that holds a share of its force, one standard deviation either way."""
+    out = np.zeros(len(plant.states))
+    for row in plant.rows[np.isin(plant.rows["law"], (BOUC_WEN_1D, BOUC_WEN_2D))]:
+        both = states_of(row)
+        out[both] = np.clip(share * rng.standard_normal(len(out[both])), -0.7, 0.7)  # within the unit disc
+    return out
+
+
+def _less(after: Residuals, before: Residuals) -> Residuals:
+    """Change of residuals; no columns where the first has none."""
+    return Residuals(*(a - b if a.shape[1] else a for a, b in zip(after, before, strict=True)))

@@ -1,0 +1,155 @@
+"""What a campaign says of the knobs by simulation: the plant driven by recorded spools, against what was measured.
+
+Residuals ask each equation by itself and put measured motion into it; a simulation asks all of them together, and only
+the spool is measured. It tells less, since oil columns ring on the spool's noise and friction's memory starts unknown,
+but what it says does not share the weakness of the residuals: that their derivatives are as noisy as the motion. So it
+is a second opinion: one Gauss-Newton step of output errors from the joint estimate, sensor errors held at theirs.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from ...core.names import SAMPLE_RATE
+from ...data.signals import resample_band_limited
+from ...mechanics.equilibrium import hydraulic_rows
+from ...mechanics.plant import Plant, State
+from ...mechanics.pose import platen_motion
+from ...simulation.simulate import OpenLoop, Run, simulate
+from ..residuals import Measured
+from .normal_equations import squares
+from .problem import Problem
+from .result import Subset
+from .sensor_errors import corrected
+from .whitened_residuals import excess, make_whitener, spectrum_of
+
+__all__ = ["by_simulation"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+STEPS = 4  # model steps a controller sample, as simulations take by default
+
+
+class _Drive(NamedTuple):
+    """A test ready to be simulated; n samples."""
+
+    spool: Array  # (samples * STEPS, n_actuators) at the middle of every model step
+    measured: Array  # (n, 6 + n_chambers) platen velocity, then chamber pressures
+    time: Array  # (n,) from zero [s]
+
+
+def by_simulation(
+    problem: Problem,
+    noisy: Sequence[Measured],
+    x: Array,
+    *,
+    band: tuple[float, ...],
+    floor: float,
+    told_below: float,
+    progress: Callable[[float], None],
+) -> Subset | None:
+    """Estimates of the knobs by open-loop simulation about x (p,), with the problem's priors; NaN for sensor errors.
+
+    noisy are the tests again, in order, any number of times, each with more noise. band are the edges [Hz] of bands of
+    frequency; floor goes under the deviations, as a share of the priors'; what is not told below told_below of theirs
+    is NaN. None where there is no such opinion: without spools and pressures, or if a run does not last.
+    """
+    knobs, tests = len(problem.knobs), len(problem.tests)
+    if any(t.spool is None or t.pressure is None for t in problem.tests):
+        return None
+    prior, step = problem.prior[:knobs], problem.comparison.step * problem.prior[:knobs]
+    drives = [_drive(corrected(t, problem.unknowns, x[knobs:])) for t in problem.tests]
+    plant = problem.plant_at(x)
+    jobs = [(plant, [drive]) for drive in drives]
+    jobs += [(plant, [_noisier(drives[i % tests], problem.tests[i % tests], t)]) for i, t in enumerate(noisy)]
+    for i, h in enumerate(step):
+        turned = x.copy()
+        turned[i] += h
+        jobs.append((problem.plant_at(turned), drives))
+
+    def errors(plant: Plant, some: Sequence[_Drive]) -> list[Complex] | None:
+        """Bins of measured less simulated outputs of each drive; None if a run did not last."""
+        found = [_outputs(plant, drive) for drive in some]
+        pairs = [(d, f) for d, f in zip(some, found, strict=True) if f is not None]
+        return [_bins(d, d.measured - f, problem, band)[0] for d, f in pairs] if len(pairs) == len(some) else None
+
+    results: list[list[Complex]] = []
+    with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
+        for result in parallel(delayed(errors)(*job) for job in jobs):
+            progress((len(results) + 1) / len(jobs))
+            if result is None:
+                return None
+            results.append(result)
+    rest, drawn, moved = [r[0] for r in results[:tests]], [r[0] for r in results[tests:-knobs]], results[-knobs:]
+    frequency = [_bins(d, d.measured, problem, band)[1] for d in drives]
+    noise = [[more - rest[t] for more in drawn[t::tests]] for t in range(tests)]
+    whitener = make_whitener(noise, frequency, np.array(band))
+    white = [whitener.apply(t, rest[t][..., None], f)[..., 0] for t, f in enumerate(frequency)]
+    power = excess(whitener, white, frequency)
+    matrix, side = np.diag(prior**-2.0), x[:knobs] / prior**2
+    for t, f in enumerate(frequency):
+        slope = np.stack([(m[t] - rest[t]) / h for m, h in zip(moved, step, strict=True)], axis=-1)
+        more, change = squares(np.moveaxis(whitener.apply(t, slope, f), -1, 0), white[t], power[t])
+        matrix, side = matrix + more, side + change
+    covariance = np.linalg.inv(matrix)
+    sd = np.sqrt(np.diag(covariance))
+    told, silent = sd < told_below * prior, np.full(len(x) - knobs, np.nan)
+    estimate = np.where(told, x[:knobs] - covariance @ side, np.nan)
+    sd = np.where(told, np.hypot(sd, floor * prior), np.nan)
+    return Subset("simulation", np.append(estimate, silent), np.append(sd, silent), part=False)
+
+
+def _bins(drive: _Drive, values: Array, problem: Problem, band: tuple[float, ...]) -> tuple[Complex, Array]:
+    dt = float(drive.time[-1]) / (len(drive.time) - 1)
+    return spectrum_of(values, dt, band[0], band[-1], problem.comparison.edge)
+
+
+def _drive(test: Measured) -> _Drive:
+    assert test.spool is not None and test.pressure is not None
+    time = np.asarray(test.dt * np.arange(test.samples), np.float64)
+    steps = int(time[-1] * SAMPLE_RATE + 1e-6) * STEPS
+    middle = (np.arange(steps) + 0.5) / (STEPS * SAMPLE_RATE)
+    return _Drive(resample_band_limited(test.spool, time, middle), _measured(test), time)
+
+
+def _noisier(drive: _Drive, test: Measured, other: Measured) -> _Drive:
+    """A drive with what more noise in its test adds."""
+    assert test.spool is not None and other.spool is not None
+    middle = (np.arange(len(drive.spool)) + 0.5) / (STEPS * SAMPLE_RATE)
+    noise = [np.interp(middle, drive.time, column) for column in (other.spool - test.spool).T]  # small: lines will do
+    measured = drive.measured + _measured(other) - _measured(test)
+    return drive._replace(spool=drive.spool + np.stack(noise, axis=1), measured=measured)
+
+
+def _measured(test: Measured) -> Array:
+    assert test.pressure is not None
+    return np.hstack([test.motion.velocity, test.pressure])
+
+
+def _outputs(plant: Plant, drive: _Drive) -> Array | None:
+    """Simulated platen velocity and chamber pressures (n, 6 + n_chambers) at a drive's samples."""
+    from scipy.interpolate import CubicSpline
+
+    states = _pressure_states(plant)
+    zero = plant.zero_state()
+    z = zero.z.copy()
+    z[states] = drive.measured[0, 6:]
+    start = State(zero.q, zero.v, z)
+    samples = len(drive.spool) // STEPS
+    run: Run = simulate(plant, OpenLoop(drive.spool, start), samples=samples, engine="fused")
+    if run.trouble:
+        return None
+    velocity = platen_motion(plant, run.q, run.v, run.a).velocity
+    found = np.hstack([velocity, run.z[:, states]])
+    return np.asarray(CubicSpline(run.time, found)(np.minimum(drive.time, run.time[-1])))
+
+
+def _pressure_states(plant: Plant) -> Array:
+    """Places of the pressures in z: chamber A of every actuator, then B of the double-acting."""
+    first = plant.rows[hydraulic_rows(plant)]["state"]
+    double = [name in plant.machine.double_acting for name in plant.machine.actuator_names]
+    return np.concatenate([first, first[double] + 1])

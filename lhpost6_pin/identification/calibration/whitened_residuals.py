@@ -1,0 +1,181 @@
+"""Residuals in the frequency domain, whitened by the noise that sensors leave in them.
+
+A discrete Fourier transform over a whole test is one zero-phase filter for everything that is compared: bins within
+the band count, the others do not. There stationary noise is independent from bin to bin, so that least squares with
+its cross-spectral matrix per band of frequencies is the best linear estimate, and its inverse normal matrix the
+covariance.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import RecordError
+
+__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "real_rows", "spectrum_of", "surprise"]
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+BELIEF = 4.0
+"""Bins that the stated power of noise counts for, where a band shows more: few bins of a band cannot tell its power."""
+
+CERTAIN = 9.0
+"""Squared partial correlation times samples from which two columns of noise count as correlated; chance gives one."""
+
+
+def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tuple[Complex, Array]:
+    """Bins (m, k) of columns (n, k) from `low` to `high` [Hz], and their frequencies (m,) [Hz].
+
+    What is transformed is without `edge` [s] at both ends, and shorter by a few samples for a fast transform.
+    Scaled so that noise of one-sided spectrum S has E|X|^2 = S; the mean, which is real, so that E X^2 = S / 2.
+    """
+    from scipy import fft
+
+    cut = round(edge / dt)
+    n = fft.prev_fast_len(len(x) - 2 * cut, real=True)
+    f = fft.rfftfreq(n, dt)
+    inside = (f >= low) & (f <= high)
+    out = fft.rfft(x[cut : cut + n], axis=0)[inside] * np.sqrt(2.0 * dt / n)
+    out[f[inside] == 0.0] /= np.sqrt(2.0)
+    return out, f[inside]
+
+
+def real_bins(bins: Complex, root: Array) -> Array:
+    """Bins (m, c, ...) as real rows (2 m c, ...), over the roots of power (m, c): real parts, then imaginary ones."""
+    scaled = bins * (np.sqrt(2.0) / root).reshape(root.shape + (1,) * (bins.ndim - 2))
+    flat = scaled.reshape(-1, *bins.shape[2:])
+    return np.concatenate([flat.real, flat.imag])
+
+
+def real_rows(slopes: Sequence[Complex] | Complex, root: Array) -> Array:
+    """`real_bins` of several arrays of bins (m, c), one a row (p, 2 m c)."""
+    rows = np.empty((len(slopes), 2, *root.shape))
+    for row, bins in zip(rows, slopes, strict=True):
+        row[0], row[1] = bins.real, bins.imag
+        row *= np.sqrt(2.0) / root
+    return rows.reshape(len(slopes), -1)
+
+
+class Whitener(NamedTuple):
+    """Inverse Cholesky factors (t, b, k, k) of the noise's cross-spectral matrices: by test, in bands between `edges`.
+
+    edges is (b + 1,) [Hz].
+    """
+
+    edges: Array
+    factor: Complex
+
+    def band(self, f: Array) -> NDArray[np.intp]:
+        """Band (m,) that each frequency f (m,) is in."""
+        return _band(self.edges, f)
+
+    def scaled(self, scale: Array) -> "Whitener":
+        """The same with whitened columns (t, b, k) times larger."""
+        return self._replace(factor=scale[..., None] * self.factor)
+
+    def apply(self, test: int, bins: Complex, f: Array) -> Complex:
+        """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
+        out = np.empty_like(bins)
+        band = self.band(f)
+        told = np.flatnonzero(bins.any(axis=(0, 2)))  # the rest would be multiplied for nothing
+        for b in np.unique(band):
+            part = bins[band == b][:, told]
+            mixed = self.factor[test, b][:, told] @ part.swapaxes(0, 1).reshape(len(told), len(part) * bins.shape[2])
+            out[band == b] = mixed.reshape(-1, len(part), bins.shape[2]).swapaxes(0, 1)
+        return out
+
+
+def _band(edges: Array, f: Array) -> NDArray[np.intp]:
+    return np.clip(np.searchsorted(edges, f, side="right") - 1, 0, len(edges) - 2)
+
+
+def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[Array]) -> list[Array]:
+    """Power (m, k) of every test's whitened bins above that of noise, by column and band; one where there is none."""
+    found = []
+    for bins, f in zip(whitened, frequency, strict=True):
+        means, counts = mean_squares(whitener, np.abs(bins) ** 2, f)
+        power = (BELIEF + counts[:, None] * np.maximum(1.0, means)) / (BELIEF + counts[:, None])
+        found.append(np.repeat(power, counts, axis=0))
+    return found
+
+
+def mean_squares(whitener: Whitener, squares: Array, f: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Means (b, k) over bands of squares (m, k) of a test's bins at rising f (m,), and the bins in each band (b,)."""
+    _, first, counts = np.unique(whitener.band(f), return_index=True, return_counts=True)
+    return np.add.reduceat(squares, first, axis=0) / counts[:, None], counts
+
+
+def surprise(means: Array, counts: NDArray[np.intp]) -> Array:
+    """Negative log-likelihood (k,) of bins by their `mean_squares`.
+
+    What is left counts as noise of unit power, or, where a band shows more of it, of a power in between: the stated
+    one counts as `BELIEF` bins. Its derivative by a mean is that of least squares over the power of `excess`.
+    """
+    more = (BELIEF + counts[:, None] * np.maximum(means, 1.0)) / (BELIEF + counts[:, None])
+    return np.asarray(counts @ np.minimum(means, 1.0) + (BELIEF + counts) @ np.log(more))
+
+
+def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:
+    """Whitener from realisations of every test's noise, bins (m, k) at its frequencies (m,).
+
+    Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. How they are
+    correlated is taken as the same in all tests, and for means as in the first band above: one test has too few bins
+    in a band to tell.
+
+    Raises RecordError if all together still have too few.
+    """
+    count, k = len(edges) - 1, noise[0][0].shape[1]
+    factors = np.zeros((len(noise), count, k, k), np.complex128)
+    scaled: list[list[Complex]] = [[] for _ in range(count)]
+    for t, (realisations, f) in enumerate(zip(noise, frequency, strict=True)):
+        whole = np.where(f > 0.0, 1.0, np.sqrt(2.0))[:, None]  # a mean is real, with half the power of other bins
+        band = _band(edges, f)
+        for b in range(count):
+            rows = np.concatenate([(bins * whole)[band == b] for bins in realisations], dtype=np.complex128)
+            power = np.mean(np.abs(rows) ** 2, axis=0) / (1.0 - 2.0 / len(rows))  # its inverse is unbiased
+            scale = np.sqrt(np.where(power > 0.0, power, 1.0))
+            scaled[b].append(rows / scale)
+            factors[t, b] = np.diag(1.0 / scale)
+    for b in range(count):
+        rows = np.vstack(scaled[b] + (scaled[1] if b == 0 else []))
+        if len(rows) <= CERTAIN:  # nothing could be told of correlations
+            what = f"{len(rows)} samples of the noise between {edges[b]:g} and {edges[b + 1]:g} Hz"
+            raise RecordError(f"the tests are too short together: they give {what}; add tests, or longer ones")
+        factors[:, b] = _uncorrelated(rows.T @ rows.conj() / len(rows), len(rows)) @ factors[:, b]  # of E[x x^H]
+    return Whitener(edges, factors)
+
+
+def _uncorrelated(matrix: Complex, count: int) -> Complex:
+    """Triangular matrix (k, k) that makes columns of a cross-spectral matrix (k, k) uncorrelated, with unit power.
+
+    Each column is rid of what those before it tell of it. Only columns whose correlation `count` samples show beyond
+    doubt are asked: correlations by chance would carry what is wrong in one kind of residual into all others.
+    """
+    k = len(matrix)
+    out = np.zeros((k, k), np.complex128)
+    for i in range(k):
+        power = float(matrix[i, i].real)
+        left, right = matrix[:i, :i].copy(), matrix[:i, i].copy()  # of columns before, rid of those that were asked
+        asked: list[int] = []
+        while len(asked) < i:
+            own = left.diagonal().real
+            free = own > 1e-9 * matrix.diagonal().real[:i]
+            share = np.where(free, np.abs(right) ** 2 / np.where(free, own, 1.0), 0.0) / max(power, 1e-12)
+            j = int(np.argmax(share))
+            if share[j] * (count - len(asked)) < CERTAIN:
+                break
+            asked.append(j)
+            power -= float(abs(right[j]) ** 2 / own[j])
+            ratio = left[:, j] / own[j]
+            right = right - ratio * right[j]
+            left = left - np.outer(ratio, left[j])
+        power = max(power, 1e-9 * float(matrix[i, i].real)) or 1.0
+        weights = np.linalg.solve(matrix[np.ix_(asked, asked)] + 1e-9 * np.eye(len(asked)), matrix[asked, i])
+        # what is left of a sample that was fitted is too small
+        scale = np.sqrt((1.0 - (len(asked) + 1) / count) / power)
+        out[i, i] = scale
+        out[i, asked] = -scale * weights.conj()
+    return out

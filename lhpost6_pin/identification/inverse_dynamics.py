@@ -1,0 +1,219 @@
+"""Inverse dynamics: from a measured motion to the forces behind it (report, Section 6.1).
+
+    found = inverse_dynamics(plant, time, motion, actuator_force, strut_pressure)
+    found.residual                          # (n, 6) [N, N m] required less measured actuator wrench, at C in {c}
+
+From the motion of C and the Euler angles follow the platen's twist and its rate in {b} (Eqs. 3-11, 3-18) and with them
+inertia (Eq. 4-26), weight, struts (Eq. 4-8), friction and viscous forces (Eqs. 4-9 to 4-19). What then balances the
+inertia is the wrench that the actuators must have given; what they did give is measured.
+
+Hidden friction states are marched along the motion by the simulation's own step rule (`stage.advance_states`), so that
+a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.compiled import compiled
+from ..core.errors import SimulationError
+from ..effects.evaluate import advance_states
+from ..effects.registry import LAWS, LOAD_FRICTION
+from ..mechanics.equilibrium import hydraulic_rows
+from ..mechanics.plant import Plant
+from ..mechanics.port_path import PortPath, ports_along
+from ..mechanics.pose import PlantMotion, PlatenMotion, plant_motion
+from ..mechanics.schemes import pose_stage
+from ..mechanics.workspace import make_workspace
+from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
+
+__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity", "with_loads"]
+
+Array = NDArray[np.float64]
+
+_GAS = ("nitrogen_strut", "gas_leak", "gas_heat")
+"""Laws of the struts' gas."""
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """A motion taken apart; n samples, wrenches on the platen at C in {c}: fx fy fz mx my mz [N, N m]."""
+
+    states: States
+    ledger: Ledger  # of the model's effects; actuators are zero: what they give is measured
+    component: tuple[str, ...]  # (k,) components whose force was measured: actuators, then struts
+    component_force: Array  # (n, k) measured force along each [N], positive where it lengthens it
+    component_wrench: Array  # (n, k, 6) the same on the platen
+    actuators: int  # how many of the components are actuators
+
+    @property
+    def required(self) -> Array:
+        """Wrench that the actuators must have given (n, 6): inertia less all other effects of the model."""
+        return self.ledger.residual
+
+    @property
+    def measured(self) -> Array:
+        """Wrench that the actuators gave (n, 6), as measured."""
+        return np.asarray(self.component_wrench[:, : self.actuators].sum(axis=1))
+
+    @property
+    def residual(self) -> Array:
+        """Required less measured actuator wrench (n, 6): what the model does not explain."""
+        return self.required - self.measured
+
+    @property
+    def struts(self) -> Array:
+        """Wrench of the struts (n, 6), of the model (Eq. 4-8), with what effects do to their gas."""
+        return self._of(*(e.name for e in self.states.plant.machine.effects if e.law in _GAS))
+
+    @property
+    def struts_measured(self) -> Array | None:
+        """Wrench of the struts (n, 6) from their measured pressures; None where there are none."""
+        if len(self.component) == self.actuators:
+            return None
+        return np.asarray(self.component_wrench[:, self.actuators :].sum(axis=1))
+
+    @property
+    def dissipative(self) -> Array:
+        """Friction and viscous wrench of the model (n, 6), with all that effects add beside oil and gas."""
+        effects = self.states.plant.machine.effects
+        return self._of(*(e.name for e in effects if e.law not in _GAS and not LAWS[e.law].takes_spool))
+
+    @property
+    def dissipative_measured(self) -> Array:
+        """The same from measured forces: inertia less weight, actuators and struts (the model's without pressures)."""
+        struts = self.struts if self.struts_measured is None else self.struts_measured
+        return self.ledger.inertia - self._of("gravity") - self.measured - struts
+
+    def _of(self, *effects: str) -> Array:
+        """Sum of their wrenches; one that makes no force has none."""
+        total = np.zeros_like(self.ledger.inertia)
+        for effect in effects:
+            if effect in self.ledger.effects:
+                total += self.ledger.wrench[:, self.ledger.effect(effect)]
+        return total
+
+
+def inverse_dynamics(
+    plant: Plant,
+    time: ArrayLike,
+    motion: PlatenMotion,
+    actuator_force: ArrayLike,
+    strut_pressure: ArrayLike | None = None,
+    *,
+    path: Array | None = None,
+    model_step: bool = False,
+) -> Decomposition:
+    """Take a motion of C and Euler angles apart, friction states starting at rest.
+
+    time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
+    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). model_step says that
+    the samples are the model steps of a semi-implicit run; forces then see the velocity that they saw there.
+    Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
+    """
+    if plant.model.nv != plant.axes.size:
+        raise SimulationError(
+            "inverse dynamics takes a platen with a rigid specimen at most: what its joints do is not measured; "
+            "lock them (--locked)"
+        )
+    t = np.asarray(time, float)
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    moved = plant_motion(plant, motion)
+    along = moved if path is None else plant_motion(plant, motion._replace(displacement=path))
+    z = march_states(plant, ports_along(plant, along), dt)
+    v = seen_velocity(moved, dt) if model_step else moved.v
+    states = States(plant, t, moved.q, v, moved.a, z)
+    measured = [np.asarray(actuator_force, float)]
+    names = list(plant.machine.actuator_names)
+    if strut_pressure is not None:
+        areas = np.array([s.area for s in plant.machine.struts])
+        measured.append(-areas * np.asarray(strut_pressure, float))
+        names += plant.machine.strut_names
+    force = np.hstack(measured)
+    wrench = leg_wrenches(plant, moved.q, force)
+    ledger = _without_oil(force_ledger(states._replace(z=with_loads(plant, z, measured[0]))), plant)
+    return Decomposition(states, ledger, tuple(names), force, wrench, plant.spools)
+
+
+def with_loads(plant: Plant, z: Array, actuator_force: Array) -> Array:
+    """Hidden states (n, n_states) that hold measured actuator forces (n, n_actuators) [N] for friction that feels them.
+
+    Each force stands as pressure in chamber A, with none in B. Where nothing feels them z comes back as it is.
+    """
+    if not np.any(plant.rows["law"] == LOAD_FRICTION):
+        return z
+    fed = plant.rows[hydraulic_rows(plant)]
+    out = z.copy()
+    out[:, fed["state"]] = actuator_force / fed["p"][:, 0]
+    return out
+
+
+def _without_oil(ledger: Ledger, plant: Plant) -> Ledger:
+    """The ledger with actuators' forces zero."""
+    oil = [e.name for e in plant.machine.effects if LAWS[e.law].takes_spool]
+    force, wrench = ledger.force.copy(), ledger.wrench.copy()
+    force[:, [row.split(".")[0] in oil for row in ledger.rows]] = 0.0
+    wrench[:, [effect in oil for effect in ledger.effects]] = 0.0
+    return replace(ledger, force=force, wrench=wrench)
+
+
+def seen_velocity(motion: PlantMotion, dt: float) -> Array:
+    """Velocity (n, nv) that forces saw at each model step of a semi-implicit run: the last step's, extrapolated.
+
+    See `schemes.staggered_stage`.
+    """
+    return np.vstack([motion.v[:1], motion.v[:-1] + dt * motion.a[:-1]])
+
+
+def march_states(
+    plant: Plant,
+    ports: PortPath,
+    dt: float,
+    start: Array | None = None,
+    *,
+    spool: Array | None = None,
+    rows: NDArray[np.void] | None = None,
+) -> Array:
+    """Hidden states (n, n_states) along a path of the ports, from `start` (n_states,) or all zero, one step a sample.
+
+    Friction states only, or those of some rows of the plant's alone; with spool (n - 1 or more, n_actuators), the mean
+    over each step, chamber pressures as well.
+    """
+    moved = plant.rows if rows is None else rows
+    if spool is None:
+        moved = moved[moved["input"] < 0]
+        spool = np.zeros((1, plant.spools))
+    z = np.zeros((len(ports.s), len(plant.states)))
+    if start is not None:
+        z[0] = start
+    _march(np.ascontiguousarray(moved), ports.s, ports.slip, dt, np.ascontiguousarray(spool, float), plant.supply, z)
+    return z
+
+
+@compiled
+def _march(rows, s, slip, dt, spool, supply, z):
+    """Fill z from its first row."""
+    last = spool.shape[0] - 1
+    for k in range(1, s.shape[0]):
+        z[k] = z[k - 1]
+        advance_states(rows, s[k - 1], slip[k], dt, spool[min(k - 1, last)], supply, z[k])
+
+
+def leg_wrenches(plant: Plant, q: Array, force: Array) -> Array:
+    """Wrenches (n, k, 6) on the platen at C in {c} of forces (n, k) [N] along the first k legs at poses q (n, nq)."""
+    out = np.zeros((*force.shape, 6))
+    ws = make_workspace(plant, plant.zero_state())
+    arrays = plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB
+    _leg_wrenches(np.ascontiguousarray(q), np.ascontiguousarray(force), *arrays, out)
+    return out
+
+
+@compiled
+def _leg_wrenches(q, force, axes, legs, body, frame, port, JB, out):
+    rho = body[0].rho_c
+    B = JB[1]
+    for k in range(q.shape[0]):
+        pose_stage(q[k], axes, legs, body, frame, port, JB)
+        for i in range(force.shape[1]):
+            add_at_c(force[k, i], B, i, rho, frame, out[k, i])

@@ -1,0 +1,241 @@
+"""Residuals: where a model and a measured test disagree, equation by equation.
+
+    wrench   required less measured actuator wrench on the platen at C in {c} [N, N m]      (Eqs. 4-24 to 4-26)
+    flow     L A / beta dP/dt + A dL/dt - Q, per chamber [m3/s]                              (Eqs. 4-2 to 4-5)
+    gas      ln P/P_0 + n ln(1 + dL/L_c0), per strut [1]                                     (Eq. 4-7)
+    force    measured actuator force less P_A A_1 - P_B A_2 [N]                              (Eq. 4-6)
+    servo    measured spool position less what its command gives, late by the valve [1]      (Section 4.1.2)
+    supply   measured supply pressure less the model's, which flow may lower [Pa]
+
+All are zero where the model is right and sensors are perfect. The laws are those of the simulation, called by the same
+tables; accelerations come from the fused engine's forward dynamics, whose oracle is Pinocchio.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..data.alignment import due_spools, gas_pressure, oil_force
+from ..data.records import require, sample_interval
+from ..data.signals import differentiate
+from ..effects.registry import GAS_HEAT, LAWS, OSCILLATOR, PORTS
+from ..mechanics.equilibrium import hydraulic_rows
+from ..mechanics.gas_pressure import gas_ratio
+from ..mechanics.plant import Plant
+from ..mechanics.port_path import PortPath, ports_along
+from ..mechanics.pose import PlatenMotion, plant_motion
+from .inverse_dynamics import march_states, with_loads
+from .oil_residuals import oil_misses
+from .wrench_residuals import missed_wrench, needed_wrench, weigh_alike
+
+__all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured", "states_of"]
+
+Array = NDArray[np.float64]
+
+RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
+"""Kinds of residuals."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured test made ready for residuals; n samples. What was not measured is None."""
+
+    name: str
+    dt: float  # [s]
+    motion: PlatenMotion  # of C and Euler angles
+    actuator_force: Array | None  # (n, n_actuators) [N]
+    pressure: Array | None  # (n, n_chambers): A of every actuator, then B of the double-acting [Pa]
+    pressure_rate: Array | None  # [Pa/s]
+    strut_pressure: Array | None  # (n, n_struts) [Pa]
+    spool: Array | None  # (n, n_actuators) at the samples' instants [1]
+    spool_command: Array | None = None  # (n, n_actuators) [1]
+    supply_pressure: Array | None = None  # (n, 1) [Pa]
+    path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
+    share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.motion.displacement)
+
+
+class Residuals(NamedTuple):
+    """Residuals of one test; n samples, no columns where something was not measured."""
+
+    wrench: Array  # (n, 6)
+    flow: Array  # (n, n_chambers)
+    gas: Array  # (n, n_struts)
+    force: Array  # (n, n_actuators)
+    servo: Array  # (n, n_actuators)
+    supply: Array  # (n, 1)
+
+    def stacked(self) -> Array:
+        """All columns side by side (n, k)."""
+        return np.hstack(self)
+
+
+def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None) -> Measured:
+    """Make a record ready, with the platen motion found from it; pressures are differentiated up to `cutoff` [Hz].
+
+    path (n, 6) is the displacement that friction follows, where it is not the motion's.
+
+    Raises RecordError if neither forces nor pressures were measured.
+    """
+    dt = sample_interval(record)
+
+    def values(name: str) -> Array | None:
+        return np.ascontiguousarray(record[name].values, float) if name in record else None
+
+    pressure_a, pressure_b = values("chamber_pressure_a"), values("chamber_pressure_b")
+    pressure = pressure_a if pressure_a is None or pressure_b is None else np.hstack([pressure_a, pressure_b])
+    force, supply = values("actuator_force"), values("supply_pressure")
+    if force is None and pressure is None:
+        require(record, "actuator_force")
+    return Measured(
+        name=str(record.attrs.get("test", "test")),
+        dt=dt,
+        motion=motion,
+        actuator_force=force,
+        pressure=pressure,
+        pressure_rate=None if pressure is None else differentiate(pressure, dt, cutoff),
+        strut_pressure=values("strut_pressure"),
+        spool=values("spool_position"),
+        spool_command=values("spool_command"),
+        supply_pressure=None if supply is None else supply[:, None],
+        path=path,
+    )
+
+
+class Path(NamedTuple):
+    """A test's motion in a plant's coordinates and ports, and the friction states that it leaves behind."""
+
+    ports: PortPath
+    along: PortPath  # what friction follows
+    needed: Array  # (n, 6) wrench at B in platen axes that the platen's inertia and weight ask for, on its free axes
+    z: Array  # (n, n_states)
+
+
+def follow(
+    plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None, *, start: Array | None = None
+) -> Path:
+    """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
+
+    What does not differ from the `known` path of the same motion, of another plant, is taken from there. start
+    (n_states,) is what friction remembers from before the test, if not nothing.
+    """
+    there: dict[tuple[object, ...], Array] = {}
+    before: dict[tuple[object, ...], slice] = {}
+    if known is None or _geometry(known[0]) != _geometry(plant):
+        moved = plant_motion(plant, test.motion)
+        along = ports = ports_along(plant, moved)
+        if test.path is not None:
+            along = ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
+        needed = needed_wrench(plant, moved, ports.turn)
+    else:
+        ports, along, needed, old = known[1]
+        if not weigh_alike(known[0], plant):
+            needed = needed_wrench(plant, plant_motion(plant, test.motion), ports.turn)
+        if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
+            return Path(ports, along, needed, old)
+        before = {_marched(row): states_of(row) for row in _moving(known[0])}
+        there = {key: old[:, place] for key, place in before.items()}
+    rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
+    fresh = {key: row for key, _, row in rows if key not in there}
+    # oscillators and heat average noise, and feel what a still path lacks
+    parts: tuple[list[np.void], list[np.void]] = [], []
+    for row in fresh.values():
+        parts[test.path is not None and int(row["law"]) in (OSCILLATOR, GAS_HEAT)].append(row)
+    for some, way in zip(parts, (along, ports), strict=True):
+        if some:
+            marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
+            there |= {_marched(row): marched[:, states_of(row)] for row in some}
+    z = np.zeros((test.samples, len(plant.states)))
+    still = 0  # states before it are those of the known path, in the same places: most of them
+    if before:
+        still = min([z.shape[1], old.shape[1], *(at.start for key, at, _ in rows if before.get(key) != at)])
+        z[:, :still] = old[:, :still]
+    for key, at, _ in rows:
+        if at.start >= still:
+            z[:, at] = there[key]
+    return Path(ports, along, needed, z)
+
+
+_WIDTH = {law.code: len(law.states) for law in LAWS.values() if law.code >= 0}
+
+
+def _moving(plant: Plant) -> Array:
+    """Rows with hidden states that the motion alone drives."""
+    return np.asarray(plant.rows[(plant.rows["state"] >= 0) & (plant.rows["input"] < 0)])
+
+
+def _marched(row: np.void) -> tuple[object, ...]:
+    """What hidden states of a row depend on: the first number is the amplitude of its force, which they do not feel."""
+    return int(row["law"]), *(int(row[port]) for port in PORTS), row["p"][1:].tobytes()
+
+
+def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
+    """Whether two tables leave hidden states that are alike."""
+    same = some.shape == others.shape and (some["p"][:, 1:] == others["p"][:, 1:])[some["input"] < 0].all()
+    return bool(same) and all((some[k] == others[k]).all() for k in ("law", *PORTS, "state", "input"))
+
+
+def states_of(row: np.void) -> slice:
+    """Hidden states of a row of the effect table, which has some."""
+    return slice(int(row["state"]), int(row["state"]) + _WIDTH[int(row["law"])])
+
+
+def _geometry(plant: Plant) -> bytes:
+    """What the motion of a plant's ports and their force columns depend on, and which they are."""
+    body = np.append(plant.body["rho_c"], plant.body["plane"]).tobytes()
+    return body + plant.legs.tobytes() + " ".join(plant.ports).encode()
+
+
+def evaluate_residuals(
+    plant: Plant, test: Measured, only: tuple[str, ...] = RESIDUALS, *, path: Path | None = None
+) -> Residuals:
+    """Residuals of a test with a plant's equations; those not in `only` have no columns.
+
+    path is that of `follow`, if it is known. Raises RecordError naming the sample where a leg is out of its stroke.
+    """
+    n, machine = test.samples, plant.machine
+    path = path or follow(plant, test)
+    force = test.actuator_force
+    if test.pressure is not None:
+        oil = oil_force(machine, test.pressure[:, : plant.spools], test.pressure[:, plant.spools :])
+        force = oil if force is None else force
+    wrench = np.zeros((n, 0))
+    if "wrench" in only and force is not None:
+        wrench = missed_wrench(plant, path.ports, path.needed, with_loads(plant, path.z, force), force)
+    flow, supplied = _of_oil(plant, test, path, only)
+    gas = np.zeros((n, 0))
+    if "gas" in only and test.strut_pressure is not None:
+        length = path.ports.s[:, plant.spools : plant.legs.size]
+        gas = np.log(test.strut_pressure / gas_pressure(machine, length) / gas_ratio(plant, path.z))
+    told, servo = np.zeros((n, 0)), np.zeros((n, 0))
+    if "force" in only and test.pressure is not None and test.actuator_force is not None:
+        told = test.actuator_force - oil
+    if "servo" in only and test.spool is not None and test.spool_command is not None:
+        servo = test.spool - due_spools(plant, test.spool_command, test.dt)
+    return Residuals(wrench, flow, gas, told, servo, supplied)
+
+
+def _of_oil(plant: Plant, test: Measured, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
+    """Residuals `flow` and `supply`."""
+    n, double = test.samples, np.isin(plant.machine.actuator_names, plant.machine.double_acting)
+    supply = test.supply_pressure if "supply" in only else None
+    none = np.zeros((n, 0))
+    if test.pressure is None or test.spool is None or ("flow" not in only and supply is None):
+        return none, none
+    flow = np.zeros((n, plant.spools + int(double.sum()))) if "flow" in only else none
+    chamber = np.full((plant.spools, 2), -1)
+    chamber[:, 0] = np.arange(plant.spools)
+    chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
+    drooped, rows = np.zeros(n), plant.rows[hydraulic_rows(plant)]
+    measured = test.pressure, test.pressure_rate, test.spool
+    states = len(plant.states)
+    oil_misses(rows, chamber, *measured, plant.supply, path.ports.s, path.ports.rate, states, test.dt, drooped, flow)
+    return flow, none if supply is None else supply - drooped[:, None]

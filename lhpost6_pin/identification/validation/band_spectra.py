@@ -1,0 +1,60 @@
+"""Spectra of what is compared, and the model's amplitude over the measured one in bands.
+
+Here nothing is low-passed at the band of the comparison, since half of the oil columns lie above it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .metrics import Numbers
+
+__all__ = ["Spectrum", "estimate_spectrum"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Power spectral densities [unit2/Hz] of one quantity over `frequency` (f,) [Hz], k columns."""
+
+    quantity: str
+    columns: tuple[str, ...]
+    frequency: Array
+    measured: Array  # (f, k)
+    model: Array  # (f, k)
+    ratio: Array  # (bands, k) amplitude of the model over the measurement; nan where there is only noise
+
+
+def estimate_spectrum(
+    quantity: str,
+    columns: Sequence[str],
+    measured: Array,
+    model: Array,
+    noise: Array,
+    dt: float,
+    numbers: Numbers,
+) -> Spectrum:
+    """Welch's estimate for both sides (n, k); noise (n, k) is a draw of what sensors add to the measurement."""
+    from scipy.signal import welch
+
+    length = min(round(numbers.spectra.segment / dt), len(measured))
+    f, ours = welch(measured, 1 / dt, nperseg=length, axis=0)
+    theirs, heard = (welch(x, 1 / dt, nperseg=length, axis=0)[1] for x in (model, noise))
+    return Spectrum(quantity, tuple(columns), f, ours, theirs, _band_ratios(f, ours, theirs, heard, numbers))
+
+
+def _band_ratios(f: Array, measured: Array, model: Array, noise: Array, numbers: Numbers) -> Array:
+    """Amplitude of the model over that of the measurement (bands, k) from powers (f, k); nan where noise prevails."""
+    edges = numbers.spectra.edges
+    out = np.full((len(edges) - 1, measured.shape[1]), np.nan)
+    for b, (low, high) in enumerate(pairwise(edges)):
+        inside = (f >= low) & (f < high)
+        if inside.any():
+            ours, theirs, heard = (x[inside].mean(axis=0) for x in (measured, model, noise))
+            clear = ours > numbers.spectra.noise**2 * heard
+            out[b] = np.sqrt(np.divide(theirs, ours, out=np.full(len(ours), np.nan), where=clear))
+    return out

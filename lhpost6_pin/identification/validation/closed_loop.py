@@ -1,0 +1,78 @@
+"""What a record says of the closed loop it was made in: controller settings, reference or drive."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...control import ControllerSettings, load_controller
+from ...core.errors import RecordError
+from ...core.files import models_folder
+from ...core.names import AXES, SAMPLE_RATE
+from ...data.records import require
+from ...data.signals import differentiate, resample_band_limited
+from ...motions import Reference, Target
+from ...tuning.drives import load_drive
+
+__all__ = ["Lag", "drive_of", "settings_of", "whose_settings"]
+
+Array = NDArray[np.float64]
+
+
+class Lag(NamedTuple):
+    """Delay of one axis behind what was asked for, of measurement and model [s]."""
+
+    column: str
+    measured: float
+    model: float
+
+
+def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> ControllerSettings:
+    """Settings that are given, else those shipped that the record's attribute `controller` names.
+
+    Raises RecordError where neither is known: without its controller a closed loop cannot be simulated.
+    """
+    if given is not None:
+        return given
+    said = record.attrs.get("controller")
+    for path in sorted((models_folder() / "controllers").glob("*.toml")):
+        settings = load_controller(path.stem)
+        if said in (path.stem, settings.name):
+            return settings
+    said = "no controller" if said is None else f"the controller {said!r}, which is not shipped"
+    raise RecordError(f"the record names {said}; give its settings as a TOML file with --controller")
+
+
+def whose_settings(record: xr.Dataset, settings: ControllerSettings, given: ControllerSettings | None) -> str:
+    """Where the settings of the closed loop come from, in words: others than the test's explain any difference."""
+    named = record.attrs.get("controller")
+    if given is None or named == settings.name:
+        return f"closed loop with the controller that the record names, “{settings.name}”"
+    said = "no controller" if named is None else f"“{named}”"
+    return f"closed loop with the controller given, “{settings.name}”; the record names {said}: settings may differ"
+
+
+def drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:
+    """Target at the controller's rate, and the drive (n, 6) if the test replayed one.
+
+    Velocity and acceleration of the reference are those stored, else derivatives low-passed at `high` [Hz]. Raises
+    RecordError without reference_displacement, or for a drive file that is missing or of another mode.
+    """
+    if "drive" in record.attrs:
+        found = load_drive(Path(str(record.attrs["drive"])))
+        if found.mode != settings.mode:
+            raise RecordError(f"{record.attrs['drive']} is for {found.mode} mode; {settings.name} has {settings.mode}")
+        return found.target, found.values
+    require(record, "reference_displacement")
+    time = record["time"].values - float(record["time"][0])
+    dt = float(time[-1]) / (len(time) - 1)
+    clock = np.arange(int(time[-1] * SAMPLE_RATE + 1e-6) + 1) / SAMPLE_RATE
+    motion = [record["reference_displacement"].values]
+    for name in ("reference_velocity", "reference_acceleration"):
+        motion.append(record[name].values if name in record else differentiate(motion[-1], dt, high))
+    x, v, a = (resample_band_limited(values, time, clock) for values in motion)
+    axes = tuple((axis, axis) for axis in AXES)
+    name = str(record.attrs.get("test", "test"))
+    return Target(clock, x, v, a, Reference(name, "reference of the record", 1.0, axes, 0.0, high, 0.0)), None

@@ -1,0 +1,20 @@
+"""What all tests of a campaign are judged with."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ...control import ControllerSettings
+from ...data.sensors import Sensors
+from ...mechanics.linearize import Mode
+from .metrics import Numbers
+
+__all__ = ["Bench"]
+
+
+class Bench(NamedTuple):
+    """What all tests of a campaign are judged with."""
+
+    sensors: Sensors
+    numbers: Numbers
+    modes: Sequence[Mode]  # oil columns of the linear model
+    settings: ControllerSettings | None  # of the controller, in place of those that records name

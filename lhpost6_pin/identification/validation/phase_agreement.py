@@ -1,0 +1,152 @@
+"""How well a model's signals agree with measured ones, column by column.
+
+Both sides come low-passed alike and on the same samples. Forces and pressures are compared less their means: a preload
+is nobody's achievement and would make errors of a vertical force look small, and an offset of a sensor would make them
+look large. The difference of the means stands by itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.names import AXES
+from ...data.signals import align, correlation, delay, drift_rate, peak_ratio, rrmse
+from .metrics import Numbers
+
+__all__ = ["MOTIONS", "Agreement", "Pair", "agree", "unit_of"]
+
+Array = NDArray[np.float64]
+
+MOTIONS = ("displacement", "velocity", "acceleration")
+"""Quantities of the platen that share the delay found on their velocity."""
+
+_UNITS = {
+    "displacement": ("m", "rad"),
+    "velocity": ("m/s", "rad/s"),
+    "acceleration": ("m/s2", "rad/s2"),
+    "wrench": ("N", "N m"),
+    "struts": ("N", "N m"),
+    "dissipative": ("N", "N m"),
+    "actuator_force": ("N",),
+    "chamber_pressure_a": ("Pa",),
+    "chamber_pressure_b": ("Pa",),
+    "spool_command": ("1",),
+}
+_PRELOADED = ("wrench", "struts", "dissipative", "actuator_force", "chamber_pressure_a", "chamber_pressure_b")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One quantity, measured and of the model; n samples, k columns, low-passed alike."""
+
+    quantity: str  # a name of the units below: "displacement", ..., "wrench" at C in {c}, "actuator_force", ...
+    columns: tuple[str, ...]
+    measured: Array  # (n, k)
+    model: Array  # (n, k)
+    heard: Array  # (k,) standard deviation of the sensors' noise in the measurement
+    noise: Array  # (k,) that it leaves in the difference; more, where the model is driven by measured channels
+    calibration: Array | None = None  # (k,) that gains and offsets of sensors leave in its mean, where known
+
+
+class Agreement(NamedTuple):
+    """How one column agrees; not-a-number where it hardly moves, or for a ratio to nothing."""
+
+    quantity: str
+    column: str
+    unit: str
+    moves: bool
+    variation: float  # rms of the measurement about its mean
+    error: float  # rms of model less measurement; of forces and pressures less its mean
+    noise: float  # standard deviation that sensor noise alone leaves in the error
+    error_aligned: float  # rms after taking the delay out; the same as before where there is none to take out
+    rrmse: float  # [1]
+    rrmse_aligned: float  # [1] after taking the delay out
+    delay: float  # of the model behind the measurement [s]
+    peak_ratio: float  # model over measurement; a delay does not change it
+    correlation: float
+    correlation_aligned: float  # after taking the delay out
+    offset: float  # mean of model less measurement
+    offset_expected: float  # standard deviation that calibration of sensors leaves in it; nan where not known
+    drift: float  # least-squares slope of the error [unit / s]
+
+    @property
+    def error_to_noise(self) -> float:
+        """Error, delay removed, in standard deviations of the sensor noise [1]."""
+        return self.error_aligned / self.noise if self.noise > 0.0 else float("nan")
+
+
+def unit_of(quantity: str, column: str) -> str:
+    """SI unit of a quantity's column."""
+    units = _UNITS[quantity]
+    return units[-1] if column in AXES[3:] else units[0]
+
+
+def agree(pairs: Sequence[Pair], dt: float, numbers: Numbers) -> tuple[Agreement, ...]:
+    """Agreement of every column of every pair, the ends of the test left out.
+
+    Displacement, velocity and acceleration of an axis have one delay, that of the velocity: an open loop drifts, and a
+    drifting displacement has none. Raises ValueError if a test is too short for the longest delay sought.
+    """
+    edge = round(numbers.edge / dt)
+    shared: dict[str, float] = {}
+    found: list[Agreement] = []
+    for pair in sorted(pairs, key=lambda p: p.quantity != "velocity"):
+        part = slice(edge, len(pair.measured) - edge)
+        moves = _moving(pair, pair.measured[part], numbers)
+        for k, column in enumerate(pair.columns):
+            late = float("nan")
+            if moves[k]:
+                late = shared.get(column, late) if pair.quantity in MOTIONS else late
+                if np.isnan(late):
+                    late = float(delay(pair.measured[part, k], pair.model[part, k], dt, numbers.longest_delay))
+            if pair.quantity == "velocity":
+                shared[column] = late
+            found.append(_agree_one(pair, k, bool(moves[k]), late, part, dt))
+    order = {pair.quantity: i for i, pair in enumerate(pairs)}
+    return tuple(sorted(found, key=lambda a: order[a.quantity]))
+
+
+def _moving(pair: Pair, measured: Array, numbers: Numbers) -> NDArray[np.bool_]:
+    """Which columns (k,) move enough to be judged by a ratio."""
+    size = measured.std(axis=0)
+    per = {"m": 1.0, "rad": numbers.hardly.radius, "N m": 1.0 / numbers.hardly.radius}
+    weight = [per.get(unit_of(pair.quantity, column).split("/")[0], 1.0) for column in pair.columns]
+    comparable = size * weight
+    enough = (comparable >= numbers.hardly.share * comparable.max(initial=0.0)) & (comparable > 0.0)
+    return np.asarray(enough & (size >= numbers.hardly.noise * pair.heard))
+
+
+def _agree_one(pair: Pair, k: int, moves: bool, late: float, part: slice, dt: float) -> Agreement:
+    measured, whole = pair.measured[part, k], pair.model[:, k]
+    offset = float((whole[part] - measured).mean())
+    if pair.quantity in _PRELOADED:
+        whole, measured = whole - whole[part].mean(), measured - measured.mean()
+    model = whole[part]
+    shifted = align(whole, late, dt)[part] if np.isfinite(late) else model
+    error = model - measured
+    ratio = ratio_aligned = peak = alike = alike_aligned = float("nan")
+    if moves:
+        ratio, peak, alike = (float(f(measured, model)) for f in (rrmse, peak_ratio, correlation))
+        ratio_aligned, alike_aligned = (float(f(measured, shifted)) for f in (rrmse, correlation))
+    return Agreement(
+        pair.quantity,
+        pair.columns[k],
+        unit_of(pair.quantity, pair.columns[k]),
+        moves,
+        float(measured.std()),
+        float(np.sqrt(np.mean(error**2))),
+        float(pair.noise[k]),
+        float(np.sqrt(np.mean((shifted - measured) ** 2))),
+        ratio,
+        ratio_aligned,
+        late,
+        peak,
+        alike,
+        alike_aligned,
+        offset,
+        float("nan") if pair.calibration is None else float(pair.calibration[k]),
+        float(drift_rate(error, dt)),
+    )

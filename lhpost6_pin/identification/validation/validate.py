@@ -1,0 +1,141 @@
+"""Three-phase validation of a campaign: every test through inverse dynamics, open loop and closed loop.
+
+found = validate(machine, campaign)
+found.phase("TX", 1).of("wrench")       # agreement of required and measured actuator wrench, per axis
+"""
+
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import xarray as xr
+from joblib import Parallel, delayed
+
+from ...control import ControllerSettings
+from ...core.errors import LhpostError, RecordError
+from ...data.alignment import Delay, align_record, group_delays
+from ...data.campaign import Campaign
+from ...data.sensors import Sensors, load_sensors
+from ...machine.machine import Machine
+from ...mechanics.linearize import oil_column_modes
+from ...mechanics.plant import make_plant
+from .comparison_basis import Bench
+from .metrics import Numbers, validation_numbers
+from .phases import PHASES, Phase, run_phase
+from .prepare_tests import prepare, too_short
+from .valve_agreement import Valves, find_valves
+
+__all__ = ["Validation", "validate"]
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What a validation found: each phase of each test."""
+
+    campaign: str
+    machine: Machine
+    sensors: Sensors
+    numbers: Numbers
+    skews: Mapping[str, Delay]  # between channel groups, taken out of all records
+    valves: Valves | None  # spools behind their commands; None where either was not recorded
+    phases: tuple[Phase, ...]  # test by test
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """Names of the tests, in the campaign's order."""
+        return tuple(dict.fromkeys(p.test for p in self.phases))
+
+    @property
+    def residual_over_noise(self) -> tuple[float, float] | None:
+        """Least and greatest residual of inverse dynamics over the noise predicted for it; None if there is none."""
+        every = [a.error_to_noise for p in self.phases if p.number == 1 for a in p.of("wrench")]
+        known = [ratio for ratio in every if math.isfinite(ratio)]
+        return (min(known), max(known)) if known else None
+
+    def phase(self, test: str, number: int) -> Phase | None:
+        """A phase of a test; None if it was not asked for."""
+        return next((p for p in self.phases if (p.test, p.number) == (test, number)), None)
+
+
+def validate(
+    machine: Machine,
+    campaign: Campaign,
+    *,
+    sensors: Sensors | None = None,
+    settings: ControllerSettings | None = None,
+    phases: Sequence[int] = tuple(PHASES),
+    jobs: int = -1,
+    progress: Progress | None = None,
+) -> Validation:
+    """Compare a campaign with its machine in the phases asked for, tests over `jobs` threads.
+
+    settings replace what records say of their controller. Skews between channel groups that stand out of their errors
+    are taken out first. A phase that cannot be says why; RecordError if no phase of any test can be, or if two tests
+    have one name.
+    """
+    _check_names(campaign)
+    sensors, numbers = sensors or load_sensors(), validation_numbers()
+    plant = make_plant(machine)
+    enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
+    skews = {
+        group: found
+        for group, found in group_delays(plant, enough).items()
+        if abs(found.delay) > numbers.significant_skew * found.standard_error
+    }
+    bench = Bench(sensors, numbers, oil_column_modes(machine), settings)
+    done, lock = [0], threading.Lock()
+
+    def count() -> None:
+        with lock:
+            done[0] += 1
+            if progress is not None:
+                progress(done[0] / (len(campaign.records) * len(phases)))
+
+    def one(record: xr.Dataset) -> list[Phase]:
+        return _phases_of(machine, align_record(record, skews), bench, phases, count)
+
+    found = Parallel(n_jobs=jobs, prefer="threads")(delayed(one)(record) for record in campaign.records)
+    every = tuple(phase for test in found for phase in test)
+    if all(phase.reason for phase in every):
+        why = "; ".join(dict.fromkeys(f"{p.test}, {PHASES[p.number]}: {p.reason}" for p in every))
+        raise RecordError(f"{campaign.name}: nothing can be compared: {why}")
+    valves = find_valves(machine, enough, numbers)
+    return Validation(campaign.name, machine, sensors, numbers, skews, valves, every)
+
+
+def _seconds(record: xr.Dataset) -> float:
+    """Length of a record [s]."""
+    return float(record["time"][-1] - record["time"][0])
+
+
+def _check_names(campaign: Campaign) -> None:
+    """Raise RecordError if two tests have one name."""
+    files: dict[str, list[str]] = {}
+    for k, record in enumerate(campaign.records, start=1):
+        file = record.encoding.get("source", f"record {k}")
+        files.setdefault(str(record.attrs.get("test", "test")), []).append(str(file))
+    for name, twice in files.items():
+        if len(twice) > 1:
+            raise RecordError(
+                f"{campaign.name}: test {name!r} is twice there: {', '.join(twice)}; rename one (attribute test)"
+            )
+
+
+def _phases_of(
+    machine: Machine, record: xr.Dataset, bench: Bench, phases: Sequence[int], count: Callable[[], None]
+) -> list[Phase]:
+    found = []
+    try:
+        if (length := _seconds(record)) < bench.numbers.shortest:
+            raise RecordError(too_short(length, bench.numbers))
+        test = prepare(machine, record, bench.sensors)
+    except LhpostError as error:
+        name, time = str(record.attrs.get("test", "test")), record["time"].values
+        test, why = None, str(error)
+    for number in phases:
+        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test, bench))
+        count()
+    return found

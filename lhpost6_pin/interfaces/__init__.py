@@ -1,0 +1,1 @@
+"""The plant for other programs: over UDP and as an FMU."""

@@ -1,0 +1,76 @@
+"""A machine with all that was changed on it, as files in a folder: what an FMU carries of its machine."""
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ... import __version__
+from ...core.errors import ParameterError
+from ...effects.effect import Effect
+from ...machine.machine import Machine, build_machine
+from ...machine.parameters import EffectEntry, Parameters, Quantity
+from ...machine.specimen import Specimen
+
+__all__ = ["MACHINE_FILE", "load_machine_file", "save_machine_file"]
+
+MACHINE_FILE = "machine.json"
+
+
+def save_machine_file(machine: Machine, folder: Path) -> list[Path]:
+    """Write a machine, and its specimen's URDF if it carries one, into a folder; returns the files.
+
+    Numbers are written so that they read back to the last bit.
+    """
+    known: dict[str, Any] = {
+        "lhpost6_pin": __version__,
+        "origin": machine.parameters.origin,
+        "words": dict(machine.parameters.words),
+        "quantities": {path: asdict(quantity) for path, quantity in machine.parameters.items()},
+        "effects": {name: asdict(entry) for name, entry in machine.parameters.effects.items()},
+        "own_effects": [asdict(effect) for effect in machine.own_effects],
+    }
+    files = [folder / MACHINE_FILE]
+    if machine.specimen is not None:
+        urdf = machine.specimen.urdf
+        if not urdf.is_file():
+            raise ParameterError(f"{urdf}: no such URDF file")
+        known["specimen"] = {**asdict(machine.specimen), "urdf": urdf.name}
+        files.append(Path(shutil.copy2(urdf, folder)))
+    files[0].write_text(json.dumps(known, indent=1), encoding="utf-8")
+    return files
+
+
+def load_machine_file(folder: Path) -> tuple[Machine, str]:
+    """Read what `save_machine_file` wrote: the machine, and the version of lhpost6_pin that wrote it."""
+    known = json.loads((folder / MACHINE_FILE).read_text(encoding="utf-8"))
+    quantities = {path: Quantity(**_tuples(entry)) for path, entry in known["quantities"].items()}
+    effects = {
+        name: EffectEntry(
+            entry["family"],
+            tuple(entry["components"]),
+            {key: Quantity(**_tuples(value)) for key, value in entry["values"].items()},
+        )
+        for name, entry in known["effects"].items()
+    }
+    specimen = None
+    if "specimen" in known:
+        entry = _tuples(known["specimen"])
+        specimen = Specimen(**{**entry, "urdf": folder / entry["urdf"]})
+    machine = build_machine(
+        Parameters(quantities, known["words"], known["origin"], effects),
+        added_effects=tuple(Effect(**_tuples(entry)) for entry in known["own_effects"]),
+        specimen=specimen,
+    )
+    return machine, known["lhpost6_pin"]
+
+
+def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy of an entry with the lists that JSON made of its tuples as tuples again."""
+
+    def again(value: Any) -> Any:
+        return tuple(map(again, value)) if isinstance(value, list) else value
+
+    return {key: again(value) for key, value in entry.items()}

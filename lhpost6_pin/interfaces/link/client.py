@@ -1,0 +1,219 @@
+"""The other end of the link: a client that commands a served plant.
+
+Any function of its readings will do:
+
+    with LinkClient() as table:
+        reading = table.reading  # sample 0, at rest
+        while reading.sample < n:
+            reading = table.exchange(command(reading))
+
+At the end of the block the plant is free for others.
+"""
+
+import secrets
+import select
+import socket
+import time
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...control.plug import Sensors
+from ...control.valves import names_of_valves, per_valve
+from ...core.errors import LinkError
+from .clock import SECOND, now
+from .protocol import COUNTS, Frame, Kind, Mode, PlantState, decode, encode, is_newer
+from .server import HOST, PORT
+from .statistics import Histogram
+
+__all__ = ["LinkClient", "Reading"]
+
+Array = NDArray[np.float64]
+
+_LARGEST = 2048  # bytes of a datagram that are read; every frame but a welcome to a huge machine is shorter
+
+
+class Reading(NamedTuple):
+    """What the plant says after a sample."""
+
+    sample: int
+    state: PlantState
+    sensors: Sensors
+    acknowledged: int  # sequence of the newest command that acted
+    stamp: int  # the server's clock [ns]
+
+
+class LinkClient:
+    """A connection to a served plant, which it puts at rest in the zero-position.
+
+    Attributes: machine; mode; rate [Hz]; actuators and valves, their names; counts, servovalves of each actuator;
+    reading, the newest; resent, commands sent again; sensors_lost, samples whose sensors never came; ignored, datagrams
+    that were no frame of this session; round_trip, from the sending of a command to the coming of sensors it acted on.
+    """
+
+    def __init__(self, host: str = HOST, port: int = PORT, *, timeout: float = 0.2, tries: int = 25) -> None:
+        """Greet the server; raises LinkError if none answers `tries` datagrams within `timeout` [s] each."""
+        self._where, self._timeout, self._tries = f"{host}:{port}", timeout, tries
+        self._session, self._sequence = secrets.randbits(32), 0
+        self.resent = self.sensors_lost = self.ignored = 0
+        self.round_trip = Histogram()
+        self._sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._sock.connect((host, port))
+            self._sock.setblocking(False)
+            found: dict[Kind, Frame] = {}
+
+            def told_all(frame: Frame) -> bool:
+                found[frame.kind] = frame
+                answers = [found.get(Kind.WELCOME), found.get(Kind.SENSORS)]
+                return None not in answers and len({a.actuators for a in answers if a}) == 1
+
+            self._ask(Frame(Kind.HELLO, self._session), told_all)
+        except OSError as error:
+            self._sock.close()
+            raise LinkError(f"{self._where} cannot be reached: {error}") from error
+        except BaseException:
+            self._sock.close()
+            raise
+        welcome = found[Kind.WELCOME].welcome
+        assert welcome is not None
+        self.mode, self.rate = found[Kind.WELCOME].mode, welcome.rate
+        self.machine, self.actuators = welcome.machine, welcome.actuators
+        self.counts = np.array(welcome.valves, np.int64)
+        self.valves = names_of_valves(self.actuators, self.counts)
+        self.reading = self._read(found[Kind.SENSORS])
+
+    def __enter__(self) -> Self:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Say goodbye, if that was not done, and close."""
+        self.close()
+
+    def send(self, command: Array) -> None:
+        """Send a command, per actuator (n_actuators,) or per servovalve (n_valves,), -1..1, and wait for nothing."""
+        self._put(self._command(command))
+
+    def newest(self) -> Reading | None:
+        """The newest sensors that have come since the last look, or None; does not wait."""
+        fresh = None
+        while (frame := self._get(0.0)) is not None:
+            fresh = self._take(frame) or fresh
+        return fresh
+
+    def exchange(self, command: Array) -> Reading:
+        """Send a command and return the next sensors.
+
+        In lock-step those of the very next sample; a command is sent again until they come. In real time and free
+        running the newest of those that come. Raises LinkError if none do.
+        """
+        frame = self._command(command)
+        if self.mode == Mode.LOCK_STEP:
+            asked = frame.sequence
+            self._ask(frame, lambda f: self._take(f) is not None and f.acknowledged == asked)
+            return self.reading
+        self._put(frame)
+        deadline = now() + round(self._timeout * self._tries * SECOND)
+        while (left := deadline - now()) > 0:
+            answer = self._get(left / SECOND)
+            if answer is not None and self._take(answer) is not None:
+                self.newest()
+                return self.reading
+        raise LinkError(self._silence())
+
+    def close(self) -> Mapping[str, int]:
+        """Give the plant back; returns the server's counts of this session, or nothing if it does not answer."""
+        if self._sock.fileno() < 0:
+            return {}
+        self._tries = min(self._tries, 5)
+        try:
+            status = self._ask(Frame(Kind.BYE, self._session), lambda f: f.kind == Kind.STATUS)
+        except LinkError:
+            return {}
+        finally:
+            self._sock.close()
+        return dict(zip(COUNTS, status.counts, strict=True))
+
+    def _command(self, command: Array) -> Frame:
+        values = np.asarray(command, float)
+        if values.shape == self.counts.shape:
+            values = per_valve(values, self.counts)
+        elif values.shape != (len(self.valves),):
+            raise LinkError(
+                f"a command of shape {values.shape}; {self.machine} has {len(self.actuators)} actuators and "
+                f"{len(self.valves)} servovalves"
+            )
+        self._sequence = (self._sequence + 1) % (1 << 32)
+        return Frame(
+            Kind.COMMAND,
+            self._session,
+            actuators=len(self.actuators),
+            valves=len(self.valves),
+            sequence=self._sequence,
+            acknowledged=self.reading.sample,
+            echo=self.reading.stamp,
+            numbers=values,
+        )
+
+    def _ask(self, frame: Frame, is_answer: Callable[[Frame], bool]) -> Frame:
+        """Send a frame until its answer comes, and return that; raises LinkError if none does."""
+        for attempt in range(self._tries):
+            self.resent += attempt > 0
+            self._put(frame)
+            deadline = now() + round(self._timeout * SECOND)
+            while (left := deadline - now()) > 0:
+                answer = self._get(left / SECOND)
+                if answer is not None and is_answer(answer):
+                    return answer
+        raise LinkError(self._silence())
+
+    def _silence(self) -> str:
+        return (
+            f"{self._where} did not answer within {self._timeout * self._tries:g} s; start the plant there with "
+            "`lhpost6 serve`, or wait until another client has left it"
+        )
+
+    def _put(self, frame: Frame) -> None:
+        try:
+            self._sock.send(encode(frame._replace(stamp=now())))
+        except (ConnectionError, BlockingIOError):  # nobody there yet, or no room: a lost datagram like any other
+            pass
+
+    def _get(self, timeout: float) -> Frame | None:
+        """A frame of this session, if a datagram comes within a time [s]."""
+        if not select.select([self._sock], [], [], timeout)[0]:
+            return None
+        try:
+            frame = decode(self._sock.recv(_LARGEST))
+        except ConnectionError:  # nobody listens there: no reason to ask at once again
+            time.sleep(timeout)
+            return None
+        except LinkError:
+            frame = None
+        if frame is None or frame.session != self._session:
+            self.ignored += 1
+            return None
+        return frame
+
+    def _take(self, frame: Frame) -> Reading | None:
+        """Keep sensors that are newer than the last, or that say that the plant has tripped."""
+        if frame.kind != Kind.SENSORS or frame.actuators != len(self.actuators):
+            return None
+        last, tripped = self.reading, frame.state == PlantState.TRIPPED
+        if not (is_newer(frame.sequence, last.sample) or tripped):
+            return None
+        if not tripped:
+            self.sensors_lost += (frame.sequence - last.sample) % (1 << 32) - 1
+        if frame.echo and frame.acknowledged != last.acknowledged:
+            self.round_trip.add(now() - frame.echo)
+        self.reading = self._read(frame)
+        return self.reading
+
+    def _read(self, frame: Frame) -> Reading:
+        assert frame.numbers is not None
+        n = len(self.actuators)
+        sensors = Sensors(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n :])
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp)

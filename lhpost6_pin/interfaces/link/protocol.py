@@ -1,0 +1,257 @@
+"""The link's datagrams, byte by byte: what a controller in any language sends and gets over UDP.
+
+All numbers are little endian, without padding; float64 is IEEE 754 binary64. One frame is one datagram. A frame is a
+header of 48 bytes and a payload whose length follows from `kind`, `actuators` and `valves`.
+
+Header
+
+    offset  type     field         meaning
+    0       char[4]  magic         "LHP6"
+    4       uint8    version       1
+    5       uint8    kind          1 hello, 2 welcome, 3 command, 4 sensors, 5 bye, 6 status
+    6       uint8    mode          0 lock-step, 1 real time, 2 free running; a client sends 0
+    7       uint8    state         0 waiting for the first command, 1 running, 2 safe hold, 3 tripped; a client sends 0
+    8       uint8    actuators     n, number of actuators; 0 in hello and bye
+    9       uint8    valves        m, number of servovalves; 0 in hello and bye
+    10      uint16   flags         bit 0: crc is filled in; the others are 0
+    12      uint32   session       any number that the client chose for its hello; the same in every frame that follows
+    16      uint32   sequence      command: 1, 2, 3 ...; sensors: sample of the plant, 0 at rest; others: 0
+    20      uint32   acknowledged  sensors: sequence of the newest command that acted; command: sample it answers to
+    24      uint64   stamp         sender's monotonic clock [ns]
+    32      uint64   echo          stamp of the frame that is acknowledged; 0: none
+    40      uint32   crc           CRC-32 (IEEE 802.3, as in zlib) of the datagram with these four bytes 0; else 0
+    44      uint32   reserved      0
+
+Payload
+
+    kind         type             content
+    hello, bye                    nothing
+    welcome      float64          controller samples a second [Hz]
+                 char[32]         machine, UTF-8, filled up with zeros
+                 n x 16 bytes     per actuator: char[15] name, UTF-8, filled up with zeros; uint8 number of its valves
+    command      m x float64      spool commands [1], -1..1, in the order of the actuators and of their valves
+    sensors      6 x float64      acceleration of the platen: of C in {s} [m/s2], of the Euler angles [rad/s2]
+                 n x float64      actuator displacements from the zero-position [m]
+                 n x float64      actuator forces [N]
+    status       12 x uint64      the server's counts, in the order of `COUNTS`
+
+An actuator with one valve has one command; one with two has two, A and B, side by side. Sequence numbers and samples
+go on at 0 after 4294967295. Nothing but finite numbers may be sent.
+
+What happens
+
+    client                              server
+    hello (again until answered)   ->   the plant is put at rest
+                                   <-   welcome, then sensors of sample 0
+    command 1                      ->   the plant takes it for sample 0
+                                   <-   sensors of sample 1
+    ...
+    bye (again until answered)     ->   the client's place is free
+                                   <-   status
+
+In lock-step the plant moves one sample for each new command; the same command again gets the same sensors again, so
+a client that hears nothing sends it again. In real time and free running the plant moves by itself from the first
+command on, takes the newest command at each sample and sends sensors after each. A hello with another session number
+puts the plant at rest again, also a tripped one.
+"""
+
+import math
+import struct
+import zlib
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import LinkError, UnknownNameError
+
+__all__ = ["COUNTS", "VERSION", "Frame", "Kind", "Mode", "PlantState", "ShortFrameError", "Welcome"]
+__all__ += ["decode", "encode", "find_mode", "is_newer"]
+
+Array = NDArray[np.float64]
+
+MAGIC, VERSION = b"LHP6", 1
+COUNTS = (
+    *("received", "late", "duplicate", "lost", "superseded", "short", "malformed", "foreign"),  # datagrams
+    *("missed_frames", "holds", "missed_deadlines", "samples"),
+)
+"""What a server counts, in the order of a status frame (see `statistics.Counts`)."""
+
+_HEADER = struct.Struct("<4s6BH3I2Q2I")
+_WELCOME = struct.Struct("<d32s")
+_ACTUATOR = struct.Struct("<15sB")
+_CRC = struct.Struct("<I")
+_CRC_AT, _HAS_CRC, _WRAP = 40, 1, 1 << 32
+
+
+class Kind(IntEnum):
+    """Kinds of frames."""
+
+    HELLO, WELCOME, COMMAND, SENSORS, BYE, STATUS = range(1, 7)
+
+
+class Mode(IntEnum):
+    """How the plant's time goes on."""
+
+    LOCK_STEP, REAL_TIME, FREE = range(3)
+
+    @property
+    def label(self) -> str:
+        """Its name on the command line."""
+        return self.name.lower().replace("_", "-")
+
+
+class PlantState(IntEnum):
+    """What the plant does."""
+
+    WAITING, RUNNING, HOLD, TRIPPED = range(4)
+
+
+class ShortFrameError(LinkError):
+    """A datagram ends before its frame does."""
+
+
+class Welcome(NamedTuple):
+    """What a server says of itself: samples a second [Hz], machine, actuator names, valves of each actuator."""
+
+    rate: float
+    machine: str
+    actuators: tuple[str, ...]
+    valves: tuple[int, ...]
+
+
+class Frame(NamedTuple):
+    """A frame: header and payload. Of the payloads only the one of its kind is not empty."""
+
+    kind: Kind
+    session: int
+    mode: Mode = Mode.LOCK_STEP
+    state: PlantState = PlantState.WAITING
+    actuators: int = 0
+    valves: int = 0
+    sequence: int = 0
+    acknowledged: int = 0
+    stamp: int = 0
+    echo: int = 0
+    numbers: Array | None = None  # command (m,), or sensors (6 + 2 n,)
+    welcome: Welcome | None = None
+    counts: tuple[int, ...] = ()
+
+
+def find_mode(label: str) -> Mode:
+    """Mode by its name on the command line; raises UnknownNameError."""
+    found = {mode.label: mode for mode in Mode}
+    if label not in found:
+        raise UnknownNameError("mode of a link", label, list(found))
+    return found[label]
+
+
+def is_newer(sequence: int, than: int) -> bool:
+    """Whether a sequence number comes after another, also past the largest of 32 bits."""
+    return 0 < (sequence - than) % _WRAP < _WRAP // 2
+
+
+def encode(frame: Frame) -> bytes:
+    """Datagram of a frame, with its CRC-32; raises LinkError for numbers that do not fit its kind and counts."""
+    if frame.kind in (Kind.COMMAND, Kind.SENSORS):
+        payload = _finite(frame.numbers).tobytes()
+    elif frame.kind == Kind.WELCOME and frame.welcome is not None:
+        rate, machine, names, valves = frame.welcome
+        payload = _WELCOME.pack(rate, _cut(machine, 32))
+        payload += b"".join(_ACTUATOR.pack(_cut(n, 15), v) for n, v in zip(names, valves, strict=True))
+    else:
+        payload = struct.pack(f"<{len(frame.counts)}Q", *frame.counts)
+    if len(payload) != _payload_size(frame.kind, frame.actuators, frame.valves):
+        raise LinkError(
+            f"a {frame.kind.name.lower()} frame of {frame.actuators} actuators and {frame.valves} valves takes "
+            f"{_payload_size(frame.kind, frame.actuators, frame.valves)} bytes of payload, not {len(payload)}"
+        )
+    datagram = bytearray(_packed_header(frame) + payload)
+    _CRC.pack_into(datagram, _CRC_AT, zlib.crc32(datagram))
+    return bytes(datagram)
+
+
+def decode(datagram: bytes) -> Frame:
+    """Frame of a datagram; raises ShortFrameError if it ends too early, LinkError for all else that can be wrong."""
+    if len(datagram) < _HEADER.size:
+        raise ShortFrameError(f"{len(datagram)} bytes are no frame; its header alone takes {_HEADER.size}")
+    magic, version, kind, mode, state, actuators, valves, flags, session, *rest = _HEADER.unpack_from(datagram)
+    sequence, acknowledged, stamp, echo, crc, _ = rest
+    if magic != MAGIC:
+        raise LinkError(f"a frame begins with {MAGIC!r}, not {magic!r}")
+    if version != VERSION:
+        raise LinkError(f"a frame of version {version}; known is {VERSION}")
+    if not (1 <= kind <= len(Kind) and mode < len(Mode) and state < len(PlantState)):
+        raise LinkError(f"kind {kind}, mode {mode}, state {state}: one of them does not exist")
+    size = _HEADER.size + _payload_size(Kind(kind), actuators, valves)
+    if len(datagram) < size:
+        raise ShortFrameError(f"{len(datagram)} bytes of a frame of {size}")
+    if len(datagram) > size:
+        raise LinkError(f"{len(datagram)} bytes are too many for a frame of {size}")
+    blank = bytearray(datagram)
+    _CRC.pack_into(blank, _CRC_AT, 0)
+    if crc != (zlib.crc32(blank) if flags & _HAS_CRC else 0):
+        raise LinkError("the CRC-32 does not fit: the frame was changed on its way")
+    head = Kind(kind), session, Mode(mode), PlantState(state), actuators, valves, sequence, acknowledged, stamp, echo
+    if kind in (Kind.COMMAND, Kind.SENSORS):
+        return Frame(*head, numbers=_finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64))
+    if kind == Kind.WELCOME:
+        return Frame(*head, welcome=_unpacked_welcome(datagram, valves))
+    return Frame(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
+
+
+def _payload_size(kind: Kind, actuators: int, valves: int) -> int:
+    return {
+        Kind.WELCOME: _WELCOME.size + actuators * _ACTUATOR.size,
+        Kind.COMMAND: 8 * valves,
+        Kind.SENSORS: 8 * (6 + 2 * actuators),
+        Kind.STATUS: 8 * len(COUNTS),
+    }.get(kind, 0)
+
+
+def _packed_header(frame: Frame) -> bytes:
+    return _HEADER.pack(
+        MAGIC,
+        VERSION,
+        frame.kind,
+        frame.mode,
+        frame.state,
+        frame.actuators,
+        frame.valves,
+        _HAS_CRC,
+        frame.session,
+        frame.sequence % _WRAP,
+        frame.acknowledged % _WRAP,
+        frame.stamp,
+        frame.echo,
+        0,
+        0,
+    )
+
+
+def _unpacked_welcome(datagram: bytes, valves: int) -> Welcome:
+    rate, machine = _WELCOME.unpack_from(datagram, _HEADER.size)
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise LinkError(f"a rate of {rate} samples a second")
+    rows = list(_ACTUATOR.iter_unpack(datagram[_HEADER.size + _WELCOME.size :]))
+    counts = tuple(count for _, count in rows)
+    if sum(counts) != valves:
+        raise LinkError(f"{valves} valves, of which the actuators have {sum(counts)}")
+    return Welcome(rate, _text(machine), tuple(_text(name) for name, _ in rows), counts)
+
+
+def _finite(numbers: Array | None) -> Array:
+    values = np.asarray(() if numbers is None else numbers, "<f8")
+    if not np.isfinite(values).all():
+        raise LinkError(f"number {int(np.argmin(np.isfinite(values))) + 1} of a frame is not finite")
+    return values
+
+
+def _cut(text: str, size: int) -> bytes:
+    """Text in UTF-8, cut to whole characters within a size."""
+    return text.encode()[:size].decode(errors="ignore").encode()
+
+
+def _text(content: bytes) -> str:
+    return content.rstrip(b"\0").decode(errors="replace")

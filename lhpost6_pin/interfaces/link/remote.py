@@ -1,0 +1,139 @@
+"""The virtual 469D, or a user's own controller, in this process and the plant in another: a run over the link."""
+
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...control.plug import Sensors, start_plugged, step_plugged, wanted_from
+from ...control.valves import valve_counts
+from ...core.errors import LinkError
+from ...core.names import SAMPLE_RATE
+from ...data.records import make_record
+from ...mechanics.plant import Plant
+from ...simulation.simulate import ClosedLoop, PluggedLoop, Progress, check_drive
+from .client import LinkClient
+from .clock import SECOND, now, undisturbed
+from .protocol import Mode, PlantState
+
+__all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
+
+Array = NDArray[np.float64]
+_CHUNK = 1024  # samples between two progress reports
+
+
+@dataclass(frozen=True)
+class LinkRun:
+    """What a run over the link leaves: rows of samples (n,), as the controller saw and commanded them.
+
+    A sample that the controller missed repeats the row before it; `answered` says which it did not.
+    """
+
+    command: Array  # (n, n_actuators)
+    displacement: Array  # (n, n_actuators)
+    acceleration: Array  # (n, 6)
+    force: Array  # (n, n_actuators)
+    state: NDArray[np.int8]  # protocol.PlantState
+    answered: NDArray[np.bool_]
+    tripped: bool
+    seconds: float  # from the first command to the last sensors [s]
+
+
+def run_over_link(
+    client: LinkClient, plant: Plant, loop: ClosedLoop | PluggedLoop, *, progress: Progress | None = None
+) -> LinkRun:
+    """Drive the served plant through a motion; `plant` is the one that the controller believes it drives.
+
+    Each sample's command answers the newest sensors, with the drive of their sample. Ends early if the plant trips.
+    Raises SimulationError for a drive that cannot be, LinkError if the plant is no longer at rest, differs from the
+    server's, or the server falls silent.
+    """
+    _check(client, plant)
+    samples = len(loop.drive if isinstance(loop, ClosedLoop) else loop.displacement)
+    check_drive(plant, loop, samples)
+    step = _stepper(plant, loop)
+    run = LinkRun(
+        command=np.zeros((samples, plant.spools)),
+        displacement=np.zeros((samples, plant.spools)),
+        acceleration=np.zeros((samples, 6)),
+        force=np.zeros((samples, plant.spools)),
+        state=np.zeros(samples, np.int8),
+        answered=np.zeros(samples, np.bool_),
+        tripped=False,
+        seconds=0.0,
+    )
+    reading, reported, begin = client.reading, 0, 0
+    with undisturbed() if client.mode != Mode.LOCK_STEP else nullcontext():
+        while reading.sample < samples and reading.state != PlantState.TRIPPED:
+            at, sensors = reading.sample, reading.sensors
+            command = step(at, sensors)
+            run.command[at], run.displacement[at] = command, sensors.displacement
+            run.acceleration[at], run.force[at] = sensors.acceleration, sensors.force
+            run.state[at], run.answered[at] = reading.state, True
+            begin = begin or now()
+            reading = client.exchange(command)
+            if progress is not None and at >= reported:
+                progress(at / samples)
+                reported = at + _CHUNK
+        seconds = (now() - begin) / SECOND
+    done = int(np.flatnonzero(run.answered)[-1]) + 1 if run.answered.any() else 0
+    last = np.maximum.accumulate(np.where(run.answered, np.arange(samples), 0))[:done]
+    rows = {name: getattr(run, name)[last] for name in ("command", "displacement", "acceleration", "force", "state")}
+    tripped = reading.state == PlantState.TRIPPED
+    return LinkRun(**rows, answered=run.answered[:done], tripped=tripped, seconds=seconds)
+
+
+def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> xr.Dataset:
+    """Record of a run over the link: what the controller measured and commanded, and what the plant did of it."""
+    states = " ".join(f"{s.value} {s.name.lower()}" for s in PlantState)
+    one = "1 if a command answered these sensors"
+    channels: dict[str, Any] = {
+        "platen_acceleration": run.acceleration,
+        "actuator_displacement": run.displacement,
+        "actuator_force": run.force,
+        "spool_command": run.command,
+        "plant_state": (("time",), run.state, {"units": "1", "long_name": f"state of the served plant: {states}"}),
+        "answered": (("time",), run.answered.astype(np.int8), {"units": "1", "long_name": one}),
+    }
+    facts = {
+        "kind": "simulated",
+        "machine": plant.machine.name,
+        "specimen": plant.machine.specimen.name if plant.machine.specimen else "none",
+        "trouble": "the plant tripped" if run.tripped else "none",
+    }
+    time = np.arange(len(run.answered)) / SAMPLE_RATE
+    return make_record(time, channels, {"actuator": plant.machine.actuator_names}, {**facts, **attrs})
+
+
+def _check(client: LinkClient, plant: Plant) -> None:
+    machine = plant.machine
+    if client.reading.sample:
+        raise LinkError("the plant has moved since this client said hello; a run begins at rest: connect once more")
+    if (client.machine, client.actuators) != (machine.name, machine.actuator_names):
+        raise LinkError(f"the server's machine is {client.machine}, the controller's {machine.name}; choose --machine")
+    if not np.array_equal(client.counts, valve_counts(machine)):
+        raise LinkError(
+            f"the server's {client.machine} has {len(client.valves)} servovalves open, the controller's "
+            f"{valve_counts(machine).sum()}; choose --valves alike"
+        )
+    if client.rate != SAMPLE_RATE:
+        raise LinkError(f"the server takes {client.rate:g} commands a second; the controller gives {SAMPLE_RATE}")
+
+
+def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Sensors], Array]:
+    """Function that gives the command (n_actuators,) of a sample."""
+    if isinstance(loop, ClosedLoop):
+        memory = loop.controller.init()
+        return lambda sample, sensors: loop.controller.step(memory, sample, loop.drive, sensors)
+    users = loop.controller
+    wanted = wanted_from(loop.displacement, loop.velocity, loop.acceleration)
+    own = start_plugged(users, plant, loop.rest)
+
+    def plugged(sample: int, sensors: Sensors) -> Array:
+        return np.clip(step_plugged(users, own, sample, wanted(sample), sensors), -1.0, 1.0)
+
+    return plugged

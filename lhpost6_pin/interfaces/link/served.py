@@ -1,0 +1,235 @@
+"""A plant that a remote client commands: what happens on a datagram and at a sample, apart from sockets and clocks.
+
+Safe hold. After five samples without a new command, in lock-step after a second of silence, the spools go over to
+those that hold the platen at rest, along a smooth ramp of 0.2 s: twice the period of the softest oil column, so that
+the oil decelerates the platen without a blow. When commands return they are blended in from the spools as they are,
+along a ramp as long as the hold was, at most as long as the one into it: smooth after a long silence, and a link that
+drops out again and again still commands. In lock-step, where time stands still between commands, the plant runs
+through the ramp at once.
+"""
+
+import logging
+from collections.abc import Hashable
+from dataclasses import astuple, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...control.plug import Sensors
+from ...control.valves import flow_curves, per_actuator, valve_counts
+from ...core.errors import LinkError, SimulationError
+from ...core.names import SAMPLE_RATE
+from ...mechanics.equilibrium import Equilibrium
+from ...mechanics.plant import Plant
+from ...simulation.running import RunningPlant
+from ...simulation.snapshot import EVERY, Watch
+from .clock import SECOND
+from .protocol import Frame, Kind, Mode, PlantState, ShortFrameError, Welcome, decode, encode, is_newer
+from .statistics import Counts, Histogram
+
+__all__ = ["MISSED_FRAMES", "PATIENCE", "RAMP", "SESSION", "ServedPlant"]
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+
+MISSED_FRAMES = 5
+"""Samples in a row without a new command after which the plant goes to its safe hold."""
+
+PATIENCE = 1.0
+"""Silence [s] after which a plant in lock-step does."""
+
+RAMP = round(0.2 * SAMPLE_RATE)
+"""Samples over which the spools go over to the hold; the most that they take back to the commands."""
+
+SESSION = 10.0
+"""Silence [s] after which a client's place is free and the plant stops moving."""
+
+
+class ServedPlant:
+    """The state of one served plant; every method returns at once, `now` is the caller's clock [ns].
+
+    Attributes: mode; state; sample; spool, which the plant took last; counts; answer_time, from the
+    sending of sensors to the coming of the command that answers them; watcher, shown the plant as it moves.
+    """
+
+    def __init__(self, plant: Plant, rest: Equilibrium, mode: Mode) -> None:
+        """Put the plant at rest and run its first samples, so that all is compiled before a client comes."""
+        self.plant, self.mode, self._rest = plant, mode, rest
+        self.counts, self.answer_time = Counts(), Histogram()
+        self.watcher: Watch | None = None
+        self._owner: Hashable = None  # who has the plant, or had it last
+        self._taken = False
+        self._session, self._at_hello, self._heard = 0, Counts(), 0
+        self._valves, self._curves = valve_counts(plant.machine), flow_curves(plant.machine)
+        self._width = int(self._valves.sum())
+        self._begin()
+        for _ in range(8):
+            self._move(0)
+        self._begin()
+        self.counts = Counts()
+
+    def _begin(self) -> None:
+        """A plant at rest that waits for its first command."""
+        self._table = RunningPlant(self.plant, self._rest)
+        self.state, self.sample, self._sensed = PlantState.WAITING, 0, _numbers(self._table.sensors())
+        self._newest = self._acted = self._acted_stamp = self._newest_stamp = self._missed = 0
+        self._fresh, self._asked = False, self._rest.spool
+        self.spool, self._from = self._rest.spool, self._rest.spool
+        self._ramp = self._on_ramp = RAMP  # samples of the ramp, and those done
+        self._answer = b""
+
+    @property
+    def client(self) -> Hashable:
+        """The address that has the plant, or None."""
+        return self._owner if self._taken else None
+
+    @property
+    def moving(self) -> bool:
+        """Whether the plant moves by itself: it has a client and a first command, and it is not in lock-step."""
+        return self.mode != Mode.LOCK_STEP and self._taken and self.state != PlantState.WAITING
+
+    def receive(self, datagram: bytes, sender: Hashable, now: int) -> list[bytes]:
+        """Take a datagram; returns what to send back to its sender. Never raises."""
+        self.counts.received += 1
+        try:
+            frame = decode(datagram)
+        except ShortFrameError:
+            self.counts.short += 1
+            return []
+        except LinkError as error:
+            self.counts.malformed += 1
+            log.debug("datagram of %s: %s", sender, error)
+            return []
+        if frame.kind == Kind.HELLO and self.client in (None, sender):
+            return self._hello(frame, sender, now)
+        known = sender == self._owner and frame.session == self._session
+        if frame.kind == Kind.BYE and known:  # also once more, should the status be lost
+            self._taken = False
+            return [self._status()]
+        if not known or not self._taken:
+            self.counts.foreign += 1
+            return []
+        if frame.kind != Kind.COMMAND or frame.valves != self._width:
+            self.counts.malformed += 1
+            return []
+        self._heard = now
+        return self._command(frame, now)
+
+    def tick(self, now: int) -> bytes | None:
+        """Move a plant that moves by itself by one sample, with the newest command; returns sensors for the client."""
+        if not self.moving:
+            return None
+        if self._fresh:
+            self._missed, self._fresh = 0, False
+            self._resume()
+        else:
+            self._missed += 1
+            self.counts.missed_frames += 1
+            if self._missed == MISSED_FRAMES:
+                self._hold()
+        return self._move(now)
+
+    def watch(self, now: int) -> None:
+        """Look whether the client is still there; to be called now and then."""
+        silence = (now - self._heard) / SECOND
+        if not self._taken:
+            return
+        if silence > SESSION:
+            log.warning("nothing heard from %s for %g s: its place is free", self._owner, SESSION)
+            self._taken = False
+        elif self.mode == Mode.LOCK_STEP and silence > PATIENCE and self.state == PlantState.RUNNING:
+            self.counts.missed_frames += MISSED_FRAMES
+            self._hold()
+            for _ in range(RAMP):
+                self._move(now)
+
+    def _hello(self, frame: Frame, sender: Hashable, now: int) -> list[bytes]:
+        self._heard = now
+        if not self._taken or frame.session != self._session:
+            self._begin()
+            self._owner, self._taken = sender, True
+            self._session, self._at_hello = frame.session, replace(self.counts)
+            log.info("%s has the plant", sender)
+        machine = self.plant.machine
+        about = Welcome(float(SAMPLE_RATE), machine.name, machine.actuator_names, tuple(map(int, self._valves)))
+        return [encode(self._frame(Kind.WELCOME)._replace(welcome=about)), self._measured(now)]
+
+    def _command(self, frame: Frame, now: int) -> list[bytes]:
+        assert frame.numbers is not None
+        if not is_newer(frame.sequence, self._newest):
+            same = frame.sequence == self._newest
+            self.counts.duplicate += same
+            self.counts.late += not same
+            return [self._answer] if same and self._answer and self.mode == Mode.LOCK_STEP else []
+        self.counts.lost += (frame.sequence - self._newest - 1) % (1 << 32)
+        self.counts.superseded += self._fresh
+        self._newest, self._newest_stamp = frame.sequence, frame.stamp
+        self._asked = np.clip(per_actuator(frame.numbers, self._valves, self._curves), -1.0, 1.0)
+        if frame.echo:
+            self.answer_time.add(now - frame.echo)
+        if self.state == PlantState.WAITING:
+            self.state = PlantState.RUNNING
+        if self.mode == Mode.LOCK_STEP:
+            self._resume()
+            return [self._move(now)]
+        self._fresh = True
+        return []
+
+    def _hold(self) -> None:
+        if self.state == PlantState.RUNNING:
+            self.state = PlantState.HOLD
+            self.counts.holds += 1
+            self._from, self._ramp, self._on_ramp = self.spool, RAMP, 0
+
+    def _resume(self) -> None:
+        """Let the newest command act."""
+        self._acted, self._acted_stamp = self._newest, self._newest_stamp
+        if self.state == PlantState.HOLD:
+            self.state = PlantState.RUNNING
+            self._from, self._ramp, self._on_ramp = self.spool, self._on_ramp, 0
+
+    def _move(self, now: int) -> bytes:
+        """One sample of the plant, unless it is tripped; returns the sensors after it."""
+        if self.state != PlantState.TRIPPED:
+            target = self._rest.spool if self.state == PlantState.HOLD else self._asked
+            self.spool, self._on_ramp = target, min(self._on_ramp + 1, self._ramp)
+            if self._on_ramp < self._ramp:
+                share = self._on_ramp / self._ramp
+                self.spool = self._from + share * share * (3.0 - 2.0 * share) * (target - self._from)
+            try:
+                self._table.advance(self.spool)
+                if self.watcher is not None and self._table.sample % EVERY == 0:
+                    self.watcher(self._table.sight())
+                numbers = _numbers(self._table.sensors())
+                if not np.isfinite(numbers).all():
+                    raise SimulationError(f"stopped at {self._table.time:.4f} s: a sensor is not finite")
+                self.sample, self._sensed = self._table.sample, numbers
+                self.counts.samples += 1
+            except SimulationError as error:
+                self.state = PlantState.TRIPPED
+                log.warning("tripped: %s", error)
+        self._answer = self._measured(now)
+        return self._answer
+
+    def _frame(self, kind: Kind) -> Frame:
+        return Frame(kind, self._session, self.mode, self.state, self.plant.spools, self._width)
+
+    def _measured(self, now: int) -> bytes:
+        return encode(
+            self._frame(Kind.SENSORS)._replace(
+                sequence=self.sample,
+                acknowledged=self._acted,
+                stamp=now,
+                echo=self._acted_stamp,
+                numbers=self._sensed,
+            )
+        )
+
+    def _status(self) -> bytes:
+        return encode(self._frame(Kind.STATUS)._replace(counts=astuple(self.counts.since(self._at_hello))))
+
+
+def _numbers(sensors: Sensors) -> Array:
+    """Sensors in the order of their frame."""
+    return np.concatenate([sensors.acceleration, sensors.displacement, sensors.force])

@@ -1,0 +1,126 @@
+"""The plant as a UDP server: sockets and clocks around a `ServedPlant`."""
+
+import logging
+import math
+import select
+import socket
+import threading
+from contextlib import nullcontext
+from typing import Any
+
+from ...core.errors import LinkError
+from ...core.names import SAMPLE_RATE
+from .clock import SECOND, now, undisturbed
+from .protocol import Mode
+from .served import ServedPlant
+from .statistics import Histogram
+
+__all__ = ["HOST", "PORT", "Timing", "open_socket", "serve"]
+
+log = logging.getLogger(__name__)
+
+HOST, PORT = "127.0.0.1", 46946
+"""Where a plant listens unless told otherwise: on this computer only, at a port of the private range."""
+
+_IDLE = 0.1  # [s] longest wait before looking at the stop event
+_SPIN = 150_000  # [ns] before a deadline that are spent asking, not sleeping: sleep ends up to 0.1 ms late
+_LARGEST = 2048  # bytes of a datagram that are read; every frame is shorter
+_BURST = 64  # datagrams taken at most before the plant moves on
+
+
+class Timing:
+    """How a plant kept time: lateness of its samples, and how long each took from its deadline's meeting to sending."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.lateness, self.work = Histogram(), Histogram()
+
+
+def open_socket(host: str = HOST, port: int = PORT) -> socket.socket:
+    """Socket that listens at an address (port 0: any free one); raises LinkError that says why it cannot."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sock.bind((host, port))
+    except (OSError, OverflowError) as error:
+        sock.close()
+        raise LinkError(f"cannot listen on {host}:{port}: {error}; choose another with --host or --port") from error
+    return sock
+
+
+def serve(
+    sock: socket.socket,
+    served: ServedPlant,
+    *,
+    stop: threading.Event | None = None,
+    seconds: float | None = None,
+) -> Timing:
+    """Answer datagrams and move the plant until `stop` is set, Ctrl-C is pressed or `seconds` are over.
+
+    Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before. The
+    counts are in `served.counts`. Raises LinkError for a time that is negative or not finite.
+    """
+    if seconds is not None and not 0.0 <= seconds < math.inf:
+        raise LinkError(f"a plant cannot be served for {seconds:g} s; give a number, zero or more, or leave it out")
+    stop, timing = stop or threading.Event(), Timing()
+    end = None if seconds is None else now() + round(seconds * SECOND)
+    begin, sample = 0, -1  # sample: of those due since `begin`; -1: the plant stands
+    with undisturbed() if served.mode != Mode.LOCK_STEP else nullcontext():
+        try:
+            while not stop.is_set() and (end is None or now() < end):
+                served.watch(now())
+                if not served.moving:
+                    sample = -1
+                    _listen(sock, served, _IDLE)
+                    continue
+                begin, sample = (now(), 0) if sample < 0 else (begin, sample + 1)
+                if served.mode == Mode.FREE:
+                    _listen_until(sock, served, now())
+                    _tick(sock, served)
+                    continue
+                due = begin + sample * SECOND // SAMPLE_RATE
+                _listen_until(sock, served, due)
+                started = now()
+                _tick(sock, served)
+                ended = now()
+                timing.lateness.add(started - due)
+                timing.work.add(ended - started)
+                served.counts.missed_deadlines += ended > due + SECOND // SAMPLE_RATE
+        except KeyboardInterrupt:
+            log.info("interrupted")
+    return timing
+
+
+def _tick(sock: socket.socket, served: ServedPlant) -> None:
+    client = served.client
+    answer = served.tick(now())
+    if answer is not None:
+        _send(sock, answer, client)
+
+
+def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
+    """Take what comes until a time [ns], and what has come by then."""
+    while (left := due - now()) > 0:
+        _listen(sock, served, max(0, left - _SPIN) / SECOND)
+    for _ in range(_BURST):
+        if not _listen(sock, served, 0.0):
+            break
+
+
+def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
+    """Take one datagram if one comes within a time [s]; False if none did."""
+    if not select.select([sock], [], [], timeout)[0]:
+        return False
+    try:
+        datagram, sender = sock.recvfrom(_LARGEST)
+    except OSError:  # some systems report here that an earlier answer found nobody
+        return True
+    for answer in served.receive(datagram, sender, now()):
+        _send(sock, answer, sender)
+    return True
+
+
+def _send(sock: socket.socket, datagram: bytes, receiver: Any) -> None:
+    try:
+        sock.sendto(datagram, receiver)
+    except OSError as error:  # gone, or no way to get there: a lost datagram like any other
+        log.debug("nothing sent to %s: %s", receiver, error)

@@ -1,0 +1,1 @@
+"""A shake table as typed, immutable data read from TOML, with its effects and its specimen."""

@@ -1,0 +1,278 @@
+"""The machine: a platen, its actuators and hold-down struts, typed, checked and immutable.
+
+A `Machine` is built from a `Parameters` mapping, so that another table is another file in ``models/``. It holds
+plain floats; where each comes from stays in `Machine.parameters` under the same path.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import ParameterError, RecordError, UnknownNameError, instead_of
+from ..effects.effect import Effect
+from ..effects.registry import LAWS
+from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
+from .library import effect_entry, make_named_effect
+from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
+from .schema import build_section
+from .specimen import Specimen, find_specimen
+from .standard_effects import standard_effects
+from .structure import Structure
+
+__all__ = ["Machine", "build_machine", "load_machine"]
+
+
+@dataclass(frozen=True)
+class Machine(Structure):
+    """A shake table as an ordered list of force effects on a platen.
+
+    Change it with `with_params`, `with_effect` and `with_specimen`; each returns a changed copy.
+    """
+
+    own_effects: tuple[Effect, ...] = ()
+    specimen: Specimen | None = None
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """All effects that make forces, in ledger order: the report's, then those added."""
+        added = (e for e in self.added_effects if not LAWS[e.law].alters)
+        return (*standard_effects(self.actuators, self.struts, self.hydraulics), *added)
+
+    @property
+    def alterations(self) -> tuple[Effect, ...]:
+        """Effects added that make no force of their own but alter what is there."""
+        return tuple(e for e in self.added_effects if LAWS[e.law].alters)
+
+    @cached_property
+    def added_effects(self) -> tuple[Effect, ...]:
+        """Effects beyond the report's: the library's that the parameters name, then those given as such."""
+        named = (make_named_effect(self, name, entry) for name, entry in self.parameters.effects.items())
+        return (*named, *self.own_effects)
+
+    def with_params(self, changes: Mapping[str, Any] | str | Path | None = None, /, **keywords: Any) -> "Machine":
+        """Return a copy with parameters replaced: a mapping by path, a small TOML file, or keywords.
+
+        In a keyword the dot of a path is two underscores: ``with_params(platen__mass=[1e5, 1e5, 1e5])``.
+        Raises ParameterError or UnknownNameError that name the key.
+        """
+        parameters = self.parameters
+        if changes is not None:
+            parameters = override_parameters(parameters, changes)
+        if keywords:
+            parameters = override_parameters(parameters, {k.replace("__", "."): v for k, v in keywords.items()})
+        return build_machine(parameters, self.own_effects, self.specimen)
+
+    def with_effect(
+        self, effect: Effect | str, components: Sequence[str] = (), *, name: str = "", **values: float
+    ) -> "Machine":
+        """Return a copy with one more effect: of the library by its family's name, or one made by hand.
+
+        Of a family: components (none: all that it can act on), values in SI (typical ones where none are given), and a
+        name of its own, the family's if empty. The name must be new.
+        Raises ParameterError; UnknownNameError for a family that the library has not.
+        """
+        label = name or (effect if isinstance(effect, str) else effect.name)
+        if label in {e.name for e in (*self.effects, *self.alterations)}:
+            raise ParameterError(f"an effect named {label!r} is in this machine already; give it another name")
+        if isinstance(effect, Effect):
+            return replace(self, own_effects=(*self.own_effects, effect))
+        return self._with_effects({**self.parameters.effects, label: effect_entry(effect, components, values)})
+
+    def without_effect(self, name: str) -> "Machine":
+        """Return a copy without an effect of the library by its name; raises UnknownNameError."""
+        entries = dict(self.parameters.effects)
+        if name not in entries:
+            raise UnknownNameError("effect of this machine", name, list(entries))
+        del entries[name]
+        return self._with_effects(entries)
+
+    def _with_effects(self, entries: Mapping[str, EffectEntry]) -> "Machine":
+        machine = replace(self, parameters=replace(self.parameters, effects=entries))
+        _ = machine.added_effects  # raises for an effect that cannot be
+        return machine
+
+    def with_valves(self, count: int) -> "Machine":
+        """Return a copy with so many servovalves open on each double-acting actuator; 0 leaves it as it is."""
+        if count == 0:
+            return self
+        return self.with_params({f"{a.kind}.valves": count for a in self.actuators if a.area_b is not None})
+
+    def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
+        """Return a copy with the servovalves open that a record's attributes state, none stated: as it is.
+
+        Raises what `refuse_unmounted` does.
+        """
+        self.refuse_unmounted(attrs, said)
+        return self.with_valves(int(attrs.get("valves_per_horizontal_actuator", 0)))
+
+    def refuse_unmounted(self, attrs: Mapping[str, Any], said: str) -> None:
+        """Raise RecordError if a record, `said` in words, was made with a specimen and this table is bare."""
+        carried = str(attrs.get("specimen", "none"))
+        if carried != "none" and self.specimen is None:
+            raise RecordError(f"{said} was made with specimen {carried!r} on the table; mount it with --specimen")
+
+    def with_specimen(
+        self,
+        urdf: str | Path,
+        position: Vec3 = (0.0, 0.0, 0.0),
+        rpy: Vec3 = (0.0, 0.0, 0.0),
+        *,
+        locked: bool = False,
+    ) -> "Machine":
+        """Return a copy with the specimen of a URDF (a path, or a shipped name: ``pendulum``) bolted to the platen.
+
+        position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
+        locked joints make it one rigid body; free ones join the same Pinocchio model.
+        """
+        return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
+
+
+def load_machine(
+    name_or_path: str | Path = "lhpost6", override: Mapping[str, Any] | str | Path | None = None
+) -> Machine:
+    """Read a machine file by shipped name or path, with an optional override file or mapping.
+
+    Raises ParameterError that names file and key for a missing, unknown, ill-dimensioned or impossible value.
+    """
+    parameters = load_parameters(name_or_path)
+    if override is not None:
+        parameters = override_parameters(parameters, override)
+    return build_machine(parameters)
+
+
+def build_machine(
+    parameters: Parameters, added_effects: tuple[Effect, ...] = (), specimen: Specimen | None = None
+) -> Machine:
+    """Give typed objects to a flat mapping of quantities; raises ParameterError."""
+    words = parameters.words
+    options = {
+        "motion": _word(parameters, "machine.motion", ("free", "x", "y", "z")),
+        "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
+    }
+    components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
+    kinds = {str(words[f"{c}.kind"]) for c in components}
+    _check_names(parameters, components, kinds)
+    actuators, struts = [], []
+    for name in components:
+        kind = str(words[f"{name}.kind"])
+        role = _word(parameters, f"{kind}.role", ("actuator", "strut"))
+        if role == "strut":
+            struts.append(build_section(Strut, parameters, (name, kind), name=name, kind=kind))
+            continue
+        actuator = build_section(
+            Actuator,
+            parameters,
+            (name, kind),
+            name=name,
+            kind=kind,
+            mount=_word(parameters, f"{kind}.mount", ("swivel", "bearing")),
+            valve=_word(parameters, f"{kind}.valve", ("4-way", "3-way")),
+            valves=_count(parameters, name, kind),
+        )
+        _check_actuator(actuator, parameters.origin)
+        actuators.append(actuator)
+    if not actuators:
+        raise ParameterError(f"{parameters.origin}: no actuator; give at least one [component.NAME] of role actuator")
+    machine = Machine(
+        name=str(words.get("machine.name", "unnamed")),
+        title=str(words.get("machine.title", "")),
+        controller=str(words.get("machine.controller", "")),
+        **options,
+        platen=build_section(Platen, parameters, ("platen",)),
+        hydraulics=build_section(Hydraulics, parameters, ("hydraulics",)),
+        actuators=tuple(actuators),
+        struts=tuple(struts),
+        limits=build_section(Limits, parameters, ("limits",)),
+        parameters=parameters,
+        own_effects=added_effects,
+        specimen=specimen,
+    )
+    _check_machine(machine)
+    try:
+        _ = machine.added_effects  # raises for an effect that cannot be
+    except (ParameterError, UnknownNameError) as error:
+        raise ParameterError(f"{parameters.origin}: {error}") from None
+    return machine
+
+
+def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:
+    word = parameters.words.get(path)
+    if word not in valid:
+        said = "is missing" if word is None else f"= {word!r}"
+        raise ParameterError(f"{parameters.origin}: {path} {said}; it should be one of {', '.join(valid)}")
+    return str(word)
+
+
+def _count(parameters: Parameters, component: str, kind: str) -> int:
+    path = f"{component}.valves" if f"{component}.valves" in parameters.words else f"{kind}.valves"
+    count = parameters.words.get(path, 1)
+    if not isinstance(count, int) or count < 1:
+        raise ParameterError(
+            f"{parameters.origin}: {path} = {count!r}; it should be a whole number of open servovalves"
+        )
+    return count
+
+
+_COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
+"""Sections of numbers to compare with; their keys are free."""
+
+
+def _check_names(parameters: Parameters, components: list[str], kinds: set[str]) -> None:
+    """Refuse keys that nothing reads: a misspelt key must not be silently ignored."""
+    both = {f.name for f in (*fields(Actuator), *fields(Strut)) if f.metadata}
+    known = {
+        "platen": {f.name for f in fields(Platen)},
+        "hydraulics": {f.name for f in fields(Hydraulics)},
+        "limits": {f.name for f in fields(Limits)},
+        "machine": {"name", "title", "motion", "thrust", "controller"},
+        **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
+        **{name: both | {"kind", "valves"} for name in components},
+    }
+    for path in (*parameters, *parameters.words):
+        section, _, key = path.partition(".")
+        if section in _COMPARISONS and path in parameters.quantities:
+            continue
+        if section not in known:
+            said = instead_of(section, sorted(known))
+            raise ParameterError(f"{parameters.origin}: {path} is in no known section; {said}")
+        if key not in known[section]:
+            said = instead_of(key, sorted(known[section]))
+            raise ParameterError(f"{parameters.origin}: unknown key {path}; {said}")
+
+
+def _check_actuator(actuator: Actuator, origin: str) -> None:
+    needed = {"4-way": ("area_b", "chamber_b"), "3-way": ()}[actuator.valve]
+    needed += {"bearing": ("pad_friction", "pad_yield", "pad_shape"), "swivel": ()}[actuator.mount]
+    for key in needed:
+        if getattr(actuator, key) is None:
+            why = f"{actuator.valve} valve on a {actuator.mount}"
+            raise ParameterError(f"{origin}: {actuator.kind}.{key} is missing; a {why} needs it")
+    if actuator.valve == "3-way" and actuator.area_b is not None:
+        raise ParameterError(f"{origin}: {actuator.kind}.area_b is given, but a 3-way valve has chamber A only")
+    room = min(c for c in (actuator.chamber_a, actuator.chamber_b) if c is not None)
+    if room <= actuator.stroke:
+        raise ParameterError(
+            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of {room:g} m; "
+            "make the chamber longer or the stroke shorter"
+        )
+
+
+def _check_machine(machine: Machine) -> None:
+    origin = machine.parameters.origin
+    if machine.hydraulics.return_pressure >= machine.hydraulics.supply_pressure:
+        raise ParameterError(f"{origin}: hydraulics.return_pressure is not below hydraulics.supply_pressure")
+    for component in machine.components:
+        if component.platen_point == component.base_point:
+            raise ParameterError(f"{origin}: {component.name}: platen_point and base_point coincide")
+        bearing = isinstance(component, Actuator) and component.mount == "bearing"
+        if bearing and component.platen_point[:2] != component.base_point[:2]:
+            raise ParameterError(
+                f"{origin}: {component.name}: a bearing actuator must be vertical in the zero-position"
+            )
+        if bearing and abs(component.platen_point[2] - machine.platen.bearing_plane[2]) > 1e-9:
+            raise ParameterError(f"{origin}: {component.name}.platen_point must lie in platen.bearing_plane")
+    n_platen = machine.platen.bearing_plane
+    if n_platen[0] != 0.0 or n_platen[1] != 0.0 or n_platen[2] == 0.0:
+        raise ParameterError(f"{origin}: platen.bearing_plane must lie straight below C: [0, 0, z]")

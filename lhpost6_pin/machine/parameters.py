@@ -1,0 +1,379 @@
+"""Numbers with unit, evidence and source, read from TOML and checked; overrides give a changed copy.
+
+A machine file is a tree of sections (``[platen]``, ``[kind.horizontal]``, ``[component.H1]``, ...). Here it becomes
+one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or ``H1.base_point`` to a `Quantity`;
+`machine.py` gives the paths their meaning.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from ..core.errors import ParameterError, UnknownNameError, instead_of
+from ..core.files import find_shipped, read_toml, reason_of
+
+__all__ = [
+    "EVIDENCE",
+    "LARGEST",
+    "EffectEntry",
+    "Parameters",
+    "Quantity",
+    "Value",
+    "load_parameters",
+    "override_parameters",
+    "to_unit",
+    "unusable",
+]
+
+Value: TypeAlias = float | tuple[float, ...]
+
+EVIDENCE = ("report", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
+"""How well a number is known, strongest claim first; `override` is what a user set by hand."""
+
+LARGEST = 1e30
+"""No quantity of a machine or a test in SI is larger, and the powers of this one can still be computed with."""
+
+_QUANTITY_KEYS = {"value", "unit", "evidence", "source", "printed", "rel_sd", "sd"}
+_GROUPS = ("kind", "component", "estimates")
+"""Sections that hold named sub-sections; the sub-section's name is the path's first part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number (or vector) with its unit and where it comes from.
+
+    `sd` is one standard deviation in `unit` (None where no uncertainty is stated).
+    """
+
+    value: Value
+    unit: str
+    evidence: str
+    source: str
+    sd: Value | None = None
+    printed: str | None = None
+
+    @property
+    def assumed(self) -> bool:
+        """True if nobody has published this number."""
+        return self.evidence == "assumed"
+
+
+@dataclass(frozen=True, slots=True)
+class EffectEntry:
+    """An effect of the library as a machine file states it in a section ``[effect.NAME]``."""
+
+    family: str
+    components: tuple[str, ...]  # empty: all that the family can act on
+    values: Mapping[str, Quantity]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters(Mapping[str, Quantity]):
+    """All quantities of a machine by path, and the plain words (kinds, mounts, options) beside them."""
+
+    quantities: Mapping[str, Quantity]
+    words: Mapping[str, str | int]
+    origin: str
+    effects: Mapping[str, EffectEntry] = field(default_factory=dict)  # by name
+
+    def __getitem__(self, path: str) -> Quantity:
+        """Return the quantity at `path`; raises UnknownNameError that lists the section's paths."""
+        try:
+            return self.quantities[path]
+        except KeyError:
+            raise _unknown_parameter(path, self.quantities) from None
+
+    def number(self, path: str) -> float:
+        """Scalar at `path`; raises UnknownNameError, or ParameterError if it is a vector."""
+        value = self[path].value
+        if isinstance(value, tuple):
+            raise ParameterError(f"{self.origin}: {path} is a vector, not a number")
+        return value
+
+    def vector(self, path: str) -> tuple[float, ...]:
+        """Vector at `path`; raises UnknownNameError, or ParameterError if it is a scalar."""
+        value = self[path].value
+        if not isinstance(value, tuple):
+            raise ParameterError(f"{self.origin}: {path} is a number, not a vector")
+        return value
+
+    def __contains__(self, path: object) -> bool:
+        """True if there is a quantity at `path`."""
+        return path in self.quantities
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over paths in file order."""
+        return iter(self.quantities)
+
+    def __len__(self) -> int:
+        """Count quantities."""
+        return len(self.quantities)
+
+
+def load_parameters(name_or_path: str | Path) -> Parameters:
+    """Read a machine file by shipped name (``lhpost6``) or by path.
+
+    Raises ParameterError that names file and key for anything that is not a complete quantity.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".toml":
+        path = find_shipped("machine", str(name_or_path))
+    return _flatten(_read_toml(path), path.name)
+
+
+def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str | Path) -> Parameters:
+    """Return a copy with some values replaced.
+
+    `changes` maps a path to a number or array in the file's unit, or to a table ``{value, unit, source, ...}`` of
+    which only value is needed; or it is the path of a small TOML file of such tables, with units. A component's path
+    (``H3.seal_friction``) may be new if its kind has that key, and a number of an effect that is there
+    (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError
+    naming the key and the file; or UnknownNameError for what is given by hand.
+    """
+    if not isinstance(changes, str | Path):
+        return _overridden(parameters, changes, {}, "given by hand")
+    path = Path(changes)
+    tree = _read_toml(path)
+    entries, added = _entries(tree, path.name), _effects(tree, path.name)
+    try:
+        return _overridden(parameters, entries, added, path.name, in_a_file=True)
+    except (ParameterError, UnknownNameError) as error:
+        raise ParameterError(f"{path.name}: {error}") from None
+
+
+def _overridden(
+    parameters: Parameters,
+    entries: Mapping[str, Any],
+    added: Mapping[str, EffectEntry],
+    origin: str,
+    in_a_file: bool = False,
+) -> Parameters:
+    quantities, words = dict(parameters.quantities), dict(parameters.words)
+    effects = {**parameters.effects, **added}
+    for key, entry in entries.items():
+        if key.startswith("effect."):
+            _override_effect(effects, key, entry, origin)
+            continue
+        inherited = _of_kind(parameters, key)
+        if key in words or inherited in words:
+            if isinstance(entry, bool) or not isinstance(entry, str | int):
+                raise ParameterError(f"{key}: {entry!r} should be a word or a whole number")
+            words[key] = entry
+            continue
+        base = quantities.get(key) or quantities.get(inherited)
+        if base is None:
+            raise _unknown_parameter(key, (*quantities, *words))
+        quantities[key] = _changed(base, entry, key, origin)
+        if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
+            raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
+    return Parameters(quantities, words, f"{parameters.origin} + {origin}", effects)
+
+
+def _unknown_parameter(path: str, known: Iterable[str]) -> UnknownNameError:
+    """Error for a path that is not `known`, with those of its section if there is such a section."""
+    section = [p for p in known if p.split(".")[0] == path.split(".")[0]]
+    return UnknownNameError("parameter", path, section or list(known), "`lhpost6 info` lists all of a machine")
+
+
+def _override_effect(effects: dict[str, EffectEntry], key: str, entry: Any, origin: str) -> None:
+    """Change a number of an effect in place, ``effect.NAME.KEY``; it must be stated."""
+    name, _, number = key.removeprefix("effect.").rpartition(".")
+    if name not in effects:
+        raise UnknownNameError("effect of the machine", name, list(effects))
+    known = effects[name]
+    if number not in known.values:
+        raise UnknownNameError(f"number of effect {name}", number, list(known.values))
+    changed = _changed(known.values[number], entry, key, origin)
+    effects[name] = replace(known, values={**known.values, number: changed})
+
+
+def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
+    """Convert `value` from `unit` to `wanted`; raises ParameterError naming `key` if the dimensions differ."""
+    if unit == wanted:
+        return value
+    import pint  # slow to import and needed only where a unit is not the SI one
+
+    registry: Any = pint.UnitRegistry()
+    try:
+        factor = registry.Quantity(1.0, _pint_spelling(unit)).to(_pint_spelling(wanted)).magnitude
+    except Exception as error:  # pint raises a dozen types for a bad unit
+        raise ParameterError(f"{key}: unit {unit!r} cannot be converted to {wanted!r}; give it in {wanted}") from error
+    if isinstance(value, tuple):
+        return tuple(float(v) * factor for v in value)
+    return float(value) * factor
+
+
+def _pint_spelling(unit: str) -> str:
+    """Spell a unit such as ``m3/s/Pa`` or ``kg m2`` the way pint reads it."""
+    words = unit.replace("·", " ").replace("/", " / ").split()
+    spelled: list[str] = []
+    for word in words:
+        if spelled and word != "/" and spelled[-1] != "/":
+            spelled.append("*")
+        stem = word.rstrip("0123456789")
+        spelled.append(f"{stem}**{word[len(stem) :]}" if stem and stem != word else word)
+    return " ".join(spelled)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return read_toml(path)
+    except FileNotFoundError:
+        raise ParameterError(f"{path}: no such machine file") from None
+    except ValueError as error:  # of TOML and of UTF-8
+        raise ParameterError(f"{path}: not a TOML file: {error}") from None
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot be read: {reason_of(error)}") from None
+
+
+def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:
+    quantities: dict[str, Quantity] = {}
+    words: dict[str, str | int] = {}
+    for path, entry in _entries(tree, file).items():
+        if isinstance(entry, dict):
+            quantities[path] = _quantity(entry, f"{file}: {path}")
+        elif isinstance(entry, str | int) and not isinstance(entry, bool):
+            words[path] = entry
+        else:
+            raise ParameterError(
+                f"{file}: {path} = {entry!r} has no unit; write {path.split('.')[-1]} = "
+                '{ value = ..., unit = "...", evidence = "...", source = "..." }'
+            )
+    return Parameters(quantities, words, file, _effects(tree, file))
+
+
+def _effects(tree: Mapping[str, Any], file: str) -> dict[str, EffectEntry]:
+    """Effects of the library that a file names, ``[effect.NAME]``."""
+    found = {}
+    if not isinstance(tree.get("effect", {}), dict):
+        raise ParameterError(f"{file}: effect must be sections [effect.NAME]")
+    for name, table in tree.get("effect", {}).items():
+        key = f"{file}: effect.{name}"
+        if not isinstance(table, dict) or not isinstance(table.get("family"), str):
+            raise ParameterError(f"{key} must be a section with family = a name of the library")
+        components = table.get("components", [])
+        if not isinstance(components, list) or not all(isinstance(c, str) for c in components):
+            raise ParameterError(f'{key}: components = {components!r} should be a list of names, such as ["H1"]')
+        entries = {k: v for k, v in table.items() if k not in ("family", "components")}
+        for k, v in entries.items():
+            if not isinstance(v, dict):
+                raise ParameterError(f"{key}: {k} = {v!r} has no unit; write {k} = {{ value = ..., unit = ... }}")
+        values = {k: _quantity({"evidence": "override", "source": file, **v}, f"{key}.{k}") for k, v in entries.items()}
+        found[name] = EffectEntry(table["family"], tuple(components), values)
+    return found
+
+
+def _entries(tree: Mapping[str, Any], file: str) -> dict[str, Any]:
+    """Entries of a file by path, as they stand."""
+    found: dict[str, Any] = {}
+    for section, table in _sections(tree, file):
+        for key, entry in table.items():
+            path = f"{section}.{key}"
+            if path in found:
+                raise ParameterError(f"{file}: {path} is given twice; kinds, components and sections share names")
+            if "." in key:
+                raise ParameterError(f"{file}: {path}: a key may not hold a dot")
+            found[path] = entry
+    return found
+
+
+def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for name, table in tree.items():
+        if name == "effect":
+            continue  # `_effects` reads these
+        if not isinstance(table, dict):
+            raise ParameterError(f"{file}: {name} stands outside any section; put it under [machine] or [platen]")
+        if name not in _GROUPS:
+            yield name, table
+            continue
+        for sub, inner in table.items():
+            if not isinstance(inner, dict):
+                raise ParameterError(f"{file}: {name}.{sub} must be a section [{name}.{sub}]")
+            if not sub.isidentifier():
+                raise ParameterError(f"{file}: {name}.{sub}: use letters, digits and underscores for a name")
+            yield (f"{name}.{sub}" if name == "estimates" else sub), inner
+
+
+def unusable(number: float) -> str:
+    """What is wrong with a number that is not within `LARGEST`, in words."""
+    return f"beyond {LARGEST:g}" if math.isfinite(number) else "not finite"
+
+
+def _number(value: object, key: str) -> Value:
+    value = value.tolist() if hasattr(value, "tolist") else value  # an array, or a number of one
+    if isinstance(value, list | tuple):
+        if not value:
+            raise ParameterError(f"{key}: an empty list is no value")
+        return tuple(_scalar(v, key) for v in value)
+    return _scalar(value, key)
+
+
+def _scalar(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(f"{key}: value {value!r} is not a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not abs(number) <= LARGEST:
+        raise ParameterError(f"{key}: value {str(value)[:40]} is {unusable(number)}")
+    return number
+
+
+def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
+    for needed in ("value", "unit", "evidence", "source"):
+        if needed not in entry:
+            raise ParameterError(f"{key}: {needed} is missing")
+    if unknown := sorted(set(entry) - _QUANTITY_KEYS):
+        raise ParameterError(f"{key}: unknown {unknown[0]}; {instead_of(unknown[0], sorted(_QUANTITY_KEYS))}")
+    if entry["evidence"] not in EVIDENCE:
+        raise ParameterError(f"{key}: evidence {entry['evidence']!r} is not one of {', '.join(EVIDENCE)}")
+    for text in ("unit", "source", "printed"):
+        if not isinstance(entry.get(text, ""), str):
+            raise ParameterError(f"{key}: {text} must be text")
+    value = _number(entry["value"], key)
+    sd = _sd(entry, value, key)
+    if sd is not None and _length(sd) not in (0, _length(value)):
+        raise ParameterError(f"{key}: sd {sd!r} has not the shape of {value!r}")
+    return Quantity(value, entry["unit"], entry["evidence"], entry["source"], sd, entry.get("printed"))
+
+
+def _sd(entry: Mapping[str, Any], value: Value, key: str) -> Value | None:
+    if "sd" in entry:
+        sd: Value = _number(entry["sd"], f"{key}.sd")
+    elif "rel_sd" in entry:
+        fraction = _scalar(entry["rel_sd"], f"{key}.rel_sd")
+        sd = tuple(abs(v) * fraction for v in value) if isinstance(value, tuple) else abs(value) * fraction
+    else:
+        return None
+    if min(sd if isinstance(sd, tuple) else (sd,)) < 0.0:
+        raise ParameterError(f"{key}: standard deviation {sd!r} is negative")
+    return sd
+
+
+def _of_kind(parameters: Parameters, key: str) -> str:
+    """Path that component key ``H3.seal_friction`` inherits from: its kind's; empty for anything else."""
+    component, _, name = key.partition(".")
+    kind = parameters.words.get(f"{component}.kind")
+    return f"{kind}.{name}" if kind is not None else ""
+
+
+def _changed(base: Quantity, entry: Any, key: str, origin: str) -> Quantity:
+    if isinstance(entry, Quantity):
+        new = entry
+    elif isinstance(entry, Mapping):
+        new = _quantity({"unit": base.unit, "evidence": "override", "source": origin, **entry}, key)
+    else:
+        new = Quantity(_number(entry, key), base.unit, "override", f"{origin}; was {base.value!r} ({base.source})")
+    value = _number(to_unit(new.value, new.unit, base.unit, key), key)
+    sd = base.sd if new.sd is None else to_unit(new.sd, new.unit, base.unit, key)
+    if _length(value) != _length(base.value) or (sd is not None and _length(sd) not in (0, _length(value))):
+        raise ParameterError(f"{key}: {new.value!r} has not the shape of {base.value!r}")
+    return replace(new, value=value, unit=base.unit, sd=sd)
+
+
+def _length(value: Value) -> int:
+    """Length of a vector, 0 for a scalar."""
+    return len(value) if isinstance(value, tuple) else 0

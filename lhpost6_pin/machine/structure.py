@@ -1,0 +1,45 @@
+"""The structure of a machine: its platen, actuators, struts, oil and limits as plain data, without effects."""
+
+from dataclasses import dataclass
+
+from .components import Actuator, Hydraulics, Limits, Platen, Strut
+from .parameters import Parameters
+
+__all__ = ["Structure"]
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What a shake table is made of; numbers are plain floats in SI, whose sources are in `parameters`."""
+
+    name: str
+    title: str
+    motion: str
+    thrust: str
+    controller: str
+    platen: Platen
+    hydraulics: Hydraulics
+    actuators: tuple[Actuator, ...]
+    struts: tuple[Strut, ...]
+    limits: Limits
+    parameters: Parameters
+
+    @property
+    def components(self) -> tuple[Actuator | Strut, ...]:
+        """Actuators, then struts: the order of legs."""
+        return (*self.actuators, *self.struts)
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """Names of actuators in file order."""
+        return tuple(a.name for a in self.actuators)
+
+    @property
+    def strut_names(self) -> tuple[str, ...]:
+        """Names of struts in file order."""
+        return tuple(s.name for s in self.struts)
+
+    @property
+    def double_acting(self) -> tuple[str, ...]:
+        """Names of the actuators that have a chamber B; the `horizontal` dimension of records."""
+        return tuple(a.name for a in self.actuators if a.area_b is not None)

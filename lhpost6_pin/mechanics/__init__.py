@@ -1,0 +1,1 @@
+"""The plant ready to evaluate: pose, coordinates, rigid body on Pinocchio, equilibrium, one step."""

@@ -1,0 +1,182 @@
+"""What the model says the machine can give, beside what Table 2.2 says."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import OutOfRangeError
+from ..core.names import AXES
+from ..laws.orifice import opening
+from ..machine.machine import Machine
+from .equilibrium import find_equilibrium, hydraulic_rows, unloaded_speeds
+from .plant import Plant, make_plant
+from .pose import leg_displacements
+from .rigid_body import platen_inertia
+
+__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "leg_speeds", "make_leg_check"]
+
+Array = NDArray[np.float64]
+LegCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
+
+
+class Capacity(NamedTuple):
+    """One line: what, the model's value, Table 2.2's, its unit and how the model's came about."""
+
+    name: str
+    model: float
+    printed: float
+    unit: str
+    how: str
+
+    @property
+    def deviation(self) -> float:
+        """Model over Table 2.2, less one."""
+        return self.model / self.printed - 1.0
+
+
+def has_printed_capacity(machine: Machine) -> bool:
+    """Whether a machine file states Table 2.2, which `capacity_table` needs."""
+    return "table_2_2.force_actuators" in machine.parameters
+
+
+def leg_speeds(plant: Plant) -> Array:
+    """Steady unloaded piston speeds at full spool, extending and retracting, (n_actuators, 2) [m/s]."""
+    rest = find_equilibrium(plant)
+    speeds = np.empty((plant.spools, 2))
+    for i, row in enumerate(plant.rows[hydraulic_rows(plant)]):
+        speeds[i] = unloaded_speeds(row, float(rest.force[i]), plant.supply)
+        speeds[i] *= opening(1.0, float(row["p"][6]))
+    return speeds
+
+
+def make_leg_check(plant: Plant) -> LegCheck:
+    """Return a check of strokes and valve flow: (displacement, velocity) (n, 6) to shares used, (n, n_actuators).
+
+    The returned function gives (speed over what the valves can feed, actuator names, elongation over stroke). Valves
+    can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
+    """
+    reserve = plant.machine.limits.valve_reserve
+    speeds, strokes = (1.0 - reserve) * leg_speeds(plant), plant.legs["stroke"][: plant.spools]
+
+    def check(displacement: Array, velocity: Array) -> tuple[Array, tuple[str, ...], Array]:
+        moved, rate = leg_displacements(plant, displacement, velocity)
+        moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
+        share = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
+        return share, plant.machine.actuator_names, np.abs(moved) / strokes
+
+    return check
+
+
+def capacity_table(machine: Machine) -> tuple[Capacity, ...]:
+    """Peak forces, accelerations, velocities, rotations and strokes of a six-axis machine against Table 2.2.
+
+    Peak velocities are with all servovalves open (two on each double-acting actuator), as the table's are.
+    Raises OutOfRangeError for a guided machine, for which there is no such table.
+    """
+    if machine.motion != "free" or "table_2_2.force_actuators" not in machine.parameters:
+        raise OutOfRangeError(
+            f"{machine.name} has no Table 2.2 to compare with; it is a {machine.motion}-guided machine"
+        )
+    plant = make_plant(machine)
+    return (*_forces(plant), *_speeds(machine), *_travel(plant))
+
+
+def _zero_jacobian(plant: Plant) -> Array:
+    """Actuator rates per velocity of C and Euler rates in the zero-position (n_actuators, 6)."""
+    _, rates = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))
+    return rates.T[: plant.spools]
+
+
+def _forces(plant: Plant) -> list[Capacity]:
+    machine, par = plant.machine, plant.machine.parameters
+    high, low = plant.supply[:2]
+    jacobian = _zero_jacobian(plant)
+    rows = plant.rows[hydraulic_rows(plant)]
+    push = high * rows["p"][:, 0] - low * rows["p"][:, 1]
+    pull = low * rows["p"][:, 0] - high * rows["p"][:, 1]
+    hold_down = sum(s.pressure * s.area for s in machine.struts)
+    printed = par.vector("table_2_2.force_actuators")
+    lines = []
+    for k, name in enumerate("XY"):
+        force = float(np.sum(np.maximum(jacobian[:, k] * push, jacobian[:, k] * pull)))
+        lines.append(Capacity(f"peak force {name}", force, printed[k], "N", "supply against return in all actuators"))
+    up = float(jacobian[:, 2] @ np.where(jacobian[:, 2] > 0.0, push, pull)) - hold_down
+    lines.append(Capacity("peak force Z up", up, printed[2], "N", "supply in all chambers, less hold-down"))
+    left = par.number("table_2_2.chamber_pressure_down")
+    down = hold_down - float(jacobian[:, 2] @ (left * rows["p"][:, 0]))
+    lines.append(
+        Capacity(
+            "peak force Z down",
+            down,
+            par.number("table_2_2.force_down"),
+            "N",
+            f"hold-down less {left / 1e6:.3g} MPa in the chambers",
+        )
+    )
+    _, mass = platen_inertia(plant.model, machine)
+    accelerations = par.vector("table_2_2.acceleration_actuators")
+    for k, name in enumerate(("X", "Y", "Z up")):
+        weight = mass[2, 2] * machine.platen.gravity if k == 2 else 0.0
+        value = (lines[k].model - weight) / mass[k, k]
+        lines.append(
+            Capacity(f"peak acceleration {name}", value, accelerations[k], "m/s2", "peak force over effective mass")
+        )
+    weight = mass[2, 2] * machine.platen.gravity
+    value = (down + weight) / mass[2, 2]
+    lines.append(
+        Capacity(
+            "peak acceleration Z down",
+            value,
+            machine.limits.acceleration[2],
+            "m/s2",
+            "peak force and weight over effective mass",
+        )
+    )
+    return lines
+
+
+def _speeds(machine: Machine) -> list[Capacity]:
+    both = machine.with_params({f"{a.kind}.valves": 2 for a in machine.actuators if a.area_b is not None})
+    plant = make_plant(both)
+    jacobian, speeds = _zero_jacobian(plant), leg_speeds(plant)
+    lines = []
+    for k, axis in enumerate(AXES):
+        for sign, word in ((1.0, "up"), (-1.0, "down")) if axis == "z" else ((1.0, ""),):
+            rate = sign * jacobian[:, k]
+            moving = np.abs(rate) > 1e-9
+            slowest = np.min(np.where(rate > 0.0, speeds[:, 0], speeds[:, 1])[moving] / np.abs(rate[moving]))
+            unit = "m/s" if k < 3 else "rad/s"
+            name = f"peak velocity {axis} {word}".strip()
+            lines.append(
+                Capacity(
+                    name,
+                    float(slowest),
+                    machine.limits.velocity[k],
+                    unit,
+                    "slowest actuator, unloaded, full spool",
+                )
+            )
+    return lines
+
+
+def _travel(plant: Plant) -> list[Capacity]:
+    """Largest excursion along each axis alone within the actuators' strokes, by bisection."""
+    limits = plant.machine.limits.displacement
+    strokes = plant.legs["stroke"][: plant.spools]
+    lines = []
+    for k, axis in enumerate(AXES):
+
+        def used(size: float, k: int = k) -> float:
+            pose = np.zeros((2, 6))
+            pose[0, k], pose[1, k] = size, -size
+            return float(np.max(np.abs(leg_displacements(plant, pose)[0][:, : plant.spools]) / strokes))
+
+        low, high = 0.0, 4.0 * limits[k]
+        while high - low > 1e-6 * high:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if used(middle) > 1.0 else (middle, high)
+        unit = "m" if k < 3 else "rad"
+        lines.append(Capacity(f"peak displacement {axis}", low, limits[k], unit, "strokes of the actuators alone"))
+    return lines

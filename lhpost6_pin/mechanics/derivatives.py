@@ -1,0 +1,48 @@
+"""Forces, rates and accelerations of a plant at one state."""
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from .plant import Plant
+from .schemes import TAU, V_SEEN, A, V, rates_stage
+from .workspace import Workspace
+
+__all__ = ["evaluate", "rates_at", "settle"]
+
+Array = NDArray[np.float64]
+
+
+def settle(plant: Plant, ws: Workspace, spool: Array) -> int:
+    """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
+    status = evaluate(plant, ws, spool)
+    if status == 0:
+        ws.motion[A] = pin.aba(plant.model, plant.model.createData(), ws.q, ws.motion[V], ws.motion[TAU])
+    return status
+
+
+def evaluate(plant: Plant, ws: Workspace, spool: Array) -> int:
+    """Ports, forces and rates at the state in `ws`; returns the stage status."""
+    ws.motion[V_SEEN] = ws.motion[V]
+    return int(rates_at(plant, ws, ws.q, ws.z, spool))
+
+
+def rates_at(plant: Plant, ws: Workspace, q: Array, z: Array, spool: Array) -> int:
+    """Ports, forces and rates at (q, z) for the velocity `motion[V_SEEN]` of `ws`; returns the stage status."""
+    return rates_stage(
+        q,
+        plant.axes,
+        plant.legs,
+        plant.body,
+        plant.rows,
+        plant.model.damping,
+        spool,
+        ws.supply,
+        ws.frame,
+        ws.port,
+        ws.JB,
+        z,
+        ws.zd,
+        ws.force,
+        ws.motion,
+    )

@@ -1,0 +1,188 @@
+"""Static equilibrium in the control zero-position (Eq. 4-30): forces, chamber pressures, spools that feed the leaks."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..core.errors import SimulationError
+from ..effects.actuator import leak_flows, start_line, valve_flows
+from ..effects.registry import AREA_A, AREA_B, EXTERNAL, HYDRAULIC_DOUBLE, LEAKAGE, NULL_BIAS, NULL_LEAKAGE, TURBULENT
+from ..effects.supply import steady_supply, supply_pressures
+from ..laws.orifice import spool_for_opening
+from .plant import Plant, State
+from .schemes import TAU, forces_stage, pose_stage
+from .workspace import make_workspace
+
+__all__ = ["Equilibrium", "find_equilibrium", "hydraulic_rows", "rest_pressures", "unloaded_speeds"]
+
+Array = NDArray[np.float64]
+
+_SUPPLY_TURNS = 8
+"""Rounds of pressures at rest and flow drawn: leaks lower the supply by a thousandth of its pressure."""
+
+
+class Equilibrium(NamedTuple):
+    """Rest in the zero-position: the state, spools (n_actuators,) [1] and actuator forces (n_actuators,) [N]."""
+
+    state: State
+    spool: Array
+    force: Array
+
+
+def hydraulic_rows(plant: Plant) -> NDArray[np.int64]:
+    """Rows of the effect table that are actuators, in the order of their spools."""
+    fed = np.flatnonzero(plant.rows["input"] >= 0)
+    return fed[np.argsort(plant.rows["input"][fed], kind="stable")]
+
+
+def find_equilibrium(plant: Plant) -> Equilibrium:
+    """Least-squares actuator forces that hold the platen at rest, and the pressures and spools that give them.
+
+    Ten actuators hold six degrees of freedom: of all solutions of Eq. 4-30 this is the one of least norm.
+    Raises SimulationError if the actuators cannot hold the platen, or not within supply and return pressure.
+    """
+    start = plant.zero_state()
+    ws = make_workspace(plant, start)
+    ws.z[:] = 0.0
+    pose_stage(ws.q, plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB)
+    forces_stage(
+        plant.axes,
+        plant.legs,
+        plant.body,
+        plant.rows,
+        plant.model.damping,
+        ws.frame,
+        ws.port,
+        ws.JB,
+        ws.z,
+        ws.force,
+        ws.motion,
+    )
+    free = plant.axes.size
+    gravity = pin.rnea(
+        plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)
+    )
+    needed = gravity[:free] - ws.motion[TAU][:free]
+    columns = ws.JB[1][: plant.spools, plant.axes].T  # (free, n_actuators)
+    force, *_ = np.linalg.lstsq(columns, needed, rcond=None)
+    miss = np.abs(columns @ force - needed).max()
+    if miss > 1e-6 * max(1.0, float(np.abs(needed).max())):
+        raise SimulationError(
+            f"the actuators cannot hold the platen in the zero-position: {miss:.3g} N or N m is left over"
+        )
+    z, spool = ws.z.copy(), np.zeros(plant.spools)
+    _fill(plant, force, plant.supply[:2], z, spool)
+    for _ in range(_SUPPLY_TURNS if plant.supply.size > 2 else 0):  # what leaks at rest is drawn from the supply, too
+        steady_supply(plant.rows, spool, plant.supply, z)
+        _fill(plant, force, np.array(supply_pressures(plant.supply, z)), z, spool)
+    return Equilibrium(State(start.q, start.v, z), spool, force)
+
+
+def _fill(plant: Plant, force: Array, supply: Array, z: Array, spool: Array) -> None:
+    """Fill pressures, flows through lines and spools at which nothing flows into any chamber."""
+    high, low = supply
+    for i, at in enumerate(hydraulic_rows(plant)):
+        row = plant.rows[at]
+        solve = rest_pressures if row["altered"] == 0 else _rest_of_altered
+        pressures, spool[i] = solve(row, float(force[i]), supply)
+        k = row["state"]
+        z[k : k + len(pressures)] = pressures
+        if not all(low <= p <= high for p in pressures):
+            name = plant.machine.actuators[i].name
+            raise SimulationError(
+                f"{name} must give {force[i]:.4g} N at rest, beyond its supply: "
+                f"{', '.join(f'{p / 1e6:.3g}' for p in pressures)} MPa is not between {low / 1e6:.3g} and "
+                f"{high / 1e6:.3g} MPa; lighten the specimen or raise hydraulics.supply_pressure"
+            )
+        start_line(plant.rows, at, spool[i], pressures[0], pressures[-1], high, low, z)
+
+
+def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[float, ...], float]:
+    """As `rest_pressures` with all that alterations add; a spool of full stroke where none is enough."""
+    from scipy.optimize import brentq
+
+    p, double = row["p"], bool(row["law"] == HYDRAULIC_DOUBLE)
+    high, low = (float(x) for x in supply)
+    if not p[[LEAKAGE, TURBULENT, EXTERNAL, NULL_LEAKAGE]].any():  # nothing leaks: the spool rests at its null
+        pressures, spool = rest_pressures(row, force, supply)
+        return pressures, spool - float(p[NULL_BIAS])
+
+    def flows(pressure_a: float, pressure_b: float, spool: float) -> tuple[float, float]:
+        flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
+        across, _, out_a, out_b, _, _ = leak_flows(p, double, pressure_a, pressure_b, low)
+        return flow_a - across - out_a, flow_b + across - out_b
+
+    def spool_for(pressure_a: float, pressure_b: float) -> float:
+        ends = [flows(pressure_a, pressure_b, x)[0] for x in (-1.0, 1.0)]
+        if ends[0] >= 0.0 or ends[1] <= 0.0:
+            return -1.0 if ends[0] >= 0.0 else 1.0
+        return float(
+            brentq(lambda x: flows(pressure_a, pressure_b, x)[0], -1.0, 1.0, xtol=1e-18, rtol=1e-15, maxiter=1000)
+        )
+
+    area_a, area_b = float(p[AREA_A]), float(p[AREA_B])
+    if not double:
+        return (force / area_a,), spool_for(force / area_a, 0.0)
+
+    def other(pressure_a: float) -> float:
+        return (pressure_a * area_a - force) / area_b
+
+    def miss(pressure_a: float) -> float:
+        return flows(pressure_a, other(pressure_a), spool_for(pressure_a, other(pressure_a)))[1]
+
+    least, most = max(low, (low * area_b + force) / area_a), min(high, (high * area_b + force) / area_a)
+    if least < most and miss(least) > 0.0 > miss(most):
+        a = float(brentq(miss, least, most, xtol=1e-6, rtol=1e-15, maxiter=1000))
+    else:  # no pressures within the supply's: what the report's law has, which says so
+        a = float(rest_pressures(row, force, supply)[0][0])
+    return (a, other(a)), spool_for(a, other(a))
+
+
+def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[float, ...], float]:
+    """Pressures [Pa] and spool [1] at which an actuator gives `force` [N] with no net flow into its chambers.
+
+    The spool feeds the leak across the piston; with no leak, its limit as the leak vanishes.
+    """
+    area_a, area_b, k_pa, k_bt, k_at, k_pb, curve, leakage = row["p"][:8]
+    high, low = supply[:2]
+    if row["law"] != HYDRAULIC_DOUBLE:
+        pressure = force / area_a
+        drop = max(high - pressure, np.finfo(float).tiny)
+        return (pressure,), float(spool_for_opening(leakage * pressure / (k_pa * math.sqrt(drop)), curve))
+    # oil leaks from B to A (spool < 0: supply to B, A to return), or from A to B (spool > 0)
+    for sign, out, into in ((-1.0, k_at, k_pb), (1.0, k_pa, k_bt)):
+        # flow through both orifices alike: out^2 drop_A = into^2 drop_B, and P_A A_1 - P_B A_2 = force
+        if sign < 0.0:
+            matrix = np.array([[out**2, into**2], [area_a, -area_b]])
+            right = np.array([out**2 * low + into**2 * high, force])
+        else:
+            matrix = np.array([[-(out**2), -(into**2)], [area_a, -area_b]])
+            right = np.array([-(out**2) * high - into**2 * low, force])
+        a, b = np.linalg.solve(matrix, right)
+        if sign * (a - b) >= 0.0:
+            drop = a - low if sign < 0.0 else high - a
+            opened = leakage * abs(a - b) / (out * math.sqrt(max(drop, np.finfo(float).tiny)))
+            return (float(a), float(b)), float(spool_for_opening(sign * opened, curve))
+    pressure = float(force / (area_a - area_b))  # in between nothing leaks and the valve is shut
+    return (pressure, pressure), 0.0
+
+
+def unloaded_speeds(row: np.void, force: float, supply: Array) -> tuple[float, float]:
+    """Steady piston speeds [m/s] at full opening under the rest force: extending, retracting (Eqs. 4-2, 4-5)."""
+    area_a, area_b, k_pa, k_bt, k_at, k_pb = (float(v) for v in row["p"][:6])
+    high, low = supply[:2]
+    if row["law"] != HYDRAULIC_DOUBLE:
+        pressure = force / area_a
+        return k_pa * math.sqrt(high - pressure) / area_a, k_at * math.sqrt(pressure - low) / area_a
+    speeds = []
+    for sign, a_in, b_in in ((1.0, k_pa, k_bt), (-1.0, k_at, k_pb)):
+        # speed^2 = (a_in/A_1)^2 drop_A = (b_in/A_2)^2 drop_B and P_A A_1 - P_B A_2 = force
+        a, b = (a_in / area_a) ** 2, (b_in / area_b) ** 2
+        source_a, source_b = (high, low) if sign > 0.0 else (low, high)
+        matrix = np.array([[a, b], [area_a, -area_b]])
+        pressure_a, _ = np.linalg.solve(matrix, np.array([a * source_a + b * source_b, force]))
+        speeds.append(float(math.sqrt(a * abs(source_a - pressure_a))))
+    return speeds[0], speeds[1]

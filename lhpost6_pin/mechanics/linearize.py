@@ -1,0 +1,97 @@
+"""The plant linearised about a state, and its oil-column modes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..core.names import AXES
+from ..machine.machine import Machine
+from .derivatives import settle
+from .equilibrium import find_equilibrium
+from .plant import Plant, State, make_plant
+from .schemes import A, V
+from .workspace import make_workspace
+
+__all__ = ["SPOOL_STEP", "LinearPlant", "Mode", "linearize", "oil_column_modes"]
+
+Array = NDArray[np.float64]
+
+# Finite-difference steps: small against every scale of the machine, large against rounding.
+_POSE_STEP, _VELOCITY_STEP, _PRESSURE_STEP, SPOOL_STEP = 1e-6, 1e-6, 1e2, 1e-6
+
+
+@dataclass(frozen=True)
+class LinearPlant:
+    """dx/dt = A x + B u about a state; x = (local pose (nv), velocity (nv), hidden states), u the spools."""
+
+    A: Array
+    B: Array
+    nv: int
+
+
+@dataclass(frozen=True)
+class Mode:
+    """An oscillation: frequency [Hz], damping ratio [1], and the platen axis that moves most at C."""
+
+    frequency: float
+    damping: float
+    axis: str
+
+
+def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
+    """Continuous-time Jacobians of a plant by central differences, at rest (v = 0) or nearly so."""
+    nv, nz, nu = plant.model.nv, len(plant.states), plant.spools
+    ws = make_workspace(plant, state)
+    pressure = np.array(["pressure" in name for name in plant.states])
+    size = np.concatenate(
+        [np.full(nv, _POSE_STEP), np.full(nv, _VELOCITY_STEP), np.where(pressure, _PRESSURE_STEP, _POSE_STEP)]
+    )
+
+    def rates(x: Array, u: Array) -> Array:
+        ws.q[:] = pin.integrate(plant.model, state.q, x[:nv])
+        ws.motion[V] = state.v + x[nv : 2 * nv]
+        ws.z[:] = state.z + x[2 * nv :]
+        settle(plant, ws, u)
+        return np.concatenate([ws.motion[V], ws.motion[A], ws.zd])
+
+    n = 2 * nv + nz
+    a, b = np.zeros((n, n)), np.zeros((n, nu))
+    for k in range(n):
+        step = np.zeros(n)
+        step[k] = size[k]
+        a[:, k] = (rates(step, spool) - rates(-step, spool)) / (2.0 * size[k])
+    for k in range(nu):
+        step = np.zeros(nu)
+        step[k] = SPOOL_STEP
+        b[:, k] = (rates(np.zeros(n), spool + step) - rates(np.zeros(n), spool - step)) / (2.0 * SPOOL_STEP)
+    return LinearPlant(a, b, nv)
+
+
+def oil_column_modes(machine: Machine, *, undamped: bool = True) -> tuple[Mode, ...]:
+    """Modes of the platen on its oil columns in the control zero-position, slowest first, valves closed.
+
+    undamped leaves out leakage, friction and viscous damping. Only the platen's own modes: a specimen is left off.
+    """
+    bare = replace(machine, specimen=None)
+    if undamped:
+        kinds = {c.kind for c in machine.components}
+        names = ("leakage", "viscous", "seal_friction", "pad_friction")
+        bare = bare.with_params({f"{k}.{n}": 0.0 for k in kinds for n in names if f"{k}.{n}" in machine.parameters})
+    plant = make_plant(bare)
+    rest = find_equilibrium(plant)
+    linear = linearize(plant, rest.state, rest.spool)
+    values, vectors = np.linalg.eig(linear.A)
+    rho = plant.body[0]["rho_c"]
+    lengths = np.linalg.norm([machine.platen.size])  # makes turns comparable with displacements
+    found = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag < 1.0:
+            continue
+        twist = np.zeros(6, complex)
+        twist[plant.axes] = vector[: linear.nv]
+        at_c = np.concatenate([twist[:3] + np.cross(twist[3:], rho), twist[3:] * lengths / 2.0])
+        size = abs(value)
+        found.append(Mode(float(size / (2 * np.pi)), float(-value.real / size), AXES[int(np.argmax(np.abs(at_c)))]))
+    return tuple(sorted(found, key=lambda m: m.frequency))

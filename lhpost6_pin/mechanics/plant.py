@@ -1,0 +1,101 @@
+"""The plant: a machine made ready to evaluate; tables for compiled code, the Pinocchio model, the zero state."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..effects.modifiers import command_path, supply_numbers
+from ..effects.registry import PORTS
+from ..effects.table import effect_table, state_names
+from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from .ports import body_table, leg_table
+from .rigid_body import free_axes, make_model
+
+if TYPE_CHECKING:
+    from ..machine.machine import Machine
+
+__all__ = ["Plant", "State", "make_plant"]
+
+Array = NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """State of a plant: q (nq,), v (nv,) as `rigid_body.make_model` orders them, hidden z (n_states,)."""
+
+    q: Array
+    v: Array
+    z: Array
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Tables of a machine for compiled code, beside its Pinocchio model. Treat the arrays as read only."""
+
+    machine: "Machine"
+    model: Any
+    axes: NDArray[np.int64]  # (n_axes,) free twist components of the platen
+    legs: NDArray[np.void]  # ports.LEG, actuators then struts
+    body: NDArray[np.void]  # ports.BODY, one row
+    rows: NDArray[np.void]  # effects.ROW
+    ports: tuple[str, ...]  # those that its arrays hold; platen's and swivels' only where an effect acts on them
+    states: tuple[str, ...]
+    supply: Array  # supply and return pressure [Pa]; behind them what `supply` needs where flow changes them
+    delays: Array  # (n_actuators,) valve delay [s]
+    lags: Array  # (n_actuators,) time constant [s] with which a spool follows its delayed command
+
+    @property
+    def spools(self) -> int:
+        """Number of valve spools, one an actuator."""
+        return len(self.machine.actuators)
+
+    @property
+    def command_path(self) -> Array:
+        """Delays of valves (n_actuators,) [s] as `schemes.spool_windows` takes them: with lags behind, if there are."""
+        return np.concatenate([self.delays, self.lags]) if self.lags.any() else self.delays
+
+    @property
+    def articulated(self) -> bool:
+        """Whether a specimen on the platen moves on joints of its own."""
+        return bool(self.model.nv > self.axes.size)
+
+    def zero_state(self) -> State:
+        """State in the control zero-position at rest with all hidden states zero (no pressure)."""
+        q = pin.neutral(self.model)
+        if self.machine.motion == "free":
+            q[:3] = self.machine.platen.centre_of_gravity
+        return State(q, np.zeros(self.model.nv), np.zeros(len(self.states)))
+
+    def state_index(self, effect: str, port: str, state: str) -> int:
+        """Number of a hidden state by effect, port and name."""
+        return self.states.index(f"{effect}.{port}.{state}")
+
+
+def make_plant(machine: "Machine") -> Plant:
+    """Build tables and model of a machine; raises ParameterError or UnknownNameError."""
+    ports = port_names(machine.actuators, machine.struts)
+    effects = (*machine.effects, *machine.alterations)
+    rows = effect_table(effects, ports)
+    used = max(rows[port].max() for port in PORTS) if len(rows) else len(ports)
+    swivels = sum(port.endswith(SWIVEL_TURNS) for port in ports)
+    for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)):
+        if used < end:
+            ports = ports[:end]  # no effect acts on the others: nothing to evaluate there
+    states = state_names(effects)
+    oil = machine.hydraulics
+    delays, lags = command_path(effects, {a.name: a.valve_delay for a in machine.actuators})
+    return Plant(
+        machine=machine,
+        model=make_model(machine),
+        axes=free_axes(machine),
+        legs=leg_table(machine),
+        body=body_table(machine),
+        rows=rows,
+        ports=ports,
+        states=states,
+        supply=np.array([oil.supply_pressure, oil.return_pressure, *supply_numbers(effects, states)]),
+        delays=np.array(delays),
+        lags=np.array(lags),
+    )

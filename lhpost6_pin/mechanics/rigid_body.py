@@ -1,0 +1,140 @@
+"""The rigid body on Pinocchio: platen with direction-dependent mass, specimen, lumped masses.
+
+A Pinocchio Inertia has one mass; the platen's identified masses differ by direction (Table 4.1). The Inertia at B
+carries the isotropic part m_0 = min(m_x, m_y, m_z) and the rotational inertia, the joint's armature the rest
+dM = M - m_0; what is then missing of Eqs. 4-24 and 4-26, the bias -dM (omega x v_B) and the weight (m_z - m_0) g, is
+added as a wrench by `stage.wrench_on_platen`. Together they are the report's equations to rounding.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..core.errors import ParameterError
+from ..machine.specimen import Specimen
+from ..machine.urdf_numbers import check_urdf
+
+if TYPE_CHECKING:
+    from ..machine.machine import Machine
+
+__all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
+
+Array = NDArray[np.float64]
+
+
+def free_axes(machine: "Machine") -> NDArray[np.int64]:
+    """Twist components (linear first) that the platen can have: all six, or one guided axis."""
+    return np.arange(6) if machine.motion == "free" else np.array(["xyz".index(machine.motion)])
+
+
+def make_model(machine: "Machine") -> Any:
+    """Build the pin.Model of platen and specimen; the platen is joint 1, its frame {b} at B.
+
+    q starts with the position of B in {s} and a quaternion (x, y, z, w), or with the guided displacement; v with the
+    twist of B in platen axes, linear first. Specimen joints follow. Raises ParameterError for an unreadable URDF.
+    """
+    platen = machine.platen
+    model = pin.Model()
+    model.name = machine.name
+    model.gravity.linear = np.array([0.0, 0.0, -platen.gravity])
+    if machine.motion == "free":
+        joint, placement = pin.JointModelFreeFlyer(), pin.SE3.Identity()
+    else:
+        joint = {"x": pin.JointModelPX, "y": pin.JointModelPY, "z": pin.JointModelPZ}[machine.motion]()
+        placement = pin.SE3(np.eye(3), np.array(platen.centre_of_gravity))
+    index = model.addJoint(0, joint, placement, "platen")
+    model.addJointFrame(index)
+    inertia = _altered(pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia)), machine)
+    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
+    top = pin.SE3(np.eye(3), -np.array(platen.centre_of_gravity))
+    model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
+    armature = np.zeros(6)
+    armature[:3] = platen.directional_mass
+    if machine.specimen is not None:
+        model = _mount(model, machine.specimen)
+    extra = np.zeros(model.nv)
+    axes = free_axes(machine)
+    extra[: axes.size] = armature[axes]
+    model.armature = model.armature + extra
+    return model
+
+
+def _altered(inertia: Any, machine: "Machine") -> Any:
+    """Inertia of the platen with what effects add to it: mass with its weight, first and second moments about B."""
+    for effect in machine.alterations:
+        if effect.law == "more_inertia":
+            for mass, x, y, z, xx, yy, zz, xy, xz, yz in effect.params:
+                total = inertia.mass + mass
+                if total <= 0.0:
+                    raise ParameterError(f"{effect.name}: {mass:g} kg leave the platen no mass")
+                if machine.motion != "free":  # what turns has no part
+                    inertia = pin.Inertia(total, inertia.lever, inertia.inertia)
+                    continue
+                lever = (inertia.mass * inertia.lever + np.array([x, y, z])) / total
+                about_b = inertia.matrix()[3:, 3:] + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+                about_middle = about_b + total * pin.skew(lever) @ pin.skew(lever)
+                if np.linalg.eigvalsh(about_middle)[0] <= 0.0:
+                    raise ParameterError(f"{effect.name}: its moments and products leave the platen no inertia")
+                inertia = pin.Inertia(total, lever, about_middle)
+    return inertia
+
+
+def _mount(model: Any, specimen: Specimen) -> Any:
+    """Bolt the specimen's URDF to the platen's top frame."""
+    if not specimen.urdf.is_file():
+        raise ParameterError(f"{specimen.urdf}: no such URDF file")
+    check_urdf(specimen.urdf)
+    try:
+        body = pin.buildModelFromUrdf(str(specimen.urdf))
+    except Exception as error:  # urdfdom reports malformed files as plain exceptions
+        raise ParameterError(f"{specimen.urdf}: not a URDF that Pinocchio can read: {error}") from error
+    if specimen.locked and body.njoints > 1:
+        body = pin.buildReducedModel(body, list(range(1, body.njoints)), pin.neutral(body))
+    if not np.all(np.isfinite((*specimen.position, *specimen.rpy))):
+        raise ParameterError(f"{specimen.urdf}: position {specimen.position} and rpy {specimen.rpy} must be finite")
+    at = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position))
+    if sum(i.mass for i in body.inertias) <= 0.0:
+        raise ParameterError(f"{specimen.urdf}: the specimen has no mass; give its links <inertial> elements")
+    try:
+        joined = pin.appendModel(model, body, model.getFrameId("platen_top"), at)
+    except ValueError as error:  # a joint or frame named as one of the platen's
+        raise ParameterError(f"{specimen.urdf}: {error}; rename it in the URDF") from error
+    joined.gravity = model.gravity
+    return joined
+
+
+def platen_inertia(model: Any, machine: "Machine") -> tuple[Array, Array]:
+    """Spatial inertia of the platen body (6, 6) at B, linear first, and the same with the directional mass added.
+
+    The first includes a rigid specimen; the fused engine uses both. [kg, kg m, kg m2]
+    """
+    plain = np.array(model.inertias[1].matrix())
+    extra = np.zeros(6)
+    extra[:3] = machine.platen.directional_mass
+    return plain, plain + np.diag(extra)
+
+
+def lumped_inertia(
+    platen_mass: Sequence[float], platen_inertia: Sequence[float], machine: "Machine"
+) -> dict[str, Array]:
+    """Compose platen alone and the moving parts of actuators and struts at their connection points (Table 4.1).
+
+    Isotropic parts are Pinocchio point masses at the platen points; what differs along and across a component adds
+    J^T dm J. Returns the 6x6 contribution of ``platen`` and of each kind, at B, linear first [kg, kg m, kg m2].
+    """
+    centre = np.array(machine.platen.centre_of_gravity)
+    alone = pin.Inertia(float(platen_mass[0]), np.zeros(3), np.diag(np.asarray(platen_inertia, float)))
+    parts = {"platen": np.array(alone.matrix())}
+    for component in machine.components:
+        lever = np.array(component.platen_point) - centre
+        along = np.array(component.platen_point) - np.array(component.base_point)
+        along /= np.linalg.norm(along)
+        point = pin.Inertia(component.mass_across, lever, np.zeros((3, 3)))
+        jacobian = np.hstack([np.eye(3), -pin.skew(lever)])
+        more = (component.mass_along - component.mass_across) * np.outer(along, along)
+        total = np.array(point.matrix()) + jacobian.T @ more @ jacobian
+        parts[component.kind] = parts.get(component.kind, np.zeros((6, 6))) + total
+    return parts

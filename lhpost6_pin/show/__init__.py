@@ -1,0 +1,1 @@
+"""What people look at: reports, the viewer, tables in a terminal, JSON."""

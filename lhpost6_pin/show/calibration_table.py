@@ -1,0 +1,75 @@
+"""What a terminal shows of a calibration."""
+
+import numpy as np
+from rich.markup import escape
+from rich.table import Table
+
+from ..core.console import make_console
+from ..identification.calibration import Calibration
+from ..identification.calibration.calibration_summary import alike_words, contradiction_words, cut_strokes, range_words
+from ..identification.calibration.verdicts import beyond, far, stated_range, verdict_on
+from ..identification.residuals import RESIDUALS
+
+__all__ = ["print_calibration"]
+
+
+def print_calibration(calibration: Calibration) -> None:
+    """Print parameters, sensor errors that stand out, misfits, and whether the fit converged."""
+    console = make_console()
+    console.print(_parameters(calibration))
+    console.print(_sensors(calibration))
+    console.print(_misfits(calibration))
+    for said in (*cut_strokes(calibration), alike_words(calibration), contradiction_words(calibration)):
+        if said:
+            console.print(escape(said))
+    rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
+    console.print(
+        f"converged after {rounds}"
+        if calibration.converged
+        else f"[bold red]not converged[/] in {rounds}: these tests tell too little; give more, or stronger ones"
+    )
+
+
+def _parameters(calibration: Calibration) -> Table:
+    table = _table("Parameters", "name", "nominal", "estimate", "unit", "90 % interval", "sd/prior", "verdict")
+    for i, knob in enumerate(calibration.knobs):
+        low, high = calibration.interval(i)
+        estimate = knob.at(float(calibration.estimate[i]))
+        interval = f"{low:.5g} to {high:.5g}" if calibration.converged else "none"
+        numbers = f"{knob.value:.5g}", f"{estimate:.5g}", knob.unit, interval
+        table.add_row(escape(knob.name), *numbers, _share(calibration, i), verdict_on(calibration, i))
+    return table
+
+
+def _sensors(calibration: Calibration) -> Table:
+    first, distance = len(calibration.knobs), far(calibration)
+    order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
+    outside, allowed = beyond(calibration), stated_range(calibration)
+    found = [i for i in order if outside[i]]
+    title = f"Errors of the sensors: {len(found)} of {len(order)} found, {range_words(calibration)}"
+    table = _table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
+    for i in found:
+        unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / allowed[i]
+        numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{share:.0%}", f"{distance[i]:+.1f}"
+        table.add_row(escape(unknown.name), *numbers, _share(calibration, i))
+    return table
+
+
+def _misfits(calibration: Calibration) -> Table:
+    kinds = [k for k, after in enumerate(calibration.misfit_after.T) if np.isfinite(after).any()]
+    title = "Misfit before, after; 1 is sensor noise alone"
+    table = _table(title, "test", *(RESIDUALS[k] for k in kinds))
+    for test, before, after in zip(calibration.tests, calibration.misfit_before, calibration.misfit_after, strict=True):
+        table.add_row(escape(test), *(f"{before[k]:.3g}, {after[k]:.3g}" for k in kinds))
+    return table
+
+
+def _share(calibration: Calibration, i: int) -> str:
+    return f"{calibration.sd[i] / calibration.prior[i]:.2g}"
+
+
+def _table(title: str, *heads: str) -> Table:
+    table = Table(title=escape(title), title_justify="left")
+    for n, head in enumerate(heads):
+        table.add_column(escape(head), justify="right" if n else "left")
+    return table

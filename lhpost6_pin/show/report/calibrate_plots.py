@@ -1,0 +1,181 @@
+"""Figures of a calibration: estimates beside their priors, groups of residuals beside all, which test tells of what."""
+
+import html
+from collections.abc import Sequence
+from statistics import NormalDist
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...identification.calibration import Calibration
+from ...identification.calibration.verdicts import changed_knobs, contradictions
+from .layout import stacked_layout, time_band
+from .page import Figure, Markup, figure, number, paragraph, shaded, table
+from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION
+
+__all__ = ["INTERVAL", "PROBABILITY", "forest_block", "half_interval", "information_blocks", "subset_block"]
+
+Array = NDArray[np.float64]
+
+PROBABILITY = 0.9  # of every interval that is drawn or printed
+INTERVAL = f"{100 * PROBABILITY:g}\N{NO-BREAK SPACE}% interval"
+ROW, SUBSET_ROW = 19, 38  # [CSS px] height of a parameter's row
+TOGETHER = "all together"
+SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "star", "hexagon")
+_SHADES = (4, 3, 2, 0)
+"""From much to little told."""
+
+
+class Dots(NamedTuple):
+    """Estimates with intervals: place (m,) up the figure, value and half interval (m,) in prior deviations."""
+
+    name: str
+    place: Sequence[float]
+    value: Sequence[float]
+    half: Sequence[float]
+    labels: Sequence[str]
+    color: str
+    symbol: str
+    size: int = 8  # [CSS px]
+
+
+def half_interval(sd: float) -> float:
+    """Half of the interval of an estimate with standard deviation `sd`."""
+    return NormalDist().inv_cdf(0.5 + 0.5 * PROBABILITY) * sd
+
+
+def _reach(calibration: Calibration) -> float:
+    """Half of a drawn interval in standard deviations; no length where the fit did not converge."""
+    return half_interval(1.0) if calibration.converged else 0.0
+
+
+def _drawn(calibration: Calibration) -> str:
+    """What estimates are drawn with."""
+    if calibration.converged:
+        return f"with {INTERVAL}s"
+    return "where the fit stopped without converging, so without intervals"
+
+
+def forest_block(calibration: Calibration) -> Markup:
+    """Return every knob's estimate with its interval beside its prior."""
+    count = len(calibration.knobs)
+    changed, informed = changed_knobs(calibration), calibration.informed
+    groups = {
+        "differs from nominal": (changed, VERMILLION, "diamond"),
+        "does not differ": ([i for i in range(count) if informed[i] and i not in changed], BLUE, "circle"),
+        "not informed": ([i for i in range(count) if not informed[i] and i not in changed], "#6e7781", "circle-open"),
+    }
+    where, reach = calibration.estimate / calibration.prior, _reach(calibration) * calibration.sd / calibration.prior
+    names = [knob.name for knob in calibration.knobs]
+    dots = [
+        Dots(name, rows, where[rows].tolist(), reach[rows].tolist(), [names[i] for i in rows], color, symbol)
+        for name, (rows, color, symbol) in groups.items()
+        if rows
+    ]
+    words = (
+        f"Estimates {_drawn(calibration)}, in standard deviations of their priors from nominal; the band is "
+        f"the {INTERVAL} of the prior, before the campaign."
+    )
+    return figure(_forest("forest", "Parameters beside their priors", words, names, dots, ROW))
+
+
+def subset_block(calibration: Calibration) -> Markup:
+    """Return what each group of residuals says of each knob by itself, beside all together."""
+    count, prior, limit = len(calibration.knobs), calibration.prior, calibration.numbers.number("report.informed")
+    own = calibration.numbers.number("simulation.deviations")
+    groups = [s for s in calibration.subsets if np.any(s.sd[:count] < limit * prior[:count])]
+    if not groups:
+        return paragraph("No group tells of a parameter by itself.")
+    tells = {s.name: [i for i in range(count) if s.sd[i] < limit * prior[i]] for s in groups}
+    told = sorted({i for knobs in tells.values() for i in knobs})
+    speakers = {i: [TOGETHER, *(name for name, knobs in tells.items() if i in knobs)] for i in told}
+    names = calibration.names
+
+    def place(name: str, i: int) -> float:
+        """Place of a group's estimate up the figure: those of one knob stand close together."""
+        spoken = speakers[i]
+        return told.index(i) + 0.8 * ((spoken.index(name) + 0.5) / len(spoken) - 0.5)
+
+    def dots_of(name: str, knobs: Sequence[int], estimate: Array, sd: Array, color: str, symbol: str) -> Dots:
+        places, labels = [place(name, i) for i in knobs], [names[i] for i in knobs]
+        where, half = ([float(x[i] / prior[i]) for i in knobs] for x in (estimate, _reach(calibration) * sd))
+        return Dots(name, places, where, half, labels, color, symbol)
+
+    series = [dots_of(TOGETHER, told, calibration.estimate, calibration.sd, BLACK, "line-ns-open")]
+    for k, s in enumerate(groups):  # the last colour is black: all together
+        color, symbol = CYCLE[k % (len(CYCLE) - 1)], SYMBOLS[k % len(SYMBOLS)]
+        series.append(dots_of(s.name, tells[s.name], s.estimate, s.sd, color, symbol))
+    alone = {s.name: s.estimate for s in groups}
+    marked = [(name, i) for name, i, _ in contradictions(calibration) if i in tells.get(name, ())]
+    if marked:
+        places, where = [place(*one) for one in marked], [float(alone[name][i] / prior[i]) for name, i in marked]
+        labels, half = [f"{names[i]}, {name}" for name, i in marked], [0.0] * len(marked)
+        series.append(Dots("contradicts all together", places, where, half, labels, VERMILLION, "circle-open", 17))
+    words = (
+        f"Estimates {_drawn(calibration)}: of each group of residuals alone, and of open-loop simulation from the "
+        "recorded spools, with the same priors; a group is left out where its predicted deviation is "
+        f"above {limit:g} of the prior's. Ringed: {calibration.limit:g} deviations or more from all together, "
+        f"simulation {own:g}. "
+        "Drag to zoom; a double click shows all."
+    )
+    shown = [names[i] for i in told]
+    return figure(_forest("subsets", "Gas law, flows and wrenches by themselves", words, shown, series, SUBSET_ROW))
+
+
+def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> list[Markup]:
+    """Return, for some unknowns, the predicted deviation from each test alone over the prior, as a shaded table."""
+    informed = calibration.numbers.number("report.informed")
+    edges = (0.2 * informed, 0.5 * informed, informed)
+    said = [f"up to {edge:g}" for edge in edges] + [f"above {informed:g}: next to nothing"]
+    key = " ".join(map(shaded, said, _SHADES))
+    ratios = np.vstack([calibration.sd, calibration.alone])[:, unknowns] / calibration.prior[unknowns]
+    rows = [
+        (
+            calibration.names[i],
+            *(shaded(number(float(r), 2), _SHADES[int(np.searchsorted(edges, r))]) for r in column),
+        )
+        for i, column in zip(unknowns, ratios.T, strict=True)
+    ]
+    header = ("Unknown", "All tests", *calibration.tests)
+    caption = "Predicted deviation from a test alone, over that of the prior"
+    return [paragraph(Markup(key)), table(caption, header, rows)]
+
+
+def _forest(
+    name: str, title: str, words: str, labels: Sequence[str], series: Sequence[Dots], row_height: int
+) -> Figure:
+    """Rows of estimates over one axis, the first on top."""
+    axis = "Prior standard deviations from nominal"
+    layout = stacked_layout([""], axis, row_height=row_height * max(len(labels), 3))
+    layout["hovermode"] = "closest"
+    layout["yaxis"] |= {
+        "range": [len(labels) - 0.5, -0.5],
+        "tickvals": list(range(len(labels))),
+        "ticktext": [html.escape(label) for label in labels],
+        "tickfont": {"size": 11},
+        "zeroline": False,
+    }
+    layout["xaxis"] |= {"zeroline": True, "zerolinecolor": BLACK, "zerolinewidth": 1}
+    layout["shapes"].append(time_band(-half_interval(1.0), half_interval(1.0), 0, GREY))
+    return Figure(name, title, words, [_trace(dots) for dots in series], layout, layout["height"])
+
+
+def _trace(dots: Dots) -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": html.escape(dots.name),
+        "x": list(dots.value),
+        "y": list(dots.place),
+        "text": [html.escape(label) for label in dots.labels],
+        "customdata": list(dots.half),
+        "hovertemplate": "%{text}: %{x:.3f}" + " ± %{customdata:.3f}" * any(dots.half),
+        "marker": {
+            "color": dots.color,
+            "symbol": dots.symbol,
+            "size": dots.size,
+            "line": {"width": 1.6, "color": dots.color},
+        },
+        "error_x": {"type": "data", "array": list(dots.half), "color": dots.color, "thickness": 1.6, "width": 3},
+    }

@@ -1,0 +1,222 @@
+"""Sections of a calibration report: parameters, sensors, what is left, what tells of what, what is alike."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...identification.calibration import Calibration
+from ...identification.calibration.calibration_summary import alike_words, contradiction_words, cut_strokes, range_words
+from ...identification.calibration.verdicts import beyond, contradictions, far, stated_range, verdict_on
+from ...identification.residuals import RESIDUALS
+from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
+from .page import Markup, details, number, paragraph, table
+from .run_motion import percent
+
+__all__ = [
+    "alike_blocks",
+    "change_of",
+    "group_blocks",
+    "knob_blocks",
+    "misfit_blocks",
+    "sensor_blocks",
+    "test_blocks",
+]
+
+LISTED = 15  # rows of a table before the rest is folded away
+KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force": "force against pressure"}
+
+
+# ---------------------------------------------------------------------------------------- parameters and sensors
+def knob_blocks(calibration: Calibration) -> list[Markup]:
+    """Return every parameter beside its prior, drawn and in numbers."""
+    outside = far(calibration)
+    informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
+    rows = []
+    for i, knob in enumerate(calibration.knobs):
+        low, high = calibration.interval(i, PROBABILITY)
+        rows.append(
+            (
+                knob.name,
+                _marked(calibration, i),
+                _plain(knob.value),
+                _plain(knob.at(float(calibration.estimate[i]))),
+                knob.unit,
+                change_of(calibration, i),
+                number(float(outside[i]), 2),
+                number(float(calibration.sd[i] / calibration.prior[i]), 2),
+                f"{_plain(low)} to {_plain(high)}" if calibration.converged else "none",
+            )
+        )
+    how = (
+        "At its bound: as far from nominal as the fit lets it go, by its prior or since no machine could be built. "
+        f"Changed: farther from nominal than {calibration.limit:g} predicted deviations, and than {material:g} of the "
+        "prior's. Unchanged: nearer, and the campaign "
+        f"has told something of it, which is a predicted deviation below {informed:g} of the prior's. Not informed: "
+        "what stands here is mostly the prior. A height is the mean over its kind's components, which move "
+        "together."
+    )
+    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "In deviations")
+    heads = (*header, "Predicted over prior", INTERVAL)
+    cut = map(paragraph, cut_strokes(calibration))
+    return [forest_block(calibration), paragraph(how), table("All parameters", heads, rows), *cut]
+
+
+def sensor_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the errors of the sensors, those that stand out first."""
+    first, outside = len(calibration.knobs), beyond(calibration)
+    order = sorted(range(first, len(calibration.prior)), key=lambda i: -abs(far(calibration)[i]))
+    rows = [_sensor_row(calibration, i) for i in order]
+    differ = sum(bool(outside[i]) for i in order)
+    how = paragraph(
+        "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
+        "parameters are free of these errors; the override file does not hold them. Every sensor is off by a little: "
+        f"{differ} of {len(order)} errors are large enough to be found, beyond {calibration.limit:g} predicted "
+        f"deviations from zero, {range_words(calibration)}."
+    )
+    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "In deviations", "Predicted over prior")
+    caption = "Errors found, the clearest first"
+    blocks = [how]
+    if differ:
+        blocks.append(table(caption, header, rows[:differ]))
+    if differ < len(rows):
+        blocks.append(details(f"The other {len(rows) - differ}", table("Other errors", header, rows[differ:])))
+    return blocks
+
+
+def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
+    unknown = calibration.unknowns[i - len(calibration.knobs)]
+    scale, unit = {"gain": (100.0, "%"), "delay": (1e3, "ms")}.get(unknown.kind, (1.0, unknown.unit))
+    return (
+        unknown.name,
+        number(scale * float(calibration.estimate[i])),
+        number(scale * half_interval(float(calibration.sd[i])), 2) if calibration.converged else "none",
+        unit,
+        percent(abs(float(calibration.estimate[i])) / float(stated_range(calibration)[i])),
+        number(float(far(calibration)[i]), 2),
+        number(float(calibration.sd[i] / calibration.prior[i]), 2),
+    )
+
+
+# ------------------------------------------------------------------------------------------- residuals and tests
+def misfit_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the misfit of every test before and after."""
+    before, after = calibration.misfit_before, calibration.misfit_after
+    kinds = [k for k in range(after.shape[1]) if np.isfinite(after[:, k]).any()]
+    rows = [
+        (test, *(f"{number(float(before[t, k]))} → {_judged(calibration, float(after[t, k]))}" for k in kinds))
+        for t, test in enumerate(calibration.tests)
+    ]
+    how = (
+        "Mean square of the residuals over what sensor noise alone would leave, with the machine and the sensors as "
+        "given and as calibrated: 1 is noise. Wrench: inertia, weight and friction against what actuators and struts "
+        "deliver. Oil flow: continuity in every chamber. Gas law: strut pressures against their lengths. Force: load "
+        f"cells against chamber pressures. ! marks what is above {calibration.noise_alone:g}."
+    )
+    header = ("Test", *(KINDS[RESIDUALS[k]] for k in kinds))
+    return [paragraph(how), table("Misfit before → after", header, rows)]
+
+
+def test_blocks(calibration: Calibration) -> list[Markup]:
+    """Return what each test alone would tell."""
+    knobs, p = len(calibration.knobs), len(calibration.prior)
+    how = paragraph(
+        "What would be known if a test were the only one: predicted deviation over the prior's, so 1 is nothing and "
+        "0.1 ten times better than before. Sensor errors are unknown at the same time."
+    )
+    blocks = [how, *information_blocks(calibration, range(knobs))]
+    if p > knobs:
+        blocks.append(details("Errors of the sensors", *information_blocks(calibration, range(knobs, p))))
+    return blocks
+
+
+def group_blocks(calibration: Calibration) -> list[Markup]:
+    """Return what groups of residuals say by themselves, contradictions first."""
+    found = contradictions(calibration)
+    rows = []
+    for one in found:
+        i = one.unknown
+        subset = next(s for s in calibration.subsets if s.name == one.subset)
+        unit = calibration.knobs[i].unit if i < len(calibration.knobs) else _unit(calibration, i)
+        alone, together = (_plain(_value(calibration, i, float(x[i]))) for x in (subset.estimate, calibration.estimate))
+        rows.append((calibration.names[i], one.subset, alone, together, unit, number(one.deviations, 2)))
+    how = paragraph(
+        f"{contradiction_words(calibration)} Many more than by chance say that an equation lacks something. Noise that "
+        "residuals share is taken off in the order wrench, flow, gas law, force: a later group holds a little of the "
+        "earlier ones. "
+        "Simulation drives the plant by the recorded spools, in open loop, and compares platen velocity and chamber "
+        "pressures, with the errors of the sensors held at what all together say of them; noise of the recorded spools "
+        "biases it by more than its predicted deviations say, so it is let go farther."
+    )
+    header = ("Unknown", "Group", "Group alone", "All together", "Unit", "In deviations")
+    blocks = [how]
+    if rows:
+        blocks += _folded("Groups that contradict all together", header, rows)
+    return [*blocks, subset_block(calibration)]
+
+
+def alike_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the pairs of unknowns that cannot be told apart."""
+    pairs = calibration.alike()
+    limit = calibration.numbers.number("report.alike")
+    if not pairs:
+        return [paragraph(f"No two unknowns are correlated by {limit:g} or more.")]
+    own = {knob.name for knob in calibration.knobs}
+    how = paragraph(
+        f"{alike_words(calibration)} These are pairs correlated by {limit:g} or more: the campaign tells their sum "
+        "(correlation negative) or difference (positive), in prior deviations, much better than either; do not read "
+        "one without the other."
+    )
+    groups = (
+        ("Parameters with each other", [p for p in pairs if p[0] in own and p[1] in own], LISTED),
+        ("A parameter with a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)], LISTED),
+        ("Sensors with each other", [p for p in pairs if p[0] not in own and p[1] not in own], 0),  # all folded away
+    )
+    blocks = [how]
+    for caption, found, listed in groups:
+        rows = [(a, b, f"{r:+.4f}".replace("-", "−")) for a, b, r in found]
+        blocks += _folded(caption, ("One", "Other", "Correlation"), rows, listed) if rows else []
+    return blocks
+
+
+def _folded(
+    caption: str, header: Sequence[str], rows: Sequence[Sequence[object]], listed: int = LISTED
+) -> list[Markup]:
+    """A table, its rows after those listed folded away."""
+    blocks = [table(caption, header, rows[:listed])] if listed else []
+    if len(rows) > listed:
+        more = f"{len(rows) - listed} more" if listed else f"{caption}: {len(rows)} pairs"
+        blocks.append(details(more, table(f"{caption}, {more}" if listed else caption, header, rows[listed:])))
+    return blocks
+
+
+# --------------------------------------------------------------------------------------------------------- words
+def _judged(calibration: Calibration, misfit: float) -> str:
+    return f"{number(misfit)}{' !' * (misfit > calibration.noise_alone)}"
+
+
+def _marked(calibration: Calibration, i: int) -> str:
+    verdict = verdict_on(calibration, i)
+    return {"at its bound": "! at its bound", "changed": "◆ changed"}.get(verdict, verdict)
+
+
+def _plain(value: float) -> str:
+    """A number in the unit of the machine file, with as many digits as a calibration can give."""
+    mantissa, _, power = f"{value:.4e}".partition("e")
+    plain = f"{float(f'{value:.5g}'):,.10g}" if -4 <= int(power) < 8 else f"{float(mantissa):g}e{int(power)}"
+    return plain.replace("-", "−")
+
+
+def _value(calibration: Calibration, i: int, coordinate: float) -> float:
+    return calibration.knobs[i].at(coordinate) if i < len(calibration.knobs) else coordinate
+
+
+def _unit(calibration: Calibration, i: int) -> str:
+    return calibration.unknowns[i - len(calibration.knobs)].unit
+
+
+def change_of(calibration: Calibration, i: int) -> str:
+    """How far knob i is from nominal, signed: relative, or in its unit."""
+    knob, coordinate = calibration.knobs[i], float(calibration.estimate[i])
+    if knob.form == "factor":
+        return f"{'+' * (coordinate > 0)}{percent(coordinate)}"
+    return f"{'+' * (coordinate > 0)}{number(coordinate)}\N{NO-BREAK SPACE}{knob.unit}"

@@ -1,0 +1,169 @@
+"""The numbers a test is judged by: tracking per axis, use of the valves, drift of the platen.
+
+Everything is computed from a record alone (dimensions `time`, `axis`, `actuator`, ...); what a record lacks
+comes out as not-a-number and is named by the report. Axis order x y z roll pitch yaw; SI.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ...core.errors import RecordError
+from ...data.signals import align, delay, lowpass_zero_phase, rrmse
+
+__all__ = [
+    "QUANTITIES",
+    "Drift",
+    "SpoolUse",
+    "Tracking",
+    "asked_axes",
+    "channel",
+    "drift",
+    "peak_window",
+    "peaks",
+    "sampling",
+    "spool_use",
+    "track",
+]
+
+QUANTITIES = ("displacement", "velocity", "acceleration")
+SQUARED = float(np.sqrt(np.finfo(np.float64).tiny))  # what is smaller has no square to divide by
+ASKED = 1e-3  # an axis is asked to move if its target reaches this share of the largest one (1 rad as 1 m)
+DRIFT_BAND = 0.2  # [Hz] what the displacement error does below this is called drift
+FEWEST = 64  # samples, below which no delay is sought and no tracking judged
+LONGEST_DELAY = 0.25  # [s] sought either way; ten times what such a table has
+END = 0.5  # [s] the residual offset is the mean error over this last part of the record
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How one quantity of one axis followed its target; not-a-number where there is no target."""
+
+    axis: str
+    place: int  # of the axis in the record's order
+    quantity: str
+    peak_target: float  # SI
+    peak_achieved: float  # SI
+    rrmse: float  # as recorded
+    delay: float  # [s], positive when the table is late
+    rrmse_aligned: float  # after removing the delay
+    aligned: NDArray[np.float64] | None  # (n,) achieved motion with the delay removed, SI
+
+
+@dataclass(frozen=True)
+class SpoolUse:
+    """How much of its stroke a fourth-stage spool used."""
+
+    actuator: str
+    peak: float  # largest |x|, 1 is the full stroke
+    rms: float
+    saturated: float  # share of the time at the limit or beyond
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Slow part of the displacement error, achieved minus target."""
+
+    error: NDArray[np.float64]  # (n, n_axes), low-passed, SI
+    cutoff: float  # [Hz]
+    largest: NDArray[np.float64]  # (n_axes,) greatest |error|
+    residual: NDArray[np.float64]  # (n_axes,) mean unfiltered error over the end of the record
+
+
+def channel(record: xr.Dataset, name: str, dim: str) -> NDArray[np.float64]:
+    """Return the variable as float64 of shape (n, n_dim)."""
+    return np.asarray(record[name].transpose("time", dim).values, dtype=np.float64)
+
+
+def sampling(record: xr.Dataset) -> tuple[float, float]:
+    """Return first time and sample interval [s]; raise `RecordError` if time is missing or not uniform."""
+    if "time" not in record.coords or record.sizes["time"] < 2:
+        raise RecordError("the record holds no time series: it needs a coordinate `time` of two samples or more")
+    time = np.asarray(record["time"].values, dtype=np.float64)
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    uneven = np.flatnonzero(~(np.abs(np.diff(time) - step) <= 0.01 * abs(step)))  # catches NaN as well
+    if step <= 0.0 or len(uneven):
+        where = int(uneven[0]) if len(uneven) else 0
+        raise RecordError(
+            f"`time` is not uniform: sample {where + 1} follows at an uneven interval; resample the record"
+        )
+    return float(time[0]), float(step)
+
+
+def asked_axes(record: xr.Dataset) -> list[str]:
+    """Return the names of the axes that the test asked to move; without a target, all that moved."""
+    name = "reference_displacement" if "reference_displacement" in record else "platen_displacement"
+    if name not in record:
+        return []
+    motion = channel(record, name, "axis")
+    size = np.nan_to_num(peaks(motion - motion[0]))
+    return [str(axis) for axis, peak in zip(record["axis"].values, size, strict=True) if peak > ASKED * size.max()]
+
+
+def track(record: xr.Dataset, quantity: str) -> list[Tracking]:
+    """Return how `quantity` of every axis followed its target; empty if the record has no such motion."""
+    if f"platen_{quantity}" not in record:
+        return []
+    _, step = sampling(record)
+    achieved = channel(record, f"platen_{quantity}", "axis")
+    known = f"reference_{quantity}" in record
+    target = channel(record, f"reference_{quantity}", "axis") if known else np.full_like(achieved, np.nan)
+    asked = asked_axes(record) if known and len(achieved) >= FEWEST else []
+    longest = min(LONGEST_DELAY, len(achieved) * step / 8.0)
+    found = []
+    for k, axis in enumerate(map(str, record["axis"].values)):
+        whole, late, without, shifted = np.nan, np.nan, np.nan, None
+        if axis in asked and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
+            whole = float(rrmse(target[:, k], achieved[:, k]))
+            late = float(delay(target[:, k], achieved[:, k], step, longest))
+            shifted = align(achieved[:, k], late, step) if np.isfinite(late) else achieved[:, k]
+            without = float(rrmse(target[:, k], shifted))
+        wanted, reached = float(peaks(target[:, k])), float(peaks(achieved[:, k]))
+        found.append(Tracking(axis, k, quantity, wanted, reached, whole, late, without, shifted))
+    return found
+
+
+def spool_use(record: xr.Dataset) -> list[SpoolUse]:
+    """Return the use of every spool, by its feedback or else its command; empty without either."""
+    name = next((name for name in ("spool_position", "spool_command") if name in record), None)
+    if name is None:
+        return []
+    x = channel(record, name, "actuator")
+    x = np.where(np.isfinite(x), x, 0.0)
+    columns = peaks(x), np.sqrt(np.mean(x**2, axis=0)), np.mean(np.abs(x) >= 1.0, axis=0)
+    return [
+        SpoolUse(str(name), *map(float, row)) for name, *row in zip(record["actuator"].values, *columns, strict=True)
+    ]
+
+
+def drift(record: xr.Dataset) -> Drift | None:
+    """Return the slow part of the displacement error, or nothing where target or motion is missing."""
+    if not {"reference_displacement", "platen_displacement"} <= set(record.variables):
+        return None
+    _, step = sampling(record)
+    error = channel(record, "platen_displacement", "axis") - channel(record, "reference_displacement", "axis")
+    if not np.isfinite(error).all():
+        return None
+    cutoff = min(max(DRIFT_BAND, 2.0 / (len(error) * step)), 0.4 / step)  # two periods at least fit in the record
+    slow = lowpass_zero_phase(error, step, cutoff, order=4)
+    end = error[-max(int(END / step), 1) :]
+    return Drift(slow, cutoff, peaks(slow), end.mean(axis=0))
+
+
+def peaks(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Greatest finite |value| of each column (n, ...) -> (...); not-a-number for a column without any."""
+    size = np.where(np.isfinite(values), np.abs(values), -np.inf).max(axis=0)
+    return np.where(size >= 0.0, size, np.nan)
+
+
+def peak_window(values: NDArray[np.float64], step: float, duration: float) -> tuple[int, int] | None:
+    """First and last sample of the `duration` [s] around the peak of (n,); nothing if the record is hardly longer."""
+    n, length = len(values), int(duration / step)
+    if n <= 2 * length:
+        return None
+    values = np.nan_to_num(values)
+    peak = int(np.abs(values - values.mean()).argmax())
+    first = min(max(peak - length // 2, 0), n - length)
+    return first, first + length

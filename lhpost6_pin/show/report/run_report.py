@@ -1,0 +1,145 @@
+"""The report of one test on the table, simulated or measured."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from ...core.errors import UnknownNameError
+from .page import Headline, Level, Page, number, save_page, versions
+from .run_components import Limits
+from .run_limits import LimitUse, limit_uses, nearest_limits
+from .run_metrics import QUANTITIES, SpoolUse, Tracking, asked_axes, sampling, spool_use, track
+from .run_motion import axis_scale, shown_as
+from .run_sections import run_sections
+from .run_verdict import headlines, judge
+
+__all__ = ["LIMIT_NAMES", "RunSummary", "write_run_report"]
+
+LIMIT_NAMES = (
+    "displacement",  # (n_axes,) [m, rad]
+    "velocity",  # (n_axes,) [m/s, rad/s]
+    "acceleration",  # (n_axes,) [m/s2, rad/s2]
+    "actuator_stroke",  # (n_act,) one-sided [m]
+    "actuator_force",  # (n_act,) largest force [N]; of pushing alone where actuator_pull is given
+    "actuator_pull",  # (n_act,) magnitude of the largest pulling force [N]; 0: it cannot pull
+    "actuator_extending",  # (n_act,) speed of the unloaded piston at full spool [m/s]
+    "actuator_retracting",  # (n_act,) the other way [m/s]
+    "supply_pressure",  # [Pa]
+    "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
+)
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What a run report says first, for a terminal or another report."""
+
+    path: Path
+    verdict: str
+    level: Level
+    headlines: tuple[Headline, ...]
+    tracking: tuple[Tracking, ...]
+    spools: tuple[SpoolUse, ...]
+    limits: tuple[LimitUse, ...]  # of every axis and actuator whose limit is known
+    missing: tuple[str, ...]  # variables of the record layout that the record lacks
+
+    @property
+    def nearest(self) -> list[LimitUse]:
+        """Of each quantity the limit that the test came nearest to, the nearest of all first."""
+        return nearest_limits(self.limits)
+
+
+EXPECTED = (
+    *(f"platen_{q}" for q in QUANTITIES),
+    *(f"reference_{q}" for q in QUANTITIES),
+    "actuator_displacement",
+    "actuator_force",
+    "chamber_pressure_a",
+    "chamber_pressure_b",
+    "strut_pressure",
+    "spool_command",
+    "spool_position",
+)
+
+
+def write_run_report(
+    record: xr.Dataset,
+    path: Path | str,
+    *,
+    limits: Mapping[str, ArrayLike] | None = None,
+    notes: Sequence[str] | None = None,
+    command: str | None = None,
+    machine_table: Iterable[Sequence[Any]] | None = None,
+) -> RunSummary:
+    """Write the self-contained HTML report of a test to `path` and return its summary.
+
+    `limits` maps names of `LIMIT_NAMES` to what the machine can give (SI; not-a-number means no limit, as does 0
+    except for `actuator_pull`),
+    `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name, value, unit,
+    source, assumed). What the record lacks is named where it would have been shown.
+    Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
+    limit.
+    """
+    bounds = _checked(limits or {})
+    sampling(record)
+    found = [row for quantity in QUANTITIES for row in track(record, quantity)]
+    spools = spool_use(record)
+    notes = [*(notes or ()), *_gaps(record)]
+    uses = limit_uses(record, found, spools, bounds)
+    verdict, level = judge(record, found, spools, uses, notes)
+    page = Page(
+        kind=f"Run report · {record.attrs.get('kind', 'test')}",
+        title=str(record.attrs.get("title") or record.attrs.get("test") or "Test on the shake table"),
+        asked=_asked(record, found),
+        verdict=verdict,
+        level=level,
+        headlines=headlines(found, uses),
+        sections=run_sections(record, found, spools, bounds, uses, list(machine_table or ())),
+        notes=notes,
+        command=command,
+        versions=versions(),
+    )
+    absent = tuple(name for name in EXPECTED if name not in record)
+    said = (verdict, level, tuple(page.headlines))
+    return RunSummary(save_page(page, path), *said, tuple(found), tuple(spools), tuple(uses), absent)
+
+
+def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
+    for name in limits:
+        if name not in LIMIT_NAMES:
+            raise UnknownNameError("limit", name, LIMIT_NAMES)
+    values = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in limits.items()}
+    least = {"actuator_pull": 0.0}  # elsewhere 0 is no limit
+    tiny = np.finfo(float).tiny
+    return {name: np.where(value >= least.get(name, tiny), value, np.nan) for name, value in values.items()}
+
+
+def _gaps(record: xr.Dataset) -> list[str]:
+    """Name the channels that hold samples that are not numbers, and since when."""
+    found = []
+    for name, variable in record.data_vars.items():
+        if "time" not in variable.dims or variable.dtype.kind != "f":
+            continue
+        gaps = ~np.isfinite(variable.transpose("time", ...).values).reshape(record.sizes["time"], -1)
+        if gaps.any():
+            first = float(record["time"].values[gaps.any(axis=1).argmax()])
+            found.append(f"{name} holds samples that are not numbers, the first at {first:.4f} s.")
+    return found
+
+
+def _asked(record: xr.Dataset, found: Sequence[Tracking]) -> str:
+    _, step = sampling(record)
+    length = f"{number(record.sizes['time'] * step)} s at {1.0 / step:.6g} samples a second"
+    asked = asked_axes(record)
+    peaks = [row for row in found if row.quantity == "displacement" and row.axis in asked]
+    if "reference_displacement" not in record:
+        return f"{length}; the record does not say what was asked."
+    words = ", ".join(f"{row.axis} {shown_as(row.peak_target, axis_scale(row.axis, 'displacement'))}" for row in peaks)
+    specimen = str(record.attrs.get("specimen", "none"))
+    load = "bare table" if specimen == "none" else f"specimen {specimen}"
+    count = f"{len(asked)} of {record.sizes['axis']} axes"
+    return f"Follow a motion on {count} (peak displacement {words}), {length}, {load}."

@@ -1,0 +1,214 @@
+"""The report of a tuning: bands, margins and Bode plots before and after, and the gains chosen."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ...tuning.tune import AxisTuning, Tuning
+from .control_blocks import assumption_blocks, decibels, degrees, gain_table, load_of
+from .page import (
+    Headline,
+    Level,
+    Markup,
+    Page,
+    Section,
+    bullet_list,
+    grid,
+    number,
+    paragraph,
+    save_page,
+    table,
+    versions,
+)
+from .plots import SCALES
+from .run_motion import shown_as
+from .tune_plots import bode_figure, overview_figure
+
+__all__ = ["write_tune_report"]
+
+# Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
+FOLLOWED = (0.1, 20.0)  # [Hz]
+GAIN_MARGIN = 6.0  # [dB]
+
+
+def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Path:
+    """Write the self-contained HTML report of a tuning to `path` and return the path."""
+    verdict, level = _judge(tuning)
+    page = Page(
+        kind="Tuning report · simulated",
+        title=f"Tuning of {tuning.machine.name}",
+        asked=(
+            f"Tune the three-variable control of {load_of(tuning.machine)}, starting from “{tuning.before.name}”, so "
+            f"that every axis follows its reference within {tuning.tolerance:g} dB and coherently (coherence at "
+            f"least {tuning.coherence:g})."
+        ),
+        verdict=verdict,
+        level=level,
+        headlines=_headlines(tuning),
+        sections=_sections(tuning),
+        command=command or None,
+        versions=versions(),
+    )
+    return save_page(page, path)
+
+
+def _follows(axis: AxisTuning) -> bool:
+    """True if the band holds every measured frequency from 0.1 to 20 Hz."""
+    f = axis.after.frequency
+    inside = f[(f >= FOLLOWED[0]) & (f <= FOLLOWED[1])]
+    return bool(inside.size and axis.band_after[0] <= inside[0] and axis.band_after[1] >= inside[-1])
+
+
+def _judge(tuning: Tuning) -> tuple[str, Level]:
+    words: list[str] = []
+    level: Level = "good"
+    band = f"from {FOLLOWED[0]:g} to {FOLLOWED[1]:g} Hz"
+    short = [axis for axis in tuning.axes if not _follows(axis)]
+    if short:
+        found = ", ".join(f"{axis.axis} {_band(axis.band_after)}" for axis in short)
+        words.append(f"Not every axis is within {tuning.tolerance:g} dB and coherent {band}: {found}.")
+        level = "attention"
+    else:
+        words.append(f"Every axis is within {tuning.tolerance:g} dB of its reference and coherent {band}.")
+    low = [axis for axis in tuning.axes if not 20.0 * np.log10(axis.margin_after.gain) >= GAIN_MARGIN]
+    if low:
+        found = ", ".join(f"{axis.axis} {decibels(axis.margin_after.gain)}" for axis in low)
+        words.append(f"Gain margin below {GAIN_MARGIN:g} dB: {found}.")
+        level = "attention"
+    else:
+        words.append(f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.")
+    if tuning.doubled:
+        words.append("With all master gains doubled at once the loop is stable.")
+    else:
+        words.append("With all master gains doubled at once the loop is unstable.")
+        level = "attention"
+    if any(np.isnan(axis.band_after[0]) for axis in tuning.axes):
+        level = "bad"
+    return " ".join(words), level
+
+
+def _headlines(tuning: Tuning) -> list[Headline]:
+    lost = [axis for axis in tuning.axes if np.isnan(axis.band_after[1])]
+    narrow = lost[0] if lost else min(tuning.axes, key=lambda axis: axis.band_after[1])
+    close = min(tuning.axes, key=lambda axis: axis.margin_after.gain)
+    late = [axis.delay_after for axis in tuning.axes]
+    return [
+        Headline(
+            _band(narrow.band_after),
+            "Narrowest band",
+            f"axis {narrow.axis}; before {_band(narrow.band_before)}",
+            "bad" if lost else "good" if all(map(_follows, tuning.axes)) else "attention",
+        ),
+        Headline(
+            decibels(close.margin_after.gain),
+            "Smallest gain margin",
+            f"axis {close.axis}, {_at(close.margin_after.gain_frequency)}; before {decibels(close.margin_before.gain)}",
+            "good" if 20.0 * np.log10(close.margin_after.gain) >= GAIN_MARGIN else "attention",
+        ),
+        Headline(
+            shown_as(tuning.delay, SCALES["time"]),
+            "Delay that all axes were tuned to have",
+            f"measured {number(1e3 * min(late))} to {shown_as(max(late), SCALES['time'])}",
+        ),
+    ]
+
+
+def _sections(tuning: Tuning) -> list[Section]:
+    names = [axis.axis for axis in tuning.axes]
+    return [
+        Section("bands", "Bands and margins", [_band_table(tuning), _margin_table(tuning), overview_figure(tuning)]),
+        Section("limits", "What limits 20 to 33 Hz", _limits(tuning)),
+        Section("bode", "Bode plots before and after", _bode(tuning)),
+        Section("gains", "Numbers chosen", gain_table(tuning.before, tuning.after, names)),
+        Section("steps", "Steps in order", _steps(tuning)),
+        Section(
+            "assumptions",
+            "Assumptions and sources",
+            assumption_blocks(tuning.machine, ("noise", "feedback_targets", "feedforward_targets")),
+        ),
+    ]
+
+
+def _band_table(tuning: Tuning) -> Markup:
+    rows = [
+        (
+            axis.axis,
+            _band(axis.band_before),
+            _band(axis.band_after),
+            shown_as(axis.delay_before, SCALES["time"]),
+            shown_as(axis.delay_after, SCALES["time"]),
+            *(_extremes(axis, after) for after in (False, True)),
+        )
+        for axis in tuning.axes
+    ]
+    spread = f"|T| {FOLLOWED[0]:g} to {FOLLOWED[1]:g} Hz"
+    header = ("Axis", "Band before", "Band after", "Delay before", "Delay after", f"{spread} before", f"{spread} after")
+    said = f"Unbroken band around 1 Hz within {tuning.tolerance:g} dB, coherence at least {tuning.coherence:g}"
+    return table(said, header, rows)
+
+
+def _extremes(axis: AxisTuning, after: bool) -> str:
+    """Least and largest gain in the band that must be followed."""
+    measured = axis.after if after else axis.before
+    f = measured.frequency
+    size = np.abs(measured.response[(f >= FOLLOWED[0]) & (f <= FOLLOWED[1]), 0, 0])
+    return f"{decibels(size.min(), sign=True)} to {decibels(size.max(), sign=True)}" if size.size else "–"
+
+
+def _margin_table(tuning: Tuning) -> Markup:
+    rows = []
+    for axis in tuning.axes:
+        cells = [axis.axis]
+        for margin in (axis.margin_before, axis.margin_after):
+            cells.append(f"{decibels(margin.gain)} {_at(margin.gain_frequency)}")
+            cells.append(f"{degrees(margin.phase)} {_at(margin.phase_frequency)}")
+        rows.append(cells)
+    header = ("Axis", "Gain before", "Phase before", "Gain after", "Phase after")
+    return table("Margins of the linear model without dry friction, the other axes closed", header, rows)
+
+
+def _limits(tuning: Tuning) -> list[Markup]:
+    said = paragraph(
+        "Up to the end of its band each axis is as flat as asked. What ends the band, from the response measured at "
+        "the next frequency:"
+    )
+    reasons = [
+        f"{axis.axis}, {_band(axis.band_after)}: {axis.limited_by or 'no reason was found'}" for axis in tuning.axes
+    ]
+    return [said, bullet_list(reasons)]
+
+
+def _bode(tuning: Tuning) -> list[Markup]:
+    how = (
+        "Response of the achieved to the wanted acceleration under white noise on that axis alone, drawn by another "
+        f"seed than the gains were fitted to. The shaded band is ±{tuning.tolerance:g} dB. Phase is shown after "
+        f"removing the common delay of {shown_as(tuning.delay, SCALES['time'])}, and as measured. The dashed line is "
+        "what the linear model without dry friction expects of the settings found; the dotted line ends the "
+        "operational band."
+    )
+    return [paragraph(how), grid(*(bode_figure(tuning, a) for a in range(len(tuning.axes))), pairs=True)]
+
+
+def _steps(tuning: Tuning) -> list[Markup]:
+    if not tuning.steps:
+        return [paragraph("No step was recorded.")]
+    rows = [
+        (f"{n}. {step.stage}", step.axis, number(step.before), number(step.after), step.reason)
+        for n, step in enumerate(tuning.steps, 1)
+    ]
+    how = (
+        "Feedback first, displacement gain Kx and force feedback KF, on the linear model; then feed-forward of "
+        "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured. The error expected of a fit is "
+        "that of the response to a pure delay, relative, over the band that it is fitted in."
+    )
+    return [paragraph(how), table("Decisions, SI", ("Step", "Axis", "Before", "After", "Reason"), rows)]
+
+
+def _band(band: tuple[float, float]) -> str:
+    if np.isnan(band[0]):
+        return "no band"
+    return f"{number(band[0], 2)} to {number(band[1])}\N{NO-BREAK SPACE}Hz"
+
+
+def _at(frequency: float) -> str:
+    return f"at {number(frequency)}\N{NO-BREAK SPACE}Hz" if np.isfinite(frequency) else ""

@@ -1,0 +1,125 @@
+"""Sections of a validation report on the machine over all tests: drift, closed loop, oil columns, servovalves."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.names import AXES
+from ...identification.validation import PHASES, Phase, Validation, Valves
+from .page import Markup, details, number, paragraph, table
+from .run_motion import percent, shown_as
+from .validate_plots import scale_of, valve_block
+from .validate_sections import why_not
+
+__all__ = ["drift_blocks", "lag_blocks", "resonance_blocks", "valve_blocks"]
+
+
+def drift_blocks(found: Validation) -> list[Markup]:
+    """Return the drift rate of every test's open loop."""
+    phases = [p for p in found.phases if p.number == 2 and not p.reason]
+    if not phases:
+        return [paragraph(f"Not known: {why_not(found, 2)}.")]
+    axes = [a.column for a in phases[0].of("displacement")]
+    rows = [
+        (p.test, *(number(1e6 * a.drift) for a in p.of("displacement")), f"{number(float(p.time[-1]))} s")
+        for p in phases
+    ]
+    how = (
+        "How fast the model's platen wanders off the measured one: least-squares slope of the displacement's error, "
+        "model less measured. Nothing holds an open loop in place: errors of pressures, spools, flow and leakage add "
+        "up, and a closed loop has no such drift. Rate times duration is about where the model ends, off the test."
+    )
+    header = ("Test", *(f"{axis} [{'µrad/s' if axis in AXES[3:] else 'µm/s'}]" for axis in axes), "Over")
+    worst = [
+        _furthest(phases, [k for k, axis in enumerate(axes) if (axis in AXES[3:]) == turns]) for turns in (False, True)
+    ]
+    said = paragraph(f"Furthest off: {'; '.join(words for words in worst if words)}.")
+    return [paragraph(how), table("Drift rate", header, rows), said]
+
+
+def _furthest(phases: Sequence[Phase], columns: Sequence[int]) -> str:
+    """Where drift leads in the test and column in which it leads furthest, in words."""
+    ends = [(p, p.of("displacement")[k], float(p.time[-1])) for p in phases for k in columns]
+    if not ends:
+        return ""
+    phase, one, seconds = max(ends, key=lambda end: abs(end[1].drift * end[2]))
+    scale = scale_of("displacement", one.column)
+    pair = phase.pair("displacement")
+    assert pair is not None
+    peak = float(np.abs(pair.measured[:, pair.columns.index(one.column)]).max())
+    moved = f"its peak was {shown_as(peak, scale)}" if one.moves else "it hardly moved"
+    off = shown_as(abs(one.drift) * seconds, scale)
+    return f"{one.column} in {phase.test}, where {moved}, by {off} after {number(seconds)} s"
+
+
+def lag_blocks(found: Validation) -> list[Markup]:
+    """Return how far test and simulated closed loop are behind what was asked for."""
+    rows = [
+        (p.test, lag.column, *(number(1e3 * value) for value in (lag.measured, lag.model, lag.model - lag.measured)))
+        for p in found.phases
+        for lag in p.lags
+    ]
+    if not rows:
+        return [paragraph(f"Not known: {why_not(found, 3)}.")]
+    how = (
+        "Delay of the platen's velocity behind that of the reference, of axes that moved. The difference is what "
+        "“delay removed” takes out."
+    )
+    header = ("Test", "Axis", "Measured [ms]", "Model [ms]", "Model less measured [ms]")
+    return [paragraph(how), table("Delay behind the reference", header, rows)]
+
+
+def valve_blocks(found: Validation) -> list[Markup]:
+    """Return spools against their commands: delays and transfer functions."""
+    valves = found.valves
+    if valves is None:
+        return [paragraph("Not known: no test has both spool_command and spool_position.")]
+    how = (
+        "Delay of each spool behind its command, from the slope of the transfer function's phase over all tests. The "
+        "model has a pure delay; a command held over the controller's samples adds half of one (0.244 ms at 2048 Hz), "
+        "and the spools' channels may have a skew of their own."
+    )
+    columns = zip(valves.columns, valves.delay, valves.standard_error, valves.model, strict=True)
+    rows = [
+        (c, number(1e3 * d, 4), number(1e3 * e, 2), number(1e3 * m, 4), number(1e3 * (m - d), 2))
+        for c, d, e, m in columns
+    ]
+    header = ("Actuator", "Measured [ms]", "Standard error [ms]", "Model [ms]", "Model less measured [ms]")
+    blocks = [valve_block(valves), details("Every delay", table("Servovalve delays", header, rows))]
+    return [paragraph(how, f" Measured: {_delays_of(valves)}."), *blocks]
+
+
+def resonance_blocks(found: Validation) -> list[Markup]:
+    """Return the oil columns as tests and model show them."""
+    rows = [
+        (
+            f"{p.test}, {PHASES[p.number]}",
+            r.column,
+            number(r.expected),
+            *(number(x.frequency, 4) for x in (r.measured, r.model)),
+            *(percent(x.sharpness) for x in (r.measured, r.model)),
+        )
+        for p in found.phases
+        for r in p.resonances
+        if np.isfinite(r.measured.frequency) and np.isfinite(r.model.frequency)
+    ]
+    how = (
+        "Where the acceleration of an axis answers its spools most, near the oil column of the linear model (undamped, "
+        "friction sliding), if it is coherent with them and above the noise. Sharpness is half the relative width at "
+        "half the power: a damping ratio, if the length of the test does not limit it. Axes that hardly moved are left "
+        "out, and peaks that only one side shows."
+    )
+    if not rows:
+        return [paragraph(how), paragraph("No test shows an oil column.")]
+    header = ("Test", "Axis", "Linear model [Hz]", "Measured [Hz]", "Model [Hz]", "Sharpness, measured", "and model")
+    return [paragraph(how), table("Oil columns", header, rows)]
+
+
+def _delays_of(valves: Valves) -> str:
+    """Least and greatest delay in words, of the spools whose delay is known nearly as well as the best known."""
+    known = np.isfinite(valves.standard_error)
+    if not known.any():
+        return "no spool moved enough to tell"
+    sure = valves.delay[known & (valves.standard_error <= 10 * valves.standard_error[known].min())]
+    low, high = number(1e3 * float(sure.min())), number(1e3 * float(sure.max()))
+    return f"{low} ms" if low == high else f"{low} to {high} ms"

@@ -1,0 +1,304 @@
+"""A machine as a URDF: bodies to look at, for the viewer and for other programs.
+
+Links: ``world``, ``platen`` (frame {b}, at B), and for each actuator and strut NAME ``NAME_barrel`` and ``NAME_rod``.
+A leg's links have z along the leg, the barrel's origin at the base point, the rod's at the platen point. A swivel leg
+turns on two revolute joints at its base point; a bearing leg stays vertical and carries ``NAME_plate`` on two revolute
+joints, the surface plate {n_i} (Eqs. 4-13, 4-14). A URDF is a tree: that the legs end at the platen is kinematics'
+business (`viewer.joint_positions`), not the URDF's. All joints are zero in the control zero-position.
+
+Masses: the platen alone, where the machine file has it (Table 4.1), and all of a leg's moving parts in its rod, a
+point mass where it has the leg's effective mass along and across (so the tree reproduces M_eff,1). Sizes come from
+the machine file, where it has none from ``models/drawing/sizes.toml``.
+"""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+from ..core.files import models_folder
+from ..machine.components import Actuator, Strut
+from ..machine.machine import Machine
+from ..machine.parameters import Parameters, load_parameters
+
+__all__ = ["drawing_colour", "drawing_rgb", "drawing_size", "drawing_sizes", "legs", "urdf_text"]
+
+Vec = Sequence[float]
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+@cache
+def drawing_sizes() -> Parameters:
+    """Sizes and colours that only drawings need; assumed ratios of lengths of the machine."""
+    return load_parameters(models_folder() / "drawing" / "sizes.toml")
+
+
+def drawing_colour(kind: str) -> str:
+    """Colour of a kind of body, as ``#0072B2``."""
+    return str(drawing_sizes().words[f"colour.{kind}"])
+
+
+def drawing_rgb(kind: str) -> tuple[float, float, float]:
+    """The same as red, green and blue, 0..1."""
+    red, green, blue = (int(drawing_colour(kind)[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return red, green, blue
+
+
+def drawing_size(path: str) -> float:
+    """Ratio of lengths by its dotted name, as in ``arrow.length``."""
+    value = drawing_sizes()[path].value
+    assert isinstance(value, float)
+    return value
+
+
+def legs(machine: Machine) -> tuple[Actuator | Strut, ...]:
+    """All that stands between the base and the platen: actuators, then struts."""
+    return (*machine.actuators, *machine.struts)
+
+
+class _Leg(NamedTuple):
+    """Measures of an actuator or strut [m]; `kind` names its colour."""
+
+    name: str
+    kind: str
+    base: Vec
+    platen_point: Vec
+    length: float  # in the control zero-position
+    travel: float  # half stroke
+    bore: float  # radius
+    rod: float  # radius
+    masses: tuple[float, float]  # along, across [kg]
+    effort: float  # largest force [N]
+    speed: float  # without load, at rated pressure [m/s]
+
+    @property
+    def tilt(self) -> Vec:
+        """Roll, pitch, yaw [rad] that bring z to the leg's direction in the control zero-position."""
+        x, y, z = (p - a for p, a in zip(self.platen_point, self.base, strict=True))
+        return 0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)
+
+    @property
+    def barrel_length(self) -> float:
+        return drawing_size("barrel.length") * (self.length - self.travel)
+
+    @property
+    def rod_length(self) -> float:
+        """Long enough to stay in the barrel, short enough not to leave it at the bottom."""
+        longest = self.length + self.travel - (1.0 - drawing_size("rod.overlap")) * self.barrel_length
+        return min(longest, self.length - self.travel)
+
+
+def _leg(machine: Machine, component: Actuator | Strut) -> _Leg:
+    length = math.dist(component.platen_point, component.base_point)
+    masses = component.mass_along, component.mass_across
+    if isinstance(component, Strut):
+        kind, area, travel = "strut", component.area, drawing_size("strut.travel") * length
+        rod = drawing_size("rod.plunger") * math.sqrt(area / math.pi)
+        effort, speed = component.area * component.pressure, 0.0
+    else:
+        kind, area, travel = component.mount, component.area_a, component.stroke
+        rod = drawing_size("rod.plunger") * math.sqrt(area / math.pi)
+        if component.area_b is not None and component.area_b != component.area_a:
+            area = max(component.area_a, component.area_b)
+            rod = math.sqrt(abs(component.area_a - component.area_b) / math.pi)
+        effort = area * machine.hydraulics.supply_pressure
+        speed = component.valves * component.flow / area
+    bore = math.sqrt(area / math.pi)
+    ends = component.base_point, component.platen_point
+    return _Leg(component.name, kind, *ends, length, travel, bore, rod, masses, effort, speed)
+
+
+def urdf_text(machine: Machine) -> str:
+    """URDF of a machine, as text that ends with a newline; the same machine gives the same text."""
+    robot = ET.Element("robot", name=machine.name)
+    measures = [_leg(machine, component) for component in legs(machine)]
+    for kind in ("platen", "swivel", "bearing", "strut", "rod", "plate", "reaction_mass"):
+        _material(robot, kind)
+    _reaction_mass(_link(robot, "world"), machine, measures)
+    _platen(robot, machine, measures)
+    for leg in measures:
+        _add_leg(robot, leg)
+    ET.indent(robot)
+    note = (
+        f"{machine.title}: bodies to look at. Made by scripts/make_urdf.py from {machine.parameters.origin} "
+        "and drawing/sizes.toml; do not edit.\n"
+        "     A tree: the legs end at the platen only if their joints are set as kinematics says.\n"
+        "     Swivels and plates turn freely: the zero effort and velocity of their limits mean nothing."
+    ).replace("--", "-")
+    return f'<?xml version="1.0"?>\n<!-- {note} -->\n{ET.tostring(robot, encoding="unicode")}\n'
+
+
+def _platen(robot: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> None:
+    """Platen as a box from its top face to the bearing plane, with lugs to swivels outside it."""
+    centre = machine.platen.centre_of_gravity
+    depth = -machine.platen.bearing_plane[2]
+    size = (*machine.platen.size, depth)
+    link = _link(robot, "platen")
+    _inertial(link, *_platen_inertia(machine))
+    middle = _minus((0.0, 0.0, -0.5 * depth), centre)
+    _visual(link, "platen", middle, box=size)
+    for leg in measures:
+        if leg.kind == "bearing":
+            continue
+        point = _minus(leg.platen_point, centre)
+        width = 2.0 * drawing_size("swivel.radius") * leg.rod
+        low, high = [], []
+        for x, m, s in zip(point, middle, size, strict=True):
+            inside = min(max(x, m - 0.5 * (s - width)), m + 0.5 * (s - width))
+            low.append(min(x, inside) - 0.25 * width * (x == inside))
+            high.append(max(x, inside) + 0.25 * width * (x == inside))
+        lug = [b - a for a, b in zip(low, high, strict=True)]
+        _visual(link, "platen", [0.5 * (a + b) for a, b in zip(low, high, strict=True)], box=lug)
+    if machine.motion == "free":
+        _joint(robot, "platen_motion", "floating", ("world", "platen"), centre)
+        return
+    axis = [float(machine.motion == x) for x in "xyz"]
+    k = "xyz".index(machine.motion)
+    travel, speed = machine.limits.displacement[k], machine.limits.velocity[k]
+    _joint(robot, "platen_motion", "prismatic", ("world", "platen"), centre, axis=axis, limit=(travel, 0.0, speed))
+
+
+def _platen_inertia(machine: Machine) -> tuple[float, Vec, Vec]:
+    """Mass, centre of gravity and moments of inertia of the platen alone, else of the smallest effective mass."""
+    known = machine.parameters
+    if "estimates.platen_alone.mass" not in known:
+        return machine.platen.isotropic_mass, ORIGIN, machine.platen.inertia
+    mass, moments = known["estimates.platen_alone.mass"].value, known["estimates.platen_alone.inertia"].value
+    assert isinstance(mass, tuple) and isinstance(moments, tuple)
+    return mass[0], ORIGIN, moments
+
+
+def _add_leg(robot: ET.Element, leg: _Leg) -> None:
+    """Barrel, rod and, for a bearing leg, surface plate."""
+    name = leg.name
+    barrel, rod = _link(robot, f"{name}_barrel"), _link(robot, f"{name}_rod")
+    half, radius = 0.5 * leg.barrel_length, drawing_size("barrel.radius") * leg.bore
+    _visual(barrel, leg.kind, (0.0, 0.0, half), cylinder=(radius, 2.0 * half))
+    bearing = leg.kind == "bearing"
+    edge = drawing_size("plate.edge") * leg.bore
+    thickness = drawing_size("plate.thickness") * edge if bearing else 0.0
+    along, across = leg.masses
+    if along > 0.0:
+        place = 0.5 if bearing else math.sqrt(across / along)  # the rod's point mass, from the base
+        _inertial(rod, along, (0.0, 0.0, (place - 1.0) * leg.length), ORIGIN)
+    bottom, top = -leg.rod_length, -thickness
+    _visual(rod, "rod", (0.0, 0.0, 0.5 * (bottom + top)), cylinder=(leg.rod, top - bottom))
+    if bearing:
+        _joint(robot, f"{name}_base", "fixed", ("world", f"{name}_barrel"), leg.base)
+    else:
+        ball = drawing_size("swivel.radius") * leg.rod
+        _visual(barrel, leg.kind, ORIGIN, sphere=ball)
+        _visual(rod, "rod", ORIGIN, sphere=ball)
+        _universal(robot, name, "swivel", "xy", ("world", f"{name}_barrel"), leg.base, leg.tilt)
+    ends, tip = (f"{name}_barrel", f"{name}_rod"), (0.0, 0.0, leg.length)
+    limit = leg.travel, leg.effort, leg.speed
+    _joint(robot, f"{name}_extension", "prismatic", ends, tip, axis=(0.0, 0.0, 1.0), limit=limit)
+    if bearing:
+        plate = _link(robot, f"{name}_plate")
+        _visual(plate, "plate", (0.0, 0.0, -0.5 * thickness), box=(edge, edge, thickness))
+        _universal(robot, name, "plate", "yx", (f"{name}_rod", f"{name}_plate"), ORIGIN, ORIGIN)
+
+
+def _universal(robot: ET.Element, name: str, what: str, axes: str, ends: tuple[str, str], xyz: Vec, rpy: Vec) -> None:
+    """Two revolute joints through one point, first about axes[0], then about axes[1]."""
+    between = f"{name}_{what}_cross"
+    _link(robot, between)
+    free = math.pi, 0.0, 0.0
+    first, second = ([float(a == x) for x in "xyz"] for a in axes)
+    _joint(robot, f"{name}_{what}_{axes[0]}", "revolute", (ends[0], between), xyz, rpy, first, free)
+    _joint(robot, f"{name}_{what}_{axes[1]}", "revolute", (between, ends[1]), ORIGIN, ORIGIN, second, free)
+
+
+def _reaction_mass(world: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> None:
+    """Translucent block that the legs stand on and in, with a pedestal under each swivel above it."""
+    margin = drawing_size("reaction_mass.margin") * max(machine.platen.size)
+    width = drawing_size("barrel.radius")
+    stand = [leg.base[2] - (0.0 if leg.kind == "bearing" else width * leg.bore) for leg in measures]
+    under_platen = machine.platen.bearing_plane[2] - 0.5 * margin
+    actuators = [z for z, leg in zip(stand, measures, strict=True) if leg.kind != "strut"]
+    top, bottom = min(*actuators, under_platen), min(*stand, under_platen) - margin
+    low, high = [], []
+    for k, size in enumerate(machine.platen.size):
+        ends = [leg.base[k] for leg in measures] + [leg.platen_point[k] for leg in measures]
+        low.append(min(*ends, -0.5 * size) - margin)
+        high.append(max(*ends, 0.5 * size) + margin)
+    low, high = [*low, bottom], [*high, top]
+    middle = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
+    _visual(world, "reaction_mass", middle, box=_minus(high, low))
+    for leg, z in zip(measures, stand, strict=True):
+        if z > top:
+            edge = 3.0 * width * leg.bore
+            _visual(world, "reaction_mass", (*leg.base[:2], 0.5 * (z + top)), box=(edge, edge, z - top))
+
+
+# ------------------------------------------------------------------------------------------------ XML
+def _text(values: Vec) -> str:
+    return " ".join(f"{v + 0.0:.15g}" for v in values)
+
+
+def _minus(a: Vec, b: Vec) -> Vec:
+    return [x - y for x, y in zip(a, b, strict=True)]
+
+
+def _material(robot: ET.Element, kind: str) -> None:
+    opacity = drawing_size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
+    rgba = _text([*(round(c, 4) for c in drawing_rgb(kind)), opacity])
+    ET.SubElement(ET.SubElement(robot, "material", name=kind), "color", rgba=rgba)
+
+
+def _link(robot: ET.Element, name: str) -> ET.Element:
+    return ET.SubElement(robot, "link", name=name)
+
+
+def _inertial(link: ET.Element, mass: float, centre: Vec, moments: Vec) -> None:
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "origin", xyz=_text(centre))
+    ET.SubElement(inertial, "mass", value=_text([mass]))
+    names = ("ixx", "iyy", "izz")
+    values = dict(zip(names, (_text([m]) for m in moments), strict=True))
+    ET.SubElement(inertial, "inertia", values | {"ixy": "0", "ixz": "0", "iyz": "0"})
+
+
+def _visual(
+    link: ET.Element,
+    material: str,
+    xyz: Vec,
+    *,
+    box: Vec | None = None,
+    cylinder: tuple[float, float] | None = None,
+    sphere: float | None = None,
+) -> None:
+    """Add a box of edges, a cylinder of (radius, length) along z, or a sphere of a radius [m]."""
+    visual = ET.SubElement(link, "visual")
+    ET.SubElement(visual, "origin", xyz=_text(xyz))
+    geometry = ET.SubElement(visual, "geometry")
+    if box is not None:
+        ET.SubElement(geometry, "box", size=_text(box))
+    if cylinder is not None:
+        ET.SubElement(geometry, "cylinder", radius=_text(cylinder[:1]), length=_text(cylinder[1:]))
+    if sphere is not None:
+        ET.SubElement(geometry, "sphere", radius=_text([sphere]))
+    ET.SubElement(visual, "material", name=material)
+
+
+def _joint(
+    robot: ET.Element,
+    name: str,
+    kind: str,
+    ends: tuple[str, str],
+    xyz: Vec,
+    rpy: Vec = ORIGIN,
+    axis: Vec | None = None,
+    limit: tuple[float, float, float] | None = None,
+) -> None:
+    """Add a joint from ends[0] to ends[1]; limit is largest |position|, effort and speed."""
+    joint = ET.SubElement(robot, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent", link=ends[0])
+    ET.SubElement(joint, "child", link=ends[1])
+    ET.SubElement(joint, "origin", xyz=_text(xyz), rpy=_text(rpy))
+    if axis is not None:
+        ET.SubElement(joint, "axis", xyz=_text(axis))
+    if limit is not None:
+        most, effort, speed = (_text([value]) for value in limit)
+        ET.SubElement(joint, "limit", lower=f"-{most}", upper=most, effort=effort, velocity=speed)

@@ -1,0 +1,1 @@
+"""Loops around one step: runs, ensembles, the force ledger, the energy audit."""

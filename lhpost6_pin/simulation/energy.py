@@ -1,0 +1,254 @@
+"""The energy audit of a run: where the energy goes.
+
+    audit = energy_audit(run)
+    audit.power[:, audit.entry("created.thrust_direction")]   # [W]
+
+Energy, per effect:  inflow = change of stored + dissipated + delivered
+and for the platen:  delivered + created = change of kinetic + gravity (+ dissipated in a specimen's joints)
+
+inflow      oil through the valves' orifices, h(P) Q per chamber
+stored      compressed oil, nitrogen (where the law has a potential); kinetic energy and weight
+dissipated  leak from chamber to chamber, and all the work of laws without a potential: seals, pads, viscous
+delivered   force times port rate, to the platen
+created     three terms of the report's equations that conserve no energy; zero in a machine with normal thrust,
+            one mass in all directions and no pad friction:
+            `thrust_direction`  f (B - J) v of bearing legs: Eq. 4-23 pushes along the vertical, their rate (3-27)
+                                is power-consistent with the platen's normal
+            `directional_mass`  -v . M (omega x v) of Eq. 4-26
+            `pad_reaction`      f (B - J) v of pads: slip is relative to the rising plate, Eq. 4-24 leaves its
+                                share of the force with the ground
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from ..core.compiled import compiled
+from ..effects.actuator import oil_power
+from ..effects.evaluate_added import added_power
+from ..effects.registry import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT
+from ..effects.supply import supply_pressures
+from ..laws.chamber import chamber_energy, flow_enthalpy, flows_double, flows_single
+from ..laws.orifice import opening
+from ..laws.strut import strut_energy
+from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
+from .ledger import number_of, stage_arguments
+from .simulate import Run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["CREATED", "Audit", "energy_audit", "row_power"]
+
+Array = NDArray[np.float64]
+
+CREATED = ("thrust_direction", "directional_mass", "pad_reaction")
+"""The known terms of the report's equations that create (or destroy) energy."""
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Energy flows of a run; n samples. Entries are named "kind.name", such as ``dissipated.seal_friction``."""
+
+    time: Array  # (n,) [s]
+    entries: tuple[str, ...]  # (k,)
+    power: Array  # (n, k) [W]
+    energy: Array  # (n, k) since the start [J]: change of a stored entry, else the integral of power
+
+    def entry(self, name: str) -> int:
+        """Number of an entry; raises UnknownNameError that lists the names."""
+        return number_of("energy entry", name, self.entries)
+
+    def total(self, kind: str, *names: str) -> Array:
+        """Energy (n,) [J] of all entries of a kind, or of those named; an absent one counts as zero."""
+        wanted = [
+            i
+            for i, entry in enumerate(self.entries)
+            if entry.split(".")[0] == kind and (not names or entry.split(".")[1] in names)
+        ]
+        return self.energy[:, wanted].sum(axis=1)
+
+    @property
+    def residual(self) -> Array:
+        """Energy that the entries do not explain (n,) [J]: inflow + created - stored - dissipated."""
+        return self.total("inflow") + self.total("created") - self.total("stored") - self.total("dissipated")
+
+    def effect_residual(self, effect: str) -> Array:
+        """Energy of one effect that its entries do not explain (n,) [J]."""
+        number_of("effect", effect, [e.split(".")[1] for e in self.entries if e.startswith("delivered.")])
+        spent = sum(self.total(kind, effect) for kind in ("stored", "dissipated", "delivered"))
+        return self.total("inflow", effect) - spent
+
+    def to_dataset(self) -> "xr.Dataset":
+        """Lay out as a dataset with dims time, entry; coordinate kind on entry."""
+        import xarray as xr
+
+        return xr.Dataset(
+            {
+                "power": (("time", "entry"), self.power, {"units": "W", "long_name": "power"}),
+                "energy": (("time", "entry"), self.energy, {"units": "J", "long_name": "energy since the start"}),
+                "residual": ("time", self.residual, {"units": "J", "long_name": "energy not accounted for"}),
+            },
+            {
+                "time": ("time", self.time, {"units": "s"}),
+                "entry": list(self.entries),
+                "kind": ("entry", [e.split(".")[0] for e in self.entries]),
+            },
+        )
+
+
+def energy_audit(run: Run) -> Audit:
+    """Energy that each effect takes in, stores, dissipates and delivers, and what the equations create.
+
+    Flows are integrated by the trapezoidal rule over recorded samples: record every sample where the residual
+    matters. Valve flow jumps with the spool: it is integrated with the mean spool of each interval, known where the
+    loop is closed and where an open loop holds its spools over a sample.
+    """
+    plant = run.plant
+    names = [e.name for e in plant.machine.effects]
+    n = len(run.time)
+    flows = np.zeros((n, len(names), 5))
+    created = np.zeros((n, len(CREATED)))
+    spool = np.ascontiguousarray(run.spool)  # over the interval after each sample; before it, that of the last one
+    before = np.concatenate([spool[:1], spool[:-1]])
+    _powers(*stage_arguments(run, spool, before, plant.supply, flows, created))
+    inflow, inflow_before, dissipated, delivered, stored = np.moveaxis(flows, 2, 0)
+    dt = 1.0 / run.rate
+    entries, powers, energies = [], [], []
+
+    def add(entry: str, power: Array, energy: Array | None = None, power_before: Array | None = None) -> None:
+        entries.append(entry)
+        powers.append(power)
+        energies.append(
+            _integral(power, power if power_before is None else power_before, dt) if energy is None else energy
+        )
+
+    laws = [LAWS[e.law] for e in plant.machine.effects]
+    for i, (name, law) in enumerate(zip(names, laws, strict=True)):
+        if law.takes_spool:
+            add(f"inflow.{name}", inflow[:, i], power_before=inflow_before[:, i])
+        if law.stores_energy:
+            rate = inflow[:, i] - dissipated[:, i] - delivered[:, i]
+            add(f"stored.{name}", rate, stored[:, i] - stored[0, i])
+        if law.states or not law.stores_energy:
+            add(f"dissipated.{name}", dissipated[:, i])
+        add(f"delivered.{name}", delivered[:, i])
+    for name, rate, energy in zip(("kinetic", "gravity"), *_rigid_energies(run), strict=True):
+        add(f"stored.{name}", rate, energy - energy[0])
+    if plant.articulated:
+        joints = slice(plant.axes.size, None)
+        add("dissipated.specimen_joints", run.v[:, joints] ** 2 @ plant.model.damping[joints])
+    for i, name in enumerate(CREATED):
+        add(f"created.{name}", created[:, i])
+    return Audit(run.time, tuple(entries), np.stack(powers, axis=1), np.stack(energies, axis=1))
+
+
+def _integral(after: Array, before: Array, dt: float) -> Array:
+    """Integral from the first sample of a power that jumps at samples, from its values on both sides of each."""
+    out = np.zeros(len(after))
+    np.cumsum(0.5 * dt * (after[:-1] + before[1:]), out=out[1:])
+    return out
+
+
+@compiled
+def row_power(row, s, z, work, spool, supply):
+    """Inflow and dissipated power [W] and stored energy [J] of one row that does `work` [W] on its ports."""
+    p = row.p
+    a = row.port
+    k = row.state
+    if row.law == NITROGEN_STRUT:
+        return 0.0, 0.0, strut_energy(s[a], p[0], p[1], p[2], p[3])
+    high, low = supply_pressures(supply, z)
+    if row.altered != 0:
+        return oil_power(row, s[a], z, spool[row.input], high, low)
+    if row.law == HYDRAULIC_DOUBLE:
+        # without leakage these are the flows of the orifices alone
+        q_a, q_b, _, _ = flows_double(
+            opening(spool[row.input], p[6]), z[k], z[k + 1], p[2], p[3], p[4], p[5], 0.0, high, low, p[11]
+        )
+        h_a, h_b = flow_enthalpy(z[k], p[10]), flow_enthalpy(z[k + 1], p[10])
+        oil = chamber_energy(z[k], p[0], p[8] + s[a], p[10]) + chamber_energy(z[k + 1], p[1], p[9] - s[a], p[10])
+        return h_a * q_a + h_b * q_b, (h_a - h_b) * p[7] * (z[k] - z[k + 1]), oil
+    if row.law == HYDRAULIC_SINGLE:
+        q_a, _ = flows_single(opening(spool[row.input], p[6]), z[k], p[2], p[4], 0.0, high, low, p[11])
+        h_a = flow_enthalpy(z[k], p[10])
+        return h_a * q_a, h_a * p[7] * z[k], chamber_energy(z[k], p[0], p[8] + s[a], p[10])
+    dissipated, held = added_power(row, s, z, work)
+    return 0.0, dissipated, held
+
+
+@compiled
+def _powers(
+    q,
+    v,
+    z,
+    axes,
+    legs,
+    body,
+    rows,
+    damping,
+    frame,
+    port,
+    JB,
+    force,
+    motion,
+    spool,
+    spool_before,
+    supply,
+    flows,
+    created,
+):
+    """Fill flows (n, n_effects, 5) and created (n, 3), in the order of CREATED [W].
+
+    Flows: inflow just after and just before the sample, dissipated, delivered [W], stored [J].
+    """
+    s, sd = port[S], port[SD]
+    for k in range(q.shape[0]):
+        motion[V_SEEN] = v[k]
+        pose_stage(q[k], axes, legs, body, frame, port, JB)
+        forces_stage(axes, legs, body, rows, damping, frame, port, JB, z[k], force, motion)
+        for i in range(rows.size):
+            row = rows[i]
+            work = force[i, 0] * sd[row.port]
+            if row.port_2 >= 0:
+                work += force[i, 1] * sd[row.port_2]
+            if row.port_3 >= 0:
+                work += force[i, 2] * sd[row.port_3]
+            inflow, dissipated, stored = row_power(row, s, z[k], work, spool[k], supply)
+            before, _, _ = row_power(row, s, z[k], work, spool_before[k], supply)
+            out = flows[k, row.effect]
+            out[0] += inflow
+            out[1] += before
+            out[2] += dissipated
+            out[3] += work
+            out[4] += stored
+        linear, turn = frame[4], frame[5]
+        for p in range(s.size):
+            apart = JB[1, p] - JB[0, p]
+            rate = 0.0
+            for j in range(3):
+                rate += apart[j] * linear[j] + apart[3 + j] * turn[j]
+            created[k, 0 if p < legs.size else 2] += port[FORCE, p] * rate
+        for j in range(3):
+            i, m = (j + 1) % 3, (j + 2) % 3
+            created[k, 1] -= body[0].mass_extra[j] * linear[j] * (turn[i] * linear[m] - turn[m] * linear[i])
+
+
+def _rigid_energies(run: Run) -> tuple[Array, Array]:
+    """Power [W] and energy [J], each (2, n): kinetic, and potential in gravity, of platen and specimen."""
+    plant = run.plant
+    model, data = plant.model, plant.model.createData()
+    weight = plant.body[0]["weight_extra"]
+    power, energy = np.zeros((2, 2, len(run.time)))
+    zero = np.zeros(model.nv)
+    for k, (q, v, a) in enumerate(zip(run.q, run.v, run.a, strict=True)):
+        holding = pin.rnea(model, data, q, zero, zero) @ v
+        power[0, k] = pin.rnea(model, data, q, v, a) @ v - holding  # with armature: all of M
+        rate = data.liMi[1].rotation @ data.v[1].linear
+        power[1, k] = holding + weight * rate[2]
+        energy[0, k] = pin.computeKineticEnergy(model, data, q, v)
+        energy[1, k] = pin.computePotentialEnergy(model, data, q) + weight * data.liMi[1].translation[2]
+    return power, energy

@@ -1,0 +1,119 @@
+"""What a run hands out: its record, in the layout that measured tests have, too."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..data.records import make_record
+from ..effects.actuator import rods_ahead
+from ..effects.supply import supply_pressures
+from ..laws.strut import gas_pressure
+from ..mechanics.equilibrium import hydraulic_rows
+from ..mechanics.gas_pressure import gas_ratio
+from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
+from ..mechanics.specimen_joints import specimen_joints, specimen_positions
+from .simulate import Run
+
+__all__ = ["record_of_run"]
+
+Array = NDArray[np.float64]
+
+
+def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | None = None) -> xr.Dataset:
+    """Record of a simulated test.
+
+    attrs are global attributes beside those that follow from the run (`test`, `title`, ...); reference, if any, is what
+    was asked for at the run's samples, with its velocity and acceleration as extra variables. Beyond the layout it
+    holds the hidden friction states and the joints of an articulated specimen.
+    """
+    plant, machine = run.plant, run.plant.machine
+    motion = platen_motion(plant, run.q, run.v, run.a)
+    legs, _ = leg_displacements(plant, motion.displacement)
+    rows = plant.rows[hydraulic_rows(plant)]
+    states = rows["state"]
+    ahead = np.zeros((len(run.z), plant.spools))
+    rods_ahead(rows, run.z, ahead)  # a stroke is measured between barrel and rod
+    double = np.array([name in machine.double_acting for name in machine.actuator_names])
+    pressure_a = run.z[:, states]
+    pressure_b = run.z[:, states[double] + 1]
+    force = pressure_a * rows["p"][:, 0]
+    force[:, double] -= pressure_b * rows["p"][double, 1]
+    channels: dict[str, Any] = {
+        "platen_displacement": motion.displacement,
+        "platen_velocity": motion.velocity,
+        "platen_acceleration": motion.acceleration,
+        "actuator_displacement": legs[:, : plant.spools] + ahead,
+        "actuator_force": force,
+        "chamber_pressure_a": pressure_a,
+        "spool_position": run.spool,
+        "supply_pressure": _supply_pressure(run),
+    }
+    labels = {"actuator": machine.actuator_names}
+    if double.any():
+        channels["chamber_pressure_b"] = pressure_b
+        labels["horizontal"] = machine.double_acting
+    if machine.struts:
+        channels["strut_pressure"] = _strut_pressure(run, legs[:, plant.spools :]) * gas_ratio(plant, run.z)
+        labels["strut"] = machine.strut_names
+    if run.command is not None:
+        channels["spool_command"] = run.command
+    if reference is not None:
+        channels["reference_displacement"] = reference.displacement
+        for name, values, unit in (
+            ("velocity", reference.velocity, "m/s, rad/s"),
+            ("acceleration", reference.acceleration, "m/s2, rad/s2"),
+        ):
+            about = {"units": unit, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
+            channels[f"reference_{name}"] = (("time", "axis"), values, about)
+    channels |= _hidden_states(run)
+    if plant.articulated:
+        joints = specimen_joints(plant)
+        about = {"units": "m or rad", "long_name": "position of the specimen's joints"}
+        about["joint_units"] = " ".join(joint.unit for joint in joints)
+        labels["specimen_joint"] = tuple(joint.name for joint in joints)
+        channels["specimen_joint_position"] = (("time", "specimen_joint"), specimen_positions(plant, run.q), about)
+    valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
+    facts: dict[str, Any] = {
+        "kind": "simulated",
+        "machine": machine.name,
+        "specimen": machine.specimen.name if machine.specimen else "none",
+        "scheme": run.scheme,
+        "steps_per_second": run.steps_per_second,
+        "engine": run.engine,
+        "spool_values_clipped": run.clipped,
+        "trouble": run.trouble or "none",
+    }
+    if valves:
+        facts["valves_per_horizontal_actuator"] = int(valves[0])
+    return make_record(run.time, channels, labels, {**facts, **attrs})
+
+
+def _strut_pressure(run: Run, elongation: Array) -> Array:
+    law = gas_pressure.py_func  # type: ignore[attr-defined]  # the scalar law as plain Python takes whole columns
+    struts = run.plant.machine.struts
+    columns = (law(x, s.pressure, s.gas_length, s.polytropic_index) for x, s in zip(elongation.T, struts, strict=True))
+    return np.column_stack(list(columns))
+
+
+def _supply_pressure(run: Run) -> Array:
+    supply, law = run.plant.supply, supply_pressures.py_func  # type: ignore[attr-defined]
+    return np.broadcast_to(law(supply, run.z.T)[0], len(run.time)).copy()
+
+
+def _hidden_states(run: Run) -> dict[str, Any]:
+    """Friction states as extra variables, by effect, with their ports as coordinate-like names in `states`."""
+    found: dict[str, Any] = {}
+    names = run.plant.states
+    for effect in dict.fromkeys(name.split(".")[0] for name in names):
+        columns = [i for i, name in enumerate(names) if name.startswith(f"{effect}.") and "pressure" not in name]
+        if columns:
+            about = {
+                "units": "1",
+                "long_name": f"hidden states of {effect}",
+                "states": " ".join(names[i].split(".", 1)[1] for i in columns),
+            }
+            found[f"hidden_{effect}"] = (("time", f"{effect}_state"), run.z[:, columns], about)
+    return found

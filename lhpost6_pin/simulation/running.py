@@ -1,0 +1,115 @@
+"""A plant that runs sample by sample, for whoever commands it from outside: a link, an FMU, an experiment in Python.
+
+    table = RunningPlant(plant, rest)
+    for sample in range(n):
+        table.advance(command(table.sensors()))
+
+The same compiled stages, in the same order, as a run of `simulate` in the Pinocchio engine: equal to the last bit.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..control.loop import sense_flat
+from ..control.plug import Sensors
+from ..core.errors import SimulationError
+from ..core.names import SAMPLE_RATE, SCHEMES
+from ..mechanics.derivatives import settle
+from ..mechanics.equilibrium import Equilibrium, hydraulic_rows
+from ..mechanics.plant import Plant, State
+from ..mechanics.schemes import V, spool_windows, steps_a_sample
+from ..mechanics.workspace import make_workspace
+from .engine_pinocchio import make_stepper
+from .simulate import diagnosis
+from .snapshot import Sight, sight_of
+
+__all__ = ["RunningPlant"]
+
+Array = NDArray[np.float64]
+
+
+class RunningPlant:
+    """A plant at rest in the zero-position that takes one command a sample.
+
+    Attributes: plant; sample, how many commands it has taken; clipped, how many spool values were beyond full stroke.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        rest: Equilibrium,
+        *,
+        scheme: str = SCHEMES[0],
+        steps_per_second: int = 4 * SAMPLE_RATE,
+    ) -> None:
+        """Start at rest; raises what `schemes.steps_a_sample` does."""
+        steps = steps_a_sample(scheme, steps_per_second)
+        self.plant, self.scheme, self.steps_per_second = plant, scheme, steps_per_second
+        self.sample = self.clipped = 0
+        self._advance = make_stepper(plant, scheme, 1.0 / steps_per_second)
+        self._ws = make_workspace(plant, rest.state)
+        self._window = np.zeros((steps, plant.spools))
+        self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))
+        self._path, self._fed = plant.command_path, hydraulic_rows(plant)
+        settle(plant, self._ws, np.ascontiguousarray(rest.spool))
+
+    @property
+    def time(self) -> float:
+        """Time of the next sample [s]."""
+        return self.sample / SAMPLE_RATE
+
+    @property
+    def state(self) -> State:
+        """Copy of the state at the next sample."""
+        return State(self._ws.q.copy(), self._ws.motion[V].copy(), self._ws.z.copy())
+
+    @property
+    def spool(self) -> Array:
+        """Spool positions (n_actuators,) that the ports saw last, mean over the sample."""
+        return np.asarray(self._window.mean(axis=0))
+
+    def sensors(self) -> Sensors:
+        """Sensors at the next sample, in new arrays."""
+        ws, plant = self._ws, self.plant
+        if self.scheme != SCHEMES[0]:  # the other schemes leave the ports of their last stage behind
+            settle(plant, ws, self._window[0])
+        found = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
+        body = plant.body.view(float)
+        sense_flat(
+            ws.port,
+            ws.force,
+            self._fed,
+            body,
+            plant.axes,
+            ws.frame,
+            ws.motion,
+            found.displacement,
+            found.acceleration,
+            found.force,
+        )
+        return found
+
+    def sight(self) -> Sight:
+        """What can be seen of the plant now."""
+        return sight_of(self.plant, self._ws, self.time)
+
+    def advance(self, command: Array) -> None:
+        """Take the command (n_actuators,) of this sample, -1..1, and go on to the next.
+
+        Raises SimulationError for a command that is not finite, and where a leg leaves its stroke or the run diverges.
+        """
+        command = np.asarray(command, float)
+        if command.shape != (self.plant.spools,) or not np.isfinite(command).all():
+            raise SimulationError(f"a command is {self.plant.spools} finite spool values; got {command}")
+        self.clipped += int(np.count_nonzero(np.abs(command) > 1.0))
+        if self.sample == 0:  # what came before the first command was the same
+            self._history[:] = self._window[:] = np.clip(command, -1.0, 1.0)
+        else:
+            self._history[:-1] = self._history[1:]
+            self._history[-1] = np.clip(command, -1.0, 1.0)
+        first = self.sample - len(self._history) + 1
+        spool_windows(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
+        status = self._advance(self._ws, self._window)
+        self.sample += 1
+        if status:
+            raise SimulationError(diagnosis(self.plant, status, self.time, self.scheme, self.steps_per_second))

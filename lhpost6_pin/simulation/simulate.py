@@ -1,0 +1,435 @@
+"""Simulation: a plant, driven by recorded spools or by a controller, by a scheme at a rate, in one of two engines.
+
+    plant = make_plant(load_machine())
+    rest = find_equilibrium(plant)
+    controller = make_controller(plant, rest, load_controller("lhpost6"))
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(drive))
+
+The controller's samples are the clock: each is divided into equal model steps. A run that leaves a stroke or diverges
+stops; what was computed is kept, and `Run.trouble` says when, which component, and what to try.
+"""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..control import Controller
+from ..control.loop import ACTUATOR, AXIS, CANCELLER, control_sample_flat, sense_flat
+from ..control.plug import Sensors, UserController, start_plugged, step_plugged, wanted_from
+from ..core.errors import SimulationError, UnknownNameError
+from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from ..mechanics.derivatives import settle
+from ..mechanics.equilibrium import Equilibrium, hydraulic_rows
+from ..mechanics.plant import Plant, State
+from ..mechanics.schemes import A, V, spool_windows, steps_a_sample
+from ..mechanics.workspace import Workspace, make_workspace
+from .engine_fused import inertia_table, refuse_joints, run_fused
+from .engine_pinocchio import make_stepper
+from .snapshot import EVERY, Watch, sight_of
+
+__all__ = ["ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis"]
+__all__ += ["check_drive", "check_options", "fastest_engine", "simulate"]
+
+log = logging.getLogger(__name__)
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+"""Called now and then with the share of the run that is done, 0..1."""
+
+_CHUNK = 1024
+"""Controller samples between two progress reports."""
+
+
+class OpenLoop(NamedTuple):
+    """Drive by spool positions as the ports see them (already delayed): spool (n * k, n_actuators), -1..1.
+
+    k = 1 holds each row over one controller sample; k = steps per sample gives one row a model step.
+    """
+
+    spool: Array
+    start: State
+
+
+class ClosedLoop(NamedTuple):
+    """Drive by the 469D: drive (n, 6) goes into its reference generators (`Controller.drive_for`).
+
+    With sine cancellers drive is (n, 13): columns 6 to 11 hold the wanted acceleration of C and Euler angles, column 12
+    the level, 0 to 1, at which they act.
+    """
+
+    controller: Controller
+    drive: Array
+    rest: Equilibrium
+
+
+class PluggedLoop(NamedTuple):
+    """Drive by a user's own controller (`control.plug`) that wants a motion of C and Euler angles, (n, 6) each."""
+
+    controller: UserController
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    rest: Equilibrium
+
+
+Drive = OpenLoop | ClosedLoop | PluggedLoop
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a simulation leaves, sampled at `rate` [Hz]: rows of time (n,)."""
+
+    plant: Plant
+    time: Array
+    q: Array  # (n, nq)
+    v: Array  # (n, nv)
+    a: Array  # (n, nv)
+    z: Array  # (n, n_states)
+    spool: Array  # (n, n_actuators) position that the ports see, mean over the sample
+    command: Array | None  # (n, n_actuators), closed loop only
+    rate: float
+    scheme: str
+    steps_per_second: int
+    engine: str
+    clipped: int
+    trouble: str | None
+
+    @property
+    def state(self) -> State:
+        """State at the last sample."""
+        return State(self.q[-1], self.v[-1], self.z[-1])
+
+
+def simulate(
+    plant: Plant,
+    drive: Drive,
+    *,
+    samples: int,
+    scheme: str = SCHEMES[0],
+    steps_per_second: int = 4 * SAMPLE_RATE,
+    engine: str = ENGINES[0],
+    record_every: int = 1,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+) -> Run:
+    """Run `samples` controller samples and return the motion, every `record_every`-th sample.
+
+    `watch` is shown the plant 32 times a second of the run, beginning with its start.
+
+    Raises UnknownNameError or SimulationError for a scheme, engine, rate or drive that cannot be. A run that goes wrong
+    on the way does not raise: see `Run.trouble`.
+    """
+    steps = _check(plant, drive, samples, scheme, steps_per_second, engine, record_every)
+    dt = 1.0 / steps_per_second
+    closed = not isinstance(drive, OpenLoop)
+    if isinstance(drive, OpenLoop):
+        start, (spool, clipped) = drive.start, _clip(drive.spool)
+        first = spool[0]
+    else:
+        start, clipped = drive.rest.state, 0
+        first = drive.rest.spool
+        spool = np.tile(first, (steps, 1))
+    ws = make_workspace(plant, start)
+    log_ = _Log(plant, -(-samples // record_every))
+    command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
+    status = settle(plant, ws, np.ascontiguousarray(first))
+    done = 0
+    if status == 0:
+        job = _Job(plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress, watch)
+        status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
+        clipped += more
+    kept = -(-done // record_every)
+    trouble = None if status == 0 else diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
+    if trouble:
+        log.warning(trouble)
+    if clipped:
+        log.warning("%d spool values beyond full stroke were clipped to it: the motion asks for more flow", clipped)
+    q, v, a, z = (x[:kept] for x in (log_.q, log_.v, log_.a, log_.z))
+    if scheme != "semi_implicit":  # their A belongs to the start of the last step
+        a = _accelerations(plant, q, v, z)
+    return Run(
+        plant=plant,
+        time=np.arange(kept) * record_every / SAMPLE_RATE,
+        q=q,
+        v=v,
+        a=a,
+        z=z,
+        spool=log_.spool[:kept],
+        command=command[:done:record_every][:kept] if closed else None,
+        rate=SAMPLE_RATE / record_every,
+        scheme=scheme,
+        steps_per_second=steps_per_second,
+        engine=engine,
+        clipped=clipped,
+        trouble=trouble,
+    )
+
+
+def fastest_engine(plant: Plant) -> str:
+    """Name of the engine that runs the 469D fastest on a plant: the fused one, unless a specimen's joints are free."""
+    return "pinocchio" if plant.articulated else "fused"
+
+
+class _Log:
+    """Arrays that a run fills, one row a recorded sample."""
+
+    def __init__(self, plant: Plant, n: int) -> None:
+        self.q = np.zeros((n, plant.model.nq))
+        self.v = np.zeros((n, plant.model.nv))
+        self.a = np.zeros((n, plant.model.nv))
+        self.z = np.zeros((n, len(plant.states)))
+        self.spool = np.zeros((n, plant.spools))
+
+    def take(self, at: int, ws: Workspace, spool: Array) -> None:
+        self.q[at], self.v[at], self.a[at], self.z[at] = ws.q, ws.motion[V], ws.motion[A], ws.z
+        self.spool[at] = spool
+
+
+def check_options(plant: Plant, *, scheme: str, steps_per_second: int, engine: str, plugged: bool = False) -> None:
+    """Raise UnknownNameError or SimulationError if no run of a plant can have these options.
+
+    `plugged`: it is driven by a user's own controller.
+    """
+    steps_a_sample(scheme, steps_per_second)
+    if engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
+    if engine == "fused":
+        refuse_joints(plant)
+        if plugged:
+            raise SimulationError(
+                "the fused engine runs compiled controllers; take the engine pinocchio for your own "
+                "(--engine pinocchio)"
+            )
+
+
+def _check(plant: Plant, drive: Drive, samples: int, scheme: str, rate: int, engine: str, record_every: int) -> int:
+    plugged = isinstance(drive, PluggedLoop)
+    check_options(plant, scheme=scheme, steps_per_second=rate, engine=engine, plugged=plugged)
+    if samples < 1:
+        raise SimulationError("nothing to simulate: the drive has no sample")
+    if record_every < 1:
+        raise SimulationError(f"every {record_every}-th sample cannot be recorded; give a number, one or more")
+    steps = steps_a_sample(scheme, rate)
+    if isinstance(drive, OpenLoop):
+        if drive.spool.ndim != 2 or drive.spool.shape[1] != plant.spools:
+            raise SimulationError(f"spool has shape {drive.spool.shape}; this machine takes (n, {plant.spools})")
+        if len(drive.spool) not in (samples, samples * steps):
+            raise SimulationError(f"spool has {len(drive.spool)} rows; {samples} or {samples * steps} are needed")
+        if not np.all(np.isfinite(drive.spool)):
+            at, which = np.argwhere(~np.isfinite(drive.spool))[0]
+            raise SimulationError(f"spool of {plant.machine.actuator_names[which]} is not finite at row {at}")
+        _check_state(plant, drive.start)
+    else:
+        check_drive(plant, drive, samples)
+    return steps
+
+
+def check_drive(plant: Plant, drive: ClosedLoop | PluggedLoop, samples: int) -> None:
+    """Raise SimulationError if a closed loop was made for another plant, or its motion has not these samples."""
+    name = plant.machine.name
+    _check_state(plant, drive.rest.state)
+    if isinstance(drive, PluggedLoop):
+        for quantity in ("displacement", "velocity", "acceleration"):
+            _check_shape(f"wanted {quantity}", getattr(drive, quantity), (samples, 6))
+        return
+    if drive.controller.plant.spools != plant.spools or not np.array_equal(drive.controller.plant.axes, plant.axes):
+        raise SimulationError(f"the controller was made for {drive.controller.plant.machine.name}; make one for {name}")
+    _check_shape("drive", drive.drive, (samples, drive.controller.columns))
+
+
+def _check_state(plant: Plant, state: State) -> None:
+    sizes = plant.model.nq, plant.model.nv, len(plant.states)
+    if any(np.shape(x) != (n,) for x, n in zip(state, sizes, strict=True)):
+        raise SimulationError(f"the run would start from a state of another plant than {plant.machine.name}")
+
+
+def _check_shape(name: str, values: Array, shape: tuple[int, int]) -> None:
+    if np.shape(values) != shape:
+        raise SimulationError(f"{name} has shape {np.shape(values)}; {shape} is needed")
+    if not np.isfinite(values).all():
+        at, axis = np.argwhere(~np.isfinite(values))[0]
+        raise SimulationError(f"{name} is not finite at sample {at}, column {axis}")
+
+
+def _clip(spool: Array) -> tuple[Array, int]:
+    beyond = int(np.count_nonzero(np.abs(spool) > 1.0))
+    return np.ascontiguousarray(np.clip(spool, -1.0, 1.0), float), beyond
+
+
+class _Job(NamedTuple):
+    """A run made ready: what both engines need."""
+
+    plant: Plant
+    drive: Drive
+    ws: Workspace
+    log: _Log
+    scheme: str
+    samples: int
+    steps: int  # model steps a sample
+    dt: float  # of one [s]
+    spool: Array  # (samples * k, n_actuators), open loop; (steps, n_actuators) of the last sample, closed
+    command: Array  # (samples, n_actuators), closed loop
+    every: int
+    progress: Progress | None
+    watch: Watch | None
+
+    def look(self, sample: int) -> None:
+        """Show the plant to whoever watches, if it is time."""
+        if self.watch is not None and sample % EVERY == 0:
+            self.watch(sight_of(self.plant, self.ws, sample / SAMPLE_RATE))
+
+
+def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
+    """Run all samples step by step; returns (status, samples done, commands clipped)."""
+    plant, ws, steps = job.plant, job.ws, job.steps
+    advance = make_stepper(plant, job.scheme, job.dt)
+    window = np.zeros((steps, plant.spools)) if isinstance(job.drive, OpenLoop) else job.spool
+    spools = _spools_from(job)
+    clipped = 0
+    for sample in range(job.samples):
+        if job.scheme != SCHEMES[0] and not isinstance(job.drive, OpenLoop):
+            settle(plant, ws, window[0])  # the other schemes leave the ports of their last stage behind
+        clipped += spools(sample, window)
+        if sample % job.every == 0:
+            job.log.take(sample // job.every, ws, window.sum(axis=0) / steps)
+        job.look(sample)
+        status = advance(ws, window)
+        if status:
+            return status, sample + 1, clipped
+        if job.progress is not None and sample % _CHUNK == 0:
+            job.progress(sample / job.samples)
+    if job.progress is not None:
+        job.progress(1.0)
+    return 0, job.samples, clipped
+
+
+def _spools_from(job: _Job) -> Callable[[int, Array], int]:
+    """Function that fills a sample's window (steps, n_actuators) of spools and returns how many were clipped."""
+    plant, drive, ws, command = job.plant, job.drive, job.ws, job.command
+    fed, rate = hydraulic_rows(plant), float(SAMPLE_RATE)
+    if isinstance(drive, OpenLoop):
+        rows = len(job.spool) // job.samples
+
+        def recorded(sample: int, window: Array) -> int:
+            window[:] = job.spool[sample * rows : (sample + 1) * rows]
+            return 0
+
+        return recorded
+    if isinstance(drive, ClosedLoop):
+        loop = drive.controller
+        state = ws.port, ws.force, fed, ws.frame, ws.motion
+        call: Any = control_sample_flat
+        values = np.ascontiguousarray(drive.drive, float)  # any other kind would be compiled for anew
+        rest = (values, *state, *loop.flat_tables(), loop.init(), command, plant.command_path, rate)
+
+        def compiled_loop(sample: int, window: Array) -> int:
+            return int(call(sample, *rest, window))
+
+        return compiled_loop
+    users = drive.controller
+    wanted = wanted_from(drive.displacement, drive.velocity, drive.acceleration)
+    own = start_plugged(users, plant, drive.rest)
+    sensors = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
+    body, path = plant.body.view(float), plant.command_path
+
+    def plugged(sample: int, window: Array) -> int:
+        sense_flat(ws.port, ws.force, fed, body, plant.axes, ws.frame, ws.motion, *sensors)
+        asked = step_plugged(users, own, sample, wanted(sample), sensors)
+        command[sample], clipped = _clip(asked)
+        spool_windows(command, 0, sample, path, rate, window)
+        return clipped
+
+    return plugged
+
+
+def _run_fused(job: _Job) -> tuple[int, int, int]:
+    """Run all samples in compiled chunks; returns (status, samples done, commands clipped)."""
+    plant, drive, ws, log_ = job.plant, job.drive, job.ws, job.log
+    inertia = inertia_table(plant)
+    damping = np.array(plant.model.damping)
+    fed = hydraulic_rows(plant)
+    if isinstance(drive, ClosedLoop):
+        loop = drive.controller
+        values = np.ascontiguousarray(drive.drive, float)
+        tables = (True, loop.axis, loop.actuator, loop.balance, loop.canceller, loop.init(), values)
+    else:
+        none = np.zeros((1, 1))
+        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER), none, none)
+    clipped, chunk = 0, _CHUNK if job.watch is None else EVERY
+    for first in range(0, job.samples, chunk):
+        last = min(first + chunk, job.samples)
+        job.look(first)
+        status, done, more = run_fused(
+            SCHEMES.index(job.scheme),
+            first,
+            last,
+            job.steps,
+            job.dt,
+            plant.axes,
+            plant.legs,
+            plant.body,
+            plant.rows,
+            damping,
+            ws.supply,
+            plant.command_path,
+            inertia,
+            ws.q,
+            ws.z,
+            ws.zd,
+            ws.motion,
+            ws.port,
+            ws.JB,
+            ws.frame,
+            ws.force,
+            fed,
+            *tables,
+            job.command,
+            job.spool,
+            job.every,
+            log_.q,
+            log_.v,
+            log_.a,
+            log_.z,
+            log_.spool,
+        )
+        clipped += more
+        if status:
+            return status, done, clipped
+        if job.progress is not None:
+            job.progress(last / job.samples)
+    return 0, job.samples, clipped
+
+
+def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:
+    """What a stage's status other than 0 means, and what to do."""
+    if status > 0:
+        leg = (*plant.machine.actuator_names, *plant.machine.strut_names)[status - 1]
+        stroke = plant.legs["stroke"][status - 1]
+        return (
+            f"stopped at {time:.4f} s: {leg} left its stroke of +-{stroke:g} m; "
+            "scale the motion down, look at the controller, or start from the record's own pose and pressures"
+        )
+    hint = "take the scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"
+    return (
+        f"stopped at {time:.4f} s: the run diverged with {scheme} at {rate} steps a second; {hint}, or take more steps "
+        "(--rate)"
+    )
+
+
+def _accelerations(plant: Plant, q: Array, v: Array, z: Array) -> Array:
+    """Accelerations (n, nv) at states of a run."""
+    out = np.zeros_like(v)
+    spool = np.zeros(plant.spools)  # forces do not depend on the spools, only pressure rates do
+    ws = make_workspace(plant, plant.zero_state())
+    for k in range(len(q)):
+        ws.q[:], ws.z[:], ws.motion[V] = q[k], z[k], v[k]
+        if settle(plant, ws, spool):
+            out[k:] = np.nan
+            break
+        out[k] = ws.motion[A]
+    return out

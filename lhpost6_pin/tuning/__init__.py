@@ -1,0 +1,1 @@
+"""The virtual 469D made ready for a test: margins, identification, tuning, iteration, sines, drives."""

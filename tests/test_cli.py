@@ -19,9 +19,11 @@ import pytest
 import xarray as xr
 from machine_cases import DATA
 
+import lhpost6_pin
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli
 from lhpost6_pin.cli import completion, runs
+from lhpost6_pin.cli.app import JOBS, command_name
 from lhpost6_pin.control.inverse import InverseFilter, save_inverse
 from lhpost6_pin.core.compiled import cache_folder
 from lhpost6_pin.core.files import shipped
@@ -104,21 +106,27 @@ def everything(folder: Path) -> list[str]:
 # Looking --------------------------------------------------------------------------------------------------------------
 
 
-def test_help_names_every_command(lhpost6):
+def test_help_names_every_command_once_grouped_by_job_in_their_order(lhpost6):
     ended = lhpost6("--help")
     assert ended.code == 0
-    for command in ("doctor", "info", "capacity", "motions", "check", "run", "open-loop"):
-        assert command in ended.out
-    assert "--beyond-limits" in lhpost6("run", "--help").out
+    names = [name for job in JOBS.values() for name in job]
+    assert sorted(names) == sorted(command_name(c) for c in cli.app.registered_commands)
+    panels = re.findall(r"╭─ (.+?) ─+╮\n(.*?)╰", ended.out, re.DOTALL)
+    shown = {title: tuple(re.findall(r"^│ ([a-z-]+) ", rows, re.MULTILINE)) for title, rows in panels}
+    assert list(shown.items())[1:] == list(JOBS.items())  # behind the options
+
+
+def test_version_is_the_package_s_own(lhpost6):
+    assert lhpost6("--version") == Ended(0, f"lhpost6 {lhpost6_pin.__version__}\n", "")
 
 
 def test_help_gives_flags_no_kind_of_value_and_says_where_results_go(lhpost6):
-    commands = [c.name or c.callback.__name__ for c in cli.app.registered_commands]
+    commands = [command_name(c) for c in cli.app.registered_commands]
     said = {name: lhpost6(name, "--help").words for name in commands} | {"": lhpost6("--help").words}
     assert "<int>" in said["run"] and "--locked" in said["run"]
     for name, words in said.items():
         assert "bool" not in words.lower(), name
-        assert "Folder for the results" not in words or "without it out/NAME" in words, name
+        assert "Directory of the results" not in words or "default: out/NAME" in words, name
 
 
 def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6):

@@ -1,4 +1,4 @@
-"""The application that the commands are added to, its entry point, and what it shows while it works."""
+"""The application: commands by job, the entry point, errors without a traceback, output and progress."""
 
 import errno
 import logging
@@ -9,28 +9,45 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from .. import __version__
 from ..core.errors import LhpostError, OutOfRangeError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["app", "main", "progress_bar", "run_script", "stderr", "tell"]
+__all__ = ["JOBS", "app", "command_name", "main", "progress_bar", "run_script", "stderr", "tell"]
+
+
+JOBS: Mapping[str, tuple[str, ...]] = {
+    "Rehearse": ("run", "open-loop", "campaign", "motions"),
+    "Control": ("tune", "iterate", "replay", "sine"),
+    "Measured data": ("import", "check", "export", "decompose", "validate", "calibrate"),
+    "Discover": ("discover", "demo"),
+    "Connect": ("serve", "link", "export-fmu"),
+    "Look": ("view", "info", "capacity", "doctor"),
+}
+"""Commands by job, in the order of `--help`, of the command reference and of the README."""
 
 
 class _Commands(TyperGroup):
-    """The commands, of which flags show no kind of value in `--help`: they take none."""
+    """The commands, grouped by job; `--help` shows no value type for flags, which take none."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        by_job = [name for names in JOBS.values() for name in names if name in self.commands]
+        return by_job + [name for name in self.commands if name not in by_job]
 
     def get_params(self, ctx: Any) -> list[Any]:
         return _without_kind(super().get_params(ctx))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        command = super().get_command(ctx, cmd_name)
+        command: Any = super().get_command(ctx, cmd_name)
         if command is not None:
+            command.rich_help_panel = next((job for job, names in JOBS.items() if cmd_name in names), None)
             _without_kind(command.get_params(ctx))
         return command
 
@@ -42,6 +59,12 @@ def _without_kind(parameters: list[Any]) -> list[Any]:
     return parameters
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"lhpost6 {__version__}")
+        raise typer.Exit
+
+
 app = typer.Typer(
     cls=_Commands,
     help="The UC San Diego LHPOST6 shake table, modelled from first principles on Pinocchio.",
@@ -51,8 +74,22 @@ app = typer.Typer(
 )
 
 
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def command_name(command: typer.models.CommandInfo) -> str:
+    """Name of a registered command on the command line."""
+    return command.name or str(getattr(command.callback, "__name__", ""))
+
+
 def main() -> None:
-    """Entry point: errors that a user can act on are printed without a traceback."""
+    """Entry point; errors that the user can correct are printed without a traceback."""
     from rich.logging import RichHandler
 
     handler = RichHandler(console=stderr(), show_path=False, show_time=False)
@@ -73,14 +110,14 @@ def main() -> None:
 
 
 def run_script(function: Callable[..., Any]) -> None:
-    """Run a script's function with options, as typer does; errors that a user can act on end it with 1, and a line."""
+    """Run a script's function as a command; an error that the user can correct is one line and exit code 1."""
     with _without_traceback(1):
         typer.run(function)
 
 
 @contextmanager
 def _without_traceback(code: int) -> Iterator[None]:
-    """Print errors that a user can act on, and end with an exit code."""
+    """Print errors that the user can correct, and exit with a code."""
     try:
         yield
     except LhpostError as error:
@@ -95,7 +132,7 @@ def _without_traceback(code: int) -> Iterator[None]:
 
 @contextmanager
 def _noting_ctrl_c() -> Iterator[None]:
-    """Keep in mind that Ctrl-C was pressed: the compiler's callbacks swallow the exception, and complain of it."""
+    """Record that Ctrl-C was pressed: callbacks of the compiler discard the exception and print a warning."""
     _PRESSED.clear()
 
     def note(number: int, frame: Any) -> None:
@@ -122,17 +159,17 @@ def _say_interrupted() -> None:
 _REMEDIES = dict.fromkeys(
     (errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "; make room, or choose another folder with --out"
 ) | {errno.EROFS: "; choose another folder with --out"}
-"""For what is wrong with where results are to go, not with what is read."""
+"""By error number: how to get results written after all."""
 
 _PRESSED: list[int] = []
-"""What Ctrl-C has sent since the command began."""
+"""Signals received from Ctrl-C since the command began."""
 
 _INTERRUPTED = 130
-"""Exit code that typer gives to Ctrl-C."""
+"""Exit code of typer after Ctrl-C."""
 
 
 def _fail(code: int, kind: str, message: str, **known: Any) -> None:
-    """Say what is refused, as JSON, too, where that was asked for, and end."""
+    """Print an error, also as JSON with --json, and exit."""
     from ..core.jsonable import as_json
 
     stderr().print("[bold red]error:[/] ", end="")
@@ -156,7 +193,7 @@ def tell(
     show: Callable[[], None],
     files: Sequence[Path] = (),
 ) -> None:
-    """Say a result and the files that it left: as JSON and nothing else, or as `show` prints it."""
+    """Print a result and the files written: as JSON alone, or by `show`."""
     from ..core.jsonable import as_json as written
 
     if as_json:
@@ -169,7 +206,7 @@ def tell(
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar with remaining time on stderr; yields what to call with the share done."""
+    """A progress bar with remaining time on stderr; yields a function of the completed fraction."""
     from rich.progress import (
         BarColumn,
         Progress,

@@ -1,4 +1,4 @@
-"""Commands that find parameters from measured campaigns: calibrate."""
+"""The command that fits parameters to measured campaigns: calibrate."""
 
 from pathlib import Path
 from typing import Annotated
@@ -26,7 +26,7 @@ __all__ = ["calibrate"]
 
 @app.command()
 def calibrate(
-    campaign: Annotated[Path, typer.Argument(help="Folder of records of one machine in one state.")],
+    campaign: Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")],
     out: Out = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
@@ -34,11 +34,11 @@ def calibrate(
     specimen: SpecimenName = None,
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated sensor noise that sets weights.")] = 0,
-    jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated sensor noise behind the weights.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Threads; -1: all cores.")] = -1,
     json: Json = False,
 ) -> None:
-    """Calibrate the machine and its sensors on measured tests; leaves override.toml and report.html."""
+    """Calibrate parameters and sensors on measured tests; writes override.toml and report.html."""
     from ..data.campaign import load_campaign
     from ..data.sensors import load_sensors
     from ..identification.calibration import calibrate as calibrate_machine

@@ -1,4 +1,4 @@
-"""Commands that make campaigns: campaign."""
+"""The command that simulates a campaign: campaign."""
 
 from typing import Annotated
 
@@ -34,13 +34,13 @@ def campaign(
     locked: Locked = False,
     controller: SettingsName = None,
     sensors: SensorsName = "lhpost6",
-    tests: Annotated[str | None, typer.Option(help="Some of its tests, such as TX,WN; else all.")] = None,
-    scale: Annotated[float, typer.Option(help="Factor on all motions, as for a smaller table.")] = 1.0,
-    errors: Annotated[bool, typer.Option(help="Draw gains, offsets and skews of the sensors.")] = True,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of noise and errors of the sensors.")] = 0,
+    tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
+    scale: Annotated[float, typer.Option(help="Scale factor of all motions, e.g. for a smaller table.")] = 1.0,
+    errors: Annotated[bool, typer.Option(help="Draw random gains, offsets and skews of the sensors.")] = True,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of sensor noise and sensor errors.")] = 0,
     json: Json = False,
 ) -> None:
-    """Rehearse a campaign of tests and record it as sensors would: to plan one, and to try what follows."""
+    """Simulate a campaign of tests, recorded through sensors with noise and errors: to plan a real one."""
     from ..data.campaign import save_campaign
     from ..data.sensors import load_sensors
     from ..simulation.simulated_campaign import simulate_campaign

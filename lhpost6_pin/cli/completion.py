@@ -1,6 +1,6 @@
-"""What the shell completes beyond commands and options: names, from the shipped data alone.
+"""Shell completion of names: motions, machines, controllers, ..., from the shipped data.
 
-A key press waits for these: nothing heavy is imported, and what goes wrong leaves nothing to complete.
+It runs at every press of the tab key: nothing heavy is imported, and any error means no completion.
 """
 
 from collections.abc import Callable, Iterable
@@ -23,7 +23,7 @@ __all__ = [
 
 
 def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Function that completes a word to some of these names."""
+    """Function that lists the names beginning with an incomplete word."""
 
     def complete(incomplete: str) -> list[str]:
         try:
@@ -47,7 +47,7 @@ _motion = _completing(_motion_names)
 
 
 def complete_motion(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Motions; behind the first word only files can stand, which the shell completes itself."""
+    """Motions; after the first word only files are valid, which the shell completes itself."""
     return [] if ctx.params.get("motion") else _motion(incomplete)
 
 

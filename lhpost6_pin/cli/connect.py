@@ -1,4 +1,4 @@
-"""Commands that connect the virtual table to others: serve, link, export-fmu."""
+"""Commands that connect the virtual table to other programs: serve, link, export-fmu."""
 
 from pathlib import Path
 from typing import Annotated
@@ -50,12 +50,10 @@ def export_fmu(
 
 @app.command()
 def serve(
-    mode: Annotated[str, typer.Option(help="lock-step, real-time, or free: as fast as the plant goes.")] = "lock-step",
-    host: Annotated[str, typer.Option(help="Address to listen at; others than this computer only if given.")] = (
-        "127.0.0.1"
-    ),
+    mode: Annotated[str, typer.Option(help="lock-step, real-time, or free (as fast as possible).")] = "lock-step",
+    host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; without it Ctrl-C ends.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Duration [s]; default: until Ctrl-C.")] = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
     valves: Valves = 0,
@@ -68,7 +66,7 @@ def serve(
     no_open: NoOpen = False,
     json: Json = False,
 ) -> None:
-    """Let a controller in another process or on another computer drive the virtual table over UDP."""
+    """Serve the virtual table over UDP, to be driven by a controller in another process or on another computer."""
     from dataclasses import asdict
 
     from ..interfaces.link import ServedPlant, find_mode, open_socket
@@ -98,8 +96,8 @@ def serve(
 @app.command()
 def link(
     motion: Motion,
-    host: Annotated[str, typer.Option(help="Where `lhpost6 serve` listens.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=1, max=65535, help="And its UDP port.")] = 46946,
+    host: Annotated[str, typer.Option(help="Host of `lhpost6 serve`.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of `lhpost6 serve`.")] = 46946,
     scale: Scale = 1.0,
     axes: Axes = None,
     out: Out = None,
@@ -113,7 +111,7 @@ def link(
     set_: Set = None,
     json: Json = False,
 ) -> None:
-    """Run the virtual 469D, or your own controller, here and the table behind `lhpost6 serve`; leaves record.nc."""
+    """Run the virtual 469D, or your own controller, against a table behind `lhpost6 serve`; writes record.nc."""
     from ..control import ControllerSettings, make_controller
     from ..data.records import save_record
     from ..interfaces.link import LinkClient, record_of_link_run, run_over_link

@@ -45,7 +45,7 @@ def tune(
     locked: Locked = False,
     json: Json = False,
 ) -> None:
-    """Tune the three-variable controller for a machine and specimen; leaves controller.toml and report.html."""
+    """Tune the three-variable controller for a machine and specimen; writes controller.toml and report.html."""
     from dataclasses import replace
 
     from ..control import save_controller
@@ -90,7 +90,7 @@ def iterate(
     beyond: Beyond = False,
     json: Json = False,
 ) -> None:
-    """Iterate on a motion until the table does what is wanted; leaves drive.nc, inverse.nc and report.html."""
+    """Iterate the drive of a motion until its tracking error is least; writes drive.nc, inverse.nc and report.html."""
     from dataclasses import replace
 
     from ..control.inverse import save_inverse
@@ -135,7 +135,7 @@ def sine(
     beyond: Beyond = False,
     json: Json = False,
 ) -> None:
-    """Run a sine without and with amplitude-phase control and harmonic cancellation; leaves report.html."""
+    """Run a sine without and with amplitude-phase control and harmonic cancellation; writes report.html."""
     from ..mechanics.plant import make_plant
     from ..show.control_tables import print_sine
     from ..show.report import write_sine_report

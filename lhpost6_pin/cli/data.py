@@ -19,16 +19,16 @@ __all__ = ["export", "import_"]
 def import_(
     files: Annotated[list[Path], typer.Argument(help="Data file(s) of one test.")],
     map_: Annotated[Path | None, typer.Option("--map", help="Channel map (TOML).")] = None,
-    guess: Annotated[bool, typer.Option("--guess", help="Write a first channel map to edit, and no record.")] = False,
+    guess: Annotated[bool, typer.Option("--guess", help="Write a draft channel map to edit, and no record.")] = False,
     out: Annotated[
         Path | None,
-        typer.Option(help="Record to write, without it out/TEST.nc; with --guess the map, without it FILE_map.toml."),
+        typer.Option(help="Record to write, default: out/TEST.nc; with --guess the map, default: FILE_map.toml."),
     ] = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
     json: Json = False,
 ) -> None:
-    """Make a record from measured data: MTS 469D, CSV, MATLAB, HDF5, netCDF, TDMS or Parquet."""
+    """Convert measured data to a record: MTS 469D, CSV, MATLAB, HDF5, netCDF, TDMS or Parquet."""
     from ..data.check import check_dataset
     from ..data.importing import (
         channel_units,
@@ -92,7 +92,7 @@ def import_(
 def export(
     record: Annotated[Path, typer.Argument(help="Record to export.")],
     to: Annotated[str, typer.Option(help="Format: csv, mat or parquet.")],
-    out: Annotated[Path | None, typer.Option(help="File to write; else beside the record.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File to write; default: beside the record.")] = None,
     json: Json = False,
 ) -> None:
     """Write a record as CSV, MATLAB v5 or Parquet, with the unit in every column's name."""
@@ -108,7 +108,7 @@ def export(
 
 
 def _print_channels(record: "xr.Dataset", sources: dict[str, str]) -> None:
-    """Print every channel with its source and range, so that a wrong unit is seen at once."""
+    """Print every channel with its source and range, which exposes a wrong unit."""
     from rich.markup import escape
     from rich.table import Table
 

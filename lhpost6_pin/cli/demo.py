@@ -1,4 +1,4 @@
-"""The command that shows it all in a minute: demo."""
+"""The command that demonstrates discovery in a minute: demo."""
 
 from typing import Annotated
 
@@ -15,12 +15,12 @@ __all__ = ["demo"]
 @app.command()
 def demo(
     out: Out = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of noise and errors of the sensors.")] = 5,
-    jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of sensor noise and sensor errors.")] = 5,
+    jobs: Annotated[int, typer.Option(help="Threads; -1: all cores.")] = -1,
     no_open: NoOpen = False,
     json: Json = False,
 ) -> None:
-    """Hide an effect in simulated measurements of a real earthquake, find it, name it, add it, see the gap shrink."""
+    """Hide an effect in simulated measurements, identify it, add it, and show the error shrink on a real earthquake."""
     import webbrowser
     from functools import partial
 

@@ -1,4 +1,4 @@
-"""The command that finds what the model lacks: discover."""
+"""The command that identifies missing effects: discover."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,25 +14,25 @@ __all__ = ["discover"]
 
 @app.command()
 def discover(
-    campaign: Annotated[Path, typer.Argument(help="Folder of records of one machine in one state.")],
+    campaign: Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")],
     model: Annotated[
         Path | None,
-        typer.Option("--model", "--override", help="TOML file of numbers and effects to replace."),
+        typer.Option("--model", "--override", help="TOML file of parameters and effects to replace."),
     ] = None,
     hold_out: Annotated[
         list[str] | None,
-        typer.Option(help="Test not to be searched, which proves what was found; may be given again. none: no test."),
+        typer.Option(help="Held-out test, excluded from the search; may be repeated. none: hold out no test."),
     ] = None,
     out: Out = None,
     machine: MachineName = "lhpost6",
     sensors: SensorsName = "lhpost6",
-    seed: Annotated[int, typer.Option(help="Of the simulated sensor noise.")] = 0,
-    jobs: Annotated[int, typer.Option(help="Threads; -1: as many as there are cores.")] = -1,
+    seed: Annotated[int, typer.Option(help="Seed of the simulated sensor noise.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Threads; -1: all cores.")] = -1,
     json: Json = False,
 ) -> None:
-    """Find the effect that the model lacks, name it, add it, prove it; leaves verdict.json, model.toml, report.html.
+    """Identify effects missing from the model, add them, test them on held-out data.
 
-    Interrupted, the same command goes on where the search stood.
+    Writes verdict.json, model.toml and report.html. An interrupted search resumes from its last checkpoint.
     """
     from ..data.campaign import load_campaign
     from ..data.sensors import load_sensors

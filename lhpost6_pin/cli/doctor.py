@@ -1,4 +1,4 @@
-"""What `lhpost6 doctor` says: versions, compiled-code cache, optional parts."""
+"""Diagnosis of an installation: versions, cache of compiled code, optional dependencies."""
 
 import platform
 import shutil
@@ -29,21 +29,21 @@ _OPTIONAL = {
 
 
 class Examined(NamedTuple):
-    """What is installed and where things are."""
+    """State of an installation."""
 
     version: str
     python: str
     required: dict[str, str | None]  # version by package; None: missing
-    optional: dict[str, bool]  # whether it is there
+    optional: dict[str, bool]  # whether installed
     browser: str | None
     machine_files: Path
     compiled_code: Path | None  # None: not kept between runs
-    first_step: float  # until a plant has taken it [s]
+    first_step: float  # time until it is done [s]
     compiled_now: bool  # for that step
 
 
 def examine() -> Examined:
-    """Look at versions, compiled code and optional parts; takes one model step."""
+    """Collect versions, cache and optional dependencies; times one model step."""
     required: dict[str, str | None] = {}
     for name in _REQUIRED:
         try:
@@ -57,7 +57,7 @@ def examine() -> Examined:
 
 
 def print_doctor(found: Examined) -> None:
-    """Print versions, whether compiled code is kept between runs and how long loading it takes, optional parts."""
+    """Print the state of an installation."""
     console = Console()
     state = Column("state", overflow="fold")  # a path is of no use cut off
     table = Table("part", state, title=f"lhpost6_pin {found.version}, Python {found.python}")
@@ -75,7 +75,7 @@ def print_doctor(found: Examined) -> None:
 
 
 def _time_first_step() -> tuple[float, bool]:
-    """Seconds until a plant has taken its first step, and whether anything was compiled for it."""
+    """Seconds until the first model step is done, and whether anything was compiled for it."""
     begin = time.perf_counter()
     from ..machine.machine import load_machine
     from ..mechanics.equilibrium import find_equilibrium

@@ -1,4 +1,4 @@
-"""Commands that take measured forces apart: decompose."""
+"""The command for force decomposition: decompose."""
 
 from pathlib import Path
 from typing import Annotated
@@ -33,11 +33,11 @@ def decompose(
     specimen_at: SpecimenAt = None,
     locked: Locked = False,
     sensors: SensorsName = "lhpost6",
-    cutoff: Annotated[float | None, typer.Option(help="Forces are compared up to here [Hz]; else 33.")] = None,
-    no_align: Annotated[bool, typer.Option("--no-align", help="Leave skews between channels alone.")] = False,
+    cutoff: Annotated[float | None, typer.Option(help="Low-pass of all forces [Hz]; default: 33.")] = None,
+    no_align: Annotated[bool, typer.Option("--no-align", help="Do not correct skews between channels.")] = False,
     json: Json = False,
 ) -> None:
-    """Find the forces behind a test by inverse dynamics; leaves ledger.nc and report.html."""
+    """Decompose the forces of a test, effect by effect, by inverse dynamics; writes ledger.nc and report.html."""
     from ..data.records import load_record
     from ..data.sensors import load_sensors
     from ..identification.decompose import decompose_record, find_agreement, find_work, save_ledger

@@ -1,4 +1,4 @@
-"""A page that shows a table while a command moves it."""
+"""A live view of the table while a command moves it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 __all__ = ["Amplify", "Change", "Live", "NoOpen", "show_address", "watched"]
 
-Amplify = Annotated[float, typer.Option(help="Draw the motion this many times as large.")]
+Amplify = Annotated[float, typer.Option(help="Factor that enlarges the motion.")]
 Change = Annotated[
-    bool, typer.Option("--force-change", help="Draw forces less what they are at the start: weight, preload.")
+    bool, typer.Option("--force-change", help="Show force change from the static value (weight, preload).")
 ]
-Live = Annotated[bool, typer.Option("--live", help="Show the table in a browser as it moves, no faster than it would.")]
-NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the page's address, open no browser.")]
+Live = Annotated[bool, typer.Option("--live", help="Show the table in a browser as it moves, in real time at most.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the address of the page; do not open a browser.")]
 
 PATIENCE = 20.0
-"""Longest wait [s] for somebody to look before a run begins."""
+"""Longest wait [s] for a viewer to connect before a run begins."""
 
 
 @contextmanager
@@ -35,9 +35,9 @@ def watched(
     err: bool = False,
     apart: bool = False,
 ) -> "Iterator[Watch | None]":
-    """Yield what shows a running plant in a browser, or None if nobody asked to see it.
+    """Yield the function that shows a running plant in a browser, or None if not `live`.
 
-    A view `apart` is drawn by another process and holds nothing up; else the run begins when somebody looks.
+    With `apart` the view runs in another process and delays nothing; else the run waits for a viewer to connect.
     """
     if not live:
         yield None
@@ -58,7 +58,7 @@ def watched(
 
 
 def show_address(url: str, what: str, open_it: bool, err: bool = False) -> None:
-    """Print where something is to be seen (as an error if `err`), and open a browser there if one can be had."""
+    """Print the address of a view (on stderr if `err`), and open it in a browser if there is one."""
     import webbrowser
 
     typer.echo(f"{url} shows {what}", err=err)

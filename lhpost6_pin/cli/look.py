@@ -1,4 +1,4 @@
-"""Commands to look at things: doctor, info, capacity, motions, check."""
+"""Commands that print tables: doctor, info, capacity, motions, check."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,7 +18,7 @@ __all__ = ["capacity", "check", "doctor", "info", "motions"]
 
 @app.command()
 def doctor(json: Json = False) -> None:
-    """Say what is installed, whether compiled code is kept, and which optional parts are there."""
+    """Print versions, the cache of compiled code and optional dependencies."""
     from .doctor import examine, print_doctor
 
     found = examine()
@@ -27,7 +27,7 @@ def doctor(json: Json = False) -> None:
 
 @app.command()
 def info(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
-    """Print a machine as a table: every number with unit and source, assumed values marked."""
+    """Print a machine: every number with unit, uncertainty and source; assumed values are marked."""
     from ..show.results import machine_entries
     from ..show.tables import print_machine
 
@@ -37,7 +37,7 @@ def info(machine: MachineName = "lhpost6", override: Override = None, json: Json
 
 @app.command()
 def capacity(machine: MachineName = "lhpost6", override: Override = None, json: Json = False) -> None:
-    """Compare what the model can give with Table 2.2, and print the oil-column modes."""
+    """Compare the capacity of the model with Table 2.2, and print the oil-column modes."""
     from ..mechanics.capacity import has_printed_capacity
     from ..show.results import capacity_entries
     from ..show.tables import print_capacity, print_modes
@@ -55,11 +55,11 @@ def capacity(machine: MachineName = "lhpost6", override: Override = None, json: 
 @app.command()
 def motions(
     name: Annotated[
-        str | None, typer.Argument(help="One of them, to see its options.", autocompletion=complete_motion)
+        str | None, typer.Argument(help="A motion, to print its options.", autocompletion=complete_motion)
     ] = None,
     json: Json = False,
 ) -> None:
-    """List the ground motions and tests known by name."""
+    """List ground motions and tests by name."""
     from ..show.results import motion_entries
     from ..show.tables import print_motions
 
@@ -68,13 +68,13 @@ def motions(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(help="Record to look into, or a campaign: a folder of records.")],
+    file: Annotated[Path, typer.Argument(help="Record, or a campaign: a directory of records.")],
     machine: MachineName = "lhpost6",
     override: Override = None,
     sensors: SensorsName = "lhpost6",
     json: Json = False,
 ) -> None:
-    """Say what is in records and what is wrong with them, and whether the sensors of measured ones agree."""
+    """Check records: layout, values, and the agreement of redundant sensors."""
     from ..data.check import check_record
     from ..show.results import finding_entries
     from ..show.tables import print_findings, print_sensor_findings
@@ -98,7 +98,7 @@ def check(
 
 
 def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> "list[SensorFinding] | None":
-    """Compare the sensors of measured records of this machine; what was simulated without noise has none."""
+    """Compare redundant sensors in measured records of this machine; noise-free simulated records are skipped."""
     from ..data.consistency import check_sensors
     from ..data.records import is_measured, load_record
     from ..data.sensors import load_sensors

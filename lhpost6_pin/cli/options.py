@@ -1,4 +1,4 @@
-"""Options that commands share, and the machine, motion and controller that they name."""
+"""Options shared by commands, and the machine, motion and controller that they select."""
 
 import logging
 from pathlib import Path
@@ -45,7 +45,9 @@ __all__ += ["refuse_no_jobs", "refuse_stepping"]
 MachineName = Annotated[
     str, typer.Option("--machine", help="Shipped machine name, or a TOML file.", autocompletion=complete_machine)
 ]
-Override = Annotated[Path | None, typer.Option("--override", help="TOML file with parameters to replace.")]
+Override = Annotated[
+    Path | None, typer.Option("--override", help="TOML file with parameters to replace, effects to add.")
+]
 Scheme = Annotated[
     str,
     typer.Option(help="Integration scheme: semi_implicit, euler or rk4.", autocompletion=complete_scheme),
@@ -65,7 +67,7 @@ SpecimenName = Annotated[
 ]
 SpecimenAt = Annotated[
     str | None,
-    typer.Option("--specimen-at", help=r"Its root on the platen's top: x,y,z \[m], or with r,p,y \[rad]."),
+    typer.Option("--specimen-at", help=r"Place of its root from C: x,y,z \[m], or with roll,pitch,yaw \[rad]."),
 ]
 Locked = Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")]
 SensorsName = Annotated[
@@ -76,28 +78,26 @@ SensorsName = Annotated[
         autocompletion=complete_sensors,
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
-Out = Annotated[
-    Path | None, typer.Option(help="Folder for the results; without it out/NAME, with the name of what is run.")
-]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
+Out = Annotated[Path | None, typer.Option(help="Directory of the results; default: out/NAME.")]
 Valves = Annotated[
-    int, typer.Option(min=0, max=2, help="Open servovalves on each horizontal actuator; 0: as the machine says.")
+    int, typer.Option(min=0, max=2, help="Open servovalves per horizontal actuator; 0: as in the machine file.")
 ]
 Motion = Annotated[
     list[str],
     typer.Argument(help="Name (see `lhpost6 motions`), file(s), or name and file(s).", autocompletion=complete_motion),
 ]
-Scale = Annotated[float, typer.Option(help="Factor on the motion.")]
-Axes = Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")]
+Scale = Annotated[float, typer.Option(help="Scale factor of the motion.")]
+Axes = Annotated[str | None, typer.Option(help="Axes, such as xyz, x, or x=y (the table's x moved by component y).")]
 HighPass = Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")]
 LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")]
 Set = Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")]
-Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion that is more than the table can give.")]
+Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
 SettingsName = Annotated[
     str | None,
     typer.Option(
         "--controller",
-        help="Controller settings: name or TOML file; else the machine's.",
+        help="Controller settings: name or TOML file; default: those of the machine.",
         autocompletion=complete_controller,
     ),
 ]
@@ -121,7 +121,7 @@ def find_machine(name: str, override: Path | None) -> "Machine":
 def find_table(
     machine: str, override: Path | None, valves: int, specimen: str | None, at: str | None, locked: bool
 ) -> "Machine":
-    """Machine with its open valves, and the specimen that the options name, if any; its doubts are logged."""
+    """Machine with its open valves and its specimen, if any; warnings about the specimen are logged."""
     from ..mechanics.plant import make_plant
     from ..mechanics.specimen_joints import specimen_doubts
 
@@ -144,7 +144,7 @@ def find_table(
 
 
 def find_settings(name: str | None, table: "Machine") -> "ControllerSettings":
-    """Settings by name or file, or those that the machine names."""
+    """Settings by name or file; default: those named by the machine."""
     from ..control import load_controller
     from ..control.plug import is_plugged
 
@@ -188,7 +188,7 @@ def find_target(
 
 
 def refuse_no_jobs(jobs: int, what: str = "threads") -> None:
-    """Raise ParameterError for no jobs at all; `what` they are, in words."""
+    """Raise ParameterError for zero jobs; `what` is the unit in the message."""
     if jobs == 0:
         raise ParameterError(f"--jobs 0: give a number of {what}, or -1 for as many as there are cores")
 
@@ -200,7 +200,7 @@ def refuse_stepping(
     engine: str,
     controller: "ControllerSettings | UserController | None" = None,
 ) -> None:
-    """Raise what `simulate` would for options that cannot be, before anybody waits for it."""
+    """Raise the errors of `simulate` for invalid options before anything long begins."""
     from ..control import ControllerSettings
     from ..mechanics.plant import make_plant
     from ..simulation.simulate import check_options
@@ -210,7 +210,7 @@ def refuse_stepping(
 
 
 def folder_for(out: Path | None, name: str) -> Path:
-    """Folder for results, out/NAME unless given; raises OSError at once if none can be written there."""
+    """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written."""
     from ..core.files import refuse_folder
 
     folder = out or Path("out") / name

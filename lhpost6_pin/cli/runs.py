@@ -64,7 +64,7 @@ def run(
     override: Override = None,
     controller: ControllerName = None,
     aic: Annotated[
-        Path | None, typer.Option(help="Condition the drive with this inverse.nc of `lhpost6 iterate`.")
+        Path | None, typer.Option(help="Condition the drive with this inverse (inverse.nc of `lhpost6 iterate`).")
     ] = None,
     valves: Valves = 0,
     specimen: SpecimenName = None,
@@ -81,7 +81,7 @@ def run(
     no_open: NoOpen = False,
     json: Json = False,
 ) -> None:
-    """Reproduce an earthquake on the virtual table; leaves record.nc and report.html."""
+    """Run a motion in closed loop on the virtual table; writes record.nc and report.html."""
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
     from ..core.names import SAMPLE_RATE
@@ -128,7 +128,7 @@ def run(
 
 @app.command()
 def replay(
-    drive: Annotated[Path, typer.Argument(help="Drive file that `lhpost6 iterate` left.")],
+    drive: Annotated[Path, typer.Argument(help="Drive file written by `lhpost6 iterate`.")],
     scheme: Scheme = "semi_implicit",
     rate: Rate = 8192,
     engine: EngineName = "pinocchio",
@@ -142,7 +142,7 @@ def replay(
     locked: Locked = False,
     json: Json = False,
 ) -> None:
-    """Replay a drive file in closed loop; leaves record.nc and report.html against the motion it is for."""
+    """Replay a drive file in closed loop, compared with its target motion; writes record.nc and report.html."""
     from ..simulation.rehearse import rehearse
     from ..tuning.drives import check_circumstances, load_drive
 
@@ -187,7 +187,7 @@ def open_loop(
     locked: Locked = False,
     json: Json = False,
 ) -> None:
-    """Drive the plant with a record's spools from its first sample's pressures; leaves record.nc."""
+    """Drive the plant in open loop with recorded spool positions, from the recorded pressures; writes record.nc."""
     from ..data.records import load_record
     from ..simulation.rehearse import replay as replay_spools
 
@@ -213,7 +213,7 @@ def open_loop(
 
 
 def repeating_command() -> str:
-    """The command line that repeats this one."""
+    """Command line that repeats this run."""
     return shlex.join(["lhpost6", *sys.argv[1:]])
 
 
@@ -226,7 +226,7 @@ def _save(
     *,
     against: "xr.Dataset | None" = None,
 ) -> None:
-    """Leave a run's record, and its report unless it is held `against` a measured test; say how it went."""
+    """Write the record and, unless it is compared `against` a measured test, the report; print a summary."""
     from ..data.records import save_record
     from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
     from ..show.results import run_entries

@@ -1,4 +1,4 @@
-"""Commands that hold the model against measured campaigns: validate."""
+"""The command that compares the model with measured campaigns: validate."""
 
 from pathlib import Path
 from typing import Annotated
@@ -29,7 +29,7 @@ __all__ = ["validate"]
 
 @app.command()
 def validate(
-    campaign: Annotated[Path, typer.Argument(help="Folder of records of one machine in one state.")],
+    campaign: Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")],
     out: Out = None,
     machine: MachineName = "lhpost6",
     override: Override = None,
@@ -40,15 +40,15 @@ def validate(
     controller: Annotated[
         str | None,
         typer.Option(
-            help="Controller settings for phase 3: name or TOML file; else those that records name.",
+            help="Controller settings for phase 3: name or TOML file; default: those named in the records.",
             autocompletion=complete_controller,
         ),
     ] = None,
-    phases: Annotated[str, typer.Option(help="Some of 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
-    jobs: Annotated[int, typer.Option(help="Tests at a time, in threads; -1: as many as there are cores.")] = -1,
+    phases: Annotated[str, typer.Option(help="Phases: 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
+    jobs: Annotated[int, typer.Option(help="Tests in parallel (threads); -1: all cores.")] = -1,
     json: Json = False,
 ) -> None:
-    """Validate the model on measured tests in three phases; leaves report.html and metrics.json."""
+    """Validate the model on measured tests in three phases; writes report.html and metrics.json."""
     from ..data.campaign import load_campaign
     from ..data.sensors import load_sensors
     from ..identification.validation import metrics, save_metrics

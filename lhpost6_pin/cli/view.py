@@ -1,4 +1,4 @@
-"""Command to look at a record in three dimensions."""
+"""The command that animates a record: view."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,14 +15,14 @@ __all__ = ["view"]
 @app.command()
 def view(
     record: Annotated[Path, typer.Argument(help="Test record (netCDF).")],
-    others: Annotated[list[Path] | None, typer.Argument(help="Other records, laid over it as outlines.")] = None,
+    others: Annotated[list[Path] | None, typer.Argument(help="Further records, overlaid as outlines.")] = None,
     export: Annotated[
-        Path | None, typer.Option(help="Write this HTML file, which plays off line, in place of opening a browser.")
+        Path | None, typer.Option(help="Write a self-contained HTML file instead of opening a browser.")
     ] = None,
     amplify: Amplify = 1.0,
-    gap: Annotated[float, typer.Option(help="Draw what the outlines differ by this many times more.")] = 1.0,
+    gap: Annotated[float, typer.Option(help="Factor that enlarges the deviation of the outlines.")] = 1.0,
     change: Change = False,
-    fps: Annotated[float, typer.Option(min=1.0, max=240.0, help="Frames a second.")] = 30.0,
+    fps: Annotated[float, typer.Option(min=1.0, max=240.0, help="Frames per second.")] = 30.0,
     no_open: NoOpen = False,
     machine: MachineName = "lhpost6",
     override: Override = None,
@@ -31,7 +31,7 @@ def view(
     locked: Locked = False,
     json: Json = False,
 ) -> None:
-    """Play a test: platen, actuators, struts and forces follow the record in a browser, or in one HTML file."""
+    """Animate a test in a browser or in one HTML file: platen, actuators, struts and force arrows."""
     import threading
 
     from ..data.records import load_record

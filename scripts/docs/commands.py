@@ -1,4 +1,4 @@
-"""The command reference: every command of the application with its arguments, options, help and defaults."""
+"""The command reference: all commands by job, with arguments, options, help and defaults."""
 
 import inspect
 from collections.abc import Callable, Iterator
@@ -9,10 +9,11 @@ from rich.text import Text
 from typer.models import ArgumentInfo, OptionInfo
 
 from lhpost6_pin import cli
+from lhpost6_pin.cli.app import JOBS, command_name
 
 from .markdown import cell, code_cell, table
 
-__all__ = ["command_names", "commands"]
+__all__ = ["commands"]
 
 KINDS = {str: "text", int: "whole number", float: "number", Path: "path", bool: ""}
 
@@ -29,42 +30,35 @@ class Given(NamedTuple):
     is_option: bool
 
 
-def command_names() -> tuple[str, ...]:
-    """Names of all commands, in the order of their modules."""
-    return tuple(name for name, _ in _commands())
-
-
 def commands() -> str:
-    """Markdown of all commands, one section each, after what their exit codes mean."""
-    sections = [_section(name, function) for name, function in _commands()]
-    return "\n\n".join([_exit_codes(), *sections])
-
-
-def _commands() -> Iterator[tuple[str, Callable[..., Any]]]:
-    found = {c.name or c.callback.__name__: c.callback for c in cli.app.registered_commands if c.callback}
-    yield from sorted(found.items())
+    """Markdown of all commands, a section per job, after the exit codes."""
+    functions = {command_name(c): c.callback for c in cli.app.registered_commands if c.callback}
+    parts = [_exit_codes()]
+    for job, names in JOBS.items():
+        parts += [f"## {job}", *(_section(name, functions[name]) for name in names)]
+    return "\n\n".join(parts)
 
 
 def _exit_codes() -> str:
-    """The sentence of the package's docstring that begins with the words."""
+    """The sentence on exit codes in the docstring of the package, as a table."""
     text = inspect.getdoc(cli) or ""
     _, _, codes = text.partition("Exit codes: ")
     if not codes:
-        raise ValueError("the docstring of lhpost6_pin.cli says no exit codes")
+        raise ValueError("no exit codes in the docstring of lhpost6_pin.cli")
     rows = [entry.strip().rstrip(".").partition(" ") for entry in " ".join(codes.split()).split(",")]
     return "## Exit codes\n\n" + table(("code", "meaning"), [(f"`{code}`", cell(what)) for code, _, what in rows])
 
 
 def _section(name: str, function: Callable[..., Any]) -> str:
     given = list(_given(function))
-    parts = [f"## lhpost6 {name}", _plain(inspect.getdoc(function) or ""), f"```text\n{_usage(name, given)}\n```"]
+    parts = [f"### lhpost6 {name}", _plain(inspect.getdoc(function) or ""), f"```text\n{_usage(name, given)}\n```"]
     for title, rows in (
         ("argument", [g for g in given if not g.is_option]),
         ("option", [g for g in given if g.is_option]),
     ):
         if rows:
             cells = [(code_cell(", ".join(g.names)), cell(g.what), code_cell(g.default), cell(g.text)) for g in rows]
-            parts.append(table((title, "takes", "default", "what it is"), cells))
+            parts.append(table((title, "value", "default", "meaning"), cells))
     return "\n\n".join(parts)
 
 
@@ -88,7 +82,7 @@ def _given(function: Callable[..., Any]) -> Iterator[Given]:
         none = parameter.default is inspect.Parameter.empty
         yield Given(
             _names(key, info, inner) if is_option else (key.strip("_").upper(),),
-            _range(KINDS[inner], info) + (", may be given again" if many and is_option else ""),
+            _range(KINDS[inner], info) + (", repeatable" if many and is_option else ""),
             "" if none or parameter.default is None else _default(parameter.default),
             _plain(info.help or ""),
             none,
@@ -98,14 +92,14 @@ def _given(function: Callable[..., Any]) -> Iterator[Given]:
 
 
 def _inner(kind: Any) -> tuple[type, bool]:
-    """The type of one value, and whether there may be several: of list[Path] | None the first is Path."""
+    """Type of one value, and whether the option is repeatable: Path and True for list[Path] | None."""
     some = next((k for k in get_args(kind) if k is not type(None)), kind) if type(None) in get_args(kind) else kind
     many = getattr(some, "__origin__", None) is list
     return (get_args(some)[0] if many else some), many
 
 
 def _names(key: str, info: OptionInfo, kind: type) -> tuple[str, ...]:
-    # within Annotated the first name given stands where the default would
+    # within Annotated, typer keeps the first name as the default
     given = [name for name in (info.default, *(info.param_decls or ())) if isinstance(name, str)]
     if given:
         return tuple(given)

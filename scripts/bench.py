@@ -154,7 +154,7 @@ class Bench:
         import pinocchio as pin
         from scipy.integrate import solve_ivp
 
-        from lhpost6_pin.mechanics.derivatives import settle
+        from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
         from lhpost6_pin.mechanics.schemes import A, V
         from lhpost6_pin.mechanics.workspace import make_workspace
 
@@ -167,7 +167,7 @@ class Bench:
                 ws.q[:] = pin.integrate(plant.model, q0, x[:nv])
                 ws.motion[V] = x[nv : 2 * nv]
                 ws.z[:] = x[2 * nv :]
-                settle(plant, ws, spool)
+                evaluate_derivatives(plant, ws, spool)
                 local = pin.dDifference(plant.model, q0, ws.q, pin.ArgumentPosition.ARG1) @ ws.motion[V]
                 return np.concatenate([local, ws.motion[A], ws.zd])
 

@@ -41,7 +41,7 @@ from scipy.signal import cont2discrete
 
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.control.plug import Sensors, Wanted
+from lhpost6_pin.control.plug import Feedback, Wanted
 from lhpost6_pin.core.errors import ControllerError
 from lhpost6_pin.core.files import refuse_folder
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
@@ -180,7 +180,7 @@ class Lqg:
         )
         return Memory(design, np.zeros(5 * m), deque(np.zeros((samples + 1, m)), maxlen=samples + 1))
 
-    def step(self, memory: Memory, wanted: Wanted, sensors: Sensors) -> Array:
+    def step(self, memory: Memory, wanted: Wanted, sensors: Feedback) -> Array:
         """Spool commands (n,) of one sample."""
         d = memory.design
         axes, m = d.plant.axes, d.plant.axes.size

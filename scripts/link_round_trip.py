@@ -21,7 +21,7 @@ import typer
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.files import refuse_folder, write_whole
 from lhpost6_pin.core.names import SAMPLE_RATE
-from lhpost6_pin.interfaces.link import LinkClient, Mode, ServedPlant, find_mode, open_socket, run_over_link, serve
+from lhpost6_pin.interfaces.link import LinkClient, LinkMode, ServedPlant, find_mode, open_socket, run_over_link, serve
 from lhpost6_pin.interfaces.link.link_summary import print_link
 from lhpost6_pin.interfaces.link.statistics import Histogram
 from lhpost6_pin.machine.machine import load_machine
@@ -31,7 +31,7 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop
 
 
-def serve_table(mode: Mode, pipe: Connection) -> None:
+def serve_table(mode: LinkMode, pipe: Connection) -> None:
     """Serve the LHPOST6 until the other end of the pipe says so; tells it the port first, how time was kept last."""
     keep_to_core(0)
     plant = make_plant(load_machine())

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lhpost6_pin.machine.machine import Machine
-from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import PlatenMotion, platen_motion
@@ -25,7 +25,7 @@ def shaken(machine: Machine, duration: float = 0.5, rate: int = RATE, size: floa
     rise = np.minimum(1.0, t / 0.2)[:, None] ** 2
     spool = rest.spool + size * rise * np.sin(2 * np.pi * (2.0 + 0.5 * k) * t[:, None] + 2.0 * k)
     ws = make_workspace(plant, rest.state)
-    settle(plant, ws, spool[0])
+    evaluate_derivatives(plant, ws, spool[0])
     advance = make_stepper(plant, "semi_implicit", 1.0 / rate)
     states: list[list[np.ndarray]] = [[], [], [], []]
     for held in spool:

@@ -13,7 +13,7 @@ from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
 from lhpost6_pin.data.fusion import fuse_motion
 from lhpost6_pin.data.records import sample_interval
-from lhpost6_pin.data.sensors import Sensors, add_noise, load_sensors
+from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import align
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.identification.calibration import (
@@ -64,7 +64,7 @@ def machine() -> Machine:
 
 
 @pytest.fixture(scope="module")
-def sensors() -> Sensors:
+def sensors() -> SensorSet:
     """Its sensors."""
     return load_sensors()
 
@@ -76,7 +76,7 @@ def truth(machine: Machine) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def campaign(machine: Machine, sensors: Sensors, truth: np.ndarray) -> Campaign:
+def campaign(machine: Machine, sensors: SensorSet, truth: np.ndarray) -> Campaign:
     """Two tests of a machine whose knobs are turned, with noise and calibration errors."""
     turned = with_knobs(machine, machine_knobs(machine), truth)
     return simulate_campaign(turned, load_controller("lhpost6"), sensors, seed=3, tests=("TX", "WN"))

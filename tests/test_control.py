@@ -8,7 +8,7 @@ from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
 from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, cancel, control_step
-from lhpost6_pin.control.plug import Sensors
+from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.core.errors import ControllerError, SimulationError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
 from lhpost6_pin.data.signals import align, delay, rrmse
@@ -334,7 +334,7 @@ def test_settings_of_another_rate_are_refused(plant, rest):
 
 
 def test_arrays_that_do_not_fit_a_controller_are_refused_before_compiled_code_sees_them(loop, rest):
-    sensors, drive, memory = Sensors(np.zeros(10), np.zeros(6), rest.force), np.zeros((5, 6)), loop.init()
+    sensors, drive, memory = Feedback(np.zeros(10), np.zeros(6), rest.force), np.zeros((5, 6)), loop.init()
     loop.step(loop.init(), 4, drive, sensors)
     for change, message in (
         ({"drive": np.zeros((5, 3))}, r"drive is ndarray of shape \(5, 3\); an array of shape \(5, 6\) is needed"),

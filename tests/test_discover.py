@@ -16,7 +16,7 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, save_campaign
-from lhpost6_pin.data.sensors import Sensors, load_sensors
+from lhpost6_pin.data.sensors import SensorSet, load_sensors
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, Weighing, refusal, squares_by_column
 from lhpost6_pin.discovery.add_effects import _fit_jointly
@@ -57,25 +57,25 @@ def machine() -> Machine:
 
 
 @pytest.fixture(scope="module")
-def sensors() -> Sensors:
+def sensors() -> SensorSet:
     """Its sensors."""
     return load_sensors()
 
 
-def measured(machine: Machine, sensors: Sensors, seed: int, tests: tuple[str, ...] = TESTS) -> Campaign:
+def measured(machine: Machine, sensors: SensorSet, seed: int, tests: tuple[str, ...] = TESTS) -> Campaign:
     """A simulated campaign of a machine as its sensors show it, with their errors."""
     return simulate_campaign(machine, load_controller("lhpost6"), sensors, seed=seed, tests=tests)
 
 
 @pytest.fixture(scope="module")
-def rubbing(machine: Machine, sensors: Sensors) -> Campaign:
+def rubbing(machine: Machine, sensors: SensorSet) -> Campaign:
     """A campaign with breakaway friction on the horizontal seals."""
     names = ("H1", "H2", "H3", "H4")
     return measured(machine.with_effect("stribeck_friction", names, friction=9e3, speed=0.04), sensors, 1)
 
 
 @pytest.fixture(scope="module")
-def ready(machine: Machine, sensors: Sensors, rubbing: Campaign) -> Prepared:
+def ready(machine: Machine, sensors: SensorSet, rubbing: Campaign) -> Prepared:
     """Two of its tests made ready."""
     return prepare_problem(machine, rubbing.records[::2], sensors, calibration_numbers())
 
@@ -85,7 +85,7 @@ ASKED = {"hold_out": ["TZ"], "phases": (1,)}
 
 @pytest.fixture(scope="module")
 def bookmarked(
-    machine: Machine, sensors: Sensors, rubbing: Campaign, tmp_path_factory: pytest.TempPathFactory
+    machine: Machine, sensors: SensorSet, rubbing: Campaign, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Discovery, Path]:
     """What is found in it, with one test held out; and what the search had kept while it looked for a second effect."""
     folder, kept = tmp_path_factory.mktemp("search"), tmp_path_factory.mktemp("kept")

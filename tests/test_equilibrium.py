@@ -7,7 +7,7 @@ from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.machine.machine import Machine, load_machine
-from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium, hydraulic_rows, rest_pressures
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
@@ -46,7 +46,7 @@ def at_rest(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """Acceleration (6,) and rates of hidden states in the equilibrium."""
     rest = find_equilibrium(plant)
     ws = make_workspace(plant, rest.state)
-    assert settle(plant, ws, rest.spool) == 0
+    assert evaluate_derivatives(plant, ws, rest.spool) == 0
     return ws.motion[A].copy(), ws.zd.copy()
 
 
@@ -88,7 +88,7 @@ def test_in_equilibrium_nothing_accelerates_and_no_pressure_drifts(machine: Mach
     assert np.abs(zd).max() < 1e-3
     rest = find_equilibrium(plant)
     shut = make_workspace(plant, rest.state)
-    settle(plant, shut, np.zeros(plant.spools))
+    evaluate_derivatives(plant, shut, np.zeros(plant.spools))
     fed = plant.rows["state"][hydraulic_rows(plant)]
     leaking = np.abs(shut.zd[fed]) > 1e3
     np.testing.assert_array_equal(leaking, rest.spool != 0.0)  # with closed valves the leak shows at once

@@ -35,7 +35,7 @@ from lhpost6_pin.core.errors import LhpostError
 from lhpost6_pin.data.importing import load_raw
 from lhpost6_pin.interfaces.link import ServedPlant, client
 from lhpost6_pin.interfaces.link.clock import SECOND
-from lhpost6_pin.interfaces.link.protocol import Frame, Kind, Mode, Welcome, decode, encode
+from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, Welcome, decode, encode
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
@@ -404,14 +404,14 @@ def test_no_sequence_of_datagrams_upsets_a_served_plant(open_valves):
 
     @settings(max_examples=max(20, settings().max_examples // 2), suppress_health_check=CHECKS)
     @given(
-        st.sampled_from(Mode),
+        st.sampled_from(LinkMode),
         st.lists(st.sampled_from(["again", "tick", "late"]) | datagrams(10, valves), max_size=20),
         st.lists(FLOATS, min_size=valves, max_size=valves),
     )
     def holds(mode, parts, numbers):
         table, now, heard = ServedPlant(plant, rest, mode), 0, []
-        hello = encode(Frame(Kind.HELLO, 1))
-        command = encode(Frame(Kind.COMMAND, 1, valves=valves, sequence=1, numbers=np.nan_to_num(numbers)))
+        hello = encode(Datagram(Kind.HELLO, 1))
+        command = encode(Datagram(Kind.COMMAND, 1, valves=valves, sequence=1, numbers=np.nan_to_num(numbers)))
         with no_leak():
             for part in (hello, command, *parts):
                 if isinstance(part, bytes):
@@ -424,7 +424,7 @@ def test_no_sequence_of_datagrams_upsets_a_served_plant(open_valves):
                     for answer in table.receive(heard[len(heard) // 2] if part == "again" else part, "a", now):
                         decode(answer)
             assert (np.abs(table.spool) <= 1.0).all()
-            decode(table.receive(encode(Frame(Kind.BYE, table._session)), "a", now)[0])
+            decode(table.receive(encode(Datagram(Kind.BYE, table._session)), "a", now)[0])
 
     holds()
 
@@ -446,8 +446,8 @@ def wire(answers: list[bytes]) -> mock.Mock:
 def test_no_answer_of_a_server_upsets_a_client(answers, valves, more):
     about = Welcome(2048.0, "m", ("a", "b"), tuple(valves))
     right = [
-        encode(Frame(Kind.WELCOME, 0, actuators=2, valves=min(sum(valves), 255), welcome=about)),
-        encode(Frame(Kind.SENSORS, 0, actuators=2 + more, numbers=np.zeros(10 + 2 * more))),
+        encode(Datagram(Kind.WELCOME, 0, actuators=2, valves=min(sum(valves), 255), welcome=about)),
+        encode(Datagram(Kind.SENSORS, 0, actuators=2 + more, numbers=np.zeros(10 + 2 * more))),
     ]
     right = [frame[:10] + b"\0\0" + frame[12:40] + bytes(4) + frame[44:] for frame in right]
     line = wire([*answers, *right])

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from machine_cases import DATA
 
 from lhpost6_pin import cli
-from lhpost6_pin.core.jsonable import as_json, plain
+from lhpost6_pin.core.jsonable import as_json, jsonable
 from lhpost6_pin.machine.machine import load_machine
 
 PRACTICE = DATA / "records" / "practice_a_TX.nc"
@@ -155,7 +155,7 @@ def test_a_refusal_is_an_object_too(said, words, kind, message):
 )
 def test_whatever_is_plain_reads_back(value):
     read = json.loads(as_json(value), parse_constant=not_a_constant)
-    assert read == plain(value)
+    assert read == jsonable(value)
 
 
 def test_arrays_records_and_paths_become_plain():
@@ -167,6 +167,6 @@ def test_arrays_records_and_paths_become_plain():
         where: Path
 
     value = {"r": Record(np.array([[1.0, np.nan]]), Path("a/b")), "p": Pair(np.float32(0.5), np.int64(3))}
-    assert plain(value) == {"r": {"values": [[1.0, None]], "where": "a/b"}, "p": {"a": 0.5, "b": 3}}
+    assert jsonable(value) == {"r": {"values": [[1.0, None]], "where": "a/b"}, "p": {"a": 0.5, "b": 3}}
     with pytest.raises(TypeError, match="object has no form"):
-        plain(object())
+        jsonable(object())

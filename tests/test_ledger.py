@@ -11,7 +11,7 @@ from lhpost6_pin.core.errors import UnknownNameError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.machine.machine import Machine, load_machine
-from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.ports import evaluate_ports, platen_pose
@@ -60,7 +60,7 @@ def every_step(machine: Machine, rate: int, duration: float = 0.5, scheme: str =
     n = int(duration * rate)
     spool = rest.spool + waves(plant.spools, (np.arange(n) + 0.5) / rate)
     ws = make_workspace(plant, rest.state)
-    settle(plant, ws, spool[0])
+    evaluate_derivatives(plant, ws, spool[0])
     advance = make_stepper(plant, scheme, 1.0 / rate)
     q, v, a, z = [], [], [], []
     for held in spool:

@@ -9,7 +9,7 @@ import pytest
 
 from lhpost6_pin import cli
 from lhpost6_pin.data.records import load_record
-from lhpost6_pin.interfaces.link import Mode, ServedPlant, open_socket, serve
+from lhpost6_pin.interfaces.link import LinkMode, ServedPlant, open_socket, serve
 
 SERVE = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {!r}; main()"
 SHORT = (
@@ -42,7 +42,7 @@ def port(plant, rest):
     """Port of a plant served in lock-step by a thread."""
     stop = threading.Event()
     with open_socket(port=0) as sock:
-        table = ServedPlant(plant, rest, Mode.LOCK_STEP)
+        table = ServedPlant(plant, rest, LinkMode.LOCK_STEP)
         thread = threading.Thread(target=serve, args=(sock, table), kwargs={"stop": stop})
         thread.start()
         yield sock.getsockname()[1]
@@ -50,7 +50,7 @@ def port(plant, rest):
         thread.join(GUARD)
 
 
-@pytest.mark.parametrize("mode", [m.label for m in Mode])
+@pytest.mark.parametrize("mode", [m.label for m in LinkMode])
 def test_a_server_says_where_it_listens_and_what_it_met(lhpost6, mode):
     code, told = lhpost6("serve", "--mode", mode, "--port", 0, "--seconds", 0.05)
     assert code == 0

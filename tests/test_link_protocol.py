@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from lhpost6_pin.core.errors import LhpostError, LinkError, UnknownNameError
 from lhpost6_pin.interfaces.link.protocol import (
     COUNTS,
-    Frame,
+    Datagram,
     Kind,
-    Mode,
+    LinkMode,
     PlantState,
-    ShortFrameError,
+    ShortDatagramError,
     Welcome,
     decode,
     encode,
@@ -27,7 +27,7 @@ U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 HEAD = {
     "session": U32,
-    "mode": st.sampled_from(Mode),
+    "mode": st.sampled_from(LinkMode),
     "state": st.sampled_from(PlantState),
     "sequence": U32,
     "acknowledged": U32,
@@ -36,17 +36,17 @@ HEAD = {
 }
 ABOUT = Welcome(2048.0, "lhpost6", ("H1", "V1", "Längs"), (2, 1, 1))
 EXAMPLES = [
-    Frame(Kind.HELLO, 7),
-    Frame(Kind.WELCOME, 7, Mode.FREE, actuators=3, valves=4, welcome=ABOUT),
-    Frame(Kind.COMMAND, 7, actuators=2, valves=3, sequence=1, numbers=np.array([0.5, -0.25, 1e-300])),
-    Frame(Kind.SENSORS, 7, Mode.REAL_TIME, PlantState.HOLD, 1, 1, 9, 8, 5, 6, np.arange(8.0)),
-    Frame(Kind.BYE, 7),
-    Frame(Kind.STATUS, 7, counts=tuple(range(12))),
+    Datagram(Kind.HELLO, 7),
+    Datagram(Kind.WELCOME, 7, LinkMode.FREE, actuators=3, valves=4, welcome=ABOUT),
+    Datagram(Kind.COMMAND, 7, actuators=2, valves=3, sequence=1, numbers=np.array([0.5, -0.25, 1e-300])),
+    Datagram(Kind.SENSORS, 7, LinkMode.REAL_TIME, PlantState.HOLD, 1, 1, 9, 8, 5, 6, np.arange(8.0)),
+    Datagram(Kind.BYE, 7),
+    Datagram(Kind.STATUS, 7, counts=tuple(range(12))),
 ]
 """One frame of each kind."""
 
 
-def same(a: Frame, b: Frame) -> bool:
+def same(a: Datagram, b: Datagram) -> bool:
     numbers = [x.tobytes() if x is not None else b"" for x in (a.numbers, b.numbers)]
     return a._replace(numbers=None) == b._replace(numbers=None) and numbers[0] == numbers[1]
 
@@ -58,7 +58,7 @@ def test_a_command_written_by_hand_from_the_layout_is_a_frame():
     for offset, form, value in ((12, "<I", 77), (16, "<I", 1), (24, "<Q", 10**18), (48, "<d", 0.5), (56, "<d", -0.25)):
         struct.pack_into(form, datagram, offset, value)
     frame = decode(bytes(datagram))
-    wanted = Frame(Kind.COMMAND, 77, actuators=2, valves=2, sequence=1, stamp=10**18, numbers=np.array([0.5, -0.25]))
+    wanted = Datagram(Kind.COMMAND, 77, actuators=2, valves=2, sequence=1, stamp=10**18, numbers=np.array([0.5, -0.25]))
     assert same(frame, wanted)
     datagram[10] = 1  # flags: a CRC is there
     struct.pack_into("<I", datagram, 40, zlib.crc32(datagram))
@@ -82,16 +82,16 @@ def test_every_kind_of_frame_comes_back_as_it_was(frame):
 
 @given(st.fixed_dictionaries(HEAD), st.lists(FINITE, max_size=30))
 def test_commands_and_sensors_come_back_to_the_last_bit(head, numbers):
-    command = Frame(Kind.COMMAND, **head, valves=len(numbers), numbers=np.array(numbers, float))
+    command = Datagram(Kind.COMMAND, **head, valves=len(numbers), numbers=np.array(numbers, float))
     assert same(decode(encode(command)), command)
     n = len(numbers) // 2
-    sensors = Frame(Kind.SENSORS, **head, actuators=n, numbers=np.array([*range(6), *numbers[: 2 * n]], float))
+    sensors = Datagram(Kind.SENSORS, **head, actuators=n, numbers=np.array([*range(6), *numbers[: 2 * n]], float))
     assert same(decode(encode(sensors)), sensors)
 
 
 def test_names_too_long_for_their_place_are_cut_to_whole_characters():
     about = Welcome(2048.0, "m" * 40, ("a" * 14 + "é",), (1,))
-    found = decode(encode(Frame(Kind.WELCOME, 0, actuators=1, valves=1, welcome=about))).welcome
+    found = decode(encode(Datagram(Kind.WELCOME, 0, actuators=1, valves=1, welcome=about))).welcome
     assert found.machine == "m" * 32 and found.actuators == ("a" * 14,)
 
 
@@ -119,7 +119,7 @@ def test_bytes_after_a_right_beginning_are_a_frame_or_refused(frame, data):
 def test_a_frame_cut_short_is_short_and_one_too_long_is_refused(frame):
     datagram = encode(frame)
     for size in range(len(datagram)):
-        with pytest.raises(ShortFrameError):
+        with pytest.raises(ShortDatagramError):
             decode(datagram[:size])
     with pytest.raises(LinkError, match="too many"):
         decode(datagram + b"\0")
@@ -167,7 +167,7 @@ def test_sequence_numbers_go_on_past_the_largest(sequence, ahead):
 
 
 def test_modes_are_found_by_name_and_a_wrong_one_is_told_the_valid_ones():
-    assert [find_mode(m.label) for m in Mode] == list(Mode)
+    assert [find_mode(m.label) for m in LinkMode] == list(LinkMode)
     with pytest.raises(UnknownNameError, match="free, lock-step, real-time"):
         find_mode("realtime")
 

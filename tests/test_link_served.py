@@ -6,16 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.control.plug import Sensors
-from lhpost6_pin.interfaces.link.protocol import COUNTS, Frame, Kind, Mode, PlantState, decode, encode
+from lhpost6_pin.control.plug import Feedback
+from lhpost6_pin.interfaces.link.protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode
 from lhpost6_pin.interfaces.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
 from lhpost6_pin.interfaces.link.statistics import Counts, Histogram
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.running import RunningPlant
 
 SECOND = 10**9
-MODES = list(Mode)
-MOVING = [Mode.REAL_TIME, Mode.FREE]
+MODES = list(LinkMode)
+MOVING = [LinkMode.REAL_TIME, LinkMode.FREE]
 
 
 class Client:
@@ -33,18 +33,18 @@ class Client:
     def hello(self, session=None):
         """Begin a session; returns welcome and sensors."""
         self.session, self.sequence = session or self.session, 0
-        return self.say(Frame(Kind.HELLO, self.session))
+        return self.say(Datagram(Kind.HELLO, self.session))
 
     def frame(self, spool, sequence=None):
         """Frame of the next command, or of one with a sequence number of its own."""
         self.sequence = self.sequence + 1 if sequence is None else sequence
         n = len(self.table.plant.machine.actuators)
-        return Frame(Kind.COMMAND, self.session, actuators=n, valves=n, sequence=self.sequence, numbers=spool)
+        return Datagram(Kind.COMMAND, self.session, actuators=n, valves=n, sequence=self.sequence, numbers=spool)
 
     def command(self, spool, sequence=None):
         """Send a command and let the plant move by one sample; returns the sensors."""
         answers = self.say(self.frame(spool, sequence))
-        return answers[0] if self.table.mode == Mode.LOCK_STEP else self.tick()
+        return answers[0] if self.table.mode == LinkMode.LOCK_STEP else self.tick()
 
     def tick(self):
         """Let a sample's time pass; returns the sensors, if the plant moves by itself."""
@@ -63,7 +63,7 @@ def client(plant, rest, request):
 
 def sensors_of(frame, n=10):
     acceleration, displacement, force = np.split(frame.numbers, [6, 6 + n])
-    return Sensors(displacement, acceleration, force)
+    return Feedback(displacement, acceleration, force)
 
 
 def spools(rest, samples, size=0.1):
@@ -109,7 +109,7 @@ def test_each_sample_takes_the_newest_command_and_counts_those_it_replaced(clien
 
 
 def test_sensors_bring_back_the_stamp_of_the_command_they_acknowledge(plant, rest):
-    client = Client(plant, rest, Mode.REAL_TIME)
+    client = Client(plant, rest, LinkMode.REAL_TIME)
     client.hello()
     client.say(client.frame(rest.spool)._replace(stamp=123, echo=40))
     client.now = 60
@@ -118,7 +118,7 @@ def test_sensors_bring_back_the_stamp_of_the_command_they_acknowledge(plant, res
 
 
 # ------------------------------------------------------------------------------------- datagrams gone astray
-@pytest.mark.parametrize("client", [Mode.LOCK_STEP], indirect=True)
+@pytest.mark.parametrize("client", [LinkMode.LOCK_STEP], indirect=True)
 def test_in_lock_step_a_command_sent_again_gets_the_same_answer_and_moves_nothing(client, rest):
     row, *_ = spools(rest, 1)
     first = client.table.receive(encode(client.frame(row)), "a", 5)
@@ -149,16 +149,16 @@ def test_short_malformed_and_foreign_datagrams_are_counted_and_change_nothing(cl
         b"x" * 128,
         good + b"\0",
         good[:50] + b"\xff" + good[51:],
-        encode(Frame(Kind.STATUS, 1, counts=(0,) * 12)),
+        encode(Datagram(Kind.STATUS, 1, counts=(0,) * 12)),
     ):
         assert table.receive(datagram, "a", 0) == []
-    few = Frame(Kind.COMMAND, 1, actuators=10, valves=4, sequence=1, numbers=np.zeros(4))
+    few = Datagram(Kind.COMMAND, 1, actuators=10, valves=4, sequence=1, numbers=np.zeros(4))
     assert table.receive(encode(few), "a", 0) == []
     assert table.counts.malformed == 5
     assert table.receive(good, "b", 0) == []  # another client
     assert table.receive(encode(client.frame(rest.spool, 1)._replace(session=2)), "a", 0) == []  # an earlier session
-    assert table.receive(encode(Frame(Kind.HELLO, 3)), "b", 0) == []
-    assert table.receive(encode(Frame(Kind.BYE, 1)), "b", 0) == []
+    assert table.receive(encode(Datagram(Kind.HELLO, 3)), "b", 0) == []
+    assert table.receive(encode(Datagram(Kind.BYE, 1)), "b", 0) == []
     assert table.counts.foreign == 4 and table.client == "a"
     assert table.counts.received == 14 and table.counts.samples == 0 and table.state == PlantState.WAITING
 
@@ -192,7 +192,7 @@ def test_no_sequence_of_datagrams_and_samples_upsets_a_served_plant(plant, rest,
             kind, session, sequence = part
             sizes = {Kind.COMMAND: 10, Kind.SENSORS: 26}
             numbers = np.zeros(sizes[kind]) if kind in sizes else None
-            frame = Frame(kind, session, actuators=10, valves=10, sequence=sequence, numbers=numbers)
+            frame = Datagram(kind, session, actuators=10, valves=10, sequence=sequence, numbers=numbers)
             if kind == Kind.WELCOME:
                 frame = frame._replace(actuators=0, welcome=(2048.0, "", (), ()))
             datagram = encode(frame._replace(counts=(0,) * len(COUNTS) if kind == Kind.STATUS else ()))
@@ -227,7 +227,7 @@ def test_four_missed_frames_are_bridged_and_the_fifth_begins_the_hold(client, re
 @pytest.mark.parametrize("share", [0.55, 0.625, 0.7])
 def test_a_table_in_strong_motion_stays_within_its_strokes_and_comes_to_rest_when_commands_stop(plant, rest, share):
     """Commands stop in the last full cycle: near its middle, on the way out, and at the end of the stroke."""
-    client = Client(plant, rest, Mode.REAL_TIME)
+    client = Client(plant, rest, LinkMode.REAL_TIME)
     _, found = client.hello()
     controller, drive = strong_sine(plant, rest)
     memory, before = controller.init(), 0.0
@@ -274,7 +274,7 @@ def test_spools_go_smoothly_to_those_of_rest_and_back_to_the_commands(client, re
 
 def test_a_link_that_drops_out_again_and_again_still_commands(plant, rest):
     """Seven of every twenty frames are lost in strong motion: a hold each time, and the table follows all the same."""
-    client = Client(plant, rest, Mode.REAL_TIME)
+    client = Client(plant, rest, LinkMode.REAL_TIME)
     _, found = client.hello()
     controller, drive = strong_sine(plant, rest)
     memory = controller.init()
@@ -295,7 +295,7 @@ def test_a_hold_after_commands_beyond_full_stroke_begins_at_full_stroke(client, 
     assert (client.table.spool >= -1.0).all() and (client.table.spool < -0.99).all()
 
 
-@pytest.mark.parametrize("client", [Mode.LOCK_STEP], indirect=True)
+@pytest.mark.parametrize("client", [LinkMode.LOCK_STEP], indirect=True)
 def test_in_lock_step_a_second_of_silence_brings_the_plant_to_its_hold(client, rest):
     rows = spools(rest, 30)
     for row in rows[:20]:
@@ -335,7 +335,7 @@ def test_a_plant_that_leaves_its_stroke_trips_and_a_new_hello_puts_it_at_rest(cl
 def test_a_hello_that_comes_again_does_not_disturb_the_run(client, rest):
     for row in spools(rest, 3):
         client.command(row)
-    _, sensors = client.say(Frame(Kind.HELLO, client.session))
+    _, sensors = client.say(Datagram(Kind.HELLO, client.session))
     assert sensors.sequence == 3 and client.table.state == PlantState.RUNNING
 
 
@@ -345,12 +345,12 @@ def test_the_place_is_free_after_a_bye_which_is_answered_with_the_counts_of_the_
     client.hello(session=8)  # counts of an earlier session are left out
     for row in spools(rest, 3):
         client.command(row)
-    (status,) = client.say(Frame(Kind.BYE, 8))
+    (status,) = client.say(Datagram(Kind.BYE, 8))
     counts = dict(zip(COUNTS, status.counts, strict=True))
     assert counts["received"] == 4 and counts["samples"] == 3 and counts["short"] == 0
-    assert client.say(Frame(Kind.BYE, 8))[0].counts[0] == 5  # its answer was lost: once more
+    assert client.say(Datagram(Kind.BYE, 8))[0].counts[0] == 5  # its answer was lost: once more
     assert client.tick() is None and client.table.client is None
-    assert len(client.say(Frame(Kind.HELLO, 9), sender="b")) == 2 and client.table.client == "b"
+    assert len(client.say(Datagram(Kind.HELLO, 9), sender="b")) == 2 and client.table.client == "b"
 
 
 @pytest.mark.parametrize("client", MODES, indirect=True)

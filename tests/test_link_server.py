@@ -18,7 +18,7 @@ from lhpost6_pin.interfaces.link import (
     HOST,
     Kind,
     LinkClient,
-    Mode,
+    LinkMode,
     PlantState,
     ServedPlant,
     open_socket,
@@ -32,13 +32,13 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
-MODES = list(Mode)
-MOVING = [Mode.REAL_TIME, Mode.FREE]
+MODES = list(LinkMode)
+MOVING = [LinkMode.REAL_TIME, LinkMode.FREE]
 GUARD = 60.0  # [s] no wait is meant to last so long
 
 
 @contextmanager
-def served(plant, rest, mode=Mode.LOCK_STEP, **options):
+def served(plant, rest, mode=LinkMode.LOCK_STEP, **options):
     """Serve a plant in a thread; yields the served plant and its address."""
     table, stop = ServedPlant(plant, rest, mode), threading.Event()
     with open_socket(port=0) as sock:
@@ -197,7 +197,7 @@ def test_a_client_hears_of_a_trip_although_the_samples_stand(plant, rest, mode):
 
 
 def test_the_newest_sensors_can_be_had_without_waiting(plant, rest):
-    with served(plant, rest, Mode.REAL_TIME) as (_, address), LinkClient(*address) as client:
+    with served(plant, rest, LinkMode.REAL_TIME) as (_, address), LinkClient(*address) as client:
         assert client.newest() is None  # the plant waits for its first command
         client.send(rest.spool)
         while (found := client.newest()) is None:
@@ -276,7 +276,7 @@ def test_a_server_ends_when_its_time_is_over(plant, rest, mode):
 @pytest.mark.parametrize("seconds", [-1.0, math.nan, math.inf])
 def test_a_time_that_is_none_is_refused(plant, rest, seconds):
     with open_socket(port=0) as sock, pytest.raises(LinkError, match="cannot be served for"):
-        serve(sock, ServedPlant(plant, rest, Mode.FREE), seconds=seconds)
+        serve(sock, ServedPlant(plant, rest, LinkMode.FREE), seconds=seconds)
 
 
 def test_a_run_over_the_link_refuses_a_drive_of_another_width(plant, rest):
@@ -287,7 +287,7 @@ def test_a_run_over_the_link_refuses_a_drive_of_another_width(plant, rest):
 
 
 def test_a_server_interrupted_by_the_keyboard_ends_and_keeps_its_counts(plant, rest, monkeypatch):
-    table = ServedPlant(plant, rest, Mode.REAL_TIME)
+    table = ServedPlant(plant, rest, LinkMode.REAL_TIME)
 
     def interrupted(now):
         raise KeyboardInterrupt

@@ -15,7 +15,7 @@ from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.signals import rrmse
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.derivatives import settle
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import PlatenMotion, platen_motion
@@ -384,7 +384,7 @@ def test_stepping_twice_is_the_same_as_running_once(plant, rest):
 
     def final(pieces):
         ws = make_workspace(plant, rest.state)
-        settle(plant, ws, spool[0])
+        evaluate_derivatives(plant, ws, spool[0])
         advance = make_stepper(plant, "semi_implicit", 1 / 8192)
         for piece in pieces:
             advance(ws, np.repeat(piece, 4, axis=0))

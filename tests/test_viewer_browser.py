@@ -159,7 +159,7 @@ def moved(plant, show) -> None:
     spool[0] += 0.2
     for sample in range(1024):
         if sample % EVERY == 0:
-            show(table.sight())
+            show(table.snapshot())
         table.advance(spool)
 
 

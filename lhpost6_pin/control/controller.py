@@ -15,7 +15,7 @@ from ..mechanics.pose import leg_jacobian
 from ..mechanics.rigid_body import platen_inertia
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
 from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, control_step_flat
-from .plug import Sensors, Wanted
+from .plug import Feedback, Wanted
 from .settings import ControllerSettings
 
 __all__ = ["Controller", "make_controller"]
@@ -45,7 +45,7 @@ class Controller(NamedTuple):
         width = max(6, self.plant.spools)
         return np.zeros((MEMORY_ROWS + len(self.canceller), width))
 
-    def step(self, memory: Array, sample: int, drive: Array, sensors: Sensors) -> Array:
+    def step(self, memory: Array, sample: int, drive: Array, sensors: Feedback) -> Array:
         """Command (n_actuators,) of a sample from drive (n, columns) and the sensors.
 
         memory is changed in place. For one sample at a time: runs call the compiled step themselves. Raises
@@ -54,7 +54,7 @@ class Controller(NamedTuple):
         n = self.plant.spools
         self._check("drive", drive, (len(drive), self.columns))
         self._check("memory", memory, (MEMORY_ROWS + len(self.canceller), max(6, n)))
-        for name, values, size in zip(Sensors._fields, sensors, (n, 6, n), strict=True):
+        for name, values, size in zip(Feedback._fields, sensors, (n, 6, n), strict=True):
             self._check(f"sensors' {name}", values, (size,))
         if not 0 <= sample < len(drive):
             raise ControllerError(f"{self.settings.name}: sample {sample} is none of the drive's {len(drive)}")

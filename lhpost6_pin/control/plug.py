@@ -24,13 +24,13 @@ from ..core.errors import ControllerError, LhpostError
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant
 
-__all__ = ["Sensors", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
+__all__ = ["Feedback", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
 __all__ += ["start_plugged", "step_plugged", "wanted_from"]
 
 Array = NDArray[np.float64]
 
 
-class Sensors(NamedTuple):
+class Feedback(NamedTuple):
     """What the table tells its controller at one sample; a run fills the same arrays each time: copy what you keep."""
 
     displacement: Array  # (n_actuators,) from the zero-position [m]
@@ -52,7 +52,7 @@ class UserController(Protocol):
     def init(self, plant: Plant, rest: Equilibrium) -> Any:
         """Memory of one run of a plant that rests in the zero-position."""
 
-    def step(self, memory: Any, wanted: Wanted, sensors: Sensors) -> ArrayLike:
+    def step(self, memory: Any, wanted: Wanted, sensors: Feedback) -> ArrayLike:
         """Spool commands (n_actuators,), -1..1, of one sample; called once a sample, in order."""
 
 
@@ -113,7 +113,7 @@ def start_plugged(controller: UserController, plant: Plant, rest: Equilibrium) -
         raise _failed(controller, "init", "", error) from error
 
 
-def step_plugged(controller: UserController, memory: Any, sample: int, wanted: Wanted, sensors: Sensors) -> Array:
+def step_plugged(controller: UserController, memory: Any, sample: int, wanted: Wanted, sensors: Feedback) -> Array:
     """Command (n_actuators,) of a user's controller at a sample, as finite numbers.
 
     Raises ControllerError naming the controller, the sample and the actuator where there is none.

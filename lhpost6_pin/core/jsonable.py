@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["as_json", "plain"]
+__all__ = ["as_json", "jsonable"]
 
 
-def plain(value: Any) -> Any:
+def jsonable(value: Any) -> Any:
     """Mappings, sequences, arrays, records and paths as dicts, lists and text; None for a number that is not finite.
 
     Raises TypeError for anything else.
@@ -22,20 +22,20 @@ def plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
+        return jsonable(value.tolist())
     if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
+        return {str(key): jsonable(inner) for key, inner in value.items()}
     if hasattr(value, "_asdict"):
-        return plain(value._asdict())
+        return jsonable(value._asdict())
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: jsonable(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, list | tuple | set | frozenset):
-        return [plain(inner) for inner in value]
+        return [jsonable(inner) for inner in value]
     raise TypeError(f"{type(value).__name__} has no form in JSON")
 
 
 def as_json(value: Any) -> str:
     """A value as JSON text, one entry a line."""
-    return json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
+    return json.dumps(jsonable(value), indent=1, ensure_ascii=False, allow_nan=False)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ..mechanics.plant import Plant
 from .records import LAYOUT, require
 from .sensor_pairs import Comparison, Term, comparisons
-from .sensors import Sensors
+from .sensors import SensorSet
 
 __all__ = ["SensorFinding", "check_sensors", "scaled_inverse"]
 
@@ -80,7 +80,7 @@ class SensorFinding:
         return f"{self.check}, {self.channel}: {value}, {due}: {self.verdict}"
 
 
-def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors) -> tuple[SensorFinding, ...]:
+def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet) -> tuple[SensorFinding, ...]:
     """Compare all sensors of a campaign that can be compared, pooled over its records.
 
     Force against pressures, lengths against platen pose, parity of the lengths, velocity and acceleration against

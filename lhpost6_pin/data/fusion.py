@@ -28,7 +28,7 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, forward_kinematics, leg_displacements
 from .conditioning import WIDTHS, integrate, quieted
 from .records import channel_name, sample_interval
-from .sensors import Sensors, spectrum
+from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate
 
 __all__ = ["FusedMotion", "fuse_motion", "kinematic_jacobian"]
@@ -63,7 +63,7 @@ class _Sensor(NamedTuple):
 def fuse_motion(
     plant: Plant,
     record: xr.Dataset,
-    sensors: Sensors,
+    sensors: SensorSet,
     *,
     crossover: float | None = None,
     band: Band | None = None,
@@ -104,7 +104,7 @@ def kinematic_jacobian(plant: Plant) -> Array:
     return columns[:, : plant.spools].T
 
 
-def _displacement(plant: Plant, record: xr.Dataset, sensors: Sensors, f: Array) -> tuple[_Sensor, list[str]]:
+def _displacement(plant: Plant, record: xr.Dataset, sensors: SensorSet, f: Array) -> tuple[_Sensor, list[str]]:
     """Displacement by all sensors that measure it, each axis weighted by the inverse of their noise."""
     found: dict[str, _Sensor] = {}
     if "actuator_displacement" in record:
@@ -128,7 +128,7 @@ def _displacement(plant: Plant, record: xr.Dataset, sensors: Sensors, f: Array) 
     return _Sensor(signal, weight**2 * one.spectrum + (1 - weight) ** 2 * two.spectrum), list(found)
 
 
-def _sensor(record: xr.Dataset, sensors: Sensors, f: Array, name: str) -> _Sensor | None:
+def _sensor(record: xr.Dataset, sensors: SensorSet, f: Array, name: str) -> _Sensor | None:
     """Platen channel with its noise; None if the record does not have it."""
     if name not in record:
         return None

@@ -18,7 +18,7 @@ from .alignment import due_spools, gas_pressure
 from .conditioning import resolution
 from .fusion import kinematic_jacobian
 from .records import sample_interval
-from .sensors import Sensors, spectrum
+from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate
 
 __all__ = ["Comparison", "Term", "comparisons", "loose_lengths"]
@@ -62,7 +62,7 @@ class Comparison(NamedTuple):
 class _View:
     """A record as the comparisons see it: filtered, trimmed and thinned, with the noise that is left."""
 
-    def __init__(self, plant: Plant, record: xr.Dataset, sensors: Sensors) -> None:
+    def __init__(self, plant: Plant, record: xr.Dataset, sensors: SensorSet) -> None:
         self.plant, self.record, self.sensors = plant, record, sensors
         time = record["time"].values
         self.dt = sample_interval(record)
@@ -107,7 +107,7 @@ class _View:
         return s.gain_sd(name), float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0))), s.delay_sd(group)
 
 
-def comparisons(plant: Plant, record: xr.Dataset, sensors: Sensors) -> Iterator[Comparison]:
+def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[Comparison]:
     """All comparisons that a record has the channels for."""
     view = _View(plant, record, sensors)
     for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools):
@@ -115,7 +115,7 @@ def comparisons(plant: Plant, record: xr.Dataset, sensors: Sensors) -> Iterator[
 
 
 def loose_lengths(
-    plant: Plant, record: xr.Dataset, sensors: Sensors, closing: float
+    plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: float
 ) -> Iterator[tuple[str, Comparison, Array]]:
     """Lengths of double-acting actuators against the platen's pose, each with the side (n,) that a loose pin bears on.
 

@@ -22,7 +22,8 @@ from .conditioning import resolution
 from .records import LAYOUT, channel_name, same_unit, sample_interval
 from .signals import Band
 
-__all__ = ["GROUPS", "NoiseEstimate", "Sensors", "add_noise", "estimate_noise", "find_rest", "load_sensors", "spectrum"]
+__all__ = ["GROUPS", "NoiseEstimate", "SensorSet", "add_noise", "estimate_noise", "find_rest", "load_sensors"]
+__all__ += ["spectrum"]
 
 Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
@@ -43,7 +44,7 @@ SAMPLING = {"rate": "Hz", "low_pass": "Hz", "low_pass_order": "1", "bits": "1", 
 
 
 @dataclass(frozen=True)
-class Sensors:
+class SensorSet:
     """Noise and calibration ranges by channel; what is not listed is free of them.
 
     `noise` is the standard deviation (1,) or (6,) of white noise at `rate` [Hz], before the low-pass `band`; gains
@@ -91,7 +92,7 @@ class Sensors:
         return self.delay_range.get(group, 0.0) / np.sqrt(3.0)
 
 
-def load_sensors(name_or_path: str | Path = "lhpost6") -> Sensors:
+def load_sensors(name_or_path: str | Path = "lhpost6") -> SensorSet:
     """Read a file of sensors by shipped name or by path.
 
     Raises UnknownNameError, or ParameterError naming file and key for what is missing, unknown or impossible.
@@ -131,7 +132,7 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> Sensors:
             what = f"{sampling[key]:g} should be a whole number from {least} to {most}"
             raise ParameterError(f"{given.origin}: sampling.{key}: {what}")
     noise, *ranges = tables.values()
-    return Sensors(
+    return SensorSet(
         name=str(given.words.get("sensors.name", path.stem)),
         rate=sampling["rate"],
         band=Band(high=sampling["low_pass"], order=int(sampling["low_pass_order"])),
@@ -145,7 +146,7 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> Sensors:
     )
 
 
-def spectrum(sensors: Sensors, record: xr.Dataset, channel: str, f: ArrayLike) -> Array:
+def spectrum(sensors: SensorSet, record: xr.Dataset, channel: str, f: ArrayLike) -> Array:
     """Noise spectrum (n, columns) of a channel in this record: its sensor's, and that of its digital resolution."""
     values = _columns(record, channel)
     step = resolution(values)
@@ -154,7 +155,7 @@ def spectrum(sensors: Sensors, record: xr.Dataset, channel: str, f: ArrayLike) -
 
 
 # -------------------------------------------------------------------------------------------- simulation
-def add_noise(record: xr.Dataset, sensors: Sensors, rng: np.random.Generator) -> xr.Dataset:
+def add_noise(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) -> xr.Dataset:
     """Record with simulated noise on every channel that has any, recorded with the sensors' bits over its range.
 
     The noise is Gaussian with the stated spectrum: white at the sensors' rate, low-passed, and sampled at the record's
@@ -171,7 +172,7 @@ def add_noise(record: xr.Dataset, sensors: Sensors, rng: np.random.Generator) ->
     return record.assign(channels).assign_attrs(noise=f"simulated: {sensors.name}")
 
 
-def _draw(sensors: Sensors, channel: str, shape: tuple[int, int], rate: float, rng: np.random.Generator) -> Array:
+def _draw(sensors: SensorSet, channel: str, shape: tuple[int, int], rate: float, rng: np.random.Generator) -> Array:
     from scipy import fft
 
     extra = int(np.ceil(0.1 * rate))  # the Fourier sum is periodic: what wraps around is thrown away
@@ -199,7 +200,7 @@ class NoiseEstimate(NamedTuple):
         return self.sd / self.stated
 
 
-def find_rest(record: xr.Dataset, sensors: Sensors, k: float = 6.0) -> slice:
+def find_rest(record: xr.Dataset, sensors: SensorSet, k: float = 6.0) -> slice:
     """Leading samples in which no channel moves beyond `k` standard deviations of its stated noise.
 
     Each column is judged from its mean over the first 1/16 s. Two periods of the low-pass at the start are left out:
@@ -220,7 +221,7 @@ def find_rest(record: xr.Dataset, sensors: Sensors, k: float = 6.0) -> slice:
     return slice(edge, n) if n >= edge + least else slice(0, 0)
 
 
-def estimate_noise(record: xr.Dataset, sensors: Sensors, rest: slice | None = None) -> tuple[NoiseEstimate, ...]:
+def estimate_noise(record: xr.Dataset, sensors: SensorSet, rest: slice | None = None) -> tuple[NoiseEstimate, ...]:
     """Noise of every column that has any stated, from the samples `rest` (found by `find_rest` if not given).
 
     Its variance over that left by the low-pass is scaled back to white noise at the sensors' rate. The standard error
@@ -248,7 +249,7 @@ def estimate_noise(record: xr.Dataset, sensors: Sensors, rest: slice | None = No
     return tuple(found)
 
 
-def _recorded_sd(sensors: Sensors, record: xr.Dataset, channel: str) -> Array:
+def _recorded_sd(sensors: SensorSet, record: xr.Dataset, channel: str) -> Array:
     """Standard deviation (columns,) of a channel's noise as recorded: the sensor's and that of the resolution."""
     values = _columns(record, channel)
     sd = np.sqrt(sensors.noise_sd(channel) ** 2 + resolution(values) ** 2 / 12)

@@ -11,7 +11,7 @@ import joblib
 
 from .. import __version__
 from ..core.files import write_whole
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..machine.machine import Machine
 from ..machine.machine_toml import machine_toml
 from .search_state import Search
@@ -59,7 +59,7 @@ class Bookmark:
 def make_bookmark(
     folder: Path | None,
     machine: Machine,
-    sensors: Sensors,
+    sensors: SensorSet,
     hashes: Mapping[str, str],
     hold_out: Sequence[str] | None,
     seed: int,

@@ -12,7 +12,7 @@ import xarray as xr
 
 from ..control import load_controller
 from ..data.campaign import Campaign
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..machine.machine import Machine
 from ..simulation.rehearse import replay
 from ..simulation.simulated_campaign import load_procedure, simulate_campaign
@@ -47,7 +47,7 @@ def hidden_effect() -> tuple[str, str, dict[str, float]]:
     return str(known.words["hidden.family"]), str(known.words["hidden.component"]), numbers
 
 
-def measured_tests(machine: Machine, sensors: Sensors, *, seed: int, progress: Progress | None = None) -> Campaign:
+def measured_tests(machine: Machine, sensors: SensorSet, *, seed: int, progress: Progress | None = None) -> Campaign:
     """Tests of a table that has the hidden effect, under the virtual 469D, as its sensors show them."""
     family, component, numbers = hidden_effect()
     table = machine.with_effect(family, (component,), name="", **numbers)
@@ -56,7 +56,13 @@ def measured_tests(machine: Machine, sensors: Sensors, *, seed: int, progress: P
 
 
 def searched(
-    machine: Machine, tests: Campaign, sensors: Sensors, *, seed: int, jobs: int = -1, progress: Progress | None = None
+    machine: Machine,
+    tests: Campaign,
+    sensors: SensorSet,
+    *,
+    seed: int,
+    jobs: int = -1,
+    progress: Progress | None = None,
 ) -> Discovery:
     """What the search says of tests when all it knows is the machine without the effect; see `discover`."""
     return discover(

@@ -14,7 +14,7 @@ from ..core.errors import RecordError, UnknownNameError
 from ..core.files import models_folder
 from ..core.progress import Progress, between
 from ..data.campaign import Campaign
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..identification.calibration import calibration_numbers
 from ..identification.calibration.free_parameters import plan_knobs, scatter_knobs
 from ..identification.calibration.normal_equations import Normal
@@ -62,7 +62,7 @@ class Discovery:
 def discover(
     machine: Machine,
     campaign: Campaign,
-    sensors: Sensors,
+    sensors: SensorSet,
     *,
     hold_out: Sequence[str] | None = None,
     phases: Sequence[int] = (1, 2, 3),
@@ -149,7 +149,7 @@ def discover(
 def _prepared(
     machine: Machine,
     records: Sequence[xr.Dataset],
-    sensors: Sensors,
+    sensors: SensorSet,
     numbers: Parameters,
     calibration: Parameters,
     seed: int,

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..data.campaign import Campaign
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..identification.calibration.sensor_errors import corrected_record
 from ..identification.validation import PHASES, Phase, Validation, validate
 from ..machine.machine import Machine
@@ -62,7 +62,7 @@ def prove(
     machine: Machine,
     found: Search,
     records: Sequence[xr.Dataset],
-    sensors: Sensors,
+    sensors: SensorSet,
     *,
     phases: Sequence[int],
     jobs: int,

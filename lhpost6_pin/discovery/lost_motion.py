@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core.progress import Progress, between
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import Comparison, loose_lengths
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..identification.calibration.fit import solve
 from ..machine.library import find_family
 from ..machine.parameters import Parameters
@@ -48,7 +48,7 @@ class LostMotion(NamedTuple):
 
 
 def lost_motion(
-    plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors, numbers: Parameters
+    plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, numbers: Parameters
 ) -> tuple[LostMotion, ...]:
     """Play that the lengths of all records together tell beyond doubt; numbers are those of `models/procedures`."""
     closing = dict(_shape())["closing_force"]

@@ -13,7 +13,7 @@ from joblib import Parallel, delayed
 
 from ..control import ControllerSettings
 from ..core.errors import SimulationError
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..identification.calibration.free_parameters import Knob
 from ..identification.calibration.normal_equations import Normal
 from ..identification.calibration.prepare import prepare_problem
@@ -41,7 +41,7 @@ class NextTest:
 
 
 def next_tests(
-    found: Search, settings: ControllerSettings, sensors: Sensors, calibration: Parameters, numbers: Parameters
+    found: Search, settings: ControllerSettings, sensors: SensorSet, calibration: Parameters, numbers: Parameters
 ) -> tuple[NextTest, ...]:
     """For every added effect and each of its rivals, the menu's tests by falling margin."""
     tests = tests_of(load_procedure(MENU))
@@ -58,7 +58,7 @@ def _trial(
     one: Contest,
     rival: Contest,
     settings: ControllerSettings,
-    sensors: Sensors,
+    sensors: SensorSet,
     calibration: Parameters,
     numbers: Parameters,
     test: str,

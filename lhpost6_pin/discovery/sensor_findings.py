@@ -13,7 +13,7 @@ import xarray as xr
 from ..core.names import AXES
 from ..data.alignment import align_record
 from ..data.consistency import SensorFinding, check_sensors
-from ..data.sensors import Sensors
+from ..data.sensors import SensorSet
 from ..mechanics.plant import Plant
 
 __all__ = ["Fault", "put_right", "wrong_sensors"]
@@ -48,7 +48,7 @@ class Fault:
 
 
 def wrong_sensors(
-    plant: Plant, records: Sequence[xr.Dataset], sensors: Sensors, loose: Sequence[str] = ()
+    plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, loose: Sequence[str] = ()
 ) -> tuple[Fault, ...]:
     """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does.
 
@@ -65,7 +65,7 @@ def wrong_sensors(
     return (*(f for f in faults if f is not None), *late)
 
 
-def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
+def _fault(finding: SensorFinding, sensors: SensorSet) -> Fault | None:
     """The gain, offset or cross-talk that a finding is of."""
     channel, _, column = finding.channel.rstrip("]").partition("[")
     kind, error = finding.quantity, finding.estimate - finding.expected
@@ -80,7 +80,7 @@ def _fault(finding: SensorFinding, sensors: Sensors) -> Fault | None:
     return Fault(kind, channel, column, error, finding.unit, finding.deviation, stated)
 
 
-def _late(findings: Sequence[SensorFinding], sensors: Sensors) -> list[Fault]:
+def _late(findings: Sequence[SensorFinding], sensors: SensorSet) -> list[Fault]:
     """Groups of channels of which most columns that can tell are late."""
     faults = []
     for check in _SKEWED:

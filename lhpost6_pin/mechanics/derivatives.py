@@ -8,12 +8,12 @@ from .plant import Plant
 from .schemes import TAU, V_SEEN, A, V, rates_stage
 from .workspace import Workspace
 
-__all__ = ["evaluate", "rates_at", "settle"]
+__all__ = ["evaluate", "rates_at", "evaluate_derivatives"]
 
 Array = NDArray[np.float64]
 
 
-def settle(plant: Plant, ws: Workspace, spool: Array) -> int:
+def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
     """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
     status = evaluate(plant, ws, spool)
     if status == 0:

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from ..core.names import AXES
 from ..machine.machine import Machine
-from .derivatives import settle
+from .derivatives import evaluate_derivatives
 from .equilibrium import find_equilibrium
 from .plant import Plant, State, make_plant
 from .schemes import A, V
 from .workspace import make_workspace
 
-__all__ = ["SPOOL_STEP", "LinearPlant", "Mode", "linearize", "oil_column_modes"]
+__all__ = ["SPOOL_STEP", "LinearPlant", "OilColumnMode", "linearize", "oil_column_modes"]
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class LinearPlant:
 
 
 @dataclass(frozen=True)
-class Mode:
+class OilColumnMode:
     """An oscillation: frequency [Hz], damping ratio [1], and the platen axis that moves most at C."""
 
     frequency: float
@@ -53,7 +53,7 @@ def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
         ws.q[:] = pin.integrate(plant.model, state.q, x[:nv])
         ws.motion[V] = state.v + x[nv : 2 * nv]
         ws.z[:] = state.z + x[2 * nv :]
-        settle(plant, ws, u)
+        evaluate_derivatives(plant, ws, u)
         return np.concatenate([ws.motion[V], ws.motion[A], ws.zd])
 
     n = 2 * nv + nz
@@ -69,7 +69,7 @@ def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
     return LinearPlant(a, b, nv)
 
 
-def oil_column_modes(machine: Machine, *, undamped: bool = True) -> tuple[Mode, ...]:
+def oil_column_modes(machine: Machine, *, undamped: bool = True) -> tuple[OilColumnMode, ...]:
     """Modes of the platen on its oil columns in the control zero-position, slowest first, valves closed.
 
     undamped leaves out leakage, friction and viscous damping. Only the platen's own modes: a specimen is left off.
@@ -93,5 +93,7 @@ def oil_column_modes(machine: Machine, *, undamped: bool = True) -> tuple[Mode, 
         twist[plant.axes] = vector[: linear.nv]
         at_c = np.concatenate([twist[:3] + np.cross(twist[3:], rho), twist[3:] * lengths / 2.0])
         size = abs(value)
-        found.append(Mode(float(size / (2 * np.pi)), float(-value.real / size), AXES[int(np.argmax(np.abs(at_c)))]))
+        found.append(
+            OilColumnMode(float(size / (2 * np.pi)), float(-value.real / size), AXES[int(np.argmax(np.abs(at_c)))])
+        )
     return tuple(sorted(found, key=lambda m: m.frequency))

@@ -26,7 +26,7 @@ Stepper = Callable[[Workspace, Array], int]
 
 
 def make_stepper(plant: Plant, scheme: str, dt: float) -> Stepper:
-    """Return the stepper of a scheme for steps of dt [s]; call `settle` on the workspace first."""
+    """Return the stepper of a scheme for steps of dt [s]; call `evaluate_derivatives` on the workspace first."""
     return {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}[scheme](plant, dt)
 
 

@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import sense_flat
-from ..control.plug import Sensors
+from ..control.plug import Feedback
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE, SCHEMES
-from ..mechanics.derivatives import settle
+from ..mechanics.derivatives import evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium, hydraulic_rows
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import V, spool_windows, steps_a_sample
 from ..mechanics.workspace import make_workspace
 from .engine_pinocchio import make_stepper
 from .simulate import diagnosis
-from .snapshot import Sight, sight_of
+from .snapshot import Snapshot, take_snapshot
 
 __all__ = ["RunningPlant"]
 
@@ -51,7 +51,7 @@ class RunningPlant:
         self._window = np.zeros((steps, plant.spools))
         self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))
         self._path, self._fed = plant.command_path, hydraulic_rows(plant)
-        settle(plant, self._ws, np.ascontiguousarray(rest.spool))
+        evaluate_derivatives(plant, self._ws, np.ascontiguousarray(rest.spool))
 
     @property
     def time(self) -> float:
@@ -68,12 +68,12 @@ class RunningPlant:
         """Spool positions (n_actuators,) that the ports saw last, mean over the sample."""
         return np.asarray(self._window.mean(axis=0))
 
-    def sensors(self) -> Sensors:
+    def sensors(self) -> Feedback:
         """Sensors at the next sample, in new arrays."""
         ws, plant = self._ws, self.plant
         if self.scheme != SCHEMES[0]:  # the other schemes leave the ports of their last stage behind
-            settle(plant, ws, self._window[0])
-        found = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
+            evaluate_derivatives(plant, ws, self._window[0])
+        found = Feedback(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
         body = plant.body.view(float)
         sense_flat(
             ws.port,
@@ -89,9 +89,9 @@ class RunningPlant:
         )
         return found
 
-    def sight(self) -> Sight:
+    def snapshot(self) -> Snapshot:
         """What can be seen of the plant now."""
-        return sight_of(self.plant, self._ws, self.time)
+        return take_snapshot(self.plant, self._ws, self.time)
 
     def advance(self, command: Array) -> None:
         """Take the command (n_actuators,) of this sample, -1..1, and go on to the next.

@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 
 from ..control import Controller
 from ..control.loop import ACTUATOR, AXIS, CANCELLER, control_sample_flat, sense_flat
-from ..control.plug import Sensors, UserController, start_plugged, step_plugged, wanted_from
+from ..control.plug import Feedback, UserController, start_plugged, step_plugged, wanted_from
 from ..core.errors import SimulationError, UnknownNameError
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
-from ..mechanics.derivatives import settle
+from ..mechanics.derivatives import evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium, hydraulic_rows
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import A, V, spool_windows, steps_a_sample
 from ..mechanics.workspace import Workspace, make_workspace
 from .engine_fused import inertia_table, refuse_joints, run_fused
 from .engine_pinocchio import make_stepper
-from .snapshot import EVERY, Watch, sight_of
+from .snapshot import EVERY, Watch, take_snapshot
 
 __all__ = ["ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "Run", "diagnosis"]
 __all__ += ["check_drive", "check_options", "fastest_engine", "simulate"]
@@ -137,7 +137,7 @@ def simulate(
     ws = make_workspace(plant, start)
     log_ = _Log(plant, -(-samples // record_every))
     command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
-    status = settle(plant, ws, np.ascontiguousarray(first))
+    status = evaluate_derivatives(plant, ws, np.ascontiguousarray(first))
     done = 0
     if status == 0:
         job = _Job(plant, drive, ws, log_, scheme, samples, steps, dt, spool, command, record_every, progress, watch)
@@ -281,7 +281,7 @@ class _Job(NamedTuple):
     def look(self, sample: int) -> None:
         """Show the plant to whoever watches, if it is time."""
         if self.watch is not None and sample % EVERY == 0:
-            self.watch(sight_of(self.plant, self.ws, sample / SAMPLE_RATE))
+            self.watch(take_snapshot(self.plant, self.ws, sample / SAMPLE_RATE))
 
 
 def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
@@ -293,7 +293,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     clipped = 0
     for sample in range(job.samples):
         if job.scheme != SCHEMES[0] and not isinstance(job.drive, OpenLoop):
-            settle(plant, ws, window[0])  # the other schemes leave the ports of their last stage behind
+            evaluate_derivatives(plant, ws, window[0])  # the other schemes leave the ports of their last stage behind
         clipped += spools(sample, window)
         if sample % job.every == 0:
             job.log.take(sample // job.every, ws, window.sum(axis=0) / steps)
@@ -334,7 +334,7 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
     users = drive.controller
     wanted = wanted_from(drive.displacement, drive.velocity, drive.acceleration)
     own = start_plugged(users, plant, drive.rest)
-    sensors = Sensors(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
+    sensors = Feedback(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
     body, path = plant.body.view(float), plant.command_path
 
     def plugged(sample: int, window: Array) -> int:
@@ -428,7 +428,7 @@ def _accelerations(plant: Plant, q: Array, v: Array, z: Array) -> Array:
     ws = make_workspace(plant, plant.zero_state())
     for k in range(len(q)):
         ws.q[:], ws.z[:], ws.motion[V] = q[k], z[k], v[k]
-        if settle(plant, ws, spool):
+        if evaluate_derivatives(plant, ws, spool):
             out[k:] = np.nan
             break
         out[k] = ws.motion[A]

@@ -17,7 +17,7 @@ from ..core.errors import SimulationError, UnknownNameError
 from ..core.files import models_folder
 from ..core.names import SAMPLE_RATE
 from ..data.campaign import Campaign
-from ..data.sensors import GROUPS, Sensors, add_noise
+from ..data.sensors import GROUPS, SensorSet, add_noise
 from ..data.signals import align
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
@@ -52,7 +52,7 @@ class SensorErrors(NamedTuple):
 def simulate_campaign(
     machine: Machine,
     settings: ControllerSettings,
-    sensors: Sensors,
+    sensors: SensorSet,
     *,
     seed: int,
     errors: bool = True,
@@ -128,7 +128,7 @@ def _target(numbers: Parameters, test: str, machine: Machine, factor: float) -> 
     return make_target(motion, scale=scale, axes=own, rate=float(SAMPLE_RATE))
 
 
-def draw_errors(record: xr.Dataset, sensors: Sensors, rng: np.random.Generator) -> SensorErrors:
+def draw_errors(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) -> SensorErrors:
     """Calibration errors of a record's channels and delays of all groups, uniform within the sensors' ranges."""
     gain: dict[str, Array] = {}
     offset: dict[str, Array] = {}
@@ -142,7 +142,7 @@ def draw_errors(record: xr.Dataset, sensors: Sensors, rng: np.random.Generator) 
 
 
 def as_sensed(
-    record: xr.Dataset, sensors: Sensors, errors: SensorErrors, rate: float, rng: np.random.Generator
+    record: xr.Dataset, sensors: SensorSet, errors: SensorErrors, rate: float, rng: np.random.Generator
 ) -> xr.Dataset:
     """A run's record as sensors show it: skewed, low-passed, sampled at `rate` [Hz], scaled, shifted, noisy.
 

@@ -12,15 +12,15 @@ from ..mechanics.pose import platen_motion
 from ..mechanics.schemes import A, V
 from ..mechanics.workspace import Workspace
 
-__all__ = ["EVERY", "Sight", "Watch", "sight_of"]
+__all__ = ["EVERY", "Snapshot", "Watch", "take_snapshot"]
 
 Array = NDArray[np.float64]
 
 EVERY = 64
-"""Controller samples from one sight to the next: 32 a second."""
+"""Controller samples from one snapshot to the next: 32 a second."""
 
 
-class Sight(NamedTuple):
+class Snapshot(NamedTuple):
     """One moment of a running plant."""
 
     time: float  # [s]
@@ -28,12 +28,12 @@ class Sight(NamedTuple):
     force: Array  # (n_legs,) of actuators' oil and of all that acts along a strut; pushes the platen away [N]
 
 
-Watch = Callable[[Sight], None]
-"""Called with a sight now and then while a plant runs."""
+Watch = Callable[[Snapshot], None]
+"""Called with a snapshot now and then while a plant runs."""
 
 
-def sight_of(plant: Plant, ws: Workspace, time: float) -> Sight:
-    """The sight of a plant whose workspace is at a time [s]."""
+def take_snapshot(plant: Plant, ws: Workspace, time: float) -> Snapshot:
+    """The snapshot of a plant whose workspace is at a time [s]."""
     displacement = platen_motion(plant, ws.q[None], ws.motion[V][None], ws.motion[A][None]).displacement[0]
     struts = [ws.force[plant.rows["port"] == i, 0].sum() for i in range(plant.spools, plant.legs.size)]
-    return Sight(time, displacement, np.array([*ws.force[hydraulic_rows(plant), 0], *struts]))
+    return Snapshot(time, displacement, np.array([*ws.force[hydraulic_rows(plant), 0], *struts]))

@@ -93,7 +93,7 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
     """
     numbers = tuning_numbers()
     plant = make_plant(machine)
-    job = _Job(plant, numbers, progress or (lambda share: None))
+    job = _Tuning(plant, numbers, progress or (lambda share: None))
     start = job.controller(settings)
     model = make_loop_model(start)
     job.done(1)
@@ -144,7 +144,7 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
     )
 
 
-class _Job:
+class _Tuning:
     """What all stages need: the plant, the numbers, and white noise of its axes."""
 
     STAGES = 12
@@ -203,14 +203,14 @@ def _with(settings: ControllerSettings, name: str, k: int, value: float) -> Cont
     return replace(settings, **changes)
 
 
-def _with_displacement_gain(job: "_Job", settings: ControllerSettings, k: int, value: float) -> ControllerSettings:
+def _with_displacement_gain(job: _Tuning, settings: ControllerSettings, k: int, value: float) -> ControllerSettings:
     """Settings with the displacement gain of degree of freedom k replaced, and the reset gain that goes with it."""
     reset = job.numbers.number("feedback_targets.reset_ratio") * value**2
     return _with(_with(settings, "displacement_gain", k, value), "reset_gain", k, reset)
 
 
 def _tune_feedback(
-    job: _Job, model: LoopModel, settings: ControllerSettings, steps: list[TuningStep]
+    job: _Tuning, model: LoopModel, settings: ControllerSettings, steps: list[TuningStep]
 ) -> ControllerSettings:
     """Kx, KF, and again, of all axes: from low gains up, each in turn no further than the margins allow."""
     numbers = job.numbers
@@ -242,7 +242,7 @@ def _tune_feedback(
 
 
 def _grown(
-    job: _Job, model: LoopModel, settings: ControllerSettings, name: str, a: int, first: float, most: float
+    job: _Tuning, model: LoopModel, settings: ControllerSettings, name: str, a: int, first: float, most: float
 ) -> ControllerSettings:
     """Settings with one gain as high as allowed; force feedback only until the resonance is damped enough."""
     k = int(job.plant.axes[a])
@@ -266,7 +266,7 @@ def _grown(
     return best
 
 
-def _allowed(job: _Job, model: LoopModel, settings: ControllerSettings, a: int) -> bool:
+def _allowed(job: _Tuning, model: LoopModel, settings: ControllerSettings, a: int) -> bool:
     """True if axis a keeps its gain margin, sensitivity and phase margin, and the other axes nearly.
 
     The phase margin counts below the oil columns; above them the sensitivity says how near the loop comes to -1.
@@ -291,7 +291,7 @@ def _slowest_column(model: LoopModel) -> float:
     return float(min(model.frequency[inside][np.argmax(column[inside])] for column in speed.T))
 
 
-def _resonance(job: _Job, model: LoopModel, settings: ControllerSettings, a: int) -> float:
+def _resonance(job: _Tuning, model: LoopModel, settings: ControllerSettings, a: int) -> float:
     """Largest velocity response of an axis to the velocity asked for, its loops closed [1]."""
     controller = job.controller(settings)
     inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(model, controller))
@@ -301,7 +301,7 @@ def _resonance(job: _Job, model: LoopModel, settings: ControllerSettings, a: int
 
 # --------------------------------------------------------------------------------------------- feed-forward
 def _tune_feedforward(
-    job: _Job, settings: ControllerSettings, slowest: float, steps: list[TuningStep]
+    job: _Tuning, settings: ControllerSettings, slowest: float, steps: list[TuningStep]
 ) -> tuple[ControllerSettings, float]:
     """Kvf, Kjf, again, Kaf of all axes, by rounds of measuring and fitting; the settings and the delay chosen."""
     numbers = job.numbers

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...core.names import AXES
 from ...core.progress import Progress, between
-from ...data.sensors import Sensors
+from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ..residuals import RESIDUALS
@@ -44,7 +44,7 @@ OVERSHOT = 1000.0
 def calibrate(
     machine: Machine,
     records: Sequence[xr.Dataset],
-    sensors: Sensors,
+    sensors: SensorSet,
     *,
     campaign: str = "campaign",
     seed: int = 0,

@@ -12,7 +12,7 @@ from ...core.errors import RecordError, SimulationError
 from ...data.alignment import align_record, group_delays
 from ...data.fusion import fuse_motion
 from ...data.records import channel_name, layout_faults, sample_interval
-from ...data.sensors import Sensors, add_noise
+from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
@@ -66,7 +66,7 @@ class Prepared:
 def prepare_problem(
     machine: Machine,
     records: Sequence[xr.Dataset],
-    sensors: Sensors,
+    sensors: SensorSet,
     numbers: Parameters,
     *,
     kinds: tuple[str, ...] = KINDS,
@@ -153,7 +153,9 @@ def _refuse_short(test: str, record: xr.Dataset, comparison: Comparison) -> None
             raise RecordError(f"{test}: {what}; take it out of the campaign")
 
 
-def _ready(plant: Plant, record: xr.Dataset, sensors: Sensors, numbers: Parameters, *, shares: bool = True) -> Measured:
+def _ready(
+    plant: Plant, record: xr.Dataset, sensors: SensorSet, numbers: Parameters, *, shares: bool = True
+) -> Measured:
     """A record with its motion fused, and each platen channel's share in it.
 
     Fusion is linear in its channels: a share is what doubling a channel adds. Lengths stay out: the geometry that turns

@@ -12,7 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from ...data.sensors import Sensors
+from ...data.sensors import SensorSet
 from ...effects.registry import BOUC_WEN_1D, BOUC_WEN_2D
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
@@ -71,7 +71,7 @@ class Problem:
         machine: Machine,
         tests: Sequence[Measured],
         noisy: Sequence[Measured],
-        sensors: Sensors,
+        sensors: SensorSet,
         comparison: Comparison,
         *,
         jobs: int = -1,

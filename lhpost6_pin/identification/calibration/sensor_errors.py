@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.names import AXES
 from ...data.records import sample_interval
-from ...data.sensors import GROUPS, Sensors
+from ...data.sensors import GROUPS, SensorSet
 from ...data.signals import align
 from ...machine.machine import Machine
 from ...mechanics.pose import PlatenMotion
@@ -75,7 +75,7 @@ _DELAYED: Mapping[str, tuple[str, ...]] = {
 """Fields of a test that the delay of a group of channels is in."""
 
 
-def sensor_unknowns(machine: Machine, sensors: Sensors, test: Measured) -> tuple[SensorUnknown, ...]:
+def sensor_unknowns(machine: Machine, sensors: SensorSet, test: Measured) -> tuple[SensorUnknown, ...]:
     """Unknown errors of the channels that a test has, for which the sensors state a range."""
     columns: dict[str, tuple[str, ...]] = {
         **dict.fromkeys(("platen_displacement", "platen_velocity", "platen_acceleration"), ()),

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.alignment import phase_delay
-from ...data.sensors import Sensors, add_noise
+from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band, correlation, differentiate, peak_ratio, rrmse
 from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
@@ -151,13 +151,13 @@ def _summed(found: Decomposed, changes: Iterator[Array]) -> Level:
     return Level(*np.sqrt(total))
 
 
-def _noise(found: Decomposed, sensors: Sensors, rng: np.random.Generator) -> Array:
+def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Array:
     noisier, *_ = take_apart(found.plant, add_noise(found.record, sensors, rng), sensors, found.comparison.band)
     change = noisier.residual - found.whole.residual
     return np.asarray(found.comparison.band.apply(change, found.dt)[found.inside].std(axis=0))
 
 
-def _by_sensors(found: Decomposed, sensors: Sensors) -> Iterator[Array]:
+def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each calibration error."""
     whole, record, machine = found.whole, found.record, found.plant.machine
     count = whole.actuators

@@ -18,7 +18,7 @@ from ...core.files import models_folder
 from ...data.alignment import Delay, align_record, group_delays, hydraulic_force
 from ...data.fusion import fuse_motion
 from ...data.records import channel_name, is_measured, require, sample_interval
-from ...data.sensors import Sensors, load_sensors
+from ...data.sensors import SensorSet, load_sensors
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -45,7 +45,7 @@ class Decomposed:
     """A record taken apart: `whole` has all samples in the sensors' band, `forces` and `motion` what is compared."""
 
     record: xr.Dataset  # aligned, if it was
-    sensors: Sensors | None  # None: the record is free of noise
+    sensors: SensorSet | None  # None: the record is free of noise
     comparison: Comparison
     whole: Decomposition
     whole_motion: PlatenMotion
@@ -85,7 +85,7 @@ def decompose_numbers() -> Parameters:
 def decompose_record(
     machine: Machine,
     record: xr.Dataset,
-    sensors: Sensors | None = None,
+    sensors: SensorSet | None = None,
     *,
     cutoff: float | None = None,
     align: bool = True,
@@ -132,7 +132,7 @@ def decompose_record(
 
 
 def take_apart(
-    plant: Plant, record: xr.Dataset, sensors: Sensors | None, band: Band
+    plant: Plant, record: xr.Dataset, sensors: SensorSet | None, band: Band
 ) -> tuple[Decomposition, PlatenMotion, Array | None, tuple[str, ...]]:
     """Inverse dynamics of a record as it stands: forces, motion, path of friction, and where they came from in words.
 

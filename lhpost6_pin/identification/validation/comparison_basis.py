@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...control import ControllerSettings
-from ...data.sensors import Sensors
-from ...mechanics.linearize import Mode
+from ...data.sensors import SensorSet
+from ...mechanics.linearize import OilColumnMode
 from .metrics import Numbers
 
 __all__ = ["Bench"]
@@ -14,7 +14,7 @@ __all__ = ["Bench"]
 class Bench(NamedTuple):
     """What all tests of a campaign are judged with."""
 
-    sensors: Sensors
+    sensors: SensorSet
     numbers: Numbers
-    modes: Sequence[Mode]  # oil columns of the linear model
+    modes: Sequence[OilColumnMode]  # oil columns of the linear model
     settings: ControllerSettings | None  # of the controller, in place of those that records name

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...data.alignment import hydraulic_force
 from ...data.fusion import fuse_motion
 from ...data.records import is_measured, require
-from ...data.sensors import Sensors, add_noise
+from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion, plant_motion
@@ -62,7 +62,7 @@ def too_short(seconds: float, numbers: Numbers) -> str:
     return f"{seconds:.3g} s are too short to compare; {numbers.shortest:.3g} s are needed"
 
 
-def prepare(machine: Machine, record: xr.Dataset, sensors: Sensors) -> Prepared:
+def prepare(machine: Machine, record: xr.Dataset, sensors: SensorSet) -> Prepared:
     """Make a record ready. Raises RecordError naming the channels without which there is no platen motion."""
     require(record, "time")
     table = machine.as_tested(record.attrs, "the test")
@@ -74,7 +74,7 @@ def prepare(machine: Machine, record: xr.Dataset, sensors: Sensors) -> Prepared:
     )
 
 
-def _motion(plant: Plant, record: xr.Dataset, sensors: Sensors) -> PlatenMotion:
+def _motion(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> PlatenMotion:
     """Platen motion: a simulated record's own if it is free of noise, else fused from all its sensors."""
     names = [f"platen_{quantity}" for quantity in PlatenMotion._fields]
     if not is_measured(record) and set(names) <= set(record.data_vars):
@@ -96,7 +96,7 @@ def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
     return np.asarray(leg_wrenches(plant, plant_motion(plant, motion).q, force).sum(axis=1))
 
 
-def wrench_calibration(test: Prepared, sensors: Sensors) -> Array:
+def wrench_calibration(test: Prepared, sensors: SensorSet) -> Array:
     """Standard deviation (6,) that gains and offsets of force sensors leave in the mean of the measured wrench at C.
 
     nan where forces were not measured.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...data.fusion import kinematic_jacobian
-from ...mechanics.linearize import Mode
+from ...mechanics.linearize import OilColumnMode
 from ...mechanics.plant import Plant
 from .metrics import Numbers
 
@@ -73,7 +73,7 @@ def estimate_response(
 
 
 def find_resonances(
-    columns: Sequence[str], measured: Response, model: Response, modes: Sequence[Mode], numbers: Numbers
+    columns: Sequence[str], measured: Response, model: Response, modes: Sequence[OilColumnMode], numbers: Numbers
 ) -> tuple[Resonance, ...]:
     """Oil-column peaks near the modes of the linear model, one for each axis that has a mode."""
     found = []

@@ -16,7 +16,7 @@ from ...control import ControllerSettings
 from ...core.errors import LhpostError, RecordError
 from ...data.alignment import Delay, align_record, group_delays
 from ...data.campaign import Campaign
-from ...data.sensors import Sensors, load_sensors
+from ...data.sensors import SensorSet, load_sensors
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
@@ -37,7 +37,7 @@ class Validation:
 
     campaign: str
     machine: Machine
-    sensors: Sensors
+    sensors: SensorSet
     numbers: Numbers
     skews: Mapping[str, Delay]  # between channel groups, taken out of all records
     valves: Valves | None  # spools behind their commands; None where either was not recorded
@@ -64,7 +64,7 @@ def validate(
     machine: Machine,
     campaign: Campaign,
     *,
-    sensors: Sensors | None = None,
+    sensors: SensorSet | None = None,
     settings: ControllerSettings | None = None,
     phases: Sequence[int] = tuple(PHASES),
     jobs: int = -1,

@@ -20,11 +20,11 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...control.plug import Sensors
+from ...control.plug import Feedback
 from ...control.valves import names_of_valves, per_valve
 from ...core.errors import LinkError
 from .clock import SECOND, now
-from .protocol import COUNTS, Frame, Kind, Mode, PlantState, decode, encode, is_newer
+from .protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
 from .server import HOST, PORT
 from .statistics import Histogram
 
@@ -40,7 +40,7 @@ class Reading(NamedTuple):
 
     sample: int
     state: PlantState
-    sensors: Sensors
+    sensors: Feedback
     acknowledged: int  # sequence of the newest command that acted
     stamp: int  # the server's clock [ns]
 
@@ -63,14 +63,14 @@ class LinkClient:
         try:
             self._sock.connect((host, port))
             self._sock.setblocking(False)
-            found: dict[Kind, Frame] = {}
+            found: dict[Kind, Datagram] = {}
 
-            def told_all(frame: Frame) -> bool:
+            def told_all(frame: Datagram) -> bool:
                 found[frame.kind] = frame
                 answers = [found.get(Kind.WELCOME), found.get(Kind.SENSORS)]
                 return None not in answers and len({a.actuators for a in answers if a}) == 1
 
-            self._ask(Frame(Kind.HELLO, self._session), told_all)
+            self._ask(Datagram(Kind.HELLO, self._session), told_all)
         except OSError as error:
             self._sock.close()
             raise LinkError(f"{self._where} cannot be reached: {error}") from error
@@ -111,7 +111,7 @@ class LinkClient:
         running the newest of those that come. Raises LinkError if none do.
         """
         frame = self._command(command)
-        if self.mode == Mode.LOCK_STEP:
+        if self.mode == LinkMode.LOCK_STEP:
             asked = frame.sequence
             self._ask(frame, lambda f: self._take(f) is not None and f.acknowledged == asked)
             return self.reading
@@ -130,14 +130,14 @@ class LinkClient:
             return {}
         self._tries = min(self._tries, 5)
         try:
-            status = self._ask(Frame(Kind.BYE, self._session), lambda f: f.kind == Kind.STATUS)
+            status = self._ask(Datagram(Kind.BYE, self._session), lambda f: f.kind == Kind.STATUS)
         except LinkError:
             return {}
         finally:
             self._sock.close()
         return dict(zip(COUNTS, status.counts, strict=True))
 
-    def _command(self, command: Array) -> Frame:
+    def _command(self, command: Array) -> Datagram:
         values = np.asarray(command, float)
         if values.shape == self.counts.shape:
             values = per_valve(values, self.counts)
@@ -147,7 +147,7 @@ class LinkClient:
                 f"{len(self.valves)} servovalves"
             )
         self._sequence = (self._sequence + 1) % (1 << 32)
-        return Frame(
+        return Datagram(
             Kind.COMMAND,
             self._session,
             actuators=len(self.actuators),
@@ -158,7 +158,7 @@ class LinkClient:
             numbers=values,
         )
 
-    def _ask(self, frame: Frame, is_answer: Callable[[Frame], bool]) -> Frame:
+    def _ask(self, frame: Datagram, is_answer: Callable[[Datagram], bool]) -> Datagram:
         """Send a frame until its answer comes, and return that; raises LinkError if none does."""
         for attempt in range(self._tries):
             self.resent += attempt > 0
@@ -176,13 +176,13 @@ class LinkClient:
             "`lhpost6 serve`, or wait until another client has left it"
         )
 
-    def _put(self, frame: Frame) -> None:
+    def _put(self, frame: Datagram) -> None:
         try:
             self._sock.send(encode(frame._replace(stamp=now())))
         except (ConnectionError, BlockingIOError):  # nobody there yet, or no room: a lost datagram like any other
             pass
 
-    def _get(self, timeout: float) -> Frame | None:
+    def _get(self, timeout: float) -> Datagram | None:
         """A frame of this session, if a datagram comes within a time [s]."""
         if not select.select([self._sock], [], [], timeout)[0]:
             return None
@@ -198,7 +198,7 @@ class LinkClient:
             return None
         return frame
 
-    def _take(self, frame: Frame) -> Reading | None:
+    def _take(self, frame: Datagram) -> Reading | None:
         """Keep sensors that are newer than the last, or that say that the plant has tripped."""
         if frame.kind != Kind.SENSORS or frame.actuators != len(self.actuators):
             return None
@@ -212,8 +212,8 @@ class LinkClient:
         self.reading = self._read(frame)
         return self.reading
 
-    def _read(self, frame: Frame) -> Reading:
+    def _read(self, frame: Datagram) -> Reading:
         assert frame.numbers is not None
         n = len(self.actuators)
-        sensors = Sensors(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n :])
+        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n :])
         return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp)

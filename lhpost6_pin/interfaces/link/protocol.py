@@ -66,7 +66,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import LinkError, UnknownNameError
 
-__all__ = ["COUNTS", "VERSION", "Frame", "Kind", "Mode", "PlantState", "ShortFrameError", "Welcome"]
+__all__ = ["COUNTS", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError", "Welcome"]
 __all__ += ["decode", "encode", "find_mode", "is_newer"]
 
 Array = NDArray[np.float64]
@@ -91,7 +91,7 @@ class Kind(IntEnum):
     HELLO, WELCOME, COMMAND, SENSORS, BYE, STATUS = range(1, 7)
 
 
-class Mode(IntEnum):
+class LinkMode(IntEnum):
     """How the plant's time goes on."""
 
     LOCK_STEP, REAL_TIME, FREE = range(3)
@@ -108,7 +108,7 @@ class PlantState(IntEnum):
     WAITING, RUNNING, HOLD, TRIPPED = range(4)
 
 
-class ShortFrameError(LinkError):
+class ShortDatagramError(LinkError):
     """A datagram ends before its frame does."""
 
 
@@ -121,12 +121,12 @@ class Welcome(NamedTuple):
     valves: tuple[int, ...]
 
 
-class Frame(NamedTuple):
+class Datagram(NamedTuple):
     """A frame: header and payload. Of the payloads only the one of its kind is not empty."""
 
     kind: Kind
     session: int
-    mode: Mode = Mode.LOCK_STEP
+    mode: LinkMode = LinkMode.LOCK_STEP
     state: PlantState = PlantState.WAITING
     actuators: int = 0
     valves: int = 0
@@ -139,9 +139,9 @@ class Frame(NamedTuple):
     counts: tuple[int, ...] = ()
 
 
-def find_mode(label: str) -> Mode:
-    """Mode by its name on the command line; raises UnknownNameError."""
-    found = {mode.label: mode for mode in Mode}
+def find_mode(label: str) -> LinkMode:
+    """LinkMode by its name on the command line; raises UnknownNameError."""
+    found = {mode.label: mode for mode in LinkMode}
     if label not in found:
         raise UnknownNameError("mode of a link", label, list(found))
     return found[label]
@@ -152,7 +152,7 @@ def is_newer(sequence: int, than: int) -> bool:
     return 0 < (sequence - than) % _WRAP < _WRAP // 2
 
 
-def encode(frame: Frame) -> bytes:
+def encode(frame: Datagram) -> bytes:
     """Datagram of a frame, with its CRC-32; raises LinkError for numbers that do not fit its kind and counts."""
     if frame.kind in (Kind.COMMAND, Kind.SENSORS):
         payload = _finite(frame.numbers).tobytes()
@@ -172,33 +172,34 @@ def encode(frame: Frame) -> bytes:
     return bytes(datagram)
 
 
-def decode(datagram: bytes) -> Frame:
-    """Frame of a datagram; raises ShortFrameError if it ends too early, LinkError for all else that can be wrong."""
+def decode(datagram: bytes) -> Datagram:
+    """Frame of a datagram; raises ShortDatagramError if it ends too early, LinkError for all else that can be wrong."""
     if len(datagram) < _HEADER.size:
-        raise ShortFrameError(f"{len(datagram)} bytes are no frame; its header alone takes {_HEADER.size}")
+        raise ShortDatagramError(f"{len(datagram)} bytes are no frame; its header alone takes {_HEADER.size}")
     magic, version, kind, mode, state, actuators, valves, flags, session, *rest = _HEADER.unpack_from(datagram)
     sequence, acknowledged, stamp, echo, crc, _ = rest
     if magic != MAGIC:
         raise LinkError(f"a frame begins with {MAGIC!r}, not {magic!r}")
     if version != VERSION:
         raise LinkError(f"a frame of version {version}; known is {VERSION}")
-    if not (1 <= kind <= len(Kind) and mode < len(Mode) and state < len(PlantState)):
+    if not (1 <= kind <= len(Kind) and mode < len(LinkMode) and state < len(PlantState)):
         raise LinkError(f"kind {kind}, mode {mode}, state {state}: one of them does not exist")
     size = _HEADER.size + _payload_size(Kind(kind), actuators, valves)
     if len(datagram) < size:
-        raise ShortFrameError(f"{len(datagram)} bytes of a frame of {size}")
+        raise ShortDatagramError(f"{len(datagram)} bytes of a frame of {size}")
     if len(datagram) > size:
         raise LinkError(f"{len(datagram)} bytes are too many for a frame of {size}")
     blank = bytearray(datagram)
     _CRC.pack_into(blank, _CRC_AT, 0)
     if crc != (zlib.crc32(blank) if flags & _HAS_CRC else 0):
         raise LinkError("the CRC-32 does not fit: the frame was changed on its way")
-    head = Kind(kind), session, Mode(mode), PlantState(state), actuators, valves, sequence, acknowledged, stamp, echo
+    counts = actuators, valves, sequence, acknowledged, stamp, echo
+    head = Kind(kind), session, LinkMode(mode), PlantState(state), *counts
     if kind in (Kind.COMMAND, Kind.SENSORS):
-        return Frame(*head, numbers=_finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64))
+        return Datagram(*head, numbers=_finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64))
     if kind == Kind.WELCOME:
-        return Frame(*head, welcome=_unpacked_welcome(datagram, valves))
-    return Frame(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
+        return Datagram(*head, welcome=_unpacked_welcome(datagram, valves))
+    return Datagram(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
 
 
 def _payload_size(kind: Kind, actuators: int, valves: int) -> int:
@@ -210,7 +211,7 @@ def _payload_size(kind: Kind, actuators: int, valves: int) -> int:
     }.get(kind, 0)
 
 
-def _packed_header(frame: Frame) -> bytes:
+def _packed_header(frame: Datagram) -> bytes:
     return _HEADER.pack(
         MAGIC,
         VERSION,

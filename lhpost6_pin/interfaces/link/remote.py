@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ...control.plug import Sensors, start_plugged, step_plugged, wanted_from
+from ...control.plug import Feedback, start_plugged, step_plugged, wanted_from
 from ...control.valves import valve_counts
 from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
@@ -18,7 +18,7 @@ from ...mechanics.plant import Plant
 from ...simulation.simulate import ClosedLoop, PluggedLoop, Progress, check_drive
 from .client import LinkClient
 from .clock import SECOND, now, undisturbed
-from .protocol import Mode, PlantState
+from .protocol import LinkMode, PlantState
 
 __all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
 
@@ -67,7 +67,7 @@ def run_over_link(
         seconds=0.0,
     )
     reading, reported, begin = client.reading, 0, 0
-    with undisturbed() if client.mode != Mode.LOCK_STEP else nullcontext():
+    with undisturbed() if client.mode != LinkMode.LOCK_STEP else nullcontext():
         while reading.sample < samples and reading.state != PlantState.TRIPPED:
             at, sensors = reading.sample, reading.sensors
             command = step(at, sensors)
@@ -124,7 +124,7 @@ def _check(client: LinkClient, plant: Plant) -> None:
         raise LinkError(f"the server takes {client.rate:g} commands a second; the controller gives {SAMPLE_RATE}")
 
 
-def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Sensors], Array]:
+def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Feedback], Array]:
     """Function that gives the command (n_actuators,) of a sample."""
     if isinstance(loop, ClosedLoop):
         memory = loop.controller.init()
@@ -133,7 +133,7 @@ def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Sen
     wanted = wanted_from(loop.displacement, loop.velocity, loop.acceleration)
     own = start_plugged(users, plant, loop.rest)
 
-    def plugged(sample: int, sensors: Sensors) -> Array:
+    def plugged(sample: int, sensors: Feedback) -> Array:
         return np.clip(step_plugged(users, own, sample, wanted(sample), sensors), -1.0, 1.0)
 
     return plugged

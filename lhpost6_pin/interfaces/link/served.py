@@ -15,7 +15,7 @@ from dataclasses import astuple, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...control.plug import Sensors
+from ...control.plug import Feedback
 from ...control.valves import flow_curves, per_actuator, valve_counts
 from ...core.errors import LinkError, SimulationError
 from ...core.names import SAMPLE_RATE
@@ -24,7 +24,7 @@ from ...mechanics.plant import Plant
 from ...simulation.running import RunningPlant
 from ...simulation.snapshot import EVERY, Watch
 from .clock import SECOND
-from .protocol import Frame, Kind, Mode, PlantState, ShortFrameError, Welcome, decode, encode, is_newer
+from .protocol import Datagram, Kind, LinkMode, PlantState, ShortDatagramError, Welcome, decode, encode, is_newer
 from .statistics import Counts, Histogram
 
 __all__ = ["MISSED_FRAMES", "PATIENCE", "RAMP", "SESSION", "ServedPlant"]
@@ -53,7 +53,7 @@ class ServedPlant:
     sending of sensors to the coming of the command that answers them; watcher, shown the plant as it moves.
     """
 
-    def __init__(self, plant: Plant, rest: Equilibrium, mode: Mode) -> None:
+    def __init__(self, plant: Plant, rest: Equilibrium, mode: LinkMode) -> None:
         """Put the plant at rest and run its first samples, so that all is compiled before a client comes."""
         self.plant, self.mode, self._rest = plant, mode, rest
         self.counts, self.answer_time = Counts(), Histogram()
@@ -87,14 +87,14 @@ class ServedPlant:
     @property
     def moving(self) -> bool:
         """Whether the plant moves by itself: it has a client and a first command, and it is not in lock-step."""
-        return self.mode != Mode.LOCK_STEP and self._taken and self.state != PlantState.WAITING
+        return self.mode != LinkMode.LOCK_STEP and self._taken and self.state != PlantState.WAITING
 
     def receive(self, datagram: bytes, sender: Hashable, now: int) -> list[bytes]:
         """Take a datagram; returns what to send back to its sender. Never raises."""
         self.counts.received += 1
         try:
             frame = decode(datagram)
-        except ShortFrameError:
+        except ShortDatagramError:
             self.counts.short += 1
             return []
         except LinkError as error:
@@ -138,13 +138,13 @@ class ServedPlant:
         if silence > SESSION:
             log.warning("nothing heard from %s for %g s: its place is free", self._owner, SESSION)
             self._taken = False
-        elif self.mode == Mode.LOCK_STEP and silence > PATIENCE and self.state == PlantState.RUNNING:
+        elif self.mode == LinkMode.LOCK_STEP and silence > PATIENCE and self.state == PlantState.RUNNING:
             self.counts.missed_frames += MISSED_FRAMES
             self._hold()
             for _ in range(RAMP):
                 self._move(now)
 
-    def _hello(self, frame: Frame, sender: Hashable, now: int) -> list[bytes]:
+    def _hello(self, frame: Datagram, sender: Hashable, now: int) -> list[bytes]:
         self._heard = now
         if not self._taken or frame.session != self._session:
             self._begin()
@@ -155,13 +155,13 @@ class ServedPlant:
         about = Welcome(float(SAMPLE_RATE), machine.name, machine.actuator_names, tuple(map(int, self._valves)))
         return [encode(self._frame(Kind.WELCOME)._replace(welcome=about)), self._measured(now)]
 
-    def _command(self, frame: Frame, now: int) -> list[bytes]:
+    def _command(self, frame: Datagram, now: int) -> list[bytes]:
         assert frame.numbers is not None
         if not is_newer(frame.sequence, self._newest):
             same = frame.sequence == self._newest
             self.counts.duplicate += same
             self.counts.late += not same
-            return [self._answer] if same and self._answer and self.mode == Mode.LOCK_STEP else []
+            return [self._answer] if same and self._answer and self.mode == LinkMode.LOCK_STEP else []
         self.counts.lost += (frame.sequence - self._newest - 1) % (1 << 32)
         self.counts.superseded += self._fresh
         self._newest, self._newest_stamp = frame.sequence, frame.stamp
@@ -170,7 +170,7 @@ class ServedPlant:
             self.answer_time.add(now - frame.echo)
         if self.state == PlantState.WAITING:
             self.state = PlantState.RUNNING
-        if self.mode == Mode.LOCK_STEP:
+        if self.mode == LinkMode.LOCK_STEP:
             self._resume()
             return [self._move(now)]
         self._fresh = True
@@ -200,7 +200,7 @@ class ServedPlant:
             try:
                 self._table.advance(self.spool)
                 if self.watcher is not None and self._table.sample % EVERY == 0:
-                    self.watcher(self._table.sight())
+                    self.watcher(self._table.snapshot())
                 numbers = _numbers(self._table.sensors())
                 if not np.isfinite(numbers).all():
                     raise SimulationError(f"stopped at {self._table.time:.4f} s: a sensor is not finite")
@@ -212,8 +212,8 @@ class ServedPlant:
         self._answer = self._measured(now)
         return self._answer
 
-    def _frame(self, kind: Kind) -> Frame:
-        return Frame(kind, self._session, self.mode, self.state, self.plant.spools, self._width)
+    def _frame(self, kind: Kind) -> Datagram:
+        return Datagram(kind, self._session, self.mode, self.state, self.plant.spools, self._width)
 
     def _measured(self, now: int) -> bytes:
         return encode(
@@ -230,6 +230,6 @@ class ServedPlant:
         return encode(self._frame(Kind.STATUS)._replace(counts=astuple(self.counts.since(self._at_hello))))
 
 
-def _numbers(sensors: Sensors) -> Array:
+def _numbers(sensors: Feedback) -> Array:
     """Sensors in the order of their frame."""
     return np.concatenate([sensors.acceleration, sensors.displacement, sensors.force])

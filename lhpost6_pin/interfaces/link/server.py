@@ -11,7 +11,7 @@ from typing import Any
 from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
 from .clock import SECOND, now, undisturbed
-from .protocol import Mode
+from .protocol import LinkMode
 from .served import ServedPlant
 from .statistics import Histogram
 
@@ -64,7 +64,7 @@ def serve(
     stop, timing = stop or threading.Event(), Timing()
     end = None if seconds is None else now() + round(seconds * SECOND)
     begin, sample = 0, -1  # sample: of those due since `begin`; -1: the plant stands
-    with undisturbed() if served.mode != Mode.LOCK_STEP else nullcontext():
+    with undisturbed() if served.mode != LinkMode.LOCK_STEP else nullcontext():
         try:
             while not stop.is_set() and (end is None or now() < end):
                 served.watch(now())
@@ -73,7 +73,7 @@ def serve(
                     _listen(sock, served, _IDLE)
                     continue
                 begin, sample = (now(), 0) if sample < 0 else (begin, sample + 1)
-                if served.mode == Mode.FREE:
+                if served.mode == LinkMode.FREE:
                     _listen_until(sock, served, now())
                     _tick(sock, served)
                     continue

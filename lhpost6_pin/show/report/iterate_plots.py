@@ -18,7 +18,7 @@ from .plots import ACHIEVED, AFTER, BEFORE, BUCKETS, RECORDED, SCALES, TARGET, R
 from .run_metrics import peak_window
 from .run_motion import ROTATIONS, axis_scale, percent, shown_as
 
-__all__ = ["Comparison", "compare", "drive_blocks", "motion_blocks", "spectrum_blocks", "table_blocks"]
+__all__ = ["AxisIteration", "compare", "drive_blocks", "motion_blocks", "spectrum_blocks", "table_blocks"]
 
 STEP = 1.0 / SAMPLE_RATE
 ORDER = 32  # of the low-pass that ends the band drawn, as steep as the one that errors are judged with
@@ -30,7 +30,7 @@ MATRIX = (0.5, 40.0)  # [Hz]
 Array = NDArray[np.float64]
 
 
-class Comparison(NamedTuple):
+class AxisIteration(NamedTuple):
     """One axis's acceleration, (n,) SI; `target`, `first` and `best` end with the band, delays are removed."""
 
     axis: str
@@ -43,7 +43,7 @@ class Comparison(NamedTuple):
     errors: tuple[float, float]  # RRMSE of the same
 
 
-def compare(result: Iterated, high: float) -> list[Comparison]:
+def compare(result: Iterated, high: float) -> list[AxisIteration]:
     """Accelerations of the first and the best run on every axis that the target moves, judged up to `high` [Hz]."""
     runs = result.first_run, result.best_run
     motions = [platen_motion(run.plant, run.q, run.v, run.a).acceleration for run in runs]
@@ -58,11 +58,11 @@ def compare(result: Iterated, high: float) -> list[Comparison]:
         target, first, best = (lowpass_zero_phase(x, STEP, high, order=ORDER) for x in (wanted, *moved))
         errors = [float(i.acceleration[k]) for i in history]
         pairs = (moved[0], moved[1]), (late[0], late[1]), (errors[0], errors[1])
-        found.append(Comparison(axis, target, first, best, wanted, *pairs))
+        found.append(AxisIteration(axis, target, first, best, wanted, *pairs))
     return found
 
 
-def motion_blocks(found: Sequence[Comparison]) -> list[Markup]:
+def motion_blocks(found: Sequence[AxisIteration]) -> list[Markup]:
     """Return target and achieved acceleration of the first and the best run, with a close-up of every axis."""
     high = tuning_numbers().number("iteration.high")
     how = (
@@ -77,7 +77,7 @@ def motion_blocks(found: Sequence[Comparison]) -> list[Markup]:
     return blocks
 
 
-def spectrum_blocks(found: Sequence[Comparison]) -> list[Markup]:
+def spectrum_blocks(found: Sequence[AxisIteration]) -> list[Markup]:
     """Return amplitude spectral densities of target and errors, per axis."""
     from scipy.signal import welch
 
@@ -108,7 +108,7 @@ def spectrum_blocks(found: Sequence[Comparison]) -> list[Markup]:
     return [paragraph(how), grid(*drawings, pairs=True)]
 
 
-def drive_blocks(result: Iterated, found: Sequence[Comparison]) -> list[Markup]:
+def drive_blocks(result: Iterated, found: Sequence[AxisIteration]) -> list[Markup]:
     """Return the best drive over the reference, in the quantity of the controller's mode."""
     mode = result.settings.mode
     how = f"The drive is {mode}, the mode of the reference generator; the reference is what iteration 0 drove with."
@@ -168,7 +168,7 @@ def table_blocks(table: TableInverse) -> list[Markup]:
     return [figure(matrix), figure(coherence)]
 
 
-def _motion(one: Comparison) -> Figure:
+def _motion(one: AxisIteration) -> Figure:
     scale = axis_scale(one.axis, "acceleration")
     late = [shown_as(d, SCALES["time"]) for d in one.delays]
     words = (
@@ -192,7 +192,7 @@ def _motion(one: Comparison) -> Figure:
     )
 
 
-def _close_up(one: Comparison) -> Figure:
+def _close_up(one: AxisIteration) -> Figure:
     n = len(one.target)
     first, last = peak_window(one.target, STEP, CLOSE_UP) or (0, n)
     part = slice(first, last)

@@ -11,7 +11,7 @@ from ...tuning.identify import tuning_numbers
 from ...tuning.iterate import Iterated, Iteration
 from .charts import Curve, Panel, XAxis, chart_figure
 from .control_blocks import AXIS_LINES, assumption_blocks, load_of
-from .iterate_plots import Comparison, compare, drive_blocks, motion_blocks, spectrum_blocks, table_blocks
+from .iterate_plots import AxisIteration, compare, drive_blocks, motion_blocks, spectrum_blocks, table_blocks
 from .page import (
     Figure,
     Headline,
@@ -122,7 +122,7 @@ def _headlines(result: Iterated) -> list[Headline]:
     ]
 
 
-def _sections(result: Iterated, found: Sequence[Comparison]) -> list[Section]:
+def _sections(result: Iterated, found: Sequence[AxisIteration]) -> list[Section]:
     machine = result.first_run.plant.machine
     return [
         Section("errors", "Error per iteration", [figure(_errors(result)), _why(result), *_history(result)]),

@@ -7,7 +7,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 
 from ...machine.machine import Machine
-from ...simulation.snapshot import Sight, Watch
+from ...simulation.snapshot import Snapshot, Watch
 from .frames import AS_IT_IS, Look
 from .live import LiveView
 
@@ -31,14 +31,14 @@ def view_apart(machine: Machine, title: str, look: Look = AS_IT_IS) -> Iterator[
     there.close()
     unseen = 0
 
-    def show(sight: Sight) -> None:
+    def show(snapshot: Snapshot) -> None:
         nonlocal unseen
         with suppress(OSError, EOFError):  # the view has ended
             while here.poll():
                 here.recv()
                 unseen -= 1
             if unseen < MOST_UNSEEN:
-                here.send(sight)
+                here.send(snapshot)
                 unseen += 1
 
     try:

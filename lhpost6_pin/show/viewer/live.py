@@ -8,7 +8,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from ...machine.machine import Machine
-from ...simulation.snapshot import Sight
+from ...simulation.snapshot import Snapshot
 from ..bodies import body_name, body_poses, joint_positions, load_bodies
 from ..urdf import legs
 from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
@@ -67,21 +67,21 @@ class LiveView:
         """Wait until somebody looks, at most so long [s]; whether somebody does."""
         return self._window.wait(seconds)
 
-    def show(self, sight: Sight) -> None:
-        """Draw one sight; returns at once, or in real time when its moment has come."""
+    def show(self, snapshot: Snapshot) -> None:
+        """Draw one snapshot; returns at once, or in real time when its moment has come."""
         if self._begin is None:
-            self._begin, self._largest = time.monotonic() - sight.time, 2.0 * largest_force(sight.force)
-            self._still = sight.force if self._look.change else self._still
+            self._begin, self._largest = time.monotonic() - snapshot.time, 2.0 * largest_force(snapshot.force)
+            self._still = snapshot.force if self._look.change else self._still
         if self._real_time:
-            time.sleep(max(0.0, self._begin + sight.time - time.monotonic()))
-        q = joint_positions(self._machine, self._bodies.model, self._look.amplify * sight.displacement)
+            time.sleep(max(0.0, self._begin + snapshot.time - time.monotonic()))
+        q = joint_positions(self._machine, self._bodies.model, self._look.amplify * snapshot.displacement)
         poses = body_poses(self._bodies.model, q)[0]
         for joint, name in self._moving.items():
             self._table[name].set_transform(pin.XYZQUATToSE3(poses[joint]).homogeneous)
-        force = sight.force - self._still
+        force = snapshot.force - self._still
         sizes, colours = arrow_sizes(self._machine, force, self._largest), arrow_colours(force, self._largest)
         for name, size, colour in zip(self._names, sizes, colours, strict=True):
             arrow = self._table[f"{name}_rod"]["force"]
             arrow.set_property("scale", size.tolist())
             arrow.set_property("color", [*colour.tolist(), OPACITY])
-        self._window.say(f"{sight.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
+        self._window.say(f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")

@@ -10,13 +10,13 @@ from lhpost6_pin import cli
 from lhpost6_pin.cli import live_view as live
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
-from lhpost6_pin.interfaces.link.protocol import Frame, Kind, Mode, encode
+from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, encode
 from lhpost6_pin.interfaces.link.served import ServedPlant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.viewer import LiveView
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
-from lhpost6_pin.simulation.snapshot import EVERY, Sight
+from lhpost6_pin.simulation.snapshot import EVERY, Snapshot
 
 
 @pytest.fixture(scope="module")
@@ -29,8 +29,8 @@ def loop(plant, rest):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_sights_are_those_of_the_record_and_looking_changes_nothing(plant, loop, engine):
-    seen: list[Sight] = []
+def test_snapshots_are_those_of_the_record_and_looking_changes_nothing(plant, loop, engine):
+    seen: list[Snapshot] = []
     run = simulate(plant, loop, samples=4000, engine=engine, watch=seen.append)
     unseen = simulate(plant, loop, samples=4000, engine=engine)
     for name in ("q", "v", "a", "z", "spool", "command"):
@@ -49,18 +49,18 @@ def test_sights_are_those_of_the_record_and_looking_changes_nothing(plant, loop,
 
 
 def test_a_served_plant_shows_itself_now_and_then(plant, rest):
-    table, seen = ServedPlant(plant, rest, Mode.LOCK_STEP), []
+    table, seen = ServedPlant(plant, rest, LinkMode.LOCK_STEP), []
     table.watcher = seen.append
-    table.receive(encode(Frame(Kind.HELLO, 1)), "a", 0)
+    table.receive(encode(Datagram(Kind.HELLO, 1)), "a", 0)
     n = plant.spools
     for k in range(1, 2 * EVERY + 2):
-        frame = Frame(Kind.COMMAND, 1, actuators=n, valves=n, sequence=k, numbers=rest.spool)
+        frame = Datagram(Kind.COMMAND, 1, actuators=n, valves=n, sequence=k, numbers=rest.spool)
         table.receive(encode(frame), "a", k)
     assert [one.time for one in seen] == [EVERY / SAMPLE_RATE, 2 * EVERY / SAMPLE_RATE]
 
 
 def test_a_live_view_is_no_faster_than_the_table(plant):
-    still = Sight(0.0, np.zeros(6), np.ones(plant.legs.size))
+    still = Snapshot(0.0, np.zeros(6), np.ones(plant.legs.size))
     with LiveView(plant.machine, "still") as view:
         begin = time.monotonic()
         for moment in (3.0, 3.1, 3.3):  # a plant may have run before it is watched

@@ -26,11 +26,12 @@ from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.control.inverse import InverseFilter, apply_inverse, load_inverse, save_inverse
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data.channels import LAYOUT, channel_unit
 from lhpost6_pin.data.check import check_record
 from lhpost6_pin.data.importing import channel_units, guess_map, load_map, load_raw, make_imported_record, save_map
-from lhpost6_pin.data.importing.channel_map import Source, channels_of, si_unit
+from lhpost6_pin.data.importing.channel_map import Source, channels_of
 from lhpost6_pin.data.importing.raw import make_raw
-from lhpost6_pin.data.records import LAYOUT, load_record, make_record, sample_interval, save_record
+from lhpost6_pin.data.records import load_record, make_record, sample_interval, save_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.parameters import load_parameters
@@ -321,7 +322,7 @@ def use_raws(raws: Any) -> None:
     guessed, remarks = guess_map(raws, LABELS)
     known = channels_of(LABELS)
     whole = {known[name][0] for name in guessed.channels}  # variables of which some channels were found
-    rest = {name: Source(constant=0.0, unit=si_unit(*known[name])) for name in known if known[name][0] in whole}
+    rest = {name: Source(constant=0.0, unit=channel_unit(name)) for name in known if known[name][0] in whole}
     with tempfile.TemporaryDirectory() as folder:
         save_map(replace(guessed, channels=rest | dict(guessed.channels)), Path(folder) / "map.toml", remarks)
         channels = load_map(Path(folder) / "map.toml")

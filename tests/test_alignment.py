@@ -5,7 +5,8 @@ import pytest
 from sensor_cases import RATE, measured, waves
 
 from lhpost6_pin.data.alignment import Delay, align_record, combine_delays, group_delays, phase_delay, slow_delay
-from lhpost6_pin.data.sensors import GROUPS, add_noise, load_sensors
+from lhpost6_pin.data.channels import sensor_groups
+from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align, differentiate
 
 DT = 1 / RATE
@@ -23,7 +24,7 @@ def skewed(plant, seed: int):
     """Noisy record with the skews above."""
     record, _ = measured(plant, seed)
     for group, tau in SKEWS.items():
-        for name in GROUPS[group]:
+        for name in sensor_groups()[group]:
             record = record.assign({name: record[name].copy(data=align(record[name].values, -tau, DT))})
     return add_noise(record, load_sensors(), np.random.default_rng(seed))
 

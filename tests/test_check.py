@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from lhpost6_pin.data.check import check_dataset, check_record
-from lhpost6_pin.data.records import Finding, load_record, make_record
+from lhpost6_pin.data.layout_faults import Finding
+from lhpost6_pin.data.records import load_record, make_record
 
 RECORDS = Path(__file__).parent / "data" / "records"
 PRACTICE = sorted(RECORDS.glob("practice_*.nc"))

@@ -9,8 +9,9 @@ from machine_cases import DATA
 
 from lhpost6_pin import cli
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
+from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.importing import export_record, guess_map, is_export, load_raw, make_imported_record
-from lhpost6_pin.data.records import LAYOUT, load_record, make_record
+from lhpost6_pin.data.records import load_record, make_record
 
 PRACTICE = DATA / "records" / "practice_a_TX.nc"
 

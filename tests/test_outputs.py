@@ -9,7 +9,8 @@ from machine_cases import DATA, machine_named
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.data.check import check_dataset
-from lhpost6_pin.data.records import layout_faults, load_record, save_record
+from lhpost6_pin.data.layout_faults import layout_faults
+from lhpost6_pin.data.records import load_record, save_record
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.kinematics import inverse_kinematics

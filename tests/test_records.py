@@ -11,19 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
+from lhpost6_pin.core.names import AXES
+from lhpost6_pin.data import layout_faults as layout_faults_module
 from lhpost6_pin.data import records
+from lhpost6_pin.data.channels import LAYOUT, LAYOUT_VERSION, channel_name, same_unit
 from lhpost6_pin.data.check import check_record
-from lhpost6_pin.data.records import (
-    AXES,
-    LAYOUT,
-    channel_name,
-    layout_faults,
-    load_record,
-    make_record,
-    require,
-    same_unit,
-    save_record,
-)
+from lhpost6_pin.data.layout_faults import layout_faults
+from lhpost6_pin.data.records import load_record, make_record, require, save_record
 
 RECORDS = Path(__file__).parent / "data" / "records"
 LABELS = {
@@ -57,20 +51,20 @@ def write_anyway(dataset: xr.Dataset, path: Path) -> Path:
 
 # ---------------------------------------------------------------------------------------- older layouts
 def test_there_is_a_step_from_every_older_layout_to_the_next():
-    assert set(records.STEPS) == set(range(1, records.LAYOUT_VERSION))
+    assert set(records.STEPS) == set(range(1, LAYOUT_VERSION))
 
 
 @pytest.mark.parametrize("path", sorted(RECORDS.glob("layout_*.nc")), ids=lambda path: path.stem)
 def test_a_record_of_every_layout_so_far_is_read(path):
     """Kept from when the layout was new; `full_record(8)` has the numbers that are in it."""
     record = load_record(path, LABELS)
-    assert record.attrs["layout_version"] == records.LAYOUT_VERSION and set(LAYOUT) <= set(record)
+    assert record.attrs["layout_version"] == LAYOUT_VERSION and set(LAYOUT) <= set(record)
     np.testing.assert_array_equal(record["strut_pressure"], full_record(8)["strut_pressure"])
 
 
 def test_a_record_of_every_layout_so_far_is_kept():
     assert [p.stem for p in sorted(RECORDS.glob("layout_*.nc"))] == [
-        f"layout_{version}" for version in range(1, records.LAYOUT_VERSION + 1)
+        f"layout_{version}" for version in range(1, LAYOUT_VERSION + 1)
     ]
 
 
@@ -87,7 +81,8 @@ def test_a_record_of_an_older_layout_is_brought_to_todays_step_by_step(tmp_path,
     old = new.assign(actuator_displacement=legs).rename(actuator_displacement="legs")
     path = write_anyway(old, tmp_path / "old.nc")
     written = path.read_bytes()
-    monkeypatch.setattr(records, "LAYOUT_VERSION", 3)
+    for module in (records, layout_faults_module):
+        monkeypatch.setattr(module, "LAYOUT_VERSION", 3)
     monkeypatch.setattr(records, "STEPS", {1: renamed, 2: in_metres})
     found = load_record(path, LABELS)
     np.testing.assert_allclose(found["actuator_displacement"], new["actuator_displacement"], rtol=1e-15)

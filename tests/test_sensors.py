@@ -7,8 +7,9 @@ from scipy.signal import welch
 
 from lhpost6_pin.core.errors import ParameterError, UnknownNameError
 from lhpost6_pin.core.files import models_folder
-from lhpost6_pin.data.records import LAYOUT, make_record
-from lhpost6_pin.data.sensors import GROUPS, add_noise, estimate_noise, find_rest, load_sensors, spectrum
+from lhpost6_pin.data.channels import LAYOUT, sensor_groups
+from lhpost6_pin.data.records import make_record
+from lhpost6_pin.data.sensors import add_noise, estimate_noise, find_rest, load_sensors, spectrum
 
 SENSORS = load_sensors()
 
@@ -25,7 +26,7 @@ def still(rate: float, duration: float = 40.0, moves: float | None = None) -> xr
 
 def test_every_noise_has_a_channel_a_unit_and_a_source() -> None:
     assert set(SENSORS.noise) <= set(LAYOUT)
-    assert set(SENSORS.delay_range) == set(GROUPS)
+    assert set(SENSORS.delay_range) == set(sensor_groups())
     assert all(q.source and q.evidence for q in SENSORS.parameters.values())
 
 

@@ -47,10 +47,9 @@ def import_(
     if guess and map_:
         raise RecordError("--guess writes a map, --map uses one; give one of them")
     table = find_machine(machine, override)
-    labels = {"actuator": table.actuator_names, "horizontal": table.double_acting, "strut": table.strut_names}
     raws = [raw for file in files for raw in load_raw(file)]
     if guess:
-        found, remarks = guess_map(raws, labels)
+        found, remarks = guess_map(raws, table.labels)
         path = out or Path(f"{files[0].stem}_map.toml")
         if path.exists():
             raise RecordError(f"{path}: exists and may have been edited; remove it, or name another with --out")
@@ -65,9 +64,9 @@ def import_(
         return
     if map_ is None and not is_export(raws):
         raise RecordError(f"{files[0]}: which column is which channel? --guess writes a first map, --map uses one")
-    channels = load_map(map_) if map_ else guess_map(raws, labels).channels
+    channels = load_map(map_) if map_ else guess_map(raws, table.labels).channels
     areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
-    record = make_imported_record(raws, channels, labels, areas)
+    record = make_imported_record(raws, channels, table.labels, areas)
     path = out or Path("out") / f"{record.attrs['test'].replace('/', '_')}.nc"
     if any(path.exists() and path.samefile(file) for file in files):
         raise RecordError(f"{path}: is one of the files to import; name another with --out")

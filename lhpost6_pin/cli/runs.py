@@ -193,7 +193,7 @@ def open_loop(
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)
     refuse_stepping(table, scheme, rate, engine)
-    measured = load_record(record, {"actuator": table.actuator_names, "horizontal": table.double_acting})
+    measured = load_record(record, table.labels)
     test = record.stem if record.stem != "record" else str(measured.attrs.get("test", "record"))
     name = f"{test}_open_loop"
     if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():

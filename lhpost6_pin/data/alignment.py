@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.pose import leg_displacements
+from .channels import LAYOUT, sensor_groups
 from .records import sample_interval
-from .sensors import GROUPS
 from .signals import Band, align, differentiate, lag
 
 __all__ = [
@@ -136,7 +136,7 @@ def combine_delays(delay: ArrayLike, error: ArrayLike) -> tuple[float, float]:
 
 
 def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay]:
-    """Delay of every group of `sensors.GROUPS` that can be had from its channels' twins, over all records.
+    """Delay of every group of `channels.sensor_groups` that can be had from its channels' twins, over all records.
 
     Motion and struts are counted from `platen_displacement`, chamber pressures from `actuator_force`. A group that is
     missing here has no twin in these records.
@@ -163,7 +163,7 @@ def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.
     for group, given in delays.items():
         delay = given.delay if isinstance(given, Delay) else float(given)
         behind = f" behind {given.reference}" if isinstance(given, Delay) else ""
-        for name in GROUPS[group]:
+        for name in sensor_groups()[group]:
             if name in record:
                 channels[name] = record[name].copy(data=align(record[name].values, delay, dt))
                 done.append(f"{name} advanced by {1e3 * delay:.4g} ms{behind}")
@@ -207,6 +207,9 @@ def gas_pressure(machine: Machine, elongation: Array) -> Array:
 def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, str, Array, Array]]:
     """Group, its reference, measured (n, k) and what it is to follow (n, k)."""
     count = plant.spools
+    for name, channel in LAYOUT.items():
+        if {name, channel.same_as} <= set(record.data_vars):
+            yield channel.group or name, channel.same_as, record[name].values, record[channel.same_as].values
     if "platen_displacement" in record:
         base = "platen_displacement"
         pose = record[base].values

@@ -31,10 +31,9 @@ def load_campaign(folder: Path | str, machine: Machine) -> Campaign:
     files = sorted(folder.glob("*.nc"))
     if not files:
         raise RecordError(f"{folder}: holds no record (.nc); import measured data with `lhpost6 import`")
-    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
     records = []
     for path in files:
-        record = load_record(path, labels)
+        record = load_record(path, machine.labels)
         record.attrs.setdefault("test", path.stem)
         records.append(record)
     for fact in ("valves_per_horizontal_actuator", "specimen"):

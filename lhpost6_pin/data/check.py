@@ -14,7 +14,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..core.errors import RecordError
-from .records import LAYOUT, Finding, channel_name, layout_faults, open_record, sample_interval
+from .channels import LAYOUT, MOTION, channel_name, channel_unit
+from .layout_faults import Finding, layout_faults
+from .records import open_record, sample_interval
 from .signals import differentiate, lowpass_zero_phase
 
 __all__ = ["check_dataset", "check_record"]
@@ -22,7 +24,6 @@ __all__ = ["check_dataset", "check_record"]
 Array = NDArray[np.float64]
 _Warning = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
-COMMANDS = ("reference_displacement", "spool_command")  # not sensors: they may hold still or jump
 START = 2e-3  # of the largest span in the same unit: how far the first sample may be from rest
 START_NOISE = 8.0  # and how many standard deviations of the noise
 STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop dead by itself
@@ -41,11 +42,11 @@ USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
     0.0254: "the other in inches",
     np.pi / 180: "the other in degrees",
 }
-LIKELY_UNITS = {  # variable: least and greatest believable peak, and what lies outside
-    "displacement": (0.0, 3.0, "mm or in for m"),
-    "angle": (0.0, 1.0, "deg for rad"),
-    "pressure": (1e5, 2e8, "MPa, bar or psi for Pa"),
-    "spool": (0.0, 1.2, "V or % for the share of full stroke"),
+LIKELY_UNITS = {  # unit: least and greatest believable peak, and what lies outside
+    "m": (0.0, 3.0, "mm or in for m"),
+    "rad": (0.0, 1.0, "deg for rad"),
+    "Pa": (1e5, 2e8, "MPa, bar or psi for Pa"),
+    "1": (0.0, 1.2, "V or % for the share of full stroke"),
 }
 
 
@@ -116,6 +117,11 @@ def _columns(dataset: xr.Dataset, *names: str) -> Iterator[tuple[str, Array, flo
                 yield channel_name(dataset[name], k), x, float(max(alike.max(), 1e-6 * spans.max()))
 
 
+def _is_command(channel: str) -> bool:
+    """Whether a column is no sensor's: it may hold still or jump."""
+    return LAYOUT[channel.split("[")[0]].role == "command"
+
+
 def _resolution(x: Array) -> float:
     """Smallest step of a channel: its digital resolution, or nearly nothing for a computed one."""
     steps = np.abs(np.diff(x))
@@ -124,18 +130,14 @@ def _resolution(x: Array) -> float:
 
 def _unlikely_units(dataset: xr.Dataset) -> Iterator[_Warning]:
     for channel, x, _ in _columns(dataset):
-        rotation = channel.endswith(("[roll]", "[pitch]", "[yaw]"))
-        kind = channel.split("[")[0].rsplit("_", 1)[-1].replace("displacement", "angle" if rotation else "displacement")
-        kind = "pressure" if "pressure" in channel else "spool" if "spool" in channel else kind
-        least, most, guess = LIKELY_UNITS.get(kind, (0.0, np.inf, ""))
+        least, most, guess = LIKELY_UNITS.get(channel_unit(channel), (0.0, np.inf, ""))
         peak = float(np.abs(x).max())
         if not least <= peak <= most:
             yield channel, int(np.abs(x).argmax()), f"reaches {peak:.4g}: {guess}?", "convert to SI"
 
 
 def _unquiet_start(dataset: xr.Dataset) -> Iterator[_Warning]:
-    motions = ("platen_displacement", "platen_velocity", "platen_acceleration", "actuator_displacement")
-    for channel, x, span in _columns(dataset, *motions, "reference_displacement"):
+    for channel, x, span in _columns(dataset, *(n for n, c in LAYOUT.items() if c.units.startswith("m"))):
         noise = 1.4826 * float(np.median(np.abs(np.diff(x, n=3)))) if len(x) > 3 else 0.0  # motion cancels
         start = float(np.median(x[:8]))  # the very first sample bears the filter's edge
         if np.ptp(x) > 0 and abs(start) > START * span + START_NOISE * noise + 2 * _resolution(x):
@@ -144,7 +146,7 @@ def _unquiet_start(dataset: xr.Dataset) -> Iterator[_Warning]:
 
 
 def _saturated_spools(dataset: xr.Dataset) -> Iterator[_Warning]:
-    for channel, x, _ in _columns(dataset, "spool_command", "spool_position"):
+    for channel, x, _ in _columns(dataset, *(n for n, c in LAYOUT.items() if c.units == "1")):
         full = np.abs(x) >= 0.999
         if full.any():
             beyond = "beyond" if np.abs(x).max() > 1.001 else "at"
@@ -159,7 +161,7 @@ def _saturated_spools(dataset: xr.Dataset) -> Iterator[_Warning]:
 def _frozen(dataset: xr.Dataset) -> Iterator[_Warning]:
     """Find runs of one and the same value into which a moving channel falls."""
     for channel, x, span in _columns(dataset):
-        if channel.split("[")[0] in COMMANDS:
+        if _is_command(channel):
             continue
         if np.ptp(x) == 0:
             if dataset.attrs.get("kind") == "measured":
@@ -189,7 +191,7 @@ def _spikes(dataset: xr.Dataset) -> Iterator[_Warning]:
 
     taps = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20  # x less its sixth-order interpolation
     for channel, x, span in _columns(dataset):
-        if channel.split("[")[0] in COMMANDS or len(x) < 64:
+        if _is_command(channel) or len(x) < 64:
             continue
         rough = np.convolve(np.pad(x, 3, "reflect", reflect_type="odd"), taps, mode="valid")
         size = np.abs(rough)
@@ -240,18 +242,17 @@ def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
     if dataset.sizes["time"] < 256 or dataset.sizes["time"] * dt < 2:
         return
     cutoff = min(40.0, 0.2 / dt)
-    motions = ("platen_displacement", "platen_velocity", "platen_acceleration")
     for low, high in ((0, 1), (1, 2), (0, 2)):
-        if not {motions[low], motions[high]} <= set(dataset.data_vars):
+        if not {MOTION[low], MOTION[high]} <= set(dataset.data_vars):
             continue
-        expected = dataset[motions[low]].values
+        expected = dataset[MOTION[low]].values
         for _ in range(high - low):
             expected = differentiate(expected, dt, cutoff)
-        found = lowpass_zero_phase(dataset[motions[high]].values, dt, cutoff)
+        found = lowpass_zero_phase(dataset[MOTION[high]].values, dt, cutoff)
         gains = {(j, k): _coherent_gain(expected[:, j], found[:, k], dt) for j, k in LIKE_AXES}
         for (j, k), gain in gains.items():
             right = gain is not None and abs(gain - 1) <= GAIN_TOLERANCE
-            place, source = channel_name(dataset[motions[high]], k), channel_name(dataset[motions[low]], j)
+            place, source = channel_name(dataset[MOTION[high]], k), channel_name(dataset[MOTION[low]], j)
             if j == k and gain is not None and not right:
                 reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
                 yield (

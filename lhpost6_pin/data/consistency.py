@@ -23,7 +23,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..mechanics.plant import Plant
-from .records import LAYOUT, require
+from .channels import channel_unit
+from .records import require
 from .sensor_pairs import Comparison, Term, comparisons
 from .sensors import SensorSet
 
@@ -174,8 +175,7 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
 
 def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[SensorFinding]:
     xx, noise = np.asarray(s.xx), np.asarray(s.noise)
-    unit = LAYOUT[channel.split("[")[0]].units.split(", ")
-    unit_y = unit[-1] if channel.endswith(("[roll]", "[pitch]", "[yaw]")) else unit[0]
+    unit_y = channel_unit(channel)
     hidden = noise * np.diag(scaled_inverse(xx, np.diag(xx))) > MOST_NOISE
     whole = any(h and not term.beside for h, term in zip(hidden, s.terms, strict=True))
     free = _solved(s, np.ones(len(noise), bool), np.where(hidden, 0.0, noise), noise_range)

@@ -26,8 +26,9 @@ from numpy.typing import NDArray
 from ..core.errors import RecordError
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, forward_kinematics, leg_displacements
+from .channels import channel_name
 from .conditioning import WIDTHS, integrate, quieted
-from .records import channel_name, sample_interval
+from .records import sample_interval
 from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate
 

@@ -15,6 +15,7 @@ from ..core.names import AXES
 from ..mechanics.plant import Plant
 from ..mechanics.pose import forward_kinematics, leg_displacements
 from .alignment import due_spools, gas_pressure
+from .channels import LAYOUT, channel_name
 from .conditioning import resolution
 from .fusion import kinematic_jacobian
 from .records import sample_interval
@@ -102,15 +103,15 @@ class _View:
 
         What holds still within a digital step is off by a part of it, which is an offset, too.
         """
-        group = "chamber_pressure" if name.startswith("chamber_pressure") else name
         s, step = self.sensors, resolution(self.values(name)) if self.has(name) else 0.0
-        return s.gain_sd(name), float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0))), s.delay_sd(group)
+        offset = float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0)))
+        return s.gain_sd(name), offset, s.delay_sd(LAYOUT[name].group or name)
 
 
 def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[Comparison]:
     """All comparisons that a record has the channels for."""
     view = _View(plant, record, sensors)
-    for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools):
+    for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools, _redundant):
         yield from compare(view)
 
 
@@ -139,6 +140,14 @@ def _compared(
 
 def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Term:
     return Term("delay", "s", nominal, rate, float(variance), delay=nominal)
+
+
+def _gain_terms(
+    due: Array, rate: Array, noise: tuple[float, float] = (0.0, 0.0), *, delay: float = 0.0, level: float = 0.0
+) -> list[Term]:
+    """Gain, delay and offset against what a column should be (n,) and its rate, with the noise variance of both."""
+    offset = _offset_term(len(due), level)
+    return [Term("gain", "1", 1.0, due, noise[0]), _delay_term(rate, noise[1], delay), offset]
 
 
 def _offset_term(n: int, expected: float = 0.0) -> Term:
@@ -221,8 +230,8 @@ def _lengths(view: _View) -> Iterator[Comparison]:
     one = np.ones(len(slow))
     time = view.step * view.dt * (np.arange(len(slow), dtype=np.float64) - 0.5 * (len(slow) - 1))
     for i, name in enumerate(plant.machine.actuator_names):
-        terms = [Term("gain", "1", 1.0, due[:, i], noise[0][i]), _delay_term(rate[:, i], noise[1][i])]
-        terms += [_offset_term(len(slow)), Term("drift", "m/s", 0.0, time, 0.0, beside=True)]
+        terms = _gain_terms(due[:, i], rate[:, i], (noise[0][i], noise[1][i]))
+        terms.append(Term("drift", "m/s", 0.0, time, 0.0, beside=True))
         errors = [gain_l * due[:, i], offset_l * one, delay_l * rate[:, i], delay_x * rate[:, i]]
         errors.append(np.sqrt(variance[i]) * time / max(time[-1] - time[0], view.dt))
         errors += [jacobian[i, k] * (gain_x * slow[:, k] + offset_x) for k in range(6)]
@@ -267,8 +276,7 @@ def _rates(view: _View) -> Iterator[Comparison]:
         variance, noise = view.variance(name), [view.variance(base, order + k) for k in (0, 1)]
         (gain_m, offset_m, delay_m), (gain_x, _, delay_x) = map(view.sd, (name, base))
         for j in view.plant.axes:
-            terms = [Term("gain", "1", 1.0, due[:, j], noise[0][j]), _delay_term(rate[:, j], noise[1][j])]
-            terms.append(_offset_term(len(due)))
+            terms = _gain_terms(due[:, j], rate[:, j], (noise[0][j], noise[1][j]))
             errors = [gain_m * due[:, j], gain_x * due[:, j], delay_m * rate[:, j], delay_x * rate[:, j]]
             errors.append(offset_m * np.ones(len(due)))
             across = [k for k in view.plant.axes if k < 3 and k != j] if order == 2 and j < 3 else []
@@ -291,7 +299,7 @@ def _struts(view: _View) -> Iterator[Comparison]:
     (gain_p, offset_p, delay_p), (gain_x, _, delay_x) = map(view.sd, ("strut_pressure", "platen_displacement"))
     one = np.ones(len(swing))
     for k, strut in enumerate(machine.struts):
-        terms = [Term("gain", "1", 1.0, swing[:, k]), _delay_term(rate[:, k], 0.0), _offset_term(len(one), level[k])]
+        terms = _gain_terms(swing[:, k], rate[:, k], level=level[k])
         spread = {key: _relative_sd(view, strut, key) for key in ("pressure", "polytropic_index")}
         whole = level[k] + swing[:, k]
         errors = [gain_p * whole, offset_p * one, gain_x * swing[:, k], delay_p * rate[:, k], delay_x * rate[:, k]]
@@ -334,7 +342,21 @@ def _spools(view: _View) -> Iterator[Comparison]:
     variance = view.variance("spool_position")
     gain, offset, delay = view.sd("spool_position")
     for i, name in enumerate(view.plant.machine.actuator_names):
-        terms = [Term("gain", "1", 1.0, due[:, i]), _delay_term(rate[:, i], 0.0, delays[i]), _offset_term(len(due))]
+        terms = _gain_terms(due[:, i], rate[:, i], delay=delays[i])
         errors = [gain * due[:, i], offset * np.ones(len(due)), delay * rate[:, i], folded[:, i]]
         channel = f"spool_position[{name}]"
         yield _compared(view, "spool against command", channel, measured[:, i], variance[i], terms, errors)
+
+
+def _redundant(view: _View) -> Iterator[Comparison]:
+    """A redundant channel against the one that measures the same."""
+    for name, base in ((n, c.same_as) for n, c in LAYOUT.items() if c.same_as and view.has(n, c.same_as)):
+        measured, (due, rate) = view.signal(view.values(name)), view.signals(view.values(base), 0, 1)
+        variance, noise = view.variance(name), [view.variance(base, k) for k in (0, 1)]
+        (gain, offset, delay), (gain_b, offset_b, delay_b) = map(view.sd, (name, base))
+        for i in range(measured.shape[1]):
+            terms = _gain_terms(due[:, i], rate[:, i], (noise[0][i], noise[1][i]))
+            errors = [g * due[:, i] for g in (gain, gain_b)] + [d * rate[:, i] for d in (delay, delay_b)]
+            errors += [o * np.ones(len(due)) for o in (offset, offset_b)]
+            channel = channel_name(view.record[name], i)
+            yield _compared(view, f"{name} against {base}", channel, measured[:, i], variance[i], terms, errors)

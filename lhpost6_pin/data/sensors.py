@@ -18,27 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.errors import ParameterError, UnknownNameError, instead_of
 from ..core.files import find_shipped
 from ..machine.parameters import Parameters, load_parameters
+from .channels import LAYOUT, channel_name, same_unit, sensor_groups
 from .conditioning import resolution
-from .records import LAYOUT, channel_name, same_unit, sample_interval
+from .records import sample_interval
 from .signals import Band
 
-__all__ = ["GROUPS", "NoiseEstimate", "SensorSet", "add_noise", "estimate_noise", "find_rest", "load_sensors"]
-__all__ += ["spectrum"]
+__all__ = ["NoiseEstimate", "SensorSet", "add_noise", "estimate_noise", "find_rest", "load_sensors", "spectrum"]
 
 Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
-
-GROUPS: Mapping[str, tuple[str, ...]] = {
-    "platen_displacement": ("platen_displacement",),
-    "platen_velocity": ("platen_velocity",),
-    "platen_acceleration": ("platen_acceleration",),
-    "actuator_displacement": ("actuator_displacement",),
-    "actuator_force": ("actuator_force",),
-    "chamber_pressure": ("chamber_pressure_a", "chamber_pressure_b"),
-    "strut_pressure": ("strut_pressure",),
-    "spool_position": ("spool_position",),
-}
-"""Channels that share conditioning, and so a skew against the others."""
 
 SAMPLING = {"rate": "Hz", "low_pass": "Hz", "low_pass_order": "1", "bits": "1", "noise_range": "1"}
 
@@ -88,7 +76,7 @@ class SensorSet:
         return self.offset_range.get(channel, 0.0) / np.sqrt(3.0)
 
     def delay_sd(self, group: str) -> float:
-        """Standard deviation of the delay of a group of `GROUPS` [s]."""
+        """Standard deviation of the delay of a group of `channels.sensor_groups` [s]."""
         return self.delay_range.get(group, 0.0) / np.sqrt(3.0)
 
 
@@ -112,7 +100,7 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> SensorSet:
             if quantity.unit != SAMPLING[channel]:
                 raise ParameterError(f"{given.origin}: {key}: unit {quantity.unit!r} should be {SAMPLING[channel]!r}")
             continue
-        valid = GROUPS if section == "delay_range" else LAYOUT
+        valid = sensor_groups() if section == "delay_range" else LAYOUT
         if channel not in valid:
             raise UnknownNameError(f"channel for {section} in {given.origin}", channel, list(valid))
         right = {"gain_range": "1", "delay_range": "s"}.get(section) or LAYOUT[channel].units

@@ -8,6 +8,7 @@ gains to set it free.
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.channels import LAYOUT
 from ..identification.calibration import Knob
 from ..identification.calibration.problem import Problem
 from ..identification.calibration.sensor_errors import SensorUnknown
@@ -34,16 +35,6 @@ _PARAMETER = {
 }
 """Family of a parameter that is far off."""
 
-_SENSOR = {
-    "actuator_force": "pressure_sensor_error",
-    "chamber_pressure_a": "pressure_sensor_error",
-    "chamber_pressure_b": "pressure_sensor_error",
-    "strut_pressure": "pressure_sensor_error",
-    "spool_position": "spool_null_bias",
-    "supply_pressure": "pressure_sensor_error",
-}
-"""Family of a channel whose gain or offset is out of its range."""
-
 
 def list_releases(problem: Problem) -> tuple[Candidate, ...]:
     """All parameters and sensor errors that are not free yet and have a name when they are far off."""
@@ -55,13 +46,13 @@ def list_releases(problem: Problem) -> tuple[Candidate, ...]:
     for unknown in problem.unknowns:  # those of the platen's motion were asked of each other before
         if unknown.name in problem.free or (unknown.kind == "delay" and unknown.column >= 0):
             continue
-        if unknown.kind == "delay" or unknown.channel in _SENSOR:
+        if unknown.kind == "delay" or LAYOUT[unknown.channel].role == "sensor":
             found.append(Candidate(find_family(_family(unknown)), (unknown.name,), (), unknown.name))
     return tuple(found)
 
 
 def _family(unknown: SensorUnknown) -> str:
-    return "channel_delay" if unknown.kind == "delay" else _SENSOR[unknown.channel]
+    return "channel_delay" if unknown.kind == "delay" else LAYOUT[unknown.channel].fault
 
 
 def _where(problem: Problem, knob: Knob) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import xarray as xr
 
 from ..core.names import AXES
 from ..data.alignment import align_record
+from ..data.channels import LAYOUT
 from ..data.consistency import SensorFinding, check_sensors
 from ..data.sensors import SensorSet
 from ..mechanics.plant import Plant
@@ -42,9 +43,7 @@ class Fault:
     @property
     def family(self) -> str:
         """Family of the library."""
-        if self.kind == "delay":
-            return "channel_delay"
-        return "length_sensor_error" if self.channel == "actuator_displacement" else "accelerometer_error"
+        return "channel_delay" if self.kind == "delay" else LAYOUT[self.channel].fault
 
 
 def wrong_sensors(

@@ -43,3 +43,8 @@ class Structure:
     def double_acting(self) -> tuple[str, ...]:
         """Names of the actuators that have a chamber B; the `horizontal` dimension of records."""
         return tuple(a.name for a in self.actuators if a.area_b is not None)
+
+    @property
+    def labels(self) -> dict[str, tuple[str, ...]]:
+        """Names along the dimensions of its records."""
+        return {"actuator": self.actuator_names, "horizontal": self.double_acting, "strut": self.strut_names}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.names import AXES
-from ..data.records import Finding
+from ..data.layout_faults import Finding
 from ..identification.calibration import Calibration
 from ..identification.calibration.verdicts import verdict_on
 from ..identification.decompose import Agreement, Decomposed

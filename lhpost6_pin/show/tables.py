@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..data.consistency import SensorFinding
-    from ..data.records import Finding
+    from ..data.layout_faults import Finding
     from ..effects.effect import Effect
     from ..mechanics.plant import Plant
     from ..simulation.simulate import Run
@@ -203,12 +203,7 @@ def print_sensor_findings(findings: "Sequence[SensorFinding]") -> None:
     )
 
 
-_COMPARED = (
-    ("platen_displacement", "axis", ("m", "m", "m", "rad", "rad", "rad")),
-    ("chamber_pressure_a", "actuator", "Pa"),
-    ("chamber_pressure_b", "horizontal", "Pa"),
-    ("actuator_force", "actuator", "N"),
-)
+_COMPARED = ("platen_displacement", "chamber_pressure_a", "chamber_pressure_b", "actuator_force")
 _SILENT = 1e-6
 """A channel whose peak is below this share of the largest of its kind did not move: its relative error says nothing."""
 
@@ -226,6 +221,7 @@ class Compared(NamedTuple):
 
 def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
     """How far a replayed test is from the recorded one, per channel, on common samples; empty if these are too few."""
+    from ..data.channels import LAYOUT, channel_unit
     from ..data.signals import drift_rate, rrmse
 
     t = measured["time"].values - float(measured["time"][0])
@@ -233,9 +229,10 @@ def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
     found: list[Compared] = []
     if len(t) < 2:
         return found
-    for name, dim, unit in _COMPARED:
+    for name in _COMPARED:
         if name not in measured or name not in simulated:
             continue
+        dim = LAYOUT[name].dims[1]
         recorded = measured[name].transpose("time", dim).values[: len(t)]
         model = simulated[name].interp(time=t).transpose("time", dim).values
         ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
@@ -243,7 +240,7 @@ def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
         for k, label in enumerate(measured[dim].values):
             moved = peak[k] > _SILENT * peak.max()
             numbers = peak[k], apart[k], ratio[k] if moved else math.nan, drift[k]
-            found.append(Compared(f"{name} {label}", unit if isinstance(unit, str) else unit[k], *map(float, numbers)))
+            found.append(Compared(f"{name} {label}", channel_unit(f"{name}[{label}]"), *map(float, numbers)))
     return found
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rods_ahead
 from ..effects.supply import supply_pressures
@@ -51,23 +52,20 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         "spool_position": run.spool,
         "supply_pressure": _supply_pressure(run),
     }
-    labels = {"actuator": machine.actuator_names}
+    labels = machine.labels
     if double.any():
         channels["chamber_pressure_b"] = pressure_b
-        labels["horizontal"] = machine.double_acting
     if machine.struts:
         channels["strut_pressure"] = _strut_pressure(run, legs[:, plant.spools :]) * gas_ratio(plant, run.z)
-        labels["strut"] = machine.strut_names
     if run.command is not None:
         channels["spool_command"] = run.command
     if reference is not None:
         channels["reference_displacement"] = reference.displacement
-        for name, values, unit in (
-            ("velocity", reference.velocity, "m/s, rad/s"),
-            ("acceleration", reference.acceleration, "m/s2, rad/s2"),
-        ):
-            about = {"units": unit, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
-            channels[f"reference_{name}"] = (("time", "axis"), values, about)
+        for name, values in (("velocity", reference.velocity), ("acceleration", reference.acceleration)):
+            like = LAYOUT[f"platen_{name}"]
+            about = {"units": like.units, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
+            channels[f"reference_{name}"] = (like.dims, values, about)
+    channels |= {name: channels[c.same_as] for name, c in LAYOUT.items() if c.same_as in channels}
     channels |= _hidden_states(run)
     if plant.articulated:
         joints = specimen_joints(plant)

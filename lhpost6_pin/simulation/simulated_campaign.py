@@ -17,7 +17,8 @@ from ..core.errors import SimulationError, UnknownNameError
 from ..core.files import models_folder
 from ..core.names import SAMPLE_RATE
 from ..data.campaign import Campaign
-from ..data.sensors import GROUPS, SensorSet, add_noise
+from ..data.channels import LAYOUT, sensor_groups
+from ..data.sensors import SensorSet, add_noise
 from ..data.signals import align
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
@@ -152,10 +153,10 @@ def as_sensed(
     dt = float(record["time"][1] - record["time"][0])
     every = round(1.0 / (rate * dt))
     channels: dict[str, Any] = {}
-    group_of = {channel: group for group, members in GROUPS.items() for channel in members}
+    group_of = {channel: group for group, members in sensor_groups().items() for channel in members}
     for name in record.data_vars:
         values = record[name].values.astype(float)
-        if name == "spool_position":
+        if name in LAYOUT and LAYOUT[str(name)].held:
             values = 0.5 * (values + np.vstack([values[:1], values[:-1]]))
         delay = errors.delay.get(group_of.get(str(name), ""), 0.0)
         if delay:

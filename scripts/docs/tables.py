@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.files import models_folder
-from lhpost6_pin.data.records import LAYOUT
+from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.machine.library import Family, Shape, families, make_effect

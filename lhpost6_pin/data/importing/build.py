@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 
 from ...core.errors import RecordError
-from ..records import LAYOUT, make_record
-from .channel_map import ChannelMap, Source, channels_of, check_map, find_column, si_unit
+from ..channels import LAYOUT, channel_unit
+from ..records import make_record
+from .channel_map import ChannelMap, Source, channels_of, check_map, find_column
 from .channel_units import si_factor
 from .raw import Array, RawTest
 from .sampling import Sampling, common_time, fill_holes, resample, uniform
@@ -46,7 +47,7 @@ def make_imported_record(
     filled = [f"{raws[f].source}: {_runs(s.gaps)}" for f, s in samplings.items() if s.gaps]
     columns: dict[str, Array] = {}
     for name, source in channels.channels.items():
-        unit = si_unit(*known[name])
+        unit = channel_unit(name)
         if source.constant is not None:
             columns[name] = np.full(len(time), _constant(source, unit, _key(channels, name)))
             continue

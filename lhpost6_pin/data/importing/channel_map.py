@@ -20,11 +20,11 @@ from typing import Any, get_args
 from ...core.errors import RecordError, instead_of, meant
 from ...core.files import read_toml, reason_of, write_whole
 from ...core.names import AXES
-from ..records import FASTEST, LAYOUT, SLOWEST
+from ..channels import LAYOUT, channel_unit
+from ..layout_faults import FASTEST, SLOWEST
 from .raw import RawTest, shown
 
 __all__ = ["ChannelMap", "Source", "TestFacts", "channels_of", "check_map", "find_column", "load_map", "save_map"]
-__all__ += ["si_unit"]
 
 _KINDS = {str: "a text", int: "a whole number", float: "a finite number"}
 
@@ -188,12 +188,6 @@ def channels_of(labels: Labels) -> dict[str, tuple[str, str | None]]:
     return found
 
 
-def si_unit(variable: str, label: str | None) -> str:
-    """Unit of a channel in a record, as in `m/s2`."""
-    units = LAYOUT[variable].units.split(", ")
-    return units[-1] if label in AXES[3:] else units[0]
-
-
 def check_map(channels: ChannelMap, labels: Labels) -> None:
     """Raise RecordError for a channel that no record of the machine has, or a variable with a channel missing."""
     known = channels_of(labels)
@@ -211,7 +205,7 @@ def check_map(channels: ChannelMap, labels: Labels) -> None:
         missing = [label for v, label in known.values() if v == variable and label not in have]
         if missing:
             said = f"{variable} has {', '.join(map(str, have))}, but not {', '.join(map(str, missing))}"
-            unit = si_unit(variable, missing[0])
+            unit = channel_unit(f"{variable}[{missing[0]}]")
             raise RecordError(
                 f'{channels.origin}, [channel]: {said}; map them too, or give {{ constant = 0, unit = "{unit}" }} for '
                 f"what is known to be zero, or leave {variable} out"

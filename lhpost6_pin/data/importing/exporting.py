@@ -9,8 +9,8 @@ import xarray as xr
 
 from ...core.errors import RecordError, UnknownNameError
 from ...core.files import write_whole
-from ...core.names import AXES
-from ..records import LAYOUT_VERSION, channel_name, layout_faults
+from ..channels import LAYOUT_VERSION, channel_name, channel_unit
+from ..layout_faults import layout_faults
 from .raw import Array
 
 __all__ = ["FORMATS", "channel_units", "export_record"]
@@ -25,11 +25,10 @@ def channel_units(record: xr.Dataset) -> Iterator[tuple[str, str, Array]]:
         if variable.dims[:1] != ("time",) or variable.ndim > 2 or variable.dtype.kind not in "fiu":
             continue
         table = variable.values.reshape(len(variable), -1).astype(float)
-        units = [unit.strip() or "-" for unit in str(variable.attrs.get("units", "-")).split(",")]
+        units = str(variable.attrs.get("units", "-"))
         for k, values in enumerate(table.T):
             channel = channel_name(variable, k)
-            rotation = channel.endswith(tuple(f"[{axis}]" for axis in AXES[3:]))  # "m, rad": translations, rotations
-            yield channel, units[-1] if rotation else units[0], values
+            yield channel, channel_unit(channel, units) or "-", values
 
 
 def export_record(record: xr.Dataset, path: Path | str, form: str) -> None:

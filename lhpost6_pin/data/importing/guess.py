@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from ...core.errors import RecordError
 from ...core.names import AXES
-from .channel_map import ChannelMap, Source, TestFacts, channels_of, si_unit
+from ..channels import channel_unit
+from .channel_map import ChannelMap, Source, TestFacts, channels_of
 from .channel_units import quantity_unit, without_unit
 from .raw import RawTest, shown
 
@@ -86,9 +87,9 @@ def guess_map(raws: Sequence[RawTest], labels: Labels) -> Guess:
         columns = shown([name for raw in raws for name in raw.names], 20)
         raise RecordError(f"{raws[0].source}: no column's name is recognised among {columns}; write the map by hand")
     partly = {known[name][0] for name in found}
-    for name, (variable, label) in known.items():
+    for name, (variable, _) in known.items():
         if variable in partly and name not in found:
-            unit = si_unit(variable, label)
+            unit = channel_unit(name)
             remarks.append(f'not found: "{name}" = {{ constant = 0.0, unit = "{unit}" }}  # if it is known to be zero')
     facts = {key: value for raw in reversed(raws) for key, value in raw.facts.items()}
     ordered = {name: found[name] for name in known if name in found}
@@ -138,7 +139,7 @@ def _channel(name: str, unit: str | None, labels: Labels, known: Mapping[str, tu
     if channel is None or channel not in known:
         return None
     si = quantity_unit(unit)
-    return channel if si in (None, si_unit(*known[channel])) else None
+    return channel if si in (None, channel_unit(channel)) else None
 
 
 def _words(name: str) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import RecordError
-from ..records import STEP_TOLERANCE
+from ..layout_faults import STEP_TOLERANCE
 from ..signals import lowpass_zero_phase, resample_band_limited
 from .raw import Array
 

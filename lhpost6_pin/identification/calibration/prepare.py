@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from ...core.errors import RecordError, SimulationError
 from ...data.alignment import align_record, group_delays
+from ...data.channels import channel_name
 from ...data.fusion import fuse_motion
-from ...data.records import channel_name, layout_faults, sample_interval
+from ...data.layout_faults import layout_faults
+from ...data.records import sample_interval
 from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band
 from ...machine.machine import Machine
@@ -112,10 +114,9 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Compari
         raise RecordError("no record to calibrate by")
     if make_plant(machine).articulated:
         raise SimulationError("calibration takes a platen with a rigid specimen at most; lock its joints (--locked)")
-    labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
     names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
     for test, record in zip(names, records, strict=True):
-        if faults := layout_faults(record, labels):
+        if faults := layout_faults(record, machine.labels):
             raise RecordError(f"{test}: {faults[0]}")
         machine.refuse_unmounted(record.attrs, test)
         _refuse_channels(test, record, double_acting=bool(machine.double_acting))

@@ -17,8 +17,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...core.names import AXES
+from ...data.channels import sensor_groups
 from ...data.records import sample_interval
-from ...data.sensors import GROUPS, SensorSet
+from ...data.sensors import SensorSet
 from ...data.signals import align
 from ...machine.machine import Machine
 from ...mechanics.pose import PlatenMotion
@@ -181,7 +182,7 @@ def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], er
     late: dict[str, Array] = {}
     for unknown, value in off:
         if unknown.kind == "delay":
-            for channel in GROUPS.get(unknown.channel, (unknown.channel,)):
+            for channel in sensor_groups().get(unknown.channel, (unknown.channel,)):
                 if channel in out:
                     _add_delay(late, channel, unknown, value, out[channel].shape[-1])
     for channel, delay in late.items():

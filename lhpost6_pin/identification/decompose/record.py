@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from ...core.errors import RecordError
 from ...core.files import models_folder
 from ...data.alignment import Delay, align_record, group_delays, hydraulic_force
+from ...data.channels import channel_name
 from ...data.fusion import fuse_motion
-from ...data.records import channel_name, is_measured, require, sample_interval
+from ...data.records import is_measured, require, sample_interval
 from ...data.sensors import SensorSet, load_sensors
 from ...data.signals import Band
 from ...machine.machine import Machine

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.names import AXES
+from ...data.channels import LAYOUT, channel_unit
 from ...data.signals import align, correlation, delay, drift_rate, peak_ratio, rrmse
 from .metrics import Numbers
 
@@ -24,16 +24,8 @@ MOTIONS = ("displacement", "velocity", "acceleration")
 """Quantities of the platen that share the delay found on their velocity."""
 
 _UNITS = {
-    "displacement": ("m", "rad"),
-    "velocity": ("m/s", "rad/s"),
-    "acceleration": ("m/s2", "rad/s2"),
-    "wrench": ("N", "N m"),
-    "struts": ("N", "N m"),
-    "dissipative": ("N", "N m"),
-    "actuator_force": ("N",),
-    "chamber_pressure_a": ("Pa",),
-    "chamber_pressure_b": ("Pa",),
-    "spool_command": ("1",),
+    **{quantity: LAYOUT[f"platen_{quantity}"].units for quantity in MOTIONS},
+    **dict.fromkeys(("wrench", "struts", "dissipative"), "N, N m"),
 }
 _PRELOADED = ("wrench", "struts", "dissipative", "actuator_force", "chamber_pressure_a", "chamber_pressure_b")
 
@@ -80,8 +72,7 @@ class Agreement(NamedTuple):
 
 def unit_of(quantity: str, column: str) -> str:
     """SI unit of a quantity's column."""
-    units = _UNITS[quantity]
-    return units[-1] if column in AXES[3:] else units[0]
+    return channel_unit(f"{quantity}[{column}]", _UNITS.get(quantity))
 
 
 def agree(pairs: Sequence[Pair], dt: float, numbers: Numbers) -> tuple[Agreement, ...]:

@@ -1,0 +1,206 @@
+"""The channels of a record: one descriptor each, from which all tables of sensors follow.
+
+A new sensor is one entry of `LAYOUT`, and its noise and ranges those of a sensors file (`models/sensors`): records,
+import, checks, simulated campaigns, alignment, cross-checks and the sensor errors of calibration take it from there.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Literal
+
+import xarray as xr
+
+from ..core.names import AXES
+
+__all__ = [
+    "LAYOUT",
+    "LAYOUT_VERSION",
+    "MOTION",
+    "Channel",
+    "calibrated_channels",
+    "channel_name",
+    "channel_unit",
+    "residuals_of",
+    "same_unit",
+    "sensor_groups",
+]
+
+LAYOUT_VERSION = 1
+"""Of the layout below. A change that older records do not follow (of a name, unit or sign) counts it up."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One variable of the layout: its dimensions, unit and meaning, what it is for, and what may be wrong with it."""
+
+    dims: tuple[str, ...]
+    units: str  # "translations, rotations" where the last dimension is `axis`
+    long_name: str
+    needed_by: tuple[str, ...] = ()  # jobs that cannot do without it
+    role: Literal["motion", "sensor", "command"] = "sensor"  # motion: fused; command: the controller's own number
+    errors: tuple[Literal["gain", "offset", "delay"], ...] = ("gain", "offset", "delay")  # that calibration estimates
+    group: str = ""  # channels that share conditioning, and so a delay; by default the channel alone
+    residuals: tuple[str, ...] = ()  # kinds of residuals that it enters; none: calibration does not use it
+    fault: str = ""  # family of the library by which an error beyond its stated range is named
+    companions: tuple[str, ...] = ()  # channels without which it serves no residual
+    replaces: str = ""  # channel whose place in the wrench it takes where that was not measured
+    same_as: str = ""  # channel that measures the same quantity, if this one is redundant
+    held: bool = False  # follows a command that is held: each column may be late by part of a controller sample
+    differentiated: bool = False  # residuals use its rate, too
+
+
+_AXIS, _ACTUATOR = ("time", "axis"), ("time", "actuator")
+_INVERSE, _OPEN = ("inverse dynamics",), ("open loop",)
+_MOVED: tuple[str, ...] = ("wrench", "flow", "gas")
+_PRESSURE: dict[str, Any] = {"units": "Pa", "fault": "pressure_sensor_error"}
+_CHAMBER: dict[str, Any] = {
+    **_PRESSURE,
+    "needed_by": _OPEN,
+    "group": "chamber_pressure",
+    "residuals": ("flow", "force"),
+    "replaces": "actuator_force",
+    "differentiated": True,
+}
+_PLATEN: dict[str, Any] = {
+    "dims": _AXIS,
+    "role": "motion",
+    "errors": ("gain", "delay"),  # the control zero-position is where they are zero
+    "residuals": _MOVED,
+    "fault": "accelerometer_error",
+}
+
+LAYOUT: Mapping[str, Channel] = {
+    "platen_displacement": Channel(
+        **_PLATEN, units="m, rad", long_name="position of C in {s}; Euler angles", needed_by=_INVERSE
+    ),
+    "platen_velocity": Channel(**_PLATEN, units="m/s, rad/s", long_name="velocity of C in {s}; Euler angle rates"),
+    "platen_acceleration": Channel(
+        **_PLATEN,
+        units="m/s2, rad/s2",
+        long_name="acceleration of C in {s} without gravity; Euler angle accelerations",
+        needed_by=_INVERSE,
+    ),
+    "actuator_displacement": Channel(
+        dims=_ACTUATOR,
+        units="m",
+        long_name="actuator length minus its length in the zero pose",
+        fault="length_sensor_error",
+    ),
+    "actuator_force": Channel(
+        dims=_ACTUATOR,
+        units="N",
+        long_name="actuator force P_A A_1 - P_B A_2",
+        needed_by=_INVERSE,
+        residuals=("wrench", "force"),
+        fault="pressure_sensor_error",
+    ),
+    "chamber_pressure_a": Channel(**_CHAMBER, dims=_ACTUATOR, long_name="pressure in chamber A"),
+    "chamber_pressure_b": Channel(**_CHAMBER, dims=("time", "horizontal"), long_name="pressure in chamber B"),
+    "strut_pressure": Channel(
+        **_PRESSURE,
+        dims=("time", "strut"),
+        long_name="nitrogen pressure of the hold-down strut",
+        residuals=("gas",),
+    ),
+    "spool_command": Channel(
+        dims=_ACTUATOR,
+        units="1",
+        long_name="normalised fourth-stage spool command",
+        role="command",
+        errors=("delay",),
+        residuals=("servo",),
+        companions=("spool_position",),
+    ),
+    "spool_position": Channel(
+        dims=_ACTUATOR,
+        units="1",
+        long_name="normalised fourth-stage spool position",
+        needed_by=_OPEN,
+        residuals=("flow", "servo"),
+        fault="spool_null_bias",
+        held=True,
+    ),
+    "supply_pressure": Channel(
+        **_PRESSURE, dims=("time",), long_name="supply pressure", errors=("gain", "offset"), residuals=("supply",)
+    ),
+    "reference_displacement": Channel(
+        dims=_AXIS, units="m, rad", long_name="displacement the test asked for", role="command", errors=()
+    ),
+}
+
+MOTION = tuple(name for name, channel in LAYOUT.items() if channel.role == "motion")
+"""Displacement, velocity and acceleration of the platen."""
+
+
+def sensor_groups() -> dict[str, tuple[str, ...]]:
+    """Channels that share conditioning, and so a delay against the others, by the name of their group."""
+    groups: dict[str, tuple[str, ...]] = {}
+    for name, channel in LAYOUT.items():
+        if channel.role != "command" and "delay" in channel.errors:
+            group = channel.group or name
+            groups[group] = (*groups.get(group, ()), name)
+    return groups
+
+
+def calibrated_channels() -> dict[str, Channel]:
+    """Measured channels that a machine is calibrated by."""
+    return {name: c for name, c in LAYOUT.items() if c.residuals and c.role != "command"}
+
+
+def residuals_of(name: str, present: Mapping[str, Any]) -> tuple[str, ...]:
+    """Kinds of residuals that a channel (or a group of channels) enters in a test that has those `present`."""
+    channel = LAYOUT.get(name) or LAYOUT[sensor_groups()[name][0]]
+    stands_in = bool(channel.replaces) and channel.replaces not in present
+    return ("wrench", *channel.residuals) if stands_in else channel.residuals
+
+
+def channel_name(variable: xr.DataArray, column: int) -> str:
+    """Name of one column of a variable, as in `platen_displacement[yaw]`."""
+    if variable.ndim < 2:
+        return str(variable.name)
+    dim = variable.dims[1]
+    return f"{variable.name}[{variable[dim].values[column] if dim in variable.coords else column}]"
+
+
+def channel_unit(channel: str, units: str | None = None) -> str:
+    """Unit of one column: `m` of `platen_displacement[x]`, `rad` of `platen_displacement[yaw]`.
+
+    `units` are those of its variable, by default the layout's.
+    """
+    variable, _, label = channel.rstrip("]").partition("[")
+    parts = (LAYOUT[variable].units if units is None else units).split(",")
+    return parts[-1 if label in AXES[3:] else 0].strip()
+
+
+def same_unit(units: object, wanted: str) -> bool:
+    """Whether two unit strings mean the same: `m/s2`, `m s-2`, `meter/second**2` do, `mm` and `m` do not."""
+    if not isinstance(units, str):
+        return False
+    if units == wanted:
+        return True
+    ours, theirs = ([_spelled(part) for part in text.split(",")] for text in (units, wanted))
+    if len(ours) != len(theirs) or not all(ours):
+        return False
+    ureg = _unit_registry()
+    try:
+        pairs = zip(ours, theirs, strict=True)
+        return all(math.isclose(ureg.Quantity(1.0, a).to(b).magnitude, 1.0, rel_tol=1e-9) for a, b in pairs)
+    except Exception:  # pint raises its own, token and type errors for what is not a unit
+        return False
+
+
+def _spelled(units: str) -> str:
+    """Return units with exponents in Python's manner; empty if not simply a product of named units."""
+    units = re.sub(r"(?<=[^\W\d_])\s?(\^|\*\*)?(?=-?\d)", "**", units.strip()).replace("·", "*")
+    units = {"": "1", "-": "1"}.get(units, units)
+    return units if re.fullmatch(r"(1|[^\W\d_]+(\*\*-?\d)?)(\s?[ */]\s?[^\W\d_]+(\*\*-?\d)?)*", units) else ""
+
+
+@cache
+def _unit_registry() -> Any:
+    import pint  # takes 0.2 s: only where a unit is not spelled as in the layout
+
+    return pint.UnitRegistry()

@@ -4,9 +4,9 @@
 
 Each seed draws every uncertain number of the machine from its stated distribution (normal, cut at three standard
 deviations, a chamber longer than its stroke), sensor errors within their ranges, and noise; simulates the campaign of
-models/procedures/campaign.toml; and calibrates the nominal machine by it. It prints, pooled over knobs and seeds, how
-often the 90 % interval holds the truth, and how far estimates are off in predicted deviations. About two minutes a
-seed on one core.
+models/procedures/campaign.toml; and calibrates the nominal machine by it. It prints, pooled over parameters and seeds,
+how often the 90 % interval holds the truth, and how far estimates are off in predicted deviations. About two minutes
+a seed on one core.
 """
 
 import json
@@ -22,7 +22,7 @@ from rich.table import Table
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.sensors import load_sensors
-from lhpost6_pin.identification.calibration import calibrate, drawn_coordinates, machine_knobs, with_knobs
+from lhpost6_pin.identification.calibration import calibrate, drawn_coordinates, machine_parameters, with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
@@ -32,13 +32,13 @@ SIGMAS = 1.6448536269514722  # half width of a 90 % interval
 def one_case(seed: int) -> dict[str, Any]:
     """Deviations of the estimates from the truth, in predicted ones, and predicted over prior ones."""
     machine, sensors = load_machine(), load_sensors()
-    knobs = machine_knobs(machine)
+    parameters = machine_parameters(machine)
     rng = np.random.default_rng([seed, 1])
-    truth = drawn_coordinates(knobs, rng)
-    turned = with_knobs(machine, knobs, truth)
+    truth = drawn_coordinates(parameters, rng)
+    turned = with_parameters(machine, parameters, truth)
     campaign = simulate_campaign(turned, load_controller("lhpost6"), sensors, seed=seed)
     found = calibrate(machine, campaign.records, sensors, seed=seed, jobs=1)
-    count = len(knobs)
+    count = len(parameters)
     return {
         "seed": seed,
         "off": ((found.estimate[:count] - truth) / found.sd[:count]).tolist(),
@@ -62,12 +62,12 @@ def main(
     off = np.array([c["off"] for c in cases])
     told = np.array([c["ratio"] for c in cases]) < 0.5
     inside = np.abs(off) < SIGMAS
-    knobs = machine_knobs(load_machine())
-    table = Table("knob", "90 % interval holds it", "rms deviation [predicted]", "predicted over prior")
-    for i, knob in enumerate(knobs):
+    parameters = machine_parameters(load_machine())
+    table = Table("parameter", "90 % interval holds it", "rms deviation [predicted]", "predicted over prior")
+    for i, parameter in enumerate(parameters):
         ratio = np.mean([c["ratio"][i] for c in cases])
         table.add_row(
-            knob.name, f"{inside[:, i].mean():.0%}", f"{np.sqrt(np.mean(off[:, i] ** 2)):.2f}", f"{ratio:.3f}"
+            parameter.name, f"{inside[:, i].mean():.0%}", f"{np.sqrt(np.mean(off[:, i] ** 2)):.2f}", f"{ratio:.3f}"
         )
     console = Console()
     console.print(table)
@@ -75,7 +75,7 @@ def main(
     console.print(
         f"90 % intervals hold the truth: {inside.mean():.1%} of all, {inside[told].mean():.1%} of the informed"
     )
-    console.print(f"informed knobs within three predicted deviations: {(np.abs(off[told]) < 3.0).mean():.1%}")
+    console.print(f"informed parameters within three predicted deviations: {(np.abs(off[told]) < 3.0).mean():.1%}")
     console.print(
         f"mean square of whitened residuals (wrench, flow, gas, force): {np.mean([c['misfit'] for c in cases], 0)}"
     )

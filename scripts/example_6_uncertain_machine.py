@@ -20,7 +20,7 @@ from lhpost6_pin.cli import run_script
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.signals import rrmse
-from lhpost6_pin.identification.calibration import drawn_coordinates, machine_knobs, with_knobs
+from lhpost6_pin.identification.calibration import drawn_coordinates, machine_parameters, with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
@@ -56,16 +56,16 @@ def main(
     nominal = load_machine("lhpost6")
     target = make_target(find_motion(motion), scale=scale)
 
-    # 1. Machines: every number that states an uncertainty is a knob; twins stay alike
-    knobs = machine_knobs(nominal)
+    # 1. Machines: every number that states an uncertainty is a parameter; twins stay alike
+    parameters = machine_parameters(nominal)
     rng = np.random.default_rng(seed)
-    drawn = np.array([drawn_coordinates(knobs, rng) for _ in range(machines)])
+    drawn = np.array([drawn_coordinates(parameters, rng) for _ in range(machines)])
 
     # 2. A controller with the same settings for each, at rest before the motion
     asked = PlatenMotion(target.displacement, target.velocity, target.acceleration)
     jobs = []
     for coordinates in drawn:
-        plant = make_plant(with_knobs(nominal, knobs, coordinates))
+        plant = make_plant(with_parameters(nominal, parameters, coordinates))
         rest = find_equilibrium(plant)
         controller = make_controller(plant, rest, load_controller(nominal.controller))
         jobs.append((plant, ClosedLoop(controller, controller.drive_for(*asked), rest)))
@@ -76,7 +76,7 @@ def main(
 
     # 4. An interval for each figure, and what it follows: the correlation of ranks with each number drawn, where it is
     #    larger than the largest that chance would give among so many numbers
-    chance = np.sqrt(2.0 * np.log(2.0 * len(knobs)) / machines)
+    chance = np.sqrt(2.0 * np.log(2.0 * len(parameters)) / machines)
     table = Table("figure", "median", "5 to 95 %", "follows most (correlation of ranks)")
     for name in found[0]:
         values = np.array([one[name] for one in found])
@@ -84,14 +84,14 @@ def main(
         ranks = np.argsort(np.argsort(np.column_stack([values, drawn]), axis=0), axis=0)
         with_value = np.corrcoef(ranks.T)[0, 1:]
         first = [k for k in np.argsort(-np.abs(with_value))[:2] if abs(with_value[k]) > chance]
-        follows = ", ".join(f"{knobs[k].name} {with_value[k]:+.2f}" for k in first) or "none beyond chance"
+        follows = ", ".join(f"{parameters[k].name} {with_value[k]:+.2f}" for k in first) or "none beyond chance"
         table.add_row(escape(name), f"{middle:.4g}", f"{low:.4g} to {high:.4g}", escape(follows))
     Console(width=120).print(table)
 
     # 5. Everything in a table for other tools
-    header = ",".join([*(f"{k.name} [{k.unit}]" for k in knobs), *found[0]])
+    header = ",".join([*(f"{k.name} [{k.unit}]" for k in parameters), *found[0]])
     rows = [
-        [*(k.at(x) for k, x in zip(knobs, coordinates, strict=True)), *one.values()]
+        [*(k.at(x) for k, x in zip(parameters, coordinates, strict=True)), *one.values()]
         for coordinates, one in zip(drawn, found, strict=True)
     ]
     with write_whole(out / "drawn.csv") as beside:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lhpost6_pin.identification.residuals import Measured, make_measured
+from lhpost6_pin.identification.residuals import MeasuredTest, make_measured_test
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
@@ -27,11 +27,11 @@ def shaken(machine: Machine, samples: int = 1024, engine: str = "fused") -> Run:
     return simulate(plant, drive, samples=samples, engine=engine, steps_per_second=2048)
 
 
-def measured_of(run: Run) -> Measured:
+def measured_of(run: Run) -> MeasuredTest:
     """The run's record, free of noise, ready for residuals."""
     record = record_of_run(run, {"test": "shaken"})
     motion = PlatenMotion(*(record[f"platen_{x}"].values for x in ("displacement", "velocity", "acceleration")))
-    return make_measured(record, motion, 200.0)
+    return make_measured_test(record, motion, 200.0)
 
 
 def rms(columns: np.ndarray) -> np.ndarray:

@@ -11,11 +11,15 @@ from typer.testing import CliRunner
 from lhpost6_pin.cli import app
 from lhpost6_pin.core.errors import LhpostError, ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.data.campaign import Campaign, load_campaign
-from lhpost6_pin.identification.calibration import Calibration, Subset, calibration_numbers, machine_knobs
-from lhpost6_pin.identification.calibration.calibration_summary import alike_words, contradiction_words, cut_strokes
+from lhpost6_pin.identification.calibration import Calibration, Subset, calibration_numbers, machine_parameters
+from lhpost6_pin.identification.calibration.calibration_summary import (
+    contradiction_summary,
+    correlation_summary,
+    cut_strokes,
+)
 from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.sensor_errors import SensorUnknown
-from lhpost6_pin.identification.calibration.verdicts import changed_knobs, contradictions, out_of_range, verdict_on
+from lhpost6_pin.identification.calibration.verdicts import changed_parameters, contradictions, out_of_range, verdict_on
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.calibration_table import print_calibration
@@ -36,8 +40,8 @@ NONE = (np.nan,) * (len(RESIDUALS) - 3)  # misfits of kinds that were not compar
 @pytest.fixture
 def found() -> Calibration:
     """Mass 3 % up in 20 deviations, leakage and viscous friction within 3, a shape nobody tells of, a height moved."""
-    knobs = tuple(k for k in machine_knobs(MACHINE) if k.name in NAMES)
-    prior = np.array([*(k.sd for k in knobs), *(u.sd for u in UNKNOWNS)])
+    parameters = tuple(k for k in machine_parameters(MACHINE) if k.name in NAMES)
+    prior = np.array([*(k.sd for k in parameters), *(u.sd for u in UNKNOWNS)])
     sd = prior * np.array([0.1, 0.2, 0.2, 0.9, 0.1, 0.1, 0.1])
     estimate = sd * np.array([20.0, 1.0, -2.0, 0.5, -4.0, 8.0, 0.0])
     correlation = np.eye(7)
@@ -52,7 +56,7 @@ def found() -> Calibration:
         machine=MACHINE,
         campaign="march",
         tests=("TX", "WN"),
-        knobs=knobs,
+        parameters=parameters,
         unknowns=UNKNOWNS,
         prior=prior,
         estimate=estimate,
@@ -83,7 +87,7 @@ def test_a_parameter_is_changed_beyond_three_deviations_and_not_informed_near_it
         "vertical.seal_shape": "not informed",
         "hold_down.base_height": "changed",
     }
-    assert changed_knobs(found) == [0, 4]
+    assert changed_parameters(found) == [0, 4]
 
 
 def test_what_went_as_far_as_it_may_is_said_to_be_at_its_bound(found) -> None:
@@ -92,18 +96,18 @@ def test_what_went_as_far_as_it_may_is_said_to_be_at_its_bound(found) -> None:
     assert verdict_on(far, 1) == "at its bound"
 
 
-def test_a_knob_is_at_its_bound_where_no_machine_could_be_built_beyond(found) -> None:
-    leakage = replace(found.knobs[1], lowest=-0.1, highest=0.2)
+def test_a_parameter_is_at_its_bound_where_no_machine_could_be_built_beyond(found) -> None:
+    leakage = replace(found.parameters[1], lowest=-0.1, highest=0.2)
     for x, verdict in ((-0.1, "at its bound"), (-0.09, "unchanged"), (0.2, "at its bound")):
         estimate = np.where(np.arange(7) == 1, x, found.estimate)
-        knobs = (found.knobs[0], leakage, *found.knobs[2:])
-        assert verdict_on(replace(found, knobs=knobs, estimate=estimate), 1) == verdict
+        parameters = (found.parameters[0], leakage, *found.parameters[2:])
+        assert verdict_on(replace(found, parameters=parameters, estimate=estimate), 1) == verdict
 
 
 def test_a_stroke_that_gives_way_to_a_chamber_is_said_and_not_passed_off_as_measured(found, tmp_path, capsys) -> None:
     assert cut_strokes(found) == []
-    (chamber,) = (k for k in machine_knobs(MACHINE, {"horizontal": 0.3}) if k.name == "horizontal.chamber_a")
-    short = replace(found, knobs=(*found.knobs[:1], chamber, *found.knobs[2:]))
+    (chamber,) = (k for k in machine_parameters(MACHINE, {"horizontal": 0.3}) if k.name == "horizontal.chamber_a")
+    short = replace(found, parameters=(*found.parameters[:1], chamber, *found.parameters[2:]))
     short = replace(short, estimate=np.where(np.arange(7) == 1, chamber.coordinate(0.7), found.estimate))
     (said,) = cut_strokes(short)
     assert said.startswith("horizontal.stroke, stated as 0.75 m, is cut to 0.6993 m")
@@ -130,14 +134,14 @@ def test_simulation_is_let_go_farther_since_the_spools_noise_biases_it(found) ->
         )
         some = replace(found, subsets=(second, found.subsets[1]))
         assert [c.subset for c in contradictions(some)] == ["simulation"] * apart
-        assert f"Of 1 by simulation {apart or 'none'} does" in contradiction_words(some)
+        assert f"Of 1 by simulation {apart or 'none'} does" in contradiction_summary(some)
 
 
 def test_contradictions_are_counted_beside_what_chance_makes(found) -> None:
-    assert contradiction_words(found).startswith("1 of 2 estimates by single groups of residuals contradicts")
-    assert "about 0.005 would by chance" in contradiction_words(found)  # two of 0.0027
-    assert contradiction_words(replace(found, subsets=found.subsets[1:])).startswith("None of 1 estimates")
-    assert contradiction_words(replace(found, subsets=())) == ""
+    assert contradiction_summary(found).startswith("1 of 2 estimates by single groups of residuals contradicts")
+    assert "about 0.005 would by chance" in contradiction_summary(found)  # two of 0.0027
+    assert contradiction_summary(replace(found, subsets=found.subsets[1:])).startswith("None of 1 estimates")
+    assert contradiction_summary(replace(found, subsets=())) == ""
 
 
 def test_errors_of_sensors_within_their_stated_ranges_are_no_cause_for_attention(found, tmp_path) -> None:
@@ -154,13 +158,13 @@ def test_errors_of_sensors_within_their_stated_ranges_are_no_cause_for_attention
 
 
 def test_pairs_of_sensors_that_are_alike_are_not_held_against_parameters(found) -> None:
-    assert alike_words(found).startswith("1 pair of a parameter with another")
+    assert correlation_summary(found).startswith("1 pair of a parameter with another")
     correlation = np.eye(7)
     correlation[5, 6] = correlation[6, 5] = 0.99
     sensors = replace(found, covariance=correlation * np.outer(found.sd, found.sd))
-    assert alike_words(sensors).startswith("Parameters can be told apart")
-    assert "1 pair of errors of sensors cannot" in alike_words(sensors)
-    assert alike_words(replace(found, covariance=np.diag(found.sd**2))) == "All unknowns can be told apart."
+    assert correlation_summary(sensors).startswith("Parameters can be told apart")
+    assert "1 pair of errors of sensors cannot" in correlation_summary(sensors)
+    assert correlation_summary(replace(found, covariance=np.diag(found.sd**2))) == "All unknowns can be told apart."
 
 
 # ---------------------------------------------------------------------------------------- page
@@ -253,9 +257,7 @@ def test_the_command_leaves_override_and_report_and_says_if_it_converged(
         asked.update(options, machine=machine.name, sensors=sensors.name)
         return replace(found, converged=converged)
 
-    monkeypatch.setattr(
-        "lhpost6_pin.simulation.simulated_campaign.load_campaign", lambda folder, machine: Campaign("march", ())
-    )
+    monkeypatch.setattr("lhpost6_pin.data.campaign.load_campaign", lambda folder, machine: Campaign("march", ()))
     monkeypatch.setattr("lhpost6_pin.identification.calibration.calibrate", pretend)
     ended = CliRunner().invoke(app, ["calibrate", "march", "--out", str(tmp_path), "--seed", "3", "--jobs", "1"])
     assert ended.exit_code == code, ended.output

@@ -1,4 +1,4 @@
-"""Calibration: knobs turn what they say, noise is whitened, derivatives are right, and the truth is recovered."""
+"""Calibration: parameters turn what they say, noise is whitened, derivatives are right, and the truth is recovered."""
 
 from dataclasses import replace
 
@@ -21,15 +21,15 @@ from lhpost6_pin.identification.calibration import (
     calibrate,
     calibration_numbers,
     fit,
-    machine_knobs,
-    with_knobs,
+    machine_parameters,
+    with_parameters,
 )
 from lhpost6_pin.identification.calibration.fit import solve
-from lhpost6_pin.identification.calibration.free_parameters import Knob, plan_knobs, scatter_knobs
+from lhpost6_pin.identification.calibration.free_parameters import FreeParameter, plan_parameters, scatter_parameters
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.prepare import _ready
-from lhpost6_pin.identification.calibration.problem import Base, Comparison, Problem
+from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem, ResidualBands
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
 from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
 from lhpost6_pin.identification.calibration.whitened_residuals import (
@@ -37,10 +37,10 @@ from lhpost6_pin.identification.calibration.whitened_residuals import (
     excess,
     make_whitener,
     mean_squares,
+    negative_log_likelihood,
     spectrum_of,
-    surprise,
 )
-from lhpost6_pin.identification.residuals import RESIDUALS, Measured, evaluate_residuals, make_measured
+from lhpost6_pin.identification.residuals import RESIDUALS, MeasuredTest, evaluate_residuals, make_measured_test
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
@@ -54,7 +54,7 @@ TURNED = {
     "platen.mass[x]": 0.02,
     "hold_down.polytropic_index": -0.04,
 }
-"""Coordinates of the knobs that the simulated machine has turned; one and a half to two stated deviations."""
+"""Coordinates of the parameters that the simulated machine has turned; one and a half to two stated deviations."""
 
 
 @pytest.fixture(scope="module")
@@ -71,45 +71,45 @@ def sensors() -> SensorSet:
 
 @pytest.fixture(scope="module")
 def truth(machine: Machine) -> np.ndarray:
-    """Coordinates of all knobs."""
-    return np.array([TURNED.get(k.name, 0.0) for k in machine_knobs(machine)])
+    """Coordinates of all parameters."""
+    return np.array([TURNED.get(k.name, 0.0) for k in machine_parameters(machine)])
 
 
 @pytest.fixture(scope="module")
 def campaign(machine: Machine, sensors: SensorSet, truth: np.ndarray) -> Campaign:
-    """Two tests of a machine whose knobs are turned, with noise and calibration errors."""
-    turned = with_knobs(machine, machine_knobs(machine), truth)
+    """Two tests of a machine whose parameters are turned, with noise and calibration errors."""
+    turned = with_parameters(machine, machine_parameters(machine), truth)
     return simulate_campaign(turned, load_controller("lhpost6"), sensors, seed=3, tests=("TX", "WN"))
 
 
-def knob(machine: Machine, name: str) -> Knob:
-    return next(k for k in machine_knobs(machine) if k.name == name)
+def parameter(machine: Machine, name: str) -> FreeParameter:
+    return next(k for k in machine_parameters(machine) if k.name == name)
 
 
-# ------------------------------------------------------------------------------------------------------- knobs
-def test_every_number_with_an_uncertainty_has_a_knob_unless_it_is_geometry(machine):
-    turned = {path for k in machine_knobs(machine) for path, _ in k.paths}
+# ------------------------------------------------------------------------------------------------------- parameters
+def test_every_number_with_an_uncertainty_is_a_free_parameter_unless_it_is_geometry(machine):
+    turned = {path for k in machine_parameters(machine) for path, _ in k.paths}
     stated = {
         p for p, q in machine.parameters.items() if q.sd is not None and not p.endswith(("_point", "bearing_plane"))
     }
     assert stated <= turned
 
 
-def test_a_knob_at_zero_leaves_the_machine_as_it_is(machine):
-    knobs = machine_knobs(machine)
-    same = with_knobs(machine, knobs, np.zeros(len(knobs)))
+def test_a_parameter_at_zero_leaves_the_machine_as_it_is(machine):
+    parameters = machine_parameters(machine)
+    same = with_parameters(machine, parameters, np.zeros(len(parameters)))
     assert all(same.parameters[p].value == q.value for p, q in machine.parameters.items())
 
 
 @pytest.mark.parametrize("name", ["horizontal.flow", "platen.centre_of_gravity[z]", "vertical.platen_height"])
 def test_a_coordinate_and_its_value_are_inverse(machine, name):
-    k = knob(machine, name)
+    k = parameter(machine, name)
     assert k.coordinate(k.at(1.3 * k.sd)) == pytest.approx(1.3 * k.sd, rel=1e-12)
 
 
 def test_a_height_moves_all_points_of_a_kind_and_the_bearing_plane_with_them(machine):
-    k = knob(machine, "vertical.platen_height")
-    lifted = with_knobs(machine, [k], np.array([0.03]))
+    k = parameter(machine, "vertical.platen_height")
+    lifted = with_parameters(machine, [k], np.array([0.03]))
     for before, after in zip(machine.actuators, lifted.actuators, strict=True):
         rise = 0.03 if before.kind == "vertical" else 0.0
         assert after.platen_point[2] - before.platen_point[2] == pytest.approx(rise, abs=1e-12)
@@ -117,39 +117,41 @@ def test_a_height_moves_all_points_of_a_kind_and_the_bearing_plane_with_them(mac
 
 
 def test_a_twin_differs_by_a_factor_of_what_its_kind_has(machine):
-    shared, own = knob(machine, "horizontal.flow"), scatter_knobs(machine, 0.05, 3.0)
+    shared, own = parameter(machine, "horizontal.flow"), scatter_parameters(machine, 0.05, 3.0)
     twin = next(k for k in own if k.name == "H2.flow")
-    turned = with_knobs(machine, [twin, shared], np.array([0.1, -0.2]))
+    turned = with_parameters(machine, [twin, shared], np.array([0.1, -0.2]))
     flows = [a.flow / b.flow for a, b in zip(turned.actuators, machine.actuators, strict=True)]
     assert flows[:4] == pytest.approx([0.8, 0.8 * 1.1, 0.8, 0.8], rel=1e-12)
     assert flows[4:] == [1.0] * 6
     assert {k.name.split(".")[0] for k in own} == set(machine.actuator_names)
-    assert not [k for k in scatter_knobs(turned, 0.05, 3.0) if k.name == "H2.flow"]  # it has a number of its own
+    assert not [k for k in scatter_parameters(turned, 0.05, 3.0) if k.name == "H2.flow"]  # it has a number of its own
 
 
 def test_what_is_positive_stays_so(machine):
-    knobs = [k for k in machine_knobs(machine) if k.form == "factor"]
-    least = with_knobs(machine, knobs, np.array([k.lowest for k in knobs]))
-    for k in knobs:
+    parameters = [k for k in machine_parameters(machine) if k.form == "factor"]
+    least = with_parameters(machine, parameters, np.array([k.lowest for k in parameters]))
+    for k in parameters:
         assert 0.0 < k.at(k.lowest) < k.value
     assert all(a.leakage > 0.0 and a.viscous > 0.0 for a in least.actuators)
 
 
 def test_points_move_in_plan_as_mirror_images(machine):
-    knobs = {k.name: k for k in plan_knobs(machine)}
-    moved = with_knobs(machine, [knobs["horizontal.base_x"], knobs["vertical.platen_y"]], np.array([0.02, 0.01]))
+    parameters = {k.name: k for k in plan_parameters(machine)}
+    moved = with_parameters(
+        machine, [parameters["horizontal.base_x"], parameters["vertical.platen_y"]], np.array([0.02, 0.01])
+    )
     for before, after in zip(machine.components, moved.components, strict=True):
         shift = np.subtract(after.base_point, before.base_point)
         kind = before.kind
         wanted = [0.02 * np.sign(before.base_point[0]) * (kind == "horizontal"), 0.01 * np.sign(before.base_point[1])]
         assert shift == pytest.approx([wanted[0], wanted[1] * (kind == "vertical"), 0.0], abs=1e-12)
-    assert "hold_down.platen_y" not in knobs  # all struts are on the axis
+    assert "hold_down.platen_y" not in parameters  # all struts are on the axis
 
 
 def test_a_chamber_is_not_turned_shorter_than_its_stroke(machine):
-    k = knob(machine, "horizontal.chamber_a")
+    k = parameter(machine, "horizontal.chamber_a")
     assert k.at(k.lowest) > machine.actuators[0].stroke
-    with_knobs(machine, [k], np.array([k.lowest]))  # can still be built
+    with_parameters(machine, [k], np.array([k.lowest]))  # can still be built
 
 
 @pytest.mark.parametrize(
@@ -163,19 +165,21 @@ def test_a_chamber_is_not_turned_shorter_than_its_stroke(machine):
 )
 def test_a_stroke_stays_as_stated_unless_a_chamber_is_shorter(machine, stated, chamber_a, chamber_b, wanted):
     machine = machine.with_params({"horizontal.stroke": stated})
-    knobs = [k for k in machine_knobs(machine, {"horizontal": 0.3}) if k.name.startswith("horizontal.chamber")]
-    turned = with_knobs(machine, knobs, np.array([chamber_a, chamber_b]) / 0.8 - 1.0)
+    parameters = [
+        k for k in machine_parameters(machine, {"horizontal": 0.3}) if k.name.startswith("horizontal.chamber")
+    ]
+    turned = with_parameters(machine, parameters, np.array([chamber_a, chamber_b]) / 0.8 - 1.0)
     assert (turned.actuators[0].chamber_a, turned.actuators[0].chamber_b) == pytest.approx((chamber_a, chamber_b))
     assert [a.stroke for a in turned.actuators[:4]] == pytest.approx([wanted] * 4, rel=1e-12)
 
 
 def test_a_chamber_is_no_shorter_than_its_piston_was_seen_to_move(machine):
-    (k,) = (k for k in machine_knobs(machine, {"horizontal": 0.6}) if k.name == "horizontal.chamber_a")
+    (k,) = (k for k in machine_parameters(machine, {"horizontal": 0.6}) if k.name == "horizontal.chamber_a")
     assert k.at(k.lowest) == pytest.approx(0.6, rel=2e-3)
 
 
-def test_a_guided_machine_has_no_knobs_of_axes_that_it_has_not():
-    names = {k.name for k in machine_knobs(load_machine("uniaxial"))}
+def test_a_guided_machine_has_no_parameters_of_axes_that_it_has_not():
+    names = {k.name for k in machine_parameters(load_machine("uniaxial"))}
     assert "platen.mass[x]" in names
     assert not {n for n in names if n.startswith("platen.inertia") or n.endswith("_height")}
 
@@ -303,17 +307,17 @@ def test_errors_of_chambers_b_are_taken_out_where_spools_were_not_measured(probl
 
 
 # --------------------------------------------------------------------------------------------------------- fit
-COMPARISON = Comparison((0.0, 0.01, 5.0, 10.0, 20.0, 30.0), 0.3, 0.1)
+COMPARISON = ResidualBands((0.0, 0.01, 5.0, 10.0, 20.0, 30.0), 0.3, 0.1)
 
 
 @pytest.fixture(scope="module")
-def seen(machine, sensors, campaign) -> list[Measured]:
+def seen(machine, sensors, campaign) -> list[MeasuredTest]:
     """One test, and four times with more noise."""
     plant = make_plant(machine)
     record = campaign.records[1].drop_vars("actuator_displacement")
     rng = np.random.default_rng(5)
     return [
-        make_measured(r, fuse_motion(plant, r, sensors).motion, 60.0)
+        make_measured_test(r, fuse_motion(plant, r, sensors).motion, 60.0)
         for r in (record, *(add_noise(record, sensors, rng) for _ in range(4)))
     ]
 
@@ -333,7 +337,7 @@ def test_unknowns_evaluated_together_have_the_derivatives_of_each_alone(problem)
     ]
     chosen = [problem.names.index(n) for n in names]
     free = np.isin(np.arange(len(x)), chosen)
-    (slope,) = problem.slopes(Base(problem, x), free, lambda share: None)
+    (slope,) = problem.slopes(OperatingPoint(problem, x), free, lambda share: None)
     for i in chosen:
         step = 0.1 * problem.prior[i] * (np.arange(len(x)) == i)
         alone = (problem.whitened(x + step)[0] - problem.whitened(x)[0]) / step[i]
@@ -346,7 +350,7 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
     without = Problem(machine, tests[:1], tests[1:], sensors, COMPARISON)
     x = np.zeros(len(without.prior))
     chosen = [without.names.index(n) for n in ("gain chamber_pressure_a[H2]", "offset chamber_pressure_b[H3]")]
-    (slope,) = without.slopes(Base(without, x), np.isin(np.arange(len(x)), chosen), lambda share: None)
+    (slope,) = without.slopes(OperatingPoint(without, x), np.isin(np.arange(len(x)), chosen), lambda share: None)
     for i in chosen:
         step = 0.1 * without.prior[i] * (np.arange(len(x)) == i)
         alone = (without.whitened(x + step)[0] - without.whitened(x)[0]) / step[i]
@@ -387,16 +391,18 @@ def test_the_surprise_of_what_is_left_falls_as_least_squares_over_its_power():
     step = 1e-6
     for b in range(3):
         more = means + step * (np.arange(3) == b)[:, None]
-        slope = float((surprise(more, counts) - surprise(means, counts))[0]) / step
+        slope = float((negative_log_likelihood(more, counts) - negative_log_likelihood(means, counts))[0]) / step
         due = counts[b] / power[np.searchsorted(f, whitener.edges[b])][0]
         assert slope == pytest.approx(due, rel=1e-4)  # of a difference over a step
-    assert surprise(np.full((3, 1), 0.7), counts)[0] == pytest.approx(0.7 * counts.sum())  # less than noise is noise
+    assert negative_log_likelihood(np.full((3, 1), 0.7), counts)[0] == pytest.approx(
+        0.7 * counts.sum()
+    )  # less than noise is noise
 
 
 def test_slopes_of_twins_keep_up_with_what_they_share(machine, sensors, seen):
     """After a frugal search that has moved what twins share, their slopes still add up to that of it."""
     ready = Problem(machine, seen[:1], seen[1:], sensors, COMPARISON)
-    ready = ready.with_machine(machine, (*ready.knobs, *scatter_knobs(machine, 0.05, 3.0)))
+    ready = ready.with_machine(machine, (*ready.parameters, *scatter_parameters(machine, 0.05, 3.0)))
     numbers, more = discovery_numbers()[1], [ready.with_tests(seen[1:2])]
     found = solve(ready, more, numbers, np.zeros(len(ready.prior)), lambda share: None, frugal=True)
     grown = dict(zip(ready.names, 1.0 + found.at, strict=True))
@@ -491,23 +497,23 @@ def found(machine, sensors, campaign):
 
 
 def test_what_was_turned_is_found_and_the_rest_stays(found, truth):
-    count = len(found.knobs)
+    count = len(found.parameters)
     off = (found.estimate[:count] - truth) / found.sd[:count]
     names = np.array(found.names[:count])
     assert found.converged
     assert found.informed[:count][np.isin(names, list(TURNED))].all()
-    # four predicted deviations: chance exceeds them for one of six knobs once in 2600 campaigns
+    # four predicted deviations: chance exceeds them for one of six parameters once in 2600 campaigns
     assert np.abs(off[np.isin(names, list(TURNED))]).max() < 4.0, dict(zip(names, off, strict=True))
-    assert np.median(np.abs(off)) < 1.2  # exact predictions give 0.67; with 37 knobs the median scatters by 0.15
+    assert np.median(np.abs(off)) < 1.2  # exact predictions give 0.67; with 37 parameters the median scatters by 0.15
 
 
 def test_simulation_is_a_second_opinion_that_agrees(found, truth):
     simulated = found.subsets[-1]
-    count = len(found.knobs)
+    count = len(found.parameters)
     off = ((simulated.estimate[:count] - truth) / simulated.sd[:count])[np.isfinite(simulated.sd[:count])]
     assert simulated.name == "simulation"
     assert np.isnan(simulated.sd[count:]).all()  # of the sensors it has no opinion of its own
-    assert len(off) > 25  # of 37 knobs
+    assert len(off) > 25  # of 37 parameters
     assert np.median(np.abs(off)) < 1.2
     assert np.abs(off).max() < 5.0  # errors of the sensors, held, are only in the floor
 
@@ -539,13 +545,13 @@ def test_a_fit_that_did_not_converge_leaves_the_deviations_of_the_machine_file(f
     text = path.read_text(encoding="utf-8")
     assert "did not converge" in text.split("[", 1)[0] and "no sd is given" in text.split("[", 1)[0]
     again = load_machine("lhpost6", path)
-    for knob in found.knobs:
-        for name, _ in knob.paths:
+    for parameter in found.parameters:
+        for name, _ in parameter.paths:
             stated, quantity = machine.parameters[name], again.parameters[name]
             assert quantity.sd == stated.sd, name
             assert "did not converge" in quantity.source
     assert again.parameters["platen.mass"].value == found.calibrated.parameters["platen.mass"].value
-    assert save_override(found, path).read_text(encoding="utf-8").count("sd = ") > len(found.knobs) / 2
+    assert save_override(found, path).read_text(encoding="utf-8").count("sd = ") > len(found.parameters) / 2
 
 
 @pytest.mark.slow
@@ -556,7 +562,7 @@ def test_chambers_shorter_than_the_stated_stroke_are_found_and_the_oil_stays_as_
     again = calibrate(machine, records, sensors)
     for name, value in {**short, "hydraulics.bulk_modulus": machine.hydraulics.bulk_modulus}.items():
         i = again.names.index(name)
-        k = again.knobs[i]
+        k = again.parameters[i]
         assert again.estimate[i] == pytest.approx(k.coordinate(value), abs=4.0 * again.sd[i]), name
         assert again.sd[i] < 0.1 * k.sd
 
@@ -570,17 +576,17 @@ def test_numbers_of_an_earlier_override_stay_in_the_new_one(found, machine, tmp_
 
 
 def test_names_with_quotes_do_not_spoil_the_override_file(machine, tmp_path):
-    knobs = machine_knobs(machine)
-    sd = np.array([k.sd for k in knobs])
+    parameters = machine_parameters(machine)
+    sd = np.array([k.sd for k in parameters])
     none = np.zeros((1, len(RESIDUALS)))
     named = Calibration(
         machine=machine,
         campaign='the "north" C:\\tests',
         tests=("line\nbreak",),
-        knobs=knobs,
+        parameters=parameters,
         unknowns=(),
         prior=sd,
-        estimate=np.zeros(len(knobs)),
+        estimate=np.zeros(len(parameters)),
         covariance=np.diag(sd**2),
         alone=sd[None],
         subsets=(),

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from lhpost6_pin.data.check import check_dataset, check_record
-from lhpost6_pin.data.layout_faults import Finding
+from lhpost6_pin.data.layout_faults import RecordFinding
 from lhpost6_pin.data.records import load_record, make_record
 
 RECORDS = Path(__file__).parent / "data" / "records"
@@ -20,7 +20,7 @@ def tests_by_name() -> dict[str, xr.Dataset]:
     return {path.stem.split("_")[2]: load_record(path) for path in PRACTICE}
 
 
-def faults(found: list[Finding]) -> list[tuple[str, str, int | None]]:
+def faults(found: list[RecordFinding]) -> list[tuple[str, str, int | None]]:
     return [(f.severity, f.channel, f.sample) for f in found if f.severity != "info"]
 
 

@@ -7,7 +7,7 @@ import pytest
 from machine_cases import plant_named
 from sensor_cases import RATE, measured
 
-from lhpost6_pin.data.consistency import SensorFinding, check_sensors
+from lhpost6_pin.data.consistency import ConsistencyFinding, check_sensors
 from lhpost6_pin.data.records import make_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align
@@ -31,7 +31,7 @@ def suspicious(findings) -> set[tuple[str, str]]:
     return {(f.channel, f.quantity) for f in findings if f.verdict == "suspicious"}
 
 
-def find(findings, channel: str, quantity: str, check: str = "") -> SensorFinding:
+def find(findings, channel: str, quantity: str, check: str = "") -> ConsistencyFinding:
     """The finding of a channel and quantity."""
     return next(f for f in findings if (f.channel, f.quantity) == (channel, quantity) and check in f.check)
 

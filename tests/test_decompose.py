@@ -15,8 +15,8 @@ from lhpost6_pin.core.errors import RecordError, SimulationError
 from lhpost6_pin.data.records import load_record, open_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import (
-    Agreement,
     Decomposed,
+    WrenchAgreement,
     decompose_record,
     find_agreement,
     find_work,
@@ -45,7 +45,7 @@ def exact(clean: xr.Dataset) -> Decomposed:
 
 
 @pytest.fixture(scope="module", params=sorted(PRACTICE))
-def practice(request: pytest.FixtureRequest) -> tuple[Decomposed, Agreement]:
+def practice(request: pytest.FixtureRequest) -> tuple[Decomposed, WrenchAgreement]:
     """A test of an independent simulator with noisy sensors, nothing hidden in it."""
     found = decompose_record(MACHINE, load_record(PRACTICE[request.param]))
     return found, find_agreement(found)
@@ -74,7 +74,9 @@ def test_sampled_more_slowly_what_is_left_is_the_staggered_schemes(clean: xr.Dat
     assert 1e-8 < left < 1e-3  # friction marched with steps four times as long
 
 
-def test_with_noise_the_residual_is_at_the_noises_level_in_every_axis(practice: tuple[Decomposed, Agreement]) -> None:
+def test_with_noise_the_residual_is_at_the_noises_level_in_every_axis(
+    practice: tuple[Decomposed, WrenchAgreement],
+) -> None:
     _, agreement = practice
     assert (agreement.noise_ratio > 0.9).all()  # 40 s x 33 Hz know a standard deviation to 3 %
     assert (agreement.noise_ratio < 1.0 + SENSORS.noise_range).all()
@@ -82,7 +84,7 @@ def test_with_noise_the_residual_is_at_the_noises_level_in_every_axis(practice: 
     assert set(agreement.offset_explained) <= {"noise", "sensors"}
 
 
-def test_where_axes_move_modelled_forces_follow_measured_ones(practice: tuple[Decomposed, Agreement]) -> None:
+def test_where_axes_move_modelled_forces_follow_measured_ones(practice: tuple[Decomposed, WrenchAgreement]) -> None:
     _, agreement = practice
     assert agreement.actuators.rrmse[0] < 0.03
     assert agreement.actuators.rrmse_varying[0] < 0.01
@@ -112,7 +114,7 @@ def test_noise_of_the_forces_alone_is_what_the_legs_make_of_it(triangle: xr.Data
     np.testing.assert_allclose(find_agreement(found).noise, expected, rtol=0.12)
 
 
-def test_offsets_and_gains_of_vertical_forces_add_in_squares(practice: tuple[Decomposed, Agreement]) -> None:
+def test_offsets_and_gains_of_vertical_forces_add_in_squares(practice: tuple[Decomposed, WrenchAgreement]) -> None:
     found, agreement = practice
     vertical = found.whole.component_force[:, 4:10].mean(axis=0)
     spread = np.sqrt(
@@ -156,14 +158,14 @@ def test_one_axis_comes_apart_too(tmp_path) -> None:
 
 
 # ---------------------------------------------------------------------------------------- work
-def test_all_effects_and_the_rest_add_up_to_the_inertia(practice: tuple[Decomposed, Agreement]) -> None:
+def test_all_effects_and_the_rest_add_up_to_the_inertia(practice: tuple[Decomposed, WrenchAgreement]) -> None:
     found, _ = practice
     effects, wrench = delivered_by(found)
     assert effects[-1] == "unexplained"
     np.testing.assert_allclose(wrench.sum(axis=1), found.forces.ledger.inertia, atol=1e-7)  # of meganewtons
 
 
-def test_energy_is_balanced_and_friction_takes_it(practice: tuple[Decomposed, Agreement]) -> None:
+def test_energy_is_balanced_and_friction_takes_it(practice: tuple[Decomposed, WrenchAgreement]) -> None:
     found, _ = practice
     work = find_work(found)
     spent = dict(zip(work.effects, work.energy[-1], strict=True))
@@ -175,7 +177,7 @@ def test_energy_is_balanced_and_friction_takes_it(practice: tuple[Decomposed, Ag
 
 
 # ---------------------------------------------------------------------------------------- on disk
-def test_the_ledger_is_written_with_names_and_units(practice: tuple[Decomposed, Agreement], tmp_path) -> None:
+def test_the_ledger_is_written_with_names_and_units(practice: tuple[Decomposed, WrenchAgreement], tmp_path) -> None:
     found, _ = practice
     save_ledger(found, tmp_path / "ledger.nc", source="here.nc")
     data = open_record(tmp_path / "ledger.nc")

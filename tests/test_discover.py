@@ -18,26 +18,26 @@ from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, save_campaign
 from lhpost6_pin.data.sensors import SensorSet, load_sensors
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
-from lhpost6_pin.discovery.acceptance import Lowered, Weighing, refusal, squares_by_column
+from lhpost6_pin.discovery.acceptance import Lowered, Reweighting, refusal, squares_by_column
 from lhpost6_pin.discovery.add_effects import _fit_jointly
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, with_background, with_other_form
-from lhpost6_pin.discovery.checkpoint import make_bookmark
+from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.pairs import score_pairs
 from lhpost6_pin.discovery.releases import block_of, list_releases
-from lhpost6_pin.discovery.residual_function import Left, _hats
+from lhpost6_pin.discovery.residual_function import ResidualFunction, _hats
 from lhpost6_pin.discovery.scores import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discovery.screening import _by_rank, stand
+from lhpost6_pin.discovery.screening import _by_rank, linearise
 from lhpost6_pin.discovery.search import _pruned, _without
-from lhpost6_pin.discovery.search_state import Added, Contest, Scored, Standing
-from lhpost6_pin.discovery.verdict import without_name
+from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored
+from lhpost6_pin.discovery.verdict import reject_effects
 from lhpost6_pin.discovery.verdict_summary import said
 from lhpost6_pin.identification.calibration import calibration_numbers
-from lhpost6_pin.identification.calibration.prepare import Prepared, prepare_problem
-from lhpost6_pin.identification.calibration.problem import Base
+from lhpost6_pin.identification.calibration.prepare import PreparedProblem, prepare_problem
+from lhpost6_pin.identification.calibration.problem import OperatingPoint
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
 from lhpost6_pin.identification.calibration.whitened_residuals import real_bins
 from lhpost6_pin.machine.library import families, find_family
@@ -75,7 +75,7 @@ def rubbing(machine: Machine, sensors: SensorSet) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def ready(machine: Machine, sensors: SensorSet, rubbing: Campaign) -> Prepared:
+def ready(machine: Machine, sensors: SensorSet, rubbing: Campaign) -> PreparedProblem:
     """Two of its tests made ready."""
     return prepare_problem(machine, rubbing.records[::2], sensors, calibration_numbers())
 
@@ -118,7 +118,7 @@ def candidate(family: str, *components: str, **shape: float) -> Candidate:
 )
 def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, family, components):
     problem = ready.problem
-    base = Base(problem, np.zeros(len(problem.prior)))
+    base = OperatingPoint(problem, np.zeros(len(problem.prior)))
     alone = [candidate(family, c) for c in components]
     (columns, _), parts = columns_of(problem, base, [*alone, candidate(family, *components)])
     for one, part in zip(alone, parts, strict=False):
@@ -274,7 +274,7 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     clear, doubtful = Lowered(80.0, 80.0, 0.5, 0.5), Lowered(80.0, 10.0, 0.5, 0.5)
     weak = Lowered(30.0, 30.0, 0.5, 0.5)
     spring, rubs = find_family("stray_spring"), find_family("stribeck_friction")
-    assert (spring.mimicked, rubs.mimicked) == (False, True)
+    assert (spring.confusable, rubs.confusable) == (False, True)
     assert [refusal([spring], one, less, numbers) for less in (clear, doubtful, weak)] == ["", "", ""]
     assert [refusal([rubs], one, less, numbers) for less in (clear, doubtful, weak)] == [
         "",
@@ -290,21 +290,21 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
 def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     """Columns of two effects laid into what is left: with a third one, only these two go together."""
     search, (numbers, calibration) = found.search, discovery_numbers()
-    standing = stand(search.solution, calibration)
-    problem, base, background = search.problem, standing.base, standing.background
+    linear = linearise(search.solution, calibration)
+    problem, base, background = search.problem, linear.base, linear.background
     hidden = [candidate("stray_spring", "platen.x"), candidate("asymmetric_friction", "V1")]
     size = [np.array([2e6]), np.array([2e4])]
-    laid = [np.zeros(len(rest)) for rest in background.rest]
+    laid = [np.zeros(len(rest)) for rest in background.residual]
     for one, amplitude in zip(hidden, size, strict=True):
         columns, (part,) = columns_of(problem, base, [one])
         for t, (c, root) in enumerate(zip(columns, background.root, strict=True)):
             laid[t] -= real_bins(c, root) @ part @ amplitude
-    rest = [r + more for r, more in zip(background.rest, laid, strict=True)]
+    rest = [r + more for r, more in zip(background.residual, laid, strict=True)]
     side = background.side + np.array([s.T @ more for s, more in zip(background.slope, laid, strict=True)])
     more = replace(background, rest=rest, side=side)
-    weigh = Weighing(problem, more, squares_by_column(search.refit.normal.rest), numbers)
+    weigh = Reweighting(problem, more, squares_by_column(search.refit.normal.residual), numbers)
     candidates = [candidate("valve_deadband", "H1"), *hidden]
-    pairs = score_pairs(problem, Standing(base, more, ()), weigh, candidates, numbers)
+    pairs = score_pairs(problem, Linearisation(base, more, ()), weigh, candidates, numbers)
     assert [p.places for p in pairs if not p.refused] == [(1, 2)]
     assert pairs[0].places == (1, 2)
     np.testing.assert_allclose(np.concatenate(pairs[0].amplitudes), [2e6, 2e4], rtol=0.1)  # noise and the refit
@@ -328,9 +328,9 @@ def test_what_is_left_is_said_to_be_where_it_is(ready):
 
 def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
     for group in list_candidates(machine):
-        for knob in group[0].knobs(tuple(s.typical for s in group[0].amplitudes), 100.0, 0.5):
-            assert knob.sd > 0.0, knob.name
-            assert knob.step is None or knob.step > 0.0, knob.name
+        for parameter in group[0].parameters(tuple(s.typical for s in group[0].amplitudes), 100.0, 0.5):
+            assert parameter.sd > 0.0, parameter.name
+            assert parameter.step is None or parameter.step > 0.0, parameter.name
 
 
 def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_be_set_free(ready):
@@ -351,11 +351,11 @@ def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_
 
 
 def test_friction_of_another_form_is_noise_and_a_background(machine):
-    whole, knobs = with_background(machine, 1.5)
-    assert [k.value for k in knobs] == [0.0] * len(knobs)
+    whole, parameters = with_background(machine, 1.5)
+    assert [k.value for k in parameters] == [0.0] * len(parameters)
     assert {e.family for e in whole.added_effects} == {f.name for f in families().values() if f.search == "background"}
     other = with_other_form(machine, 0.7)
-    assert {e.name for e in other.added_effects} == {k.name.rpartition(".")[0] for k in knobs}
+    assert {e.name for e in other.added_effects} == {k.name.rpartition(".")[0] for k in parameters}
 
 
 def test_what_is_at_its_bound_moves_inward_where_a_candidate_lets_it():
@@ -417,18 +417,18 @@ def test_what_was_hidden_is_named_and_measured(found):
 def test_a_free_function_takes_the_place_of_names_it_beats_and_is_the_form_of_those_that_beat_it():
     numbers = discovery_numbers()[0]
 
-    def added(family: str, components: tuple[str, ...], gain: float) -> Added:
-        return Added(candidate(family, *components), gain, 0, 10, (), np.zeros(1), 10.0)
+    def added(family: str, components: tuple[str, ...], gain: float) -> AddedEffect:
+        return AddedEffect(candidate(family, *components), gain, 0, 10, (), np.zeros(1), 10.0)
 
-    def free(gain: float, *components: str, beyond: float = 1e3) -> Left:
+    def free(gain: float, *components: str, beyond: float = 1e3) -> ResidualFunction:
         none = np.zeros(2)
-        return Left(components, "position", 0.0, none, none, none, gain, beyond, np.full(3, 100.0))
+        return ResidualFunction(components, "position", 0.0, none, none, none, gain, beyond, np.full(3, 100.0))
 
     spring, leak = added("stray_spring", ("H1",), 400.0), added("piston_leakage", ("H1",), 400.0)
     names = {one.candidate.family.name: one.candidate.name for one in (spring, leak)}
 
-    def told(left: list[Left], instead: list[Left]) -> tuple[float, set[str]]:
-        function, doubted = without_name([spring, leak], left, instead, numbers)
+    def told(left: list[ResidualFunction], instead: list[ResidualFunction]) -> tuple[float, set[str]]:
+        function, doubted = reject_effects([spring, leak], left, instead, numbers)
         return (0.0 if function is None else function.gain), doubted
 
     assert told([], [free(500.0, "H1")]) == (0.0, set())  # a little better than the name: no wonder, of 24 values
@@ -537,7 +537,7 @@ def test_what_no_test_proves_is_said_to_be_unproven(found):
 def test_a_search_of_anything_else_does_not_go_on_from_there(machine, sensors, tmp_path):
     hashes = {"TX": "a"}
     names = {
-        make_bookmark(tmp_path, *inputs).path
+        make_checkpoint(tmp_path, *inputs).path
         for inputs in (
             (machine, sensors, hashes, None, 0),
             (machine.with_params({"hydraulics.bulk_modulus": 1e9}), sensors, hashes, None, 0),
@@ -567,7 +567,10 @@ def test_the_next_test_tells_apart_what_it_excites(machine, sensors):
     """Breakaway friction explained by itself, and by more viscosity, in strokes of a few millimetres."""
     names = ("H1", "H2", "H3", "H4")
     rubs, drags = candidate("stribeck_friction", *names, speed=0.02), candidate("local_viscous", *names)
-    one, rival = Contest(rubs, 0.0, rubs.on(machine, (9e3,))), Contest(drags, 1.0, drags.on(machine, (2e4,)))
+    one, rival = (
+        FittedCandidate(rubs, 0.0, rubs.on(machine, (9e3,))),
+        FittedCandidate(drags, 1.0, drags.on(machine, (2e4,))),
+    )
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     settings = load_controller("lhpost6")
     itself, other = (

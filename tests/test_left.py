@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.discovery.formula import sparse_formula
-from lhpost6_pin.discovery.residual_function import Left, _state, with_unnamed
+from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, with_residual_function
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate_added import advance_added, apply_added
 from lhpost6_pin.effects.registry import NODES
@@ -47,8 +47,8 @@ def test_noise_has_no_formula_to_speak_of() -> None:
 )
 def test_a_function_without_a_name_goes_into_the_machine_switched_off(state, memory, tmp_path) -> None:
     sd, held = np.full(NODES, 10.0), np.full(3, 100.0)
-    left = Left(("H3",), state, memory, X, 1e3 * np.arange(NODES), sd, 500.0, 400.0, held)
-    machine = with_unnamed(load_machine(), left)
+    left = ResidualFunction(("H3",), state, memory, X, 1e3 * np.arange(NODES), sd, 500.0, 400.0, held)
+    machine = with_residual_function(load_machine(), left)
     (effect,) = machine.added_effects
     assert effect.params[0][0] == 0.0
     (name,) = machine.parameters.effects

@@ -22,7 +22,7 @@ from lhpost6_pin.effects.evaluate import advance_states, state_rates
 from lhpost6_pin.effects.modifiers import supply_numbers
 from lhpost6_pin.effects.registry import HYDRAULIC_DOUBLE, LAWS
 from lhpost6_pin.effects.table import effect_table, state_names
-from lhpost6_pin.identification.residuals import Measured, Residuals, evaluate_residuals
+from lhpost6_pin.identification.residuals import MeasuredTest, Residuals, evaluate_residuals
 from lhpost6_pin.laws import bulk, chamber, leaks, lines, orifice, play, spool
 from lhpost6_pin.machine.library import families
 from lhpost6_pin.machine.library.oil_families import BUILD
@@ -390,7 +390,7 @@ def stirred(machine: Machine, engine: str = "fused", samples: int = 600, steps: 
     return simulate(plant, drive, samples=samples, engine=engine, steps_per_second=2048 * steps, **more)
 
 
-def as_measured(run: Run) -> Measured:
+def as_measured(run: Run) -> MeasuredTest:
     """A run as perfect sensors see it; pressure rates by central differences, spools in the middle of jumps."""
     plant = run.plant
     rows = plant.rows[hydraulic_rows(plant)]
@@ -398,7 +398,7 @@ def as_measured(run: Run) -> Measured:
     pressure, position = run.z[:, columns], run.spool.copy()
     position[1:] = 0.5 * (run.spool[1:] + run.spool[:-1])
     record = record_of_run(run, {"test": "t"})
-    return Measured(
+    return MeasuredTest(
         name="t",
         dt=1.0 / 2048,
         motion=platen_motion(plant, run.q, run.v, run.a),
@@ -411,7 +411,7 @@ def as_measured(run: Run) -> Measured:
     )
 
 
-def seen(machine: Machine, test: Measured) -> Residuals:
+def seen(machine: Machine, test: MeasuredTest) -> Residuals:
     """Residuals of a machine away from the ends, where central differences are one-sided."""
     found = evaluate_residuals(make_plant(machine), test, ("flow", "supply"))
     return Residuals(*(x[5:-5] for x in found))
@@ -563,10 +563,10 @@ def test_spools_are_late_in_a_closed_loop_and_not_again_in_a_replay(
 def test_servo_and_supply_are_residuals_where_they_were_measured(machine: Machine) -> None:
     run = stirred(machine, samples=200, steps=4)
     test = as_measured(run)
-    found = evaluate_residuals(run.plant, Measured(**{**vars(test), "spool_command": test.spool}))
+    found = evaluate_residuals(run.plant, MeasuredTest(**{**vars(test), "spool_command": test.spool}))
     assert found.servo.shape == (200, run.plant.spools) and found.supply.shape == (200, 1)
     late = make_plant(machine.with_effect("transport_delay", delay=-0.004))  # 5 ms, less 4
-    sooner = evaluate_residuals(late, Measured(**{**vars(test), "spool_command": test.spool}), ("servo",))
+    sooner = evaluate_residuals(late, MeasuredTest(**{**vars(test), "spool_command": test.spool}), ("servo",))
     assert rms(sooner.servo) < 0.3 * rms(found.servo)
     assert evaluate_residuals(run.plant, test).servo.shape == (200, 0)
 

@@ -12,7 +12,7 @@ from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.lost_motion import LostMotion, _groups, lost_motion
-from lhpost6_pin.discovery.sensor_findings import put_right, wrong_sensors
+from lhpost6_pin.discovery.sensor_findings import correct_records, find_sensor_faults
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.plant import Plant
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
@@ -48,8 +48,8 @@ def crossed(values: np.ndarray) -> np.ndarray:
 
 
 def test_good_sensors_have_no_faults(plant: Plant, campaign) -> None:
-    assert wrong_sensors(plant, campaign, SENSORS) == ()
-    assert put_right(campaign, ())[0] is campaign[0]
+    assert find_sensor_faults(plant, campaign, SENSORS) == ()
+    assert correct_records(campaign, ())[0] is campaign[0]
 
 
 @pytest.mark.parametrize(
@@ -65,14 +65,14 @@ def test_a_gain_or_cross_talk_beyond_its_range_is_named_and_measured(
     plant: Plant, campaign, channel, change, name, family, value
 ) -> None:
     wrong = changed(campaign, channel, change)
-    faults = {f.name: f for f in wrong_sensors(plant, wrong, SENSORS)}
+    faults = {f.name: f for f in find_sensor_faults(plant, wrong, SENSORS)}
     assert faults[name].family == family
     # what calibration leaves open of both sensors that are compared: half a percent each
     assert faults[name].value == pytest.approx(value, abs=0.012)
     assert abs(value) > faults[name].stated
     if channel.startswith("platen"):
-        mended = put_right(wrong, tuple(faults.values()))
-        assert wrong_sensors(plant, mended, SENSORS) == ()
+        mended = correct_records(wrong, tuple(faults.values()))
+        assert find_sensor_faults(plant, mended, SENSORS) == ()
         again, first = mended[0][channel].values, campaign[0][channel].values
         np.testing.assert_allclose(again, first, atol=0.012 * np.abs(first).max())
 
@@ -80,7 +80,7 @@ def test_a_gain_or_cross_talk_beyond_its_range_is_named_and_measured(
 def test_a_late_group_of_channels_is_named(plant: Plant, campaign) -> None:
     dt = float(campaign[0]["time"][1] - campaign[0]["time"][0])
     late = changed(campaign, "platen_acceleration", lambda x: align(x, -3e-3, dt))
-    (fault,) = wrong_sensors(plant, late, SENSORS)
+    (fault,) = find_sensor_faults(plant, late, SENSORS)
     assert (fault.name, fault.family) == ("delay platen_acceleration", "channel_delay")
     assert fault.value == pytest.approx(3e-3, abs=3e-4)  # what calibration leaves open
 
@@ -93,7 +93,7 @@ def test_a_length_that_drifts_within_tests_is_a_fault_of_its_own(plant: Plant, c
         values[:, 2] += np.linspace(0.0, 2e-4, len(values))
         return values
 
-    faults = {f.name: f for f in wrong_sensors(plant, changed(campaign, "actuator_displacement", warmed), SENSORS)}
+    faults = {f.name: f for f in find_sensor_faults(plant, changed(campaign, "actuator_displacement", warmed), SENSORS)}
     found = faults["drift actuator_displacement[H3]"]
     assert (found.family, found.stated) == ("length_sensor_error", 0.0)
     assert found.value == pytest.approx(rate, rel=0.15)  # noise of a record of some seconds
@@ -109,7 +109,7 @@ def test_the_play_of_a_pin_shows_in_its_length_and_nowhere_else(plant: Plant, ca
     assert found.component == "H3"
     assert found.half_play == pytest.approx(5e-5, rel=0.2)  # skews of force and length blunt the turn: `lengths.form`
     assert found.gain > 100.0
-    assert not any(f.kind == "offset" for f in wrong_sensors(plant, loose, SENSORS, ["H3"]))
+    assert not any(f.kind == "offset" for f in find_sensor_faults(plant, loose, SENSORS, ["H3"]))
 
 
 def test_play_is_one_effect_where_all_pins_have_about_as_much() -> None:

@@ -17,7 +17,7 @@ from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.data.signals import Band, align, resample_band_limited
-from lhpost6_pin.identification.validation import PHASES, Pair, metrics, validate
+from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, metrics, validate
 from lhpost6_pin.identification.validation.metrics import validation_numbers
 from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
 from lhpost6_pin.identification.validation.resonance import find_peak
@@ -257,7 +257,7 @@ def test_a_column_moves_if_it_stands_out_of_the_noise_and_of_the_others(scale, m
     x = np.sin(2 * np.pi * t)
     measured = np.stack([x, scale * x], axis=1)
     numbers = validation_numbers()
-    pair = Pair("displacement", ("x", "y"), measured, 1.1 * measured, np.full(2, 1e-4), np.full(2, 1e-4))
+    pair = ComparedQuantity("displacement", ("x", "y"), measured, 1.1 * measured, np.full(2, 1e-4), np.full(2, 1e-4))
     rows = agree([pair], 1 / 512, numbers)
     assert rows[0].rrmse == pytest.approx(0.1)
     assert rows[1].moves is moves
@@ -271,7 +271,7 @@ def test_a_preload_makes_no_error_look_small_and_an_offset_none_large():
     t = np.arange(4096) / 512
     x = np.sin(2 * np.pi * t)
     measured, model = 1e6 + 1e4 * x, 1.01e6 + 1.2e4 * x
-    pair = Pair("actuator_force", ("V1",), measured[:, None], model[:, None], np.ones(1), np.ones(1))
+    pair = ComparedQuantity("actuator_force", ("V1",), measured[:, None], model[:, None], np.ones(1), np.ones(1))
     (one,) = agree([pair], 1 / 512, validation_numbers())
     assert one.rrmse == pytest.approx(0.2)
     assert one.offset == pytest.approx(1e4, rel=1e-3)  # the ends are left out, and with them a whole number of periods

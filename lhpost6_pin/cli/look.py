@@ -10,7 +10,7 @@ from .completion import complete_motion
 from .options import Json, MachineName, Override, SensorsName, find_machine
 
 if TYPE_CHECKING:
-    from ..data.consistency import SensorFinding
+    from ..data.consistency import ConsistencyFinding
     from ..machine.machine import Machine
 
 __all__ = ["capacity", "check", "doctor", "info", "motions"]
@@ -97,7 +97,7 @@ def check(
         raise typer.Exit(1)
 
 
-def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> "list[SensorFinding] | None":
+def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> "list[ConsistencyFinding] | None":
     """Compare redundant sensors in measured records of this machine; noise-free simulated records are skipped."""
     from ..data.consistency import check_sensors
     from ..data.records import is_measured, load_record

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import RecordError
 from .channels import LAYOUT, MOTION, channel_name, channel_unit
-from .layout_faults import Finding, layout_faults
+from .layout_faults import RecordFinding, layout_faults
 from .records import open_record, sample_interval
 from .signals import differentiate, lowpass_zero_phase
 
@@ -50,7 +50,7 @@ LIKELY_UNITS = {  # unit: least and greatest believable peak, and what lies outs
 }
 
 
-def check_record(path: Path | str, areas: Mapping[str, tuple[float, float]] | None = None) -> list[Finding]:
+def check_record(path: Path | str, areas: Mapping[str, tuple[float, float]] | None = None) -> list[RecordFinding]:
     """List what is in the record at `path` and what is wrong with it; an unreadable file is one error.
 
     `areas` are the piston areas (A_1, A_2) [m²] by actuator; with them forces are compared with pressures.
@@ -58,14 +58,14 @@ def check_record(path: Path | str, areas: Mapping[str, tuple[float, float]] | No
     try:
         return check_dataset(open_record(path), areas)
     except RecordError as error:
-        return [Finding("error", "", None, str(error))]
+        return [RecordFinding("error", "", None, str(error))]
 
 
-def check_dataset(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] | None = None) -> list[Finding]:
+def check_dataset(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] | None = None) -> list[RecordFinding]:
     """List errors, then warnings, then the contents of a record in memory; see `check_record`."""
     errors = layout_faults(dataset)
     broken = {finding.channel.split("[")[0] for finding in errors}
-    contents = [Finding("info", *fact) for fact in _contents(dataset)]
+    contents = [RecordFinding("info", *fact) for fact in _contents(dataset)]
     known = [name for name in LAYOUT if name in dataset and not {name, *LAYOUT[name].dims} & broken]
     if "time" in broken or not known:
         return errors + contents  # nothing can be said about signals on a broken time axis
@@ -80,7 +80,7 @@ def check_dataset(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] 
         _inconsistent_motion(sound),
         _inconsistent_forces(sound, areas or {}),
     )
-    return errors + [Finding("warning", *fault) for fault in faults] + contents
+    return errors + [RecordFinding("warning", *fault) for fault in faults] + contents
 
 
 # -------------------------------------------------------------------------------------------- contents

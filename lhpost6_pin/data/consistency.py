@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from ..mechanics.plant import Plant
 from .channels import channel_unit
 from .records import require
-from .sensor_pairs import Comparison, Term, comparisons
+from .sensor_pairs import Regressor, SensorComparison, comparisons
 from .sensors import SensorSet
 
-__all__ = ["SensorFinding", "check_sensors", "scaled_inverse"]
+__all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,7 +39,7 @@ MOST_NOISE = 0.1  # of what the other columns leave of one: where more is noise,
 
 
 @dataclass(frozen=True)
-class SensorFinding:
+class ConsistencyFinding:
     """One number by which two sensors (or a sensor and a law) were compared.
 
     `tolerance` is what calibration and geometry may make of it, at least three deviations; `standard_error` is that
@@ -81,7 +81,7 @@ class SensorFinding:
         return f"{self.check}, {self.channel}: {value}, {due}: {self.verdict}"
 
 
-def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet) -> tuple[SensorFinding, ...]:
+def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet) -> tuple[ConsistencyFinding, ...]:
     """Compare all sensors of a campaign that can be compared, pooled over its records.
 
     Force against pressures, lengths against platen pose, parity of the lengths, velocity and acceleration against
@@ -106,7 +106,7 @@ def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSe
 class _Sums(NamedTuple):
     """Sums of products over records."""
 
-    terms: tuple[Term, ...]
+    terms: tuple[Regressor, ...]
     xx: Array | float  # (p, p)
     xy: Array | float
     xe: Array | float  # (p, k)
@@ -118,7 +118,7 @@ class _Sums(NamedTuple):
     independent: float
 
 
-def _added(sums: _Sums | None, c: Comparison) -> _Sums:
+def _added(sums: _Sums | None, c: SensorComparison) -> _Sums:
     x = np.stack([t.column for t in c.terms], axis=1) if c.terms else np.zeros((len(c.y), 0))
     n = len(c.y)
     s = sums or _Sums(c.terms, *(0.0,) * 9)
@@ -173,7 +173,7 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
     )
 
 
-def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[SensorFinding]:
+def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[ConsistencyFinding]:
     xx, noise = np.asarray(s.xx), np.asarray(s.noise)
     unit_y = channel_unit(channel)
     hidden = noise * np.diag(scaled_inverse(xx, np.diag(xx))) > MOST_NOISE
@@ -217,10 +217,10 @@ def _finding(
     *,
     untested: bool = False,
     instead: tuple[str, ...] = (),
-) -> SensorFinding:
+) -> ConsistencyFinding:
     """Suspicious is what is farther off than noise and its tolerance explain; a residual may be less than expected."""
     off = estimate - expected if quantity == "residual" else abs(estimate - expected)
     far = off > np.hypot(CONFIDENCE * error, tolerance)
     verdict: Literal["ok", "suspicious", "untested"] = "untested" if untested else "suspicious" if far else "ok"
     numbers = float(estimate), float(error), float(expected), float(tolerance)
-    return SensorFinding(check, channel, quantity, unit, *numbers, verdict, instead)
+    return ConsistencyFinding(check, channel, quantity, unit, *numbers, verdict, instead)

@@ -13,7 +13,7 @@ from ..core.names import AXES
 from ..machine.parameters import LARGEST, unusable
 from .channels import LAYOUT, LAYOUT_VERSION, Channel, channel_name, same_unit
 
-__all__ = ["FASTEST", "SLOWEST", "STEP_TOLERANCE", "Finding", "is_number", "layout_faults", "sampling_rate"]
+__all__ = ["FASTEST", "SLOWEST", "STEP_TOLERANCE", "RecordFinding", "is_number", "layout_faults", "sampling_rate"]
 
 STEP_TOLERANCE = 0.01  # of one sample: how far a time stamp may be from its place
 RATE_TOLERANCE = 1e-4  # relative: 2 ms over 20 s, the least that would spoil a comparison of two records
@@ -21,7 +21,7 @@ SLOWEST, FASTEST = 0.1, 1e6  # [Hz]: a test at another rate has its time in anot
 
 
 @dataclass(frozen=True)
-class Finding:
+class RecordFinding:
     """One thing found in a record: where it is, what it is and what to do about it.
 
     `channel` is a variable with its label, as in `platen_displacement[yaw]`, or empty for the whole record.
@@ -42,7 +42,7 @@ class Finding:
 _Fault = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
 
-def layout_faults(dataset: xr.Dataset, labels: Mapping[str, Sequence[str]] | None = None) -> list[Finding]:
+def layout_faults(dataset: xr.Dataset, labels: Mapping[str, Sequence[str]] | None = None) -> list[RecordFinding]:
     """List everything in which a dataset breaks the layout; empty for a valid record."""
     faults = chain(
         _time_faults(dataset),
@@ -50,7 +50,7 @@ def layout_faults(dataset: xr.Dataset, labels: Mapping[str, Sequence[str]] | Non
         *(_channel_faults(dataset[name], channel) for name, channel in LAYOUT.items() if name in dataset),
         _attribute_faults(dataset),
     )
-    return [Finding("error", *fault) for fault in faults]
+    return [RecordFinding("error", *fault) for fault in faults]
 
 
 def _time_faults(dataset: xr.Dataset) -> Iterator[_Fault]:

@@ -18,7 +18,7 @@ from ..core.errors import RecordError, UnknownNameError
 from ..core.files import write_whole
 from ..core.names import AXES
 from .channels import LAYOUT, LAYOUT_VERSION
-from .layout_faults import Finding, is_number, layout_faults, sampling_rate
+from .layout_faults import RecordFinding, is_number, layout_faults, sampling_rate
 
 __all__ = [
     "DEFLATE_LIMIT",
@@ -154,7 +154,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
         raise RecordError(f"{file}: has no {', '.join(missing)}; it has {', '.join(map(str, dataset.data_vars))}")
 
 
-def _refuse(faults: Sequence[Finding], source: str) -> None:
+def _refuse(faults: Sequence[RecordFinding], source: str) -> None:
     """Raise the first few faults as one `RecordError`."""
     if faults:
         more = f"; and {len(faults) - 3} more faults" * (len(faults) > 3)

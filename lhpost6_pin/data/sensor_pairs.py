@@ -22,7 +22,7 @@ from .records import sample_interval
 from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate
 
-__all__ = ["Comparison", "Term", "comparisons", "loose_lengths"]
+__all__ = ["SensorComparison", "Regressor", "comparisons", "loose_lengths"]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ TRIM = 0.1  # s: left out at both ends, where filtered records say little
 FAST = 0.3  # of the sampling rate: above it a command is fast
 
 
-class Term(NamedTuple):
+class Regressor(NamedTuple):
     """One column of X: what its coefficient is called, and what it should be; `delay` turns it into one."""
 
     quantity: str
@@ -48,14 +48,14 @@ class Term(NamedTuple):
         return self.expected if self.delay is None else 0.0
 
 
-class Comparison(NamedTuple):
+class SensorComparison(NamedTuple):
     """One y and its X in one record."""
 
     check: str
     channel: str
     y: Array  # (n,)
     variance: float  # of its noise
-    terms: tuple[Term, ...]
+    terms: tuple[Regressor, ...]
     errors: Array  # (n, k), one standard deviation each
     independent: float  # number of independent samples
 
@@ -108,7 +108,7 @@ class _View:
         return s.gain_sd(name), offset, s.delay_sd(LAYOUT[name].group or name)
 
 
-def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[Comparison]:
+def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[SensorComparison]:
     """All comparisons that a record has the channels for."""
     view = _View(plant, record, sensors)
     for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools, _redundant):
@@ -117,7 +117,7 @@ def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterato
 
 def loose_lengths(
     plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: float
-) -> Iterator[tuple[str, Comparison, Array]]:
+) -> Iterator[tuple[str, SensorComparison, Array]]:
     """Lengths of double-acting actuators against the platen's pose, each with the side (n,) that a loose pin bears on.
 
     The side, -1 to 1, is by the measured force, of which `closing` [N] presses most of the play out (`laws.play`).
@@ -132,29 +132,29 @@ def loose_lengths(
 
 
 def _compared(
-    view: _View, check: str, channel: str, y: Array, variance: float, terms: list[Term], errors: Sequence[Array]
-) -> Comparison:
+    view: _View, check: str, channel: str, y: Array, variance: float, terms: list[Regressor], errors: Sequence[Array]
+) -> SensorComparison:
     columns = np.stack(errors, axis=1)
-    return Comparison(check, channel, y, float(variance), tuple(terms), columns, view.independent)
+    return SensorComparison(check, channel, y, float(variance), tuple(terms), columns, view.independent)
 
 
-def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Term:
-    return Term("delay", "s", nominal, rate, float(variance), delay=nominal)
+def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Regressor:
+    return Regressor("delay", "s", nominal, rate, float(variance), delay=nominal)
 
 
 def _gain_terms(
     due: Array, rate: Array, noise: tuple[float, float] = (0.0, 0.0), *, delay: float = 0.0, level: float = 0.0
-) -> list[Term]:
+) -> list[Regressor]:
     """Gain, delay and offset against what a column should be (n,) and its rate, with the noise variance of both."""
     offset = _offset_term(len(due), level)
-    return [Term("gain", "1", 1.0, due, noise[0]), _delay_term(rate, noise[1], delay), offset]
+    return [Regressor("gain", "1", 1.0, due, noise[0]), _delay_term(rate, noise[1], delay), offset]
 
 
-def _offset_term(n: int, expected: float = 0.0) -> Term:
-    return Term("offset", "", expected, np.ones(n))
+def _offset_term(n: int, expected: float = 0.0) -> Regressor:
+    return Regressor("offset", "", expected, np.ones(n))
 
 
-def _forces(view: _View) -> Iterator[Comparison]:
+def _forces(view: _View) -> Iterator[SensorComparison]:
     """actuator_force = P_A A_1 - P_B A_2."""
     if not view.has("actuator_force", "chamber_pressure_a"):
         return
@@ -174,7 +174,7 @@ def _forces(view: _View) -> Iterator[Comparison]:
         one = np.ones(len(force))
         push, rate = area_a * a[:, i], area_a * rate_a[:, i]
         still = area_a**2 * noise["chamber_pressure_a"][1][i]
-        terms = [Term("gain a", "1", 1.0, push, area_a**2 * noise["chamber_pressure_a"][0][i])]
+        terms = [Regressor("gain a", "1", 1.0, push, area_a**2 * noise["chamber_pressure_a"][0][i])]
         errors = [gain_f * force[:, i], offset_f * one, gain_a * push, area_a * offset_a * one]
         if area_b is not None:
             if not (both and actuator.name in names):
@@ -182,7 +182,7 @@ def _forces(view: _View) -> Iterator[Comparison]:
             j = names.index(actuator.name)
             pull, rate = -area_b * b[:, j], rate - area_b * rate_b[:, j]
             still += area_b**2 * noise["chamber_pressure_b"][1][j]
-            terms.append(Term("gain b", "1", 1.0, pull, area_b**2 * noise["chamber_pressure_b"][0][j]))
+            terms.append(Regressor("gain b", "1", 1.0, pull, area_b**2 * noise["chamber_pressure_b"][0][j]))
             errors += [gain_b * pull, area_b * offset_b * one]
         errors += [delay_f * rate, delay_p * rate]
         terms += [_delay_term(rate, still), _offset_term(len(force))]
@@ -211,7 +211,7 @@ def _geometry(view: _View, pose: Array) -> list[Array]:
     return changes
 
 
-def _lengths(view: _View) -> Iterator[Comparison]:
+def _lengths(view: _View) -> Iterator[SensorComparison]:
     """actuator_displacement against that of the measured platen pose; it may drift by its noise within a record."""
     if not view.has("actuator_displacement", "platen_displacement"):
         return
@@ -231,7 +231,7 @@ def _lengths(view: _View) -> Iterator[Comparison]:
     time = view.step * view.dt * (np.arange(len(slow), dtype=np.float64) - 0.5 * (len(slow) - 1))
     for i, name in enumerate(plant.machine.actuator_names):
         terms = _gain_terms(due[:, i], rate[:, i], (noise[0][i], noise[1][i]))
-        terms.append(Term("drift", "m/s", 0.0, time, 0.0, beside=True))
+        terms.append(Regressor("drift", "m/s", 0.0, time, 0.0, beside=True))
         errors = [gain_l * due[:, i], offset_l * one, delay_l * rate[:, i], delay_x * rate[:, i]]
         errors.append(np.sqrt(variance[i]) * time / max(time[-1] - time[0], view.dt))
         errors += [jacobian[i, k] * (gain_x * slow[:, k] + offset_x) for k in range(6)]
@@ -240,7 +240,7 @@ def _lengths(view: _View) -> Iterator[Comparison]:
         yield _compared(view, "length against platen pose", channel, measured[:, i], variance[i], terms, errors)
 
 
-def _parity(view: _View) -> Iterator[Comparison]:
+def _parity(view: _View) -> Iterator[SensorComparison]:
     """What no pose explains of the actuators' lengths: as many combinations as there are more of them than axes."""
     plant = view.plant
     if not view.has("actuator_displacement"):
@@ -262,7 +262,7 @@ def _parity(view: _View) -> Iterator[Comparison]:
         yield _compared(view, "kinematic parity", channel, y, combination**2 @ variance, [], signals)
 
 
-def _rates(view: _View) -> Iterator[Comparison]:
+def _rates(view: _View) -> Iterator[SensorComparison]:
     """platen_velocity and platen_acceleration against derivatives of platen_displacement.
 
     An accelerometer may feel the two axes across its own, too; as much as its gain may be off is lawful.
@@ -280,13 +280,13 @@ def _rates(view: _View) -> Iterator[Comparison]:
             errors = [gain_m * due[:, j], gain_x * due[:, j], delay_m * rate[:, j], delay_x * rate[:, j]]
             errors.append(offset_m * np.ones(len(due)))
             across = [k for k in view.plant.axes if k < 3 and k != j] if order == 2 and j < 3 else []
-            terms += [Term(f"cross {AXES[k]}", "1", 0.0, due[:, k], noise[0][k], beside=True) for k in across]
+            terms += [Regressor(f"cross {AXES[k]}", "1", 0.0, due[:, k], noise[0][k], beside=True) for k in across]
             errors += [gain_m * due[:, k] for k in across]
             check = f"{name.split('_')[1]} against displacement"
             yield _compared(view, check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
 
 
-def _struts(view: _View) -> Iterator[Comparison]:
+def _struts(view: _View) -> Iterator[SensorComparison]:
     """strut_pressure against P_0 (1 + dL / L_c0)^-n of the platen's pose; the offset is that level, P_0."""
     plant, machine = view.plant, view.plant.machine
     if not view.has("strut_pressure") or not view.has("platen_displacement"):
@@ -315,7 +315,7 @@ def _relative_sd(view: _View, component: Any, key: str) -> float:
     return float(sd) / parameters.number(path) if isinstance(sd, float) else 0.0
 
 
-def _supply(view: _View) -> Iterator[Comparison]:
+def _supply(view: _View) -> Iterator[SensorComparison]:
     """supply_pressure against the nominal one."""
     if view.has("supply_pressure"):
         nominal = view.plant.machine.hydraulics.supply_pressure
@@ -327,7 +327,7 @@ def _supply(view: _View) -> Iterator[Comparison]:
         yield _compared(view, "supply pressure against nominal", "supply_pressure", y, variance, terms, errors)
 
 
-def _spools(view: _View) -> Iterator[Comparison]:
+def _spools(view: _View) -> Iterator[SensorComparison]:
     """spool_position against the command, late by the valve's delay.
 
     Commands are recorded as they are, without a low-pass: what is fast in them says how much may have folded down.
@@ -348,7 +348,7 @@ def _spools(view: _View) -> Iterator[Comparison]:
         yield _compared(view, "spool against command", channel, measured[:, i], variance[i], terms, errors)
 
 
-def _redundant(view: _View) -> Iterator[Comparison]:
+def _redundant(view: _View) -> Iterator[SensorComparison]:
     """A redundant channel against the one that measures the same."""
     for name, base in ((n, c.same_as) for n, c in LAYOUT.items() if c.same_as and view.has(n, c.same_as)):
         measured, (due, rate) = view.signal(view.values(name)), view.signals(view.values(base), 0, 1)

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identification.calibration.problem import Problem
-from ..identification.calibration.whitened_residuals import mean_squares, surprise
+from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
 from ..machine.library import Family
 from ..machine.parameters import Parameters
 from .scores import Background, Score
 
-__all__ = ["Lowered", "Weighing", "gate", "refusal", "squares_by_column"]
+__all__ = ["Lowered", "Reweighting", "gate", "refusal", "squares_by_column"]
 
 Array = NDArray[np.float64]
 
@@ -31,14 +31,14 @@ class Lowered(NamedTuple):
     of_first: float  # in the column where this is most: of the squares that were there before any effect was added
 
 
-class Weighing:
+class Reweighting:
     """Weighs what is left anew, with a candidate and without: large effects count for more than their linear gain."""
 
     def __init__(self, problem: Problem, background: Background, first: Array, numbers: Parameters) -> None:
         """`first` (c,) are the squares before any effect was added."""
         self.problem, self.background, self.first = problem, background, first
         self.doubt, self.much = numbers.number("accept.doubt"), numbers.number("accept.gain")
-        self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.rest])
+        self.before = self._left(background.alone, [np.zeros(len(r)) for r in background.residual])
 
     def _left(self, change: Array, explained: Sequence[Array]) -> tuple[Array, Array, float]:
         """What is left by a change (p,) of the background and what is explained (n,) of every test.
@@ -47,15 +47,17 @@ class Weighing:
         (2, c); that of the prior.
         """
         b, whole, beyond = self.background, np.zeros((2, self.first.size)), np.zeros((2, self.first.size))
-        for slope, rest, root, more, f in zip(b.slope, b.rest, b.root, explained, self.problem.frequency, strict=True):
+        for slope, rest, root, more, f in zip(
+            b.slope, b.residual, b.root, explained, self.problem.frequency, strict=True
+        ):
             left = (rest + slope @ change + more) ** 2
             squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
             means, counts = mean_squares(self.problem.whitener, squares, f)
-            whole += surprise(means, counts), squares.sum(axis=0)
+            whole += negative_log_likelihood(means, counts), squares.sum(axis=0)
             more_than_noise = np.maximum(means / self.doubt, 1.0)
             first = int(f[0] == 0.0)  # the band of the means alone
             for k, part in enumerate((slice(0, first), slice(first, None))):
-                beyond[k] += surprise(more_than_noise[part], counts[part]) - counts[part].sum()
+                beyond[k] += negative_log_likelihood(more_than_noise[part], counts[part]) - counts[part].sum()
         return whole, beyond, 0.5 * float(np.sum((b.place + change) ** 2))
 
     def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
@@ -77,7 +79,7 @@ def squares_by_column(rest: Sequence[NDArray[np.complex128]]) -> Array:
 
 def gate(family: Family, numbers: Parameters) -> float:
     """Least gain of log-likelihood for a candidate of a family."""
-    return numbers.number("accept.mimicked" if family.mimicked else "accept.gain")
+    return numbers.number("accept.confusable" if family.confusable else "accept.gain")
 
 
 def refusal(families: Sequence[Family], one: Score, less: Lowered, numbers: Parameters) -> str:
@@ -94,7 +96,7 @@ def refusal(families: Sequence[Family], one: Score, less: Lowered, numbers: Para
     worst = -max(2.0 * chance, numbers.number("accept.worst") * one.gain)
     if better < numbers.number("accept.better") or held.min() < worst:
         return "makes tests worse that it was not fitted on"
-    if less.beyond < sum(gate(family, numbers) for family in families if family.mimicked):
+    if less.beyond < sum(gate(family, numbers) for family in families if family.confusable):
         return "explains what may be noise"
     if less.share < numbers.number("accept.closure"):
         return "explains too little of what is more than noise"

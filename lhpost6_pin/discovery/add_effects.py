@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from ..core.progress import Progress, between
 from ..identification.calibration.fit import solve
-from ..identification.calibration.free_parameters import Knob
-from ..identification.calibration.prepare import Prepared
+from ..identification.calibration.free_parameters import FreeParameter
+from ..identification.calibration.prepare import PreparedProblem
 from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, squares_by_column
 from .candidates import Candidate
 from .pairs import score_pairs
 from .screening import weighing
-from .search_state import Added, Contest, Scored, Search, Standing, firsts, fitted_machine
+from .search_state import AddedEffect, FittedCandidate, Linearisation, Scored, Search, best_per_family, fitted_machine
 
-__all__ = ["further", "joined", "refined"]
+__all__ = ["add_effect", "refined", "with_candidate"]
 
 Array = NDArray[np.float64]
 
 
-def further(
-    found: Search, standing: Standing, calibration: Parameters, numbers: Parameters, progress: Progress
+def add_effect(
+    found: Search, linear: Linearisation, calibration: Parameters, numbers: Parameters, progress: Progress
 ) -> Search | None:
     """The search with one more effect, or with two where no one does as well; None if nothing is to be added."""
     scored = found.rounds[-1].scored
@@ -39,9 +39,9 @@ def further(
     full = len(found.added) + 2 > numbers.number("accept.effects")
     if hopeless or full or (more is not None and more.power < numbers.number("accept.settled")):
         return more
-    weigh = weighing(found, standing, numbers)
+    weigh = weighing(found, linear, numbers)
     candidates = [one.candidate for one in few]
-    pairs = score_pairs(found.problem, standing, weigh, candidates, numbers)
+    pairs = score_pairs(found.problem, linear, weigh, candidates, numbers)
     first = pairs[0]
     stands_in = more is None or more.added[-1].candidate.family.named not in {
         candidates[i].family.named for i in first.places
@@ -59,7 +59,7 @@ def _strongest(scored: Sequence[Scored], numbers: Parameters) -> list[Scored]:
     """The best candidate of each family, of the families that gain most."""
     look = numbers.number("accept.look")
     some = [one for one in scored if one.score.gain >= look and not one.candidate.release]
-    return firsts(some, named=True)[: int(numbers.number("accept.paired"))]
+    return best_per_family(some, named=True)[: int(numbers.number("accept.paired"))]
 
 
 def _better(
@@ -87,7 +87,7 @@ def _in_its_place(found: Search, one: Scored, numbers: Parameters) -> list[Score
     near = numbers.number("accept.near") * one.gain
     taken = {one.candidate.family.name, *(a.candidate.family.name for a in found.added)}
     some = [o for o in found.rounds[-1].scored if o.gain >= near and not o.candidate.release]
-    there = firsts([o for o in some if o.candidate.components == one.candidate.components])
+    there = best_per_family([o for o in some if o.candidate.components == one.candidate.components])
     rivals = [o for o in there if o.candidate.family.name not in taken]
     return rivals[: int(numbers.number("accept.rivals")) - 1]
 
@@ -100,7 +100,7 @@ def _add(
     Of those that explain the campaign alike the simplest counts. Where none of them lowers what is left when it is
     fitted in full, those next in gain are tried; None if none of these does either.
     """
-    waiting = firsts(passed)
+    waiting = best_per_family(passed)
     most, batches = int(numbers.number("accept.rivals")), int(numbers.number("accept.batches"))
     for batch in range(batches):
         near = numbers.number("accept.near") * waiting[0].gain if waiting else 0.0
@@ -129,7 +129,7 @@ def _best_of(
         fitted.append(_fit_jointly(found, rival, calibration, numbers, share))
     before, *left = (one.objective for one in (found, *fitted))
     gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
-    passed = [i for i, needed in enumerate(gates) if before - left[i] >= needed]
+    passed = [i for i, required in enumerate(gates) if before - left[i] >= required]
     if not passed:
         return None
     lowest = min(left[i] for i in passed)
@@ -140,12 +140,13 @@ def _best_of(
     best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
     contest = tuple(
-        Contest(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i].solution)) for i in order
+        FittedCandidate(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i].solution))
+        for i in order
     )
     more = refined(fitted[best], calibration, between(progress, 0.7, 1.0))
-    first, last = (squares_by_column(one.rest) for one in (found, more))
+    first, last = (squares_by_column(one.residual) for one in (found, more))
     place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
-    added = Added(rivals[best].candidate, before - left[best], place, tried, contest, first - last, apart)
+    added = AddedEffect(rivals[best].candidate, before - left[best], place, tried, contest, first - last, apart)
     more.added.append(added)
     return more
 
@@ -186,15 +187,15 @@ def _fit_from(
     Derivatives by everything else are those from before: enough to tell which candidate is the best.
     """
     problem, candidate = found.problem, one.candidate
-    count, start = len(problem.knobs), found.solution.at
+    count, start = len(problem.parameters), found.solution.at
     if candidate.release:
         sort = "known" if problem.names.index(candidate.release) < count else "sensor"
         ready = found.ready.with_free(candidate.release, numbers.number(f"fit.{sort}_free"))
     else:
         low, high = candidate.bounds
         amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
-        own = candidate.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
-        ready, start = joined(found, candidate, amplitudes, own, start)
+        own = candidate.parameters(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
+        ready, start = with_candidate(found, candidate, amplitudes, own, start)
     solution = solve(
         *(ready.problem, ready.replicas, calibration, np.zeros_like(start) if afresh else start, progress),
         found.solution.normal,
@@ -205,16 +206,16 @@ def _fit_from(
     return Search(ready, solution, found.refit, list(found.added), found.rounds)
 
 
-def joined(
-    found: Search, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[Knob], x: Array
-) -> tuple[Prepared, Array]:
+def with_candidate(
+    found: Search, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[FreeParameter], x: Array
+) -> tuple[PreparedProblem, Array]:
     """The search's tests with a candidate in the machine and its unknowns in the fit; and its place x with theirs."""
     problem = found.problem
-    ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.knobs, *own))
-    return ready, np.insert(x, len(problem.knobs), np.zeros(len(own)))
+    ready = found.ready.with_machine(candidate.on(problem.machine, amplitudes), (*problem.parameters, *own))
+    return ready, np.insert(x, len(problem.parameters), np.zeros(len(own)))
 
 
 def _near(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
     """Unknowns (p,) whose derivatives change much with an effect: of oil and valves, those of oil and valves."""
-    knobs = [k.shows_in == ("flow",) for k in problem.knobs]
-    return np.array([*knobs, *(u.alone[1] >= 0 for u in problem.unknowns)]) & ("flow" in candidate.family.shows_in)
+    parameters = [k.shows_in == ("flow",) for k in problem.parameters]
+    return np.array([*parameters, *(u.alone[1] >= 0 for u in problem.unknowns)]) & ("flow" in candidate.family.shows_in)

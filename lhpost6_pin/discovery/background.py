@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.calibration.normal_equations import Normal, bounds_of, positive
+from ..identification.calibration.normal_equations import NormalEquations, bounds_of, positive
 from ..identification.calibration.problem import Problem
 from ..identification.calibration.whitened_residuals import real_bins, real_rows
 from ..machine.parameters import Parameters
@@ -16,7 +16,7 @@ __all__ = ["make_background"]
 Array = NDArray[np.float64]
 
 
-def make_background(problem: Problem, normal: Normal, x: Array, numbers: Parameters) -> Background:
+def make_background(problem: Problem, normal: NormalEquations, x: Array, numbers: Parameters) -> Background:
     """Background from the normal equations at the solution x (p,); `normal` is corrected for noise.
 
     What is at its bound there, as `numbers` of the fit set it, goes no further: beyond it something else is wrong.
@@ -28,7 +28,7 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
         return (real_rows(slopes, root) * prior[:, None]).T
 
     slope, rest, root, matrix, side = [], [], [], [], []
-    for t, (own, left, power) in enumerate(zip(normal.slope, normal.rest, normal.power, strict=True)):
+    for t, (own, left, power) in enumerate(zip(normal.slope, normal.residual, normal.power, strict=True)):
         w = np.sqrt(power)
         slope.append(rows(own, w))
         rest.append(real_bins(left, w))
@@ -38,7 +38,7 @@ def make_background(problem: Problem, normal: Normal, x: Array, numbers: Paramet
         side.append(right * prior)
     noise = []
     if normal.bias is not None:
-        for slopes, rests in zip(normal.bias.slope, normal.bias.rest, strict=True):
+        for slopes, rests in zip(normal.bias.slope, normal.bias.residual, strict=True):
             changes = [rows(own, w) for own, w in zip(slopes, root, strict=True)]
             noise.append((changes, [real_bins(r, w) for r, w in zip(rests, root, strict=True)]))
     low, high = bounds_of(problem, numbers)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.registry import LAWS
-from ..identification.calibration.problem import Base, Problem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
 from ..identification.residuals import RESIDUALS, Residuals, follow
 from ..identification.wrench_residuals import row_wrenches
@@ -27,7 +27,7 @@ Columns = list[Complex]
 """Whitened bins (m, c, k) of every test."""
 
 
-def columns_of(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> tuple[Columns, list[Array]]:
+def columns_of(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> tuple[Columns, list[Array]]:
     """Columns of candidates alike but for their components; and how (k, q) each candidate's add up from them."""
     first = candidates[0]
     effect = first.on(base.plant.machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1]
@@ -51,7 +51,7 @@ def side_by_side(parts: Sequence[Columns]) -> Columns:
     return [np.concatenate(bins, axis=-1) for bins in zip(*parts, strict=True)]
 
 
-def _by_difference(problem: Problem, base: Base, candidate: Candidate) -> Columns:
+def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Columns:
     kinds = tuple(k for k in candidate.family.shows_in if k in RESIDUALS)
     typical = [s.typical for s in candidate.amplitudes]
     parts = []
@@ -62,7 +62,7 @@ def _by_difference(problem: Problem, base: Base, candidate: Candidate) -> Column
     return _whitened(problem, [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)])
 
 
-def _by_force(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> Columns:
+def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
     """Wrench of each candidate's force, all in one machine; what it gives, the actuators need not."""
     size = candidates[0].amplitudes[0].typical
     machine: Machine = base.plant.machine
@@ -85,7 +85,7 @@ def _by_force(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> 
     return _whitened(problem, found)
 
 
-def _by_oil(problem: Problem, base: Base, candidate: Candidate) -> Columns:
+def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Columns:
     """Flows of all actuators of a candidate at once, one by one."""
     size = candidate.amplitudes[0].typical
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), ("flow",))

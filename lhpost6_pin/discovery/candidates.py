@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.calibration import Knob
+from ..identification.calibration import FreeParameter
 from ..identification.residuals import RESIDUALS
 from ..machine.library import Family, Shape, families
 from ..machine.machine import Machine
@@ -59,7 +59,9 @@ class Candidate:
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         return machine.with_effect(self.family.name, self.components, name=self.name, **values)
 
-    def knobs(self, amplitudes: tuple[float, ...], spread: float, factor: float = 0.0) -> tuple[Knob, ...]:
+    def parameters(
+        self, amplitudes: tuple[float, ...], spread: float, factor: float = 0.0
+    ) -> tuple[FreeParameter, ...]:
         """Unknowns of a fit that starts here: amplitudes within `spread` typical ones.
 
         Logarithms of shapes are within `factor`; without one shapes are left out.
@@ -71,7 +73,7 @@ class Candidate:
             relative = not s.amplitude and s.low > 0.0
             if not s.amplitude and factor == 0.0:
                 continue
-            knob = Knob(
+            parameter = FreeParameter(
                 name=f"{self.name}.{s.name}",
                 paths=((f"effect.{self.name}.{s.name}", -1),),
                 unit=s.unit,
@@ -81,21 +83,21 @@ class Candidate:
                 shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
                 step=s.typical if s.amplitude else None,
             )
-            found.append(knob.within(s.low, s.high))
+            found.append(parameter.within(s.low, s.high))
         return tuple(found)
 
 
-def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[Knob, ...]]:
-    """The machine with the library's effects of the background, absent as yet, alike for each kind; and their knobs.
+def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[FreeParameter, ...]]:
+    """The machine with the library's effects of the background, at zero, alike for each kind; and their parameters.
 
     spread is the standard deviation of an amplitude in typical ones.
     """
-    knobs: list[Knob] = []
+    parameters: list[FreeParameter] = []
     for one in _of_background(machine):
         absent = tuple(0.0 for _ in one.amplitudes)
         machine = one.on(machine, absent)
-        knobs += one.knobs(absent, spread)
-    return machine, tuple(knobs)
+        parameters += one.parameters(absent, spread)
+    return machine, tuple(parameters)
 
 
 def with_other_form(machine: Machine, size: float) -> Machine:

@@ -16,13 +16,13 @@ from ..machine.machine import Machine
 from ..machine.machine_toml import machine_toml
 from .search_state import Search
 
-__all__ = ["Bookmark", "Place", "make_bookmark"]
+__all__ = ["Checkpoint", "SearchCheckpoint", "make_checkpoint"]
 
 
 log = logging.getLogger(__name__)
 
 
-class Place(NamedTuple):
+class SearchCheckpoint(NamedTuple):
     """Where a search stands between two steps."""
 
     machine: Machine  # as delivered, in the state that was tested
@@ -31,20 +31,20 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Bookmark:
+class Checkpoint:
     """Keeps the place of one search; without a path it keeps nothing."""
 
     path: Path | None
 
-    def read(self) -> Place | None:
+    def read(self) -> SearchCheckpoint | None:
         """The place that was kept last; None if there is none."""
         if self.path is None or not self.path.is_file():
             return None
-        place: Place = joblib.load(self.path)
+        place: SearchCheckpoint = joblib.load(self.path)
         log.warning("goes on where the search was interrupted, with %d effects found", len(place.search.added))
         return place
 
-    def write(self, place: Place) -> None:
+    def write(self, place: SearchCheckpoint) -> None:
         """Keep a place, whole or not at all."""
         if self.path is not None:
             with write_whole(self.path) as beside:
@@ -56,20 +56,20 @@ class Bookmark:
             self.path.unlink(missing_ok=True)
 
 
-def make_bookmark(
+def make_checkpoint(
     folder: Path | None,
     machine: Machine,
     sensors: SensorSet,
     hashes: Mapping[str, str],
     hold_out: Sequence[str] | None,
     seed: int,
-) -> Bookmark:
+) -> Checkpoint:
     """A bookmark in a folder for a search with these inputs, named by them: any other search does not see it.
 
     No effect made by hand has a name that says what it does: a machine with one gets a bookmark that keeps nothing.
     """
     if folder is None or machine.own_effects:
-        return Bookmark(None)
+        return Checkpoint(None)
     inputs = (__version__, machine_toml(machine), repr(machine.specimen), repr(sensors), dict(hashes), hold_out, seed)
     digest = hashlib.sha256(repr(inputs).encode()).hexdigest()
-    return Bookmark(folder / f".unfinished-{digest[:16]}.joblib")
+    return Checkpoint(folder / f".unfinished-{digest[:16]}.joblib")

@@ -16,23 +16,23 @@ from ..core.progress import Progress, between
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
 from ..identification.calibration import calibration_numbers
-from ..identification.calibration.free_parameters import plan_knobs, scatter_knobs
-from ..identification.calibration.normal_equations import Normal
-from ..identification.calibration.prepare import Prepared, prepare_problem
+from ..identification.calibration.free_parameters import plan_parameters, scatter_parameters
+from ..identification.calibration.normal_equations import NormalEquations
+from ..identification.calibration.prepare import PreparedProblem, prepare_problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.plant import make_plant
 from .candidates import with_background, with_other_form, with_warm_oil
-from .checkpoint import Place, make_bookmark
+from .checkpoint import SearchCheckpoint, make_checkpoint
 from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
-from .residual_function import Left, what_is_left, with_unnamed
-from .screening import stand, weighing
+from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
+from .screening import linearise, weighing
 from .search import refit, search
 from .search_state import Search, fitted_machine
-from .sensor_findings import put_right, wrong_sensors
+from .sensor_findings import correct_records, find_sensor_faults
 from .verdict import Verdict, judge
 
 __all__ = ["Discovery", "discover", "discovery_numbers"]
@@ -51,7 +51,7 @@ class Discovery:
     held_out: tuple[str, ...]  # tests that were not
     verdict: Verdict
     search: Search
-    left: tuple[Left, ...]
+    residual_functions: tuple[ResidualFunction, ...]
     proof: Proof | None  # None where no test was held out
     next_tests: tuple[NextTest, ...]  # where names cannot be told apart: tests that may, simulated
     numbers: Parameters
@@ -88,34 +88,34 @@ def discover(
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     plant = make_plant(machine)
     lost = lost_motion(plant, campaign.records, sensors, numbers)
-    faults = wrong_sensors(plant, campaign.records, sensors, [one.component for one in lost])
-    records = put_right(campaign.records, faults)
+    faults = find_sensor_faults(plant, campaign.records, sensors, [one.component for one in lost])
+    records = correct_records(campaign.records, faults)
     hashes = {name: _hash(record) for name, record in zip(names, campaign.records, strict=True)}
     held = _asked_for(names, hold_out)
-    bookmark = make_bookmark(unfinished, machine, sensors, hashes, hold_out, seed)
-    place = bookmark.read()
+    checkpoint = make_checkpoint(unfinished, machine, sensors, hashes, hold_out, seed)
+    place = checkpoint.read()
     if place is None:
         ready = _prepared(machine, records, sensors, numbers, calibration, seed, jobs)
         report(0.1)
         place = _begin(ready, held, numbers, calibration, more=hold_out is None, progress=between(report, 0.1, 0.38))
         begun = with_lost_motion(place.search, lost, calibration, numbers, between(report, 0.38, 0.4))
         place = place._replace(search=begun)
-        bookmark.write(place)
+        checkpoint.write(place)
     machine, held = place.machine, place.held
     used = [i for i in range(len(names)) if i not in held]
 
     def keep(found: Search) -> None:
-        bookmark.write(place._replace(search=found))
+        checkpoint.write(place._replace(search=found))
 
-    found, standing = search(place.search, calibration, numbers, keep, between(report, 0.4, 0.75))
-    left: tuple[Left, ...] = ()
+    found, linear = search(place.search, calibration, numbers, keep, between(report, 0.4, 0.75))
+    left: tuple[ResidualFunction, ...] = ()
     if found.misfit("wrench") > numbers.number("left.noise"):
-        left = what_is_left(standing.base, weighing(found, standing, numbers), numbers)
-    instead: tuple[Left, ...] = ()
+        left = fit_residual_functions(linear.base, weighing(found, linear, numbers), numbers)
+    instead: tuple[ResidualFunction, ...] = ()
     forces = any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added)
     if forces and found.misfit("wrench") > numbers.number("accept.settled"):  # else no function could do better by far
-        before = stand(found.refit, calibration)
-        instead = what_is_left(before.base, weighing(found, before, numbers), numbers)
+        before = linearise(found.refit, calibration)
+        instead = fit_residual_functions(before.base, weighing(found, before, numbers), numbers)
     report(0.8)
     proof = None
     if held:
@@ -125,19 +125,21 @@ def discover(
     tests: tuple[NextTest, ...] = ()
     if propose and verdict.word == "ambiguous":
         tests = next_tests(found, load_controller("lhpost6"), sensors, calibration, numbers)
-    bookmark.remove()
+    checkpoint.remove()
     report(1.0)
-    alone = any(verdict.left is one for one in instead)  # in place of the effects, not beside them
+    alone = any(verdict.residual_function is one for one in instead)  # in place of the effects, not beside them
     fitted = fitted_machine(found.refit if alone else found.solution)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
-        fitted=fitted if verdict.left is None else with_unnamed(fitted, verdict.left),
+        fitted=fitted
+        if verdict.residual_function is None
+        else with_residual_function(fitted, verdict.residual_function),
         used=tuple(names[i] for i in used),
         held_out=tuple(names[i] for i in held),
         verdict=verdict,
         search=found,
-        left=left,
+        residual_functions=left,
         proof=proof,
         next_tests=tests,
         numbers=numbers,
@@ -154,7 +156,7 @@ def _prepared(
     calibration: Parameters,
     seed: int,
     jobs: int,
-) -> Prepared:
+) -> PreparedProblem:
     """All tests made ready, friction of another form and warmer oil counted as noise."""
     others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
     return prepare_problem(
@@ -163,28 +165,28 @@ def _prepared(
 
 
 def _begin(
-    ready: Prepared,
+    ready: PreparedProblem,
     held: tuple[int, ...],
     numbers: Parameters,
     calibration: Parameters,
     *,
     more: bool,
     progress: Progress,
-) -> Place:
+) -> SearchCheckpoint:
     """Refit what is known to the tests that are not held out; `more`: hold out the one that tells least, too."""
     machine = ready.problem.machine
-    knobs = (*ready.problem.knobs, *plan_knobs(machine))
-    twins = scatter_knobs(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
+    parameters = (*ready.problem.parameters, *plan_parameters(machine))
+    twins = scatter_parameters(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
     whole, forms = with_background(machine, numbers.number("scatter.spread"))
-    ready = ready.with_machine(whole, (*knobs, *twins, *forms))
+    ready = ready.with_machine(whole, (*parameters, *twins, *forms))
     used = [i for i in range(len(ready.problem.tests)) if i not in held]
     ready = ready.only(used)
-    first = Normal(ready.problem, np.zeros(len(ready.problem.prior)), between(progress, 0.0, 0.3))
+    first = NormalEquations(ready.problem, np.zeros(len(ready.problem.prior)), between(progress, 0.0, 0.3))
     if more and len(used) > FEWEST:
         least = _tells_least(first)
         held = (used.pop(least),)
         ready, first = ready.only(used), first.only(used)
-    return Place(machine, held, refit(ready, first, calibration, between(progress, 0.3, 1.0)))
+    return SearchCheckpoint(machine, held, refit(ready, first, calibration, between(progress, 0.3, 1.0)))
 
 
 def discovery_numbers() -> tuple[Parameters, Parameters]:
@@ -211,11 +213,11 @@ def _asked_for(names: Sequence[str], wanted: Sequence[str] | None) -> tuple[int,
     return held
 
 
-def _tells_least(first: Normal) -> int:
+def _tells_least(first: NormalEquations) -> int:
     """The test without which the others tell most of the machine's parameters; what was measured in it has no say."""
-    count = len(first.problem.knobs)
+    count = len(first.problem.parameters)
     prior = first.problem.prior[:count]
-    own = [first.of([t])[0][:count, :count] * np.outer(prior, prior) for t in range(len(first.rest))]
+    own = [first.of([t])[0][:count, :count] * np.outer(prior, prior) for t in range(len(first.residual))]
     without = [sum(own) - one + np.eye(count) for one in own]
     return int(np.argmax([np.linalg.slogdet(m)[1] for m in without]))
 

@@ -70,9 +70,9 @@ def prove(
 ) -> Proof:
     """Validate the three models on held-out records; `machine` is the one delivered."""
     first = found.refit.normal.problem
-    knobs = len(first.knobs)
+    count = len(first.parameters)
     before, after = fitted_machine(found.refit), fitted_machine(found.solution)
-    errors = found.refit.x[knobs:], found.solution.x[len(found.problem.knobs) :]
+    errors = found.refit.x[count:], found.solution.x[len(found.problem.parameters) :]
     models = (
         (machine, list(records)),
         (before, [corrected_record(r, first.unknowns, errors[0]) for r in records]),

@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from ..core.progress import Progress, between
 from ..data.consistency import scaled_inverse
-from ..data.sensor_pairs import Comparison, loose_lengths
+from ..data.sensor_pairs import SensorComparison, loose_lengths
 from ..data.sensors import SensorSet
 from ..identification.calibration.fit import solve
 from ..machine.library import find_family
 from ..machine.parameters import Parameters
 from ..mechanics.plant import Plant
 from .acceptance import squares_by_column
-from .add_effects import joined
+from .add_effects import with_candidate
 from .candidates import Candidate
-from .search_state import Added, Contest, Search, fitted_machine
+from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
 __all__ = ["LostMotion", "lost_motion", "with_lost_motion"]
 
@@ -52,16 +52,16 @@ def lost_motion(
 ) -> tuple[LostMotion, ...]:
     """Play that the lengths of all records together tell beyond doubt; numbers are those of `models/procedures`."""
     closing = dict(_shape())["closing_force"]
-    parts: dict[str, list[tuple[Comparison, Array]]] = {}
+    parts: dict[str, list[tuple[SensorComparison, Array]]] = {}
     for record in records:
         for name, comparison, side in loose_lengths(plant, record, sensors, closing):
             parts.setdefault(name, []).append((comparison, side))
     found = [LostMotion(name, *_play(some)) for name, some in parts.items()]
-    least, size = numbers.number("accept.mimicked"), numbers.number("lengths.play")
+    least, size = numbers.number("accept.confusable"), numbers.number("lengths.play")
     return tuple(one for one in found if one.half_play >= size and one.gain >= least)
 
 
-def _play(parts: Sequence[tuple[Comparison, Array]]) -> tuple[float, float]:
+def _play(parts: Sequence[tuple[SensorComparison, Array]]) -> tuple[float, float]:
     """Half the play and its standard deviation [m]: least squares, with errors of sensors and geometry in them."""
     due = np.array([term.due for term in parts[0][0].terms])
     rows, rest = [], []
@@ -117,15 +117,17 @@ def _with_play(
     size = float(weight @ [one.half_play for one in group] / weight.sum())
     sd = float(weight.sum() ** -0.5)  # no wider: oil that a pin hammers tells of play, but wrongly
     own = tuple(
-        replace(knob, sd=sd) if knob.name.endswith(".half_play") else knob
-        for knob in candidate.knobs((size,), numbers.number("fit.spread"), numbers.number("fit.factor"))
+        replace(parameter, sd=sd) if parameter.name.endswith(".half_play") else parameter
+        for parameter in candidate.parameters((size,), numbers.number("fit.spread"), numbers.number("fit.factor"))
     )
-    ready, start = joined(found, candidate, (size,), own, found.solution.x)
+    ready, start = with_candidate(found, candidate, (size,), own, found.solution.x)
     solution = solve(ready.problem, ready.replicas, calibration, start, progress, found.solution.normal, frugal=True)
     more = Search(ready, solution, found.refit, list(found.added), found.rounds)
     told = sum(one.gain for one in group)
-    contest = (Contest(candidate, 0.0, fitted_machine(solution)),)
-    fall = squares_by_column(found.rest) - squares_by_column(more.rest)
+    contest = (FittedCandidate(candidate, 0.0, fitted_machine(solution)),)
+    fall = squares_by_column(found.residual) - squares_by_column(more.residual)
     tried = len(found.problem.machine.double_acting)
-    more.added.append(Added(candidate, told + found.objective - more.objective, 0, tried, contest, fall, 0.0, told))
+    more.added.append(
+        AddedEffect(candidate, told + found.objective - more.objective, 0, tried, contest, fall, 0.0, told)
+    )
     return more

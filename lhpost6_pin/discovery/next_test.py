@@ -14,15 +14,15 @@ from joblib import Parallel, delayed
 from ..control import ControllerSettings
 from ..core.errors import SimulationError
 from ..data.sensors import SensorSet
-from ..identification.calibration.free_parameters import Knob
-from ..identification.calibration.normal_equations import Normal
+from ..identification.calibration.free_parameters import FreeParameter
+from ..identification.calibration.normal_equations import NormalEquations
 from ..identification.calibration.prepare import prepare_problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..simulation.simulated_campaign import load_procedure, simulate_campaign, tests_of
 from .candidates import Candidate
-from .search_state import Contest, Search
+from .search_state import FittedCandidate, Search
 
 __all__ = ["NextTest", "next_tests"]
 
@@ -37,7 +37,7 @@ class NextTest:
     test: str
     families: tuple[str, str]
     margin: float  # expected log-likelihood by which the wrong one stands behind; nan where the test cannot be run
-    told: bool  # whether that is enough
+    informative: bool  # whether that is enough
 
 
 def next_tests(
@@ -55,8 +55,8 @@ def next_tests(
 
 
 def _trial(
-    one: Contest,
-    rival: Contest,
+    one: FittedCandidate,
+    rival: FittedCandidate,
     settings: ControllerSettings,
     sensors: SensorSet,
     calibration: Parameters,
@@ -69,23 +69,23 @@ def _trial(
     try:
         run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
-        return NextTest(test, names, float("nan"), told=False)
+        return NextTest(test, names, float("nan"), informative=False)
     ready = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1)
-    knobs = (*ready.problem.knobs, *_own_knobs(rival, numbers))
-    problem = ready.problem.with_machine(ready.problem.machine, knobs)
-    margin = _margin(Normal(problem, np.zeros(len(problem.prior)), lambda share: None))
-    return NextTest(test, names, margin, told=margin >= numbers.number("accept.apart"))
+    parameters = (*ready.problem.parameters, *_own_parameters(rival, numbers))
+    problem = ready.problem.with_machine(ready.problem.machine, parameters)
+    margin = _margin(NormalEquations(problem, np.zeros(len(problem.prior)), lambda share: None))
+    return NextTest(test, names, margin, informative=margin >= numbers.number("accept.apart"))
 
 
-def _own_knobs(rival: Contest, numbers: Parameters) -> tuple[Knob, ...]:
-    """Knobs of the rival's effect where it was fitted; none of a parameter that was set free."""
+def _own_parameters(rival: FittedCandidate, numbers: Parameters) -> tuple[FreeParameter, ...]:
+    """Parameters of the rival's effect where it was fitted; none of a parameter that was set free."""
     candidate = rival.candidate
     if candidate.release:
         return ()
     amplitudes = tuple(_value(rival.machine, candidate, s.name) for s in candidate.amplitudes)
     shape = tuple((name, _value(rival.machine, candidate, name)) for name, _ in candidate.shape)
     fitted = replace(candidate, shape=shape)
-    return fitted.knobs(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
+    return fitted.parameters(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
 
 
 def _value(machine: Machine, candidate: Candidate, number: str) -> float:
@@ -94,9 +94,9 @@ def _value(machine: Machine, candidate: Candidate, number: str) -> float:
     return value
 
 
-def _margin(normal: Normal) -> float:
+def _margin(normal: NormalEquations) -> float:
     """Least negative log-likelihood and log-prior, to first order; noise of unit power, none in the test."""
-    (matrix, side), rest = normal.whole, sum(float(np.sum(np.abs(r) ** 2)) for r in normal.rest)
+    (matrix, side), rest = normal.whole, sum(float(np.sum(np.abs(r) ** 2)) for r in normal.residual)
     scale = normal.problem.prior
     scaled = matrix * np.outer(scale, scale) + np.eye(len(scale))
     return rest - 0.5 * float(side * scale @ np.linalg.solve(scaled, side * scale))

@@ -11,20 +11,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.calibration.problem import Base, Problem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..machine.parameters import Parameters
-from .acceptance import Weighing, gate, refusal
+from .acceptance import Reweighting, gate, refusal
 from .candidate_columns import Columns, columns_of, side_by_side
 from .candidates import Candidate
 from .scores import less_noise, make_block, score
-from .search_state import Standing
+from .search_state import Linearisation
 
-__all__ = ["Pair", "score_pairs"]
+__all__ = ["CandidatePair", "score_pairs"]
 
 Array = NDArray[np.float64]
 
 
-class Pair(NamedTuple):
+class CandidatePair(NamedTuple):
     """Two candidates together."""
 
     places: tuple[int, int]  # among the candidates
@@ -34,13 +34,13 @@ class Pair(NamedTuple):
 
 
 def score_pairs(
-    problem: Problem, standing: Standing, weigh: Weighing, candidates: Sequence[Candidate], numbers: Parameters
-) -> list[Pair]:
+    problem: Problem, linear: Linearisation, weigh: Reweighting, candidates: Sequence[Candidate], numbers: Parameters
+) -> list[CandidatePair]:
     """All pairs of candidates where a search of the problem stands, by falling gain."""
-    background = standing.background
+    background = linear.background
     ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
-    columns = _all_columns(problem, standing.base, candidates)
-    noisy = [_all_columns(again, there, candidates) for again, there in standing.replicas]
+    columns = _all_columns(problem, linear.base, candidates)
+    noisy = [_all_columns(again, there, candidates) for again, there in linear.replicas]
     block = make_block(background, columns)
     if noisy:
         block = less_noise(background, block, columns, noisy)
@@ -60,17 +60,17 @@ def score_pairs(
         less = weigh.lowered(background.explained([c[..., k] for c in columns], one.amplitude), one)
         families = candidates[i].family, candidates[j].family
         why = refusal(families, one, less, numbers)
-        needed = all(
+        required = all(
             one.gain - other >= gate(family, numbers)
             for family, other in zip(families, (alone[j], alone[i]), strict=True)
         )
         count = len(candidates[i].amplitudes)
         amplitudes = one.amplitude[:count], one.amplitude[count:]
-        found.append(Pair((i, j), less.gain, amplitudes, why if needed else "one of them explains as much"))
+        found.append(CandidatePair((i, j), less.gain, amplitudes, why if required else "one of them explains as much"))
     return sorted(found, key=lambda pair: -pair.gain)
 
 
-def _all_columns(problem: Problem, base: Base, candidates: Sequence[Candidate]) -> Columns:
+def _all_columns(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
     """Columns (m, c, k) of every test, those of all candidates' amplitudes."""
     each = []
     for candidate in candidates:

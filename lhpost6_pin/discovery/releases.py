@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.channels import LAYOUT
-from ..identification.calibration import Knob
+from ..identification.calibration import FreeParameter
 from ..identification.calibration.problem import Problem
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.library import find_family
@@ -39,10 +39,10 @@ _PARAMETER = {
 def list_releases(problem: Problem) -> tuple[Candidate, ...]:
     """All parameters and sensor errors that are not free yet and have a name when they are far off."""
     found = []
-    for knob in problem.knobs:
-        family = "" if knob.of else _PARAMETER.get(knob.name.split(".")[-1].split("[")[0], "")
-        if family and knob.name not in problem.free:
-            found.append(Candidate(find_family(family), _where(problem, knob), (), knob.name))
+    for parameter in problem.parameters:
+        family = "" if parameter.of else _PARAMETER.get(parameter.name.split(".")[-1].split("[")[0], "")
+        if family and parameter.name not in problem.free:
+            found.append(Candidate(find_family(family), _where(problem, parameter), (), parameter.name))
     for unknown in problem.unknowns:  # those of the platen's motion were asked of each other before
         if unknown.name in problem.free or (unknown.kind == "delay" and unknown.column >= 0):
             continue
@@ -55,8 +55,8 @@ def _family(unknown: SensorUnknown) -> str:
     return "channel_delay" if unknown.kind == "delay" else LAYOUT[unknown.channel].fault
 
 
-def _where(problem: Problem, knob: Knob) -> tuple[str, ...]:
-    section = knob.name.split(".")[0]
+def _where(problem: Problem, parameter: FreeParameter) -> tuple[str, ...]:
+    section = parameter.name.split(".")[0]
     return tuple(c.name for c in problem.machine.components if c.kind == section) or (section,)
 
 

@@ -14,19 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..effects.registry import NODES
-from ..identification.calibration.problem import Base, Problem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.calibration.whitened_residuals import spectrum_of
 from ..identification.inverse_dynamics import leg_wrenches
-from ..identification.residuals import Measured
+from ..identification.residuals import MeasuredTest
 from ..laws.lines import filter_shares
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.pose import leg_displacements, plant_motion
-from .acceptance import Weighing
+from .acceptance import Reweighting
 from .formula import Formula, sparse_formula
 from .scores import make_block, score
 
-__all__ = ["Left", "what_is_left", "with_unnamed"]
+__all__ = ["ResidualFunction", "fit_residual_functions", "with_residual_function"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -41,7 +41,7 @@ _FAMILY: dict[State, str] = {
 
 
 @dataclass(frozen=True)
-class Left:
+class ResidualFunction:
     """A free function of the state of legs, alike for all of them, fitted to what is left."""
 
     components: tuple[str, ...]
@@ -70,7 +70,7 @@ class Left:
         return sparse_formula(self.nodes, self.value, self.sd, self.unit)
 
 
-def with_unnamed(machine: Machine, left: Left) -> Machine:
+def with_residual_function(machine: Machine, left: ResidualFunction) -> Machine:
     """The machine with the free function as an effect that is switched off: share = 1 switches it on."""
     family = _FAMILY[left.state]
     values = {f"force_{k + 1}": -float(v) for k, v in enumerate(left.value)}
@@ -81,7 +81,9 @@ def with_unnamed(machine: Machine, left: Left) -> Machine:
     return machine.with_effect(family, left.components, name=name, share=0.0, **values)
 
 
-def what_is_left(base: Base, weigh: Weighing, numbers: Parameters) -> tuple[Left, ...]:
+def fit_residual_functions(
+    base: OperatingPoint, weigh: Reweighting, numbers: Parameters
+) -> tuple[ResidualFunction, ...]:
     """Free functions of every leg's states and of those of all legs of a kind, by falling gain."""
     problem = weigh.problem
     seen = [_legs(base, t) for t in range(len(base.tests))]
@@ -111,20 +113,22 @@ def what_is_left(base: Base, weigh: Weighing, numbers: Parameters) -> tuple[Left
 
 
 def _fitted(
-    weigh: Weighing,
+    weigh: Reweighting,
     numbers: Parameters,
     state: State,
     memory: float,
     nodes: Array,
     components: tuple[str, ...],
     columns: Sequence[Complex],
-) -> Left:
+) -> ResidualFunction:
     """The function whose values are worth these columns (m, c, k) of each test."""
     background, free = weigh.background, np.full(NODES, np.inf)
     spread = np.full(NODES, numbers.number("left.spread"))
     one = score(background, make_block(background, columns), -free, free, spread)
     less = weigh.lowered(background.explained(columns, one.amplitude), one)
-    return Left(components, state, memory, nodes, one.amplitude, one.sd, less.gain, less.beyond, one.held_out)
+    return ResidualFunction(
+        components, state, memory, nodes, one.amplitude, one.sd, less.gain, less.beyond, one.held_out
+    )
 
 
 def _states(numbers: Parameters) -> Iterator[tuple[State, float]]:
@@ -150,7 +154,7 @@ def _state(state: State, memory: float, position: Array, velocity: Array, dt: fl
     return np.asarray(past if state == "past position" else position - past)
 
 
-def _legs(base: Base, t: int) -> tuple[tuple[Array, Array], Array]:
+def _legs(base: OperatingPoint, t: int) -> tuple[tuple[Array, Array], Array]:
     """Elongations and their rates (n, legs) and wrenches of unit forces (n, legs, 6) of a test."""
     motion = base.tests[t].motion
     moved = leg_displacements(base.plant, motion.displacement, motion.velocity)
@@ -163,7 +167,7 @@ def _hats(x: Array, nodes: Array) -> Array:
     return np.asarray(np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) / step))
 
 
-def _whitened(problem: Problem, t: int, test: Measured, wrench: Array) -> Complex:
+def _whitened(problem: Problem, t: int, test: MeasuredTest, wrench: Array) -> Complex:
     """Columns (m, c, k) of wrenches (n, 6, k)."""
     n, axes, count = wrench.shape
     c = problem.comparison

@@ -1,6 +1,6 @@
 """Screening: what each candidate would explain, with all known parameters and sensor errors refitted.
 
-Everything is linear here: the residuals' derivatives by knobs, sensor errors and scatter between twins (the
+Everything is linear here: the residuals' derivatives by parameters, sensor errors and scatter between twins (the
 background), and by a candidate's amplitudes. The gain is the log-likelihood that the candidate adds to a refit without
 it; held out is what it adds to the prediction of each test, its amplitudes fitted on the others.
 """
@@ -48,7 +48,7 @@ class Background:
     """
 
     slope: Sequence[Array]  # (n, p) of every test
-    rest: Sequence[Array]  # (n,)
+    residual: Sequence[Array]  # (n,)
     root: Sequence[Array]  # (m, c) roots of power
     matrix: Array  # (t, p, p)
     side: Array  # (t, p)
@@ -102,7 +102,7 @@ class Background:
 def make_block(background: Background, columns: Sequence[Complex]) -> Block:
     """Block of columns (m, c, k) by test."""
     cross, own, side = [], [], []
-    for slope, rest, root, column in zip(background.slope, background.rest, background.root, columns, strict=True):
+    for slope, rest, root, column in zip(background.slope, background.residual, background.root, columns, strict=True):
         c = real_bins(column, root)
         cross.append(slope.T @ c)
         own.append(c.T @ c)

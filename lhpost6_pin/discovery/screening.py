@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 
 from ..core.progress import Progress
 from ..identification.calibration.fit import Solution
-from ..identification.calibration.problem import Base, Problem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..machine.library import Family
 from ..machine.parameters import Parameters
-from .acceptance import Lowered, Weighing, refusal, squares_by_column
+from .acceptance import Lowered, Reweighting, refusal, squares_by_column
 from .background import make_background
 from .candidate_columns import Columns, columns_of, side_by_side
 from .candidates import Candidate, list_candidates
 from .releases import block_of, list_releases
 from .scores import Background, Block, Score, less_noise, make_block, score
-from .search_state import Round, Scored, Search, Standing
+from .search_state import Linearisation, Round, Scored, Search
 
-__all__ = ["screen", "stand", "weighing"]
+__all__ = ["linearise", "screen", "weighing"]
 
 Array = NDArray[np.float64]
 
@@ -28,27 +28,29 @@ BATCH = 8
 """Groups of candidates that are weighed at once."""
 
 
-def stand(solution: Solution, calibration: Parameters, replicas: Sequence[Problem] = ()) -> Standing:
+def linearise(solution: Solution, calibration: Parameters, replicas: Sequence[Problem] = ()) -> Linearisation:
     """Normal equations of the background about a solution, with replicas of its problem where candidates are asked."""
     problem, at = solution.normal.problem, solution.at
     background = make_background(problem, solution.normal, at, calibration)
-    return Standing(Base(problem, at), background, tuple((one, Base(one, at)) for one in replicas))
+    return Linearisation(
+        OperatingPoint(problem, at), background, tuple((one, OperatingPoint(one, at)) for one in replicas)
+    )
 
 
-def weighing(found: Search, standing: Standing, numbers: Parameters) -> Weighing:
+def weighing(found: Search, linear: Linearisation, numbers: Parameters) -> Reweighting:
     """What weighs candidates there."""
-    first = squares_by_column(found.refit.normal.rest)
-    return Weighing(found.refit.normal.problem, standing.background, first, numbers)
+    first = squares_by_column(found.refit.normal.residual)
+    return Reweighting(found.refit.normal.problem, linear.background, first, numbers)
 
 
-def screen(found: Search, standing: Standing, numbers: Parameters, progress: Progress) -> Round:
+def screen(found: Search, linear: Linearisation, numbers: Parameters, progress: Progress) -> Round:
     """Score all candidates."""
-    problem, base, background = found.problem, standing.base, standing.background
+    problem, base, background = found.problem, linear.base, linear.background
     taken = {a.candidate.name for a in found.added}
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
-    rest = found.solution.normal.rest
+    rest = found.solution.normal.residual
     left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
-    weigh = weighing(found, standing, numbers)
+    weigh = weighing(found, linear, numbers)
 
     def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
         less = Lowered(one.gain, 0.0, 0.0, 0.0)
@@ -66,7 +68,7 @@ def screen(found: Search, standing: Standing, numbers: Parameters, progress: Pro
 
         found = scores(block)
         if max(one.gain for one in found) >= numbers.number("accept.look"):
-            noisy = [columns_of(again, there, group)[0] for again, there in standing.replicas]
+            noisy = [columns_of(again, there, group)[0] for again, there in linear.replicas]
             found = scores(less_noise(background, block, columns, noisy))
         scored = []
         for candidate, part, one in zip(group, parts, found, strict=True):

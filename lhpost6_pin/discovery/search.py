@@ -11,19 +11,19 @@ import numpy as np
 
 from ..core.progress import Progress, between
 from ..identification.calibration.fit import solve
-from ..identification.calibration.normal_equations import Normal, bounds_of
-from ..identification.calibration.prepare import Prepared
+from ..identification.calibration.normal_equations import NormalEquations, bounds_of
+from ..identification.calibration.prepare import PreparedProblem
 from ..machine.parameters import Parameters
 from .acceptance import gate
-from .add_effects import further, refined
+from .add_effects import add_effect, refined
 from .candidates import Candidate
-from .screening import screen, stand
-from .search_state import Search, Standing
+from .screening import linearise, screen
+from .search_state import Linearisation, Search
 
 __all__ = ["refit", "search"]
 
 
-def refit(ready: Prepared, begin: Normal, calibration: Parameters, progress: Progress) -> Search:
+def refit(ready: PreparedProblem, begin: NormalEquations, calibration: Parameters, progress: Progress) -> Search:
     """Where a search begins: known parameters and sensor errors fitted to a prepared campaign, without any effect.
 
     begin are its normal equations where all unknowns are zero; calibration are numbers of `models/procedures`.
@@ -36,7 +36,7 @@ def refit(ready: Prepared, begin: Normal, calibration: Parameters, progress: Pro
 
 def search(
     found: Search, calibration: Parameters, numbers: Parameters, keep: Callable[[Search], None], progress: Progress
-) -> tuple[Search, Standing]:
+) -> tuple[Search, Linearisation]:
     """Search the library for what the machine lacks, from a refit or from where an earlier search was interrupted.
 
     Returns also what is needed to go on from there; calibration and numbers are those of `models/procedures`. keep is
@@ -45,28 +45,28 @@ def search(
     most = int(numbers.number("accept.effects"))
     for k in range(len(found.rounds), most + 1):
         low, high = (i / (most + 1) for i in (k, k + 1))
-        standing = stand(found.solution, calibration, found.ready.replicas)
-        one = screen(found, standing, numbers, between(progress, low, 0.5 * (low + high)))
+        linear = linearise(found.solution, calibration, found.ready.replicas)
+        one = screen(found, linear, numbers, between(progress, low, 0.5 * (low + high)))
         found.rounds.append(one)
         if k == most:
             break
-        more = further(found, standing, calibration, numbers, between(progress, 0.5 * (low + high), high))
+        more = add_effect(found, linear, calibration, numbers, between(progress, 0.5 * (low + high), high))
         if more is None:
             break
         found = more
         keep(found)
     if len(found.added) > 1:
         fewer = _pruned(found, calibration, numbers)
-        found, standing = fewer, standing if fewer is found else stand(fewer.solution, calibration)
+        found, linear = fewer, linear if fewer is found else linearise(fewer.solution, calibration)
     progress(1.0)
-    return found, standing
+    return found, linear
 
 
 def _pruned(found: Search, calibration: Parameters, numbers: Parameters) -> Search:
     """The search without what it can do without, now that more has been added: helpers of what was found later."""
     for one in found.added[:-1]:
         less = _without(found, one.candidate, calibration)
-        if less.objective - found.objective + one.told < gate(one.candidate.family, numbers):
+        if less.objective - found.objective + one.from_lengths < gate(one.candidate.family, numbers):
             return _pruned(refined(less, calibration, lambda share: None), calibration, numbers)
     return found
 
@@ -77,8 +77,8 @@ def _without(found: Search, candidate: Candidate, calibration: Parameters) -> Se
     if candidate.release:
         ready = found.ready.without_free(candidate.release)
     else:
-        knobs = tuple(k for k in problem.knobs if not k.name.startswith(f"{candidate.name}."))
-        ready = found.ready.with_machine(problem.machine.without_effect(candidate.name), knobs)
+        parameters = tuple(k for k in problem.parameters if not k.name.startswith(f"{candidate.name}."))
+        ready = found.ready.with_machine(problem.machine.without_effect(candidate.name), parameters)
     place = dict(zip(problem.names, found.solution.x, strict=True))
     start = np.array([place[name] for name in ready.problem.names])
     low, high = bounds_of(ready.problem, calibration)

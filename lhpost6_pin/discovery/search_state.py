@@ -7,15 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identification.calibration.fit import Solution, misfit, objective
-from ..identification.calibration.free_parameters import with_knobs
-from ..identification.calibration.prepare import Prepared
-from ..identification.calibration.problem import Base, Problem
+from ..identification.calibration.free_parameters import with_parameters
+from ..identification.calibration.prepare import PreparedProblem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from .candidates import Candidate
 from .scores import Background, Score
 
-__all__ = ["Added", "Contest", "Round", "Scored", "Search", "Standing", "firsts", "fitted_machine"]
+__all__ = [
+    "AddedEffect",
+    "FittedCandidate",
+    "Round",
+    "Scored",
+    "Search",
+    "Linearisation",
+    "best_per_family",
+    "fitted_machine",
+]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +40,7 @@ class Scored:
     refused: str  # why it is not added; empty if it may be
 
 
-def firsts(scored: Sequence[Scored], *, named: bool = False) -> list[Scored]:
+def best_per_family(scored: Sequence[Scored], *, named: bool = False) -> list[Scored]:
     """The first of each entry of the library, or of each name that a verdict gives."""
     found: dict[str, Scored] = {}
     for one in scored:
@@ -41,7 +50,7 @@ def firsts(scored: Sequence[Scored], *, named: bool = False) -> list[Scored]:
 
 
 @dataclass(frozen=True)
-class Contest:
+class FittedCandidate:
     """A family that was fitted in full for the same place, and how far it stands behind the one that was added."""
 
     candidate: Candidate
@@ -50,20 +59,20 @@ class Contest:
 
 
 @dataclass(frozen=True)
-class Added:
+class AddedEffect:
     """An effect that the search has added."""
 
     candidate: Candidate
     gain: float  # of log-likelihood and log-prior, of the joint fit
     round: int  # of the search, from 0
     tried: int  # candidates in that round
-    contest: tuple[Contest, ...]
+    contest: tuple[FittedCandidate, ...]
     fall: Array  # (c,) of the squares of what is left, by column
     apart: float  # log-likelihood within which two families explained the campaign alike
-    told: float = 0.0  # log-likelihood of what is not in the search's residuals: lengths
+    from_lengths: float = 0.0  # log-likelihood of what is not in the search's residuals: lengths
 
     @property
-    def rivals(self) -> tuple[Contest, ...]:
+    def rivals(self) -> tuple[FittedCandidate, ...]:
         """Those of other families that explain the campaign alike."""
         near = [one for one in self.contest[1:] if one.behind < self.apart]
         return tuple(one for one in near if one.candidate.family.named != self.candidate.family.named)
@@ -79,26 +88,26 @@ class Round:
     @property
     def best(self) -> dict[str, Scored]:
         """The best candidate of each family, by falling gain."""
-        return {one.candidate.family.named: one for one in firsts(self.scored, named=True)}
+        return {one.candidate.family.named: one for one in best_per_family(self.scored, named=True)}
 
 
 @dataclass(frozen=True)
-class Standing:
+class Linearisation:
     """The search's place, ready for candidates."""
 
-    base: Base
+    base: OperatingPoint
     background: Background
-    replicas: tuple[tuple[Problem, Base], ...]  # the same with more noise
+    replicas: tuple[tuple[Problem, OperatingPoint], ...]  # the same with more noise
 
 
 @dataclass
 class Search:
     """Where a search stands, and how it came there."""
 
-    ready: Prepared
+    ready: PreparedProblem
     solution: Solution
     refit: Solution  # without any effect
-    added: list[Added] = field(default_factory=list)
+    added: list[AddedEffect] = field(default_factory=list)
     rounds: list[Round] = field(default_factory=list)
 
     @property
@@ -107,26 +116,26 @@ class Search:
         return self.ready.problem
 
     @property
-    def rest(self) -> list[NDArray[np.complex128]]:
+    def residual(self) -> list[NDArray[np.complex128]]:
         """What is left at the solution: whitened bins (m, c) of every test."""
-        return self.solution.rest
+        return self.solution.residual
 
     @property
     def power(self) -> float:
         """Mean square of what is left, over all tests alike."""
-        return float(np.mean([np.mean(np.abs(r) ** 2) for r in self.rest]))
+        return float(np.mean([np.mean(np.abs(r) ** 2) for r in self.residual]))
 
     @property
     def objective(self) -> float:
         """Negative log-likelihood and log-prior at the solution."""
-        return objective(self.problem, self.rest, self.solution.x)
+        return objective(self.problem, self.residual, self.solution.x)
 
     def misfit(self, kind: str) -> float:
         """Mean square of what is left of one kind, over all tests alike; nan where there is none."""
-        return float(np.mean(misfit(self.problem, self.rest)[:, RESIDUALS.index(kind)]))
+        return float(np.mean(misfit(self.problem, self.residual)[:, RESIDUALS.index(kind)]))
 
 
 def fitted_machine(solution: Solution) -> Machine:
     """The machine of a solution, all numbers as fitted: with its effects, or as refitted without any."""
     problem = solution.normal.problem
-    return with_knobs(problem.machine, problem.knobs, solution.x[: len(problem.knobs)])
+    return with_parameters(problem.machine, problem.parameters, solution.x[: len(problem.parameters)])

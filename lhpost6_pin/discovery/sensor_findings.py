@@ -13,18 +13,18 @@ import xarray as xr
 from ..core.names import AXES
 from ..data.alignment import align_record
 from ..data.channels import LAYOUT
-from ..data.consistency import SensorFinding, check_sensors
+from ..data.consistency import ConsistencyFinding, check_sensors
 from ..data.sensors import SensorSet
 from ..mechanics.plant import Plant
 
-__all__ = ["Fault", "put_right", "wrong_sensors"]
+__all__ = ["SensorFault", "correct_records", "find_sensor_faults"]
 
 _CHECKS = ("velocity against displacement", "acceleration against displacement", "length against platen pose")
 _SKEWED = (*_CHECKS, "force against pressures")
 
 
 @dataclass(frozen=True)
-class Fault:
+class SensorFault:
     """A sensor that is off beyond its stated range: measured = (1 + gain) true + cross-talk + offset, and late."""
 
     kind: str  # "gain", "offset", "drift", "delay", or "cross x": of the acceleration along x
@@ -46,9 +46,9 @@ class Fault:
         return "channel_delay" if self.kind == "delay" else LAYOUT[self.channel].fault
 
 
-def wrong_sensors(
+def find_sensor_faults(
     plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, loose: Sequence[str] = ()
-) -> tuple[Fault, ...]:
+) -> tuple[SensorFault, ...]:
     """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does.
 
     Play of actuators that are `loose` shifts the means of their lengths, by how long a rod bears on either side.
@@ -64,7 +64,7 @@ def wrong_sensors(
     return (*(f for f in faults if f is not None), *late)
 
 
-def _fault(finding: SensorFinding, sensors: SensorSet) -> Fault | None:
+def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | None:
     """The gain, offset or cross-talk that a finding is of."""
     channel, _, column = finding.channel.rstrip("]").partition("[")
     kind, error = finding.quantity, finding.estimate - finding.expected
@@ -76,10 +76,10 @@ def _fault(finding: SensorFinding, sensors: SensorSet) -> Fault | None:
         stated = sensors.offset_range.get(channel, 0.0)
     else:
         return None
-    return Fault(kind, channel, column, error, finding.unit, finding.deviation, stated)
+    return SensorFault(kind, channel, column, error, finding.unit, finding.deviation, stated)
 
 
-def _late(findings: Sequence[SensorFinding], sensors: SensorSet) -> list[Fault]:
+def _late(findings: Sequence[ConsistencyFinding], sensors: SensorSet) -> list[SensorFault]:
     """Groups of channels of which most columns that can tell are late."""
     faults = []
     for check in _SKEWED:
@@ -89,11 +89,11 @@ def _late(findings: Sequence[SensorFinding], sensors: SensorSet) -> list[Fault]:
             group = told[0].channel.partition("[")[0]  # of one channel, all that are asked here
             middle = sorted(off, key=lambda f: f.estimate)[len(off) // 2]
             error, stated = middle.estimate - middle.expected, sensors.delay_range.get(group, 0.0)
-            faults.append(Fault("delay", group, "", error, "s", middle.deviation, stated))
+            faults.append(SensorFault("delay", group, "", error, "s", middle.deviation, stated))
     return faults
 
 
-def put_right(records: Sequence[xr.Dataset], faults: Sequence[Fault]) -> list[xr.Dataset]:
+def correct_records(records: Sequence[xr.Dataset], faults: Sequence[SensorFault]) -> list[xr.Dataset]:
     """Records without the gains and cross-talk of these faults of the platen's sensors; delays are aligned later."""
     mended = []
     for record in records:

@@ -16,11 +16,11 @@ from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import squares_by_column
 from .localise import Spot, worst_spots
-from .residual_function import Left
-from .search_state import Added, Search
-from .sensor_findings import Fault
+from .residual_function import ResidualFunction
+from .search_state import AddedEffect, Search
+from .sensor_findings import SensorFault
 
-__all__ = ["Estimate", "Finding", "SensorFinding", "Verdict", "Word", "judge", "without_name"]
+__all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
 Array = NDArray[np.float64]
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
@@ -37,7 +37,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Finding:
+class EffectFinding:
     """An effect found."""
 
     family: str
@@ -64,10 +64,10 @@ class Verdict:
     """What a search has found."""
 
     word: Word
-    effects: tuple[Finding, ...]
+    effects: tuple[EffectFinding, ...]
     changed: dict[str, Estimate]  # parameters that differ from what the machine file states, within calibration
     sensors: tuple[SensorFinding, ...]
-    left: Left | None  # what has no name
+    residual_function: ResidualFunction | None  # what has no name
     untestable: tuple[str, ...]  # families that this campaign could not show, of typical size
     nearest: tuple[str, ...] = ()  # families in the model that come nearest to what has no name
     where: tuple[Spot, ...] = ()  # where most of what has no name is, by falling share
@@ -75,9 +75,9 @@ class Verdict:
 
 def judge(
     found: Search,
-    left: Sequence[Left],
-    instead: Sequence[Left],
-    faults: Sequence[Fault],
+    left: Sequence[ResidualFunction],
+    instead: Sequence[ResidualFunction],
+    faults: Sequence[SensorFault],
     calibration: Parameters,
     numbers: Parameters,
 ) -> Verdict:
@@ -87,14 +87,14 @@ def judge(
     faults are of sensors that were put right before.
     """
     problem, x, added = found.problem, found.solution.x, [a.candidate for a in found.added]
-    count = len(problem.knobs)
-    own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.knobs])
+    count = len(problem.parameters)
+    own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.parameters])
     floor = calibration.number("fit.floor") * problem.stated
     floor[:count][own] = 0.0  # their priors are flat
-    by_lengths = tuple(f"{a.candidate.name}." for a in found.added if a.told)
-    for i, knob in enumerate(problem.knobs):
-        if knob.name.startswith(by_lengths):
-            floor[i] = numbers.number("lengths.form") * (knob.value if knob.form == "shift" else 1.0)
+    by_lengths = tuple(f"{a.candidate.name}." for a in found.added if a.from_lengths)
+    for i, parameter in enumerate(problem.parameters):
+        if parameter.name.startswith(by_lengths):
+            floor[i] = numbers.number("lengths.form") * (parameter.value if parameter.form == "shift" else 1.0)
     covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
     sd = np.sqrt(np.diag(covariance) + floor**2)
     reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
@@ -103,9 +103,9 @@ def judge(
         if i >= count:
             error = problem.unknowns[i - count]
             return Estimate(float(x[i]), error.unit, float(x[i] - reach * sd[i]), float(x[i] + reach * sd[i]))
-        knob = problem.knobs[i]
-        low, high = sorted(knob.at(float(x[i] + side * reach * sd[i])) for side in (-1.0, 1.0))
-        return Estimate(knob.at(float(x[i])), knob.unit, low, high)
+        parameter = problem.parameters[i]
+        low, high = sorted(parameter.at(float(x[i] + side * reach * sd[i])) for side in (-1.0, 1.0))
+        return Estimate(parameter.at(float(x[i])), parameter.unit, low, high)
 
     released = tuple(
         SensorFinding(u.name, c.family.named, estimate(i), float(np.sqrt(3.0) * u.sd))
@@ -118,13 +118,13 @@ def judge(
     kept = [one for one in found.added if one.candidate.name not in errors]
     effects = [_of_added(one, problem, estimate) for one in kept]
     changed = {}
-    for i, knob in enumerate(problem.knobs):
+    for i, parameter in enumerate(problem.parameters):
         sure = abs(x[i]) > calibration.number("report.deviations") * sd[i]
         material = abs(x[i]) > calibration.number("report.material") * problem.stated[i]
-        if sure and material and not own[i] and knob.name not in problem.free:
-            changed[knob.name] = estimate(i)
-    free, doubted = without_name(kept, left, instead, numbers)
-    doubted |= {one.candidate.name for one in kept if not one.told and _leaves_much(one, found, numbers)}
+        if sure and material and not own[i] and parameter.name not in problem.free:
+            changed[parameter.name] = estimate(i)
+    free, doubted = reject_effects(kept, left, instead, numbers)
+    doubted |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found, numbers)}
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
     unnamed = free is not None or bool(doubted) or drifting or _more_than_noise(found, numbers)
     nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
@@ -133,7 +133,7 @@ def judge(
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + told)
     named = _merged(effects)
     word = _word(named, changed, sensors, unnamed, blind)
-    spots = tuple(worst_spots(problem, found.rest)) if word == "unexplained" else ()
+    spots = tuple(worst_spots(problem, found.residual)) if word == "unexplained" else ()
     return Verdict(word, named, changed, sensors, free, hidden, nearest, spots)
 
 
@@ -149,14 +149,14 @@ def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], in
     return hidden, len(clear) - len(hidden)
 
 
-def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate]) -> Finding:
+def _of_added(added: AddedEffect, problem: Problem, estimate: Callable[[int], Estimate]) -> EffectFinding:
     candidate = added.candidate
     values = {}
     for i, name in enumerate(problem.names):
         if name == candidate.release or name.startswith(f"{candidate.name}."):
             values[name.removeprefix(f"{candidate.name}.")] = estimate(i)
     chance = float(chi2.sf(2.0 * added.gain, len(values)))
-    return Finding(
+    return EffectFinding(
         family=candidate.family.named,
         components=candidate.components,
         parameters=values,
@@ -167,14 +167,14 @@ def _of_added(added: Added, problem: Problem, estimate: Callable[[int], Estimate
     )
 
 
-def _of_fault(fault: Fault, reach: float) -> SensorFinding:
+def _of_fault(fault: SensorFault, reach: float) -> SensorFinding:
     low, high = (fault.value + side * reach * fault.deviation for side in (-1.0, 1.0))
     return SensorFinding(fault.name, fault.family, Estimate(fault.value, fault.unit, low, high), fault.stated)
 
 
-def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
+def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:
     """Findings of one family from parameters of several kinds as one."""
-    merged: dict[str, Finding] = {}
+    merged: dict[str, EffectFinding] = {}
     for one in effects:
         key = one.family if "." in next(iter(one.parameters), "") else f"{one.family} {one.components}"
         if key in merged:
@@ -194,13 +194,13 @@ def _merged(effects: Sequence[Finding]) -> tuple[Finding, ...]:
 
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     """Whether more is left than noise, and than the form of the effects found."""
-    limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
+    limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.residual")
     doubt, heard = numbers.number("accept.doubt"), ~_hammered(found)
     for kind in found.problem.kinds:
         rows = found.problem.rows(kind) & heard
         if not rows.any():
             continue
-        first, last = ([r[:, rows] for r in rest] for rest in (found.refit.normal.rest, found.rest))
+        first, last = ([r[:, rows] for r in rest] for rest in (found.refit.normal.residual, found.residual))
         misfit = float(np.mean([np.mean(np.abs(r) ** 2) for r in last]))
         if misfit > limit and _excess(last, doubt) > share * _excess(first, doubt):
             return True
@@ -211,7 +211,7 @@ def _hammered(found: Search) -> NDArray[np.bool_]:
     """Columns (c,) of actuators with play that the lengths tell: their pins hammer faster than records show."""
     names, columns = found.problem.machine.actuator_names, np.zeros(sum(found.problem.widths), bool)
     for one in found.added:
-        for name in one.candidate.components if one.told else ():
+        for name in one.candidate.components if one.from_lengths else ():
             columns |= found.problem.rows_of_actuator(names.index(name))
     return columns
 
@@ -222,19 +222,22 @@ def _excess(rest: Sequence[NDArray[np.complex128]], doubt: float) -> float:
     return max(sum(float(np.sum(np.abs(r) ** 2)) for r in rest) - doubt * count, 0.1 * count)
 
 
-def _leaves_much(added: Added, found: Search, numbers: Parameters) -> bool:
+def _leaves_much(added: AddedEffect, found: Search, numbers: Parameters) -> bool:
     """Whether much is left of what an effect should have explained, where it explained most of it: a wrong name."""
-    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
+    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.residual")
     where = (added.fall > 0.1 * added.fall.max()) & ~_hammered(found)
-    left = squares_by_column(found.rest)[where]
-    noise = float(sum(len(r) for r in found.rest) * left.size)
+    left = squares_by_column(found.residual)[where]
+    noise = float(sum(len(r) for r in found.residual) * left.size)
     excess = left.sum() - numbers.number("accept.doubt") * noise
     return bool(left.sum() > limit * noise and excess > rest * added.fall[where].sum())
 
 
-def without_name(
-    kept: Sequence[Added], left: Sequence[Left], instead: Sequence[Left], numbers: Parameters
-) -> tuple[Left | None, set[str]]:
+def reject_effects(
+    kept: Sequence[AddedEffect],
+    left: Sequence[ResidualFunction],
+    instead: Sequence[ResidualFunction],
+    numbers: Parameters,
+) -> tuple[ResidualFunction | None, set[str]]:
     """What has no name, and the effects that are therefore no right names.
 
     A free function that explains far more than all forces that were added takes their place; one that is left beside
@@ -249,26 +252,26 @@ def without_name(
     return free, {one.candidate.name for one in forces if _outweighed(one, free, numbers)}
 
 
-def _its_form(free: Left, one: Added, numbers: Parameters) -> bool:
+def _its_form(free: ResidualFunction, one: AddedEffect, numbers: Parameters) -> bool:
     """Whether what has no name is so little of an effect found, there or elsewhere, that it is the form of that."""
     there = set(free.components) <= set(one.candidate.components)
-    return free.gain < numbers.number("verdict.rest" if there else "verdict.elsewhere") * one.gain
+    return free.gain < numbers.number("verdict.residual" if there else "verdict.elsewhere") * one.gain
 
 
-def _outweighed(one: Added, free: Left, numbers: Parameters) -> bool:
+def _outweighed(one: AddedEffect, free: ResidualFunction, numbers: Parameters) -> bool:
     """Whether what has no name explains more than this name, or much of it where it acts: then it is part of that."""
     there = bool(set(one.candidate.components) & set(free.components))
     return free.gain > (numbers.number("accept.again") if there else 1.0) * one.gain
 
 
-def _first(left: Sequence[Left], numbers: Parameters) -> Left | None:
+def _first(left: Sequence[ResidualFunction], numbers: Parameters) -> ResidualFunction | None:
     """The free function that gains most, if it gains enough, beyond doubt and on tests that it was not fitted on."""
     share, least = numbers.number("accept.held_out"), numbers.number("left.gain")
     return next((o for o in left if min(o.gain, o.beyond) > least and o.held_out.sum() > share * least), None)
 
 
 def _word(
-    effects: Sequence[Finding], changed: object, sensors: Sequence[SensorFinding], unnamed: bool, blind: bool
+    effects: Sequence[EffectFinding], changed: object, sensors: Sequence[SensorFinding], unnamed: bool, blind: bool
 ) -> Word:
     if unnamed:
         return "unexplained"

@@ -10,7 +10,7 @@ from ..core.files import write_whole
 from ..core.jsonable import as_json
 from ..machine.library import find_family
 from .discover import Discovery
-from .verdict import Estimate, Finding
+from .verdict import EffectFinding, Estimate
 
 __all__ = ["save_verdict", "verdict_entries"]
 
@@ -43,7 +43,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "unexplained": None if verdict.word != "unexplained" else _left(found),
         "not_testable": list(verdict.untestable),
         "next_test": [
-            {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.told}
+            {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.informative}
             for n in found.next_tests
         ],
         "advice": advice(found),
@@ -67,7 +67,7 @@ def advice(found: Discovery) -> list[str]:
     return [f"{name}: {find_family(name).tell_apart}" for name in dict.fromkeys(rivals)]
 
 
-def _effect(one: Finding) -> dict[str, Any]:
+def _effect(one: EffectFinding) -> dict[str, Any]:
     return {
         "name": one.family,
         "family": one.family,
@@ -84,7 +84,7 @@ def _interval(value: Estimate) -> dict[str, Any]:
 
 
 def _left(found: Discovery) -> dict[str, Any] | None:
-    left = found.verdict.left
+    left = found.verdict.residual_function
     known = {
         "nearest": list(found.verdict.nearest),
         "where": [

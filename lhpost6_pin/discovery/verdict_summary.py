@@ -29,7 +29,7 @@ def _found(found: Discovery) -> str:
     if verdict.word == "ambiguous":
         rivals = " and ".join(" or ".join(map(title_of, (e.family, *e.rivals))) for e in verdict.effects if e.rivals)
         return f"{effects}; the campaign cannot tell {rivals}."
-    left, place = verdict.left, "more than noise is left"
+    left, place = verdict.residual_function, "more than noise is left"
     if left is not None:
         place = f"something acts on {where(left.components)}, by {left.words}"
     elif drifting := [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]:

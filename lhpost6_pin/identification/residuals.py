@@ -30,9 +30,18 @@ from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import PlatenMotion, plant_motion
 from .inverse_dynamics import march_states, with_loads
 from .oil_residuals import oil_misses
-from .wrench_residuals import missed_wrench, needed_wrench, weigh_alike
+from .wrench_residuals import required_wrench, weigh_alike, wrench_residual
 
-__all__ = ["RESIDUALS", "Measured", "Path", "Residuals", "evaluate_residuals", "follow", "make_measured", "states_of"]
+__all__ = [
+    "RESIDUALS",
+    "MeasuredTest",
+    "Path",
+    "Residuals",
+    "evaluate_residuals",
+    "follow",
+    "make_measured_test",
+    "states_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -41,7 +50,7 @@ RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredTest:
     """A measured test made ready for residuals; n samples. What was not measured is None."""
 
     name: str
@@ -78,7 +87,9 @@ class Residuals(NamedTuple):
         return np.hstack(self)
 
 
-def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None) -> Measured:
+def make_measured_test(
+    record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None
+) -> MeasuredTest:
     """Make a record ready, with the platen motion found from it; pressures are differentiated up to `cutoff` [Hz].
 
     path (n, 6) is the displacement that friction follows, where it is not the motion's.
@@ -95,7 +106,7 @@ def make_measured(record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, pa
     force, supply = values("actuator_force"), values("supply_pressure")
     if force is None and pressure is None:
         require(record, "actuator_force")
-    return Measured(
+    return MeasuredTest(
         name=str(record.attrs.get("test", "test")),
         dt=dt,
         motion=motion,
@@ -115,12 +126,12 @@ class Path(NamedTuple):
 
     ports: PortPath
     along: PortPath  # what friction follows
-    needed: Array  # (n, 6) wrench at B in platen axes that the platen's inertia and weight ask for, on its free axes
+    required: Array  # (n, 6) wrench at B in platen axes that the platen's inertia and weight ask for, on its free axes
     z: Array  # (n, n_states)
 
 
 def follow(
-    plant: Plant, test: Measured, known: tuple[Plant, Path] | None = None, *, start: Array | None = None
+    plant: Plant, test: MeasuredTest, known: tuple[Plant, Path] | None = None, *, start: Array | None = None
 ) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
@@ -134,13 +145,13 @@ def follow(
         along = ports = ports_along(plant, moved)
         if test.path is not None:
             along = ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
-        needed = needed_wrench(plant, moved, ports.turn)
+        required = required_wrench(plant, moved, ports.turn)
     else:
-        ports, along, needed, old = known[1]
+        ports, along, required, old = known[1]
         if not weigh_alike(known[0], plant):
-            needed = needed_wrench(plant, plant_motion(plant, test.motion), ports.turn)
+            required = required_wrench(plant, plant_motion(plant, test.motion), ports.turn)
         if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
-            return Path(ports, along, needed, old)
+            return Path(ports, along, required, old)
         before = {_marched(row): states_of(row) for row in _moving(known[0])}
         there = {key: old[:, place] for key, place in before.items()}
     rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
@@ -161,7 +172,7 @@ def follow(
     for key, at, _ in rows:
         if at.start >= still:
             z[:, at] = there[key]
-    return Path(ports, along, needed, z)
+    return Path(ports, along, required, z)
 
 
 _WIDTH = {law.code: len(law.states) for law in LAWS.values() if law.code >= 0}
@@ -195,7 +206,7 @@ def _geometry(plant: Plant) -> bytes:
 
 
 def evaluate_residuals(
-    plant: Plant, test: Measured, only: tuple[str, ...] = RESIDUALS, *, path: Path | None = None
+    plant: Plant, test: MeasuredTest, only: tuple[str, ...] = RESIDUALS, *, path: Path | None = None
 ) -> Residuals:
     """Residuals of a test with a plant's equations; those not in `only` have no columns.
 
@@ -209,7 +220,7 @@ def evaluate_residuals(
         force = oil if force is None else force
     wrench = np.zeros((n, 0))
     if "wrench" in only and force is not None:
-        wrench = missed_wrench(plant, path.ports, path.needed, with_loads(plant, path.z, force), force)
+        wrench = wrench_residual(plant, path.ports, path.required, with_loads(plant, path.z, force), force)
     flow, supplied = _of_oil(plant, test, path, only)
     gas = np.zeros((n, 0))
     if "gas" in only and test.strut_pressure is not None:
@@ -223,7 +234,7 @@ def evaluate_residuals(
     return Residuals(wrench, flow, gas, told, servo, supplied)
 
 
-def _of_oil(plant: Plant, test: Measured, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
+def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
     """Residuals `flow` and `supply`."""
     n, double = test.samples, np.isin(plant.machine.actuator_names, plant.machine.double_acting)
     supply = test.supply_pressure if "supply" in only else None

@@ -17,7 +17,7 @@ from ..mechanics.schemes import set_twist
 from ..simulation.engine_fused import inertia_table, platen_acceleration
 from ..simulation.ledger import add_at_c, add_row_at_c
 
-__all__ = ["missed_wrench", "needed_wrench", "row_wrenches", "weigh_alike"]
+__all__ = ["wrench_residual", "required_wrench", "row_wrenches", "weigh_alike"]
 
 Array = NDArray[np.float64]
 
@@ -28,25 +28,25 @@ def weigh_alike(some: Plant, other: Plant) -> bool:
     return bool(np.array_equal(one, two) and some.body["weight_extra"] == other.body["weight_extra"])
 
 
-def needed_wrench(plant: Plant, motion: PlantMotion, turn: Array) -> Array:
+def required_wrench(plant: Plant, motion: PlantMotion, turn: Array) -> Array:
     """Wrench (n, 6) at B in platen axes that inertia and weight ask for along a motion, on the platen's free axes.
 
     Mass times the acceleration that the fused engine's forward dynamics do not give without forces; turn (n, 3, 3) is
     the platen's rotation. Raises SimulationError for an articulated specimen.
     """
-    needed = np.zeros((len(motion.q), 6))
+    required = np.zeros((len(motion.q), 6))
     _, mass = platen_inertia(plant.model, plant.machine)
     v, a = (np.ascontiguousarray(x) for x in (motion.v, motion.a))
-    _needed(v, a, turn, plant.axes, plant.body, inertia_table(plant), mass, needed)
-    return needed
+    _required(v, a, turn, plant.axes, plant.body, inertia_table(plant), mass, required)
+    return required
 
 
 @compiled
-def _needed(v, a, turn, axes, body, inertia, mass, needed):
+def _required(v, a, turn, axes, body, inertia, mass, required):
     frame, work = np.zeros((8, 3)), np.zeros((2, 6))
     column, force = np.zeros((1, 6)), np.zeros(1)
     tau, miss = np.zeros(axes.size), np.zeros(axes.size)
-    for k in range(needed.shape[0]):
+    for k in range(required.shape[0]):
         frame[:3] = turn[k]
         set_twist(v[k], axes, frame)
         wrench_on_platen(frame, body, column, force)  # what no Inertia holds
@@ -57,23 +57,23 @@ def _needed(v, a, turn, axes, body, inertia, mass, needed):
             miss[j] = a[k, j] - miss[j]
         for i in range(axes.size):
             for j in range(axes.size):
-                needed[k, axes[i]] += mass[axes[i], axes[j]] * miss[j]
+                required[k, axes[i]] += mass[axes[i], axes[j]] * miss[j]
 
 
-def missed_wrench(plant: Plant, ports: PortPath, needed: Array, z: Array, measured: Array) -> Array:
+def wrench_residual(plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array) -> Array:
     """Wrench (n, 6) at C in {c} that is needed beyond what the plant's laws and measured forces give [N, N m].
 
-    needed is that of `needed_wrench`, z (n, n_states) the hidden states, measured (n, n_actuators) the actuators' [N].
+    required is that of `required_wrench`, z (n, n_states) hidden states, measured (n, n_actuators) forces [N].
     """
     rows = plant.rows[plant.rows["input"] < 0]
     missed = np.zeros((len(z), 6))
-    rest = ports.s, ports.rate, ports.column, ports.turn, needed, z, np.ascontiguousarray(measured)
-    _missed(rows, plant.axes, plant.body, *rest, missed)
+    rest = ports.s, ports.rate, ports.column, ports.turn, required, z, np.ascontiguousarray(measured)
+    _residual(rows, plant.axes, plant.body, *rest, missed)
     return missed
 
 
 @compiled
-def _missed(rows, axes, body, s, rate, column, turn, needed, z, measured, missed):
+def _residual(rows, axes, body, s, rate, column, turn, required, z, measured, missed):
     force, port_force = np.zeros((rows.size, len(PORTS))), np.zeros(s.shape[1])
     frame, left = np.zeros((8, 3)), np.zeros((1, 6))
     for k in range(s.shape[0]):
@@ -84,7 +84,7 @@ def _missed(rows, axes, body, s, rate, column, turn, needed, z, measured, missed
             given = 0.0
             for i in range(port_force.size):
                 given += column[k, i, axes[j]] * port_force[i]
-            left[0, axes[j]] = needed[k, axes[j]] - given
+            left[0, axes[j]] = required[k, axes[j]] - given
         frame[:3] = turn[k]
         add_at_c(1.0, left, 0, body[0].rho_c, frame, missed[k])
 

@@ -6,7 +6,12 @@ from rich.table import Table
 
 from ..core.console import make_console
 from ..identification.calibration import Calibration
-from ..identification.calibration.calibration_summary import alike_words, contradiction_words, cut_strokes, range_words
+from ..identification.calibration.calibration_summary import (
+    contradiction_summary,
+    correlation_summary,
+    cut_strokes,
+    range_summary,
+)
 from ..identification.calibration.verdicts import beyond, far, stated_range, verdict_on
 from ..identification.residuals import RESIDUALS
 
@@ -19,7 +24,7 @@ def print_calibration(calibration: Calibration) -> None:
     console.print(_parameters(calibration))
     console.print(_sensors(calibration))
     console.print(_misfits(calibration))
-    for said in (*cut_strokes(calibration), alike_words(calibration), contradiction_words(calibration)):
+    for said in (*cut_strokes(calibration), correlation_summary(calibration), contradiction_summary(calibration)):
         if said:
             console.print(escape(said))
     rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
@@ -32,21 +37,21 @@ def print_calibration(calibration: Calibration) -> None:
 
 def _parameters(calibration: Calibration) -> Table:
     table = _table("Parameters", "name", "nominal", "estimate", "unit", "90 % interval", "sd/prior", "verdict")
-    for i, knob in enumerate(calibration.knobs):
+    for i, parameter in enumerate(calibration.parameters):
         low, high = calibration.interval(i)
-        estimate = knob.at(float(calibration.estimate[i]))
+        estimate = parameter.at(float(calibration.estimate[i]))
         interval = f"{low:.5g} to {high:.5g}" if calibration.converged else "none"
-        numbers = f"{knob.value:.5g}", f"{estimate:.5g}", knob.unit, interval
-        table.add_row(escape(knob.name), *numbers, _share(calibration, i), verdict_on(calibration, i))
+        numbers = f"{parameter.value:.5g}", f"{estimate:.5g}", parameter.unit, interval
+        table.add_row(escape(parameter.name), *numbers, _share(calibration, i), verdict_on(calibration, i))
     return table
 
 
 def _sensors(calibration: Calibration) -> Table:
-    first, distance = len(calibration.knobs), far(calibration)
+    first, distance = len(calibration.parameters), far(calibration)
     order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
     outside, allowed = beyond(calibration), stated_range(calibration)
     found = [i for i in order if outside[i]]
-    title = f"Errors of the sensors: {len(found)} of {len(order)} found, {range_words(calibration)}"
+    title = f"Errors of the sensors: {len(found)} of {len(order)} found, {range_summary(calibration)}"
     table = _table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
     for i in found:
         unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / allowed[i]

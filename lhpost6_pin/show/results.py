@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.names import AXES
-from ..data.layout_faults import Finding
+from ..data.layout_faults import RecordFinding
 from ..identification.calibration import Calibration
 from ..identification.calibration.verdicts import verdict_on
-from ..identification.decompose import Agreement, Decomposed
+from ..identification.decompose import Decomposed, WrenchAgreement
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..simulation.simulate import Run
@@ -78,7 +78,7 @@ def motion_entries(name: str | None) -> Entries:
     return {**found._asdict(), "options": [dict(zip(words, o, strict=True)) for o in motion_options(found.name)]}
 
 
-def finding_entries(found: Mapping[str, Sequence[Finding]]) -> Entries:
+def finding_entries(found: Mapping[str, Sequence[RecordFinding]]) -> Entries:
     """What is in records and wrong with them, by file."""
     every = [f for findings in found.values() for f in findings]
     return {
@@ -161,7 +161,7 @@ def sine_entries(found: SineTest) -> Entries:
     return {**asked, "alone": result(found.before), "with_cancellers": result(found.after)}
 
 
-def agreement_entries(found: Decomposed, agreement: Agreement) -> Entries:
+def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
     """Modelled against measured forces, and the residual with what is to be expected of it, by axis."""
     matches = {name: getattr(agreement, name) for name in ("actuators", "struts", "dissipative")}
 
@@ -189,12 +189,12 @@ def agreement_entries(found: Decomposed, agreement: Agreement) -> Entries:
 
 def calibration_entries(found: Calibration) -> Entries:
     """Parameters with intervals and verdicts, sensor errors, misfits of every test."""
-    parameters, first = {}, len(found.knobs)
-    for i, knob in enumerate(found.knobs):
-        parameters[knob.name] = {
-            "nominal": knob.value,
-            "value": knob.at(float(found.estimate[i])),
-            "unit": knob.unit,
+    parameters, first = {}, len(found.parameters)
+    for i, parameter in enumerate(found.parameters):
+        parameters[parameter.name] = {
+            "nominal": parameter.value,
+            "value": parameter.at(float(found.estimate[i])),
+            "unit": parameter.unit,
             "ci90": found.interval(i),
             "sd_over_prior": found.sd[i] / found.prior[i],
             "verdict": verdict_on(found, i),

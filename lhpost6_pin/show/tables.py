@@ -14,8 +14,8 @@ from ..machine.machine import Machine
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..data.consistency import SensorFinding
-    from ..data.layout_faults import Finding
+    from ..data.consistency import ConsistencyFinding
+    from ..data.layout_faults import RecordFinding
     from ..effects.effect import Effect
     from ..mechanics.plant import Plant
     from ..simulation.simulate import Run
@@ -172,7 +172,7 @@ def print_motions(name: str | None = None) -> None:
         console.print(found.request or f"not installed: {found.remedy}", markup=False, soft_wrap=True)
 
 
-def print_findings(file: str, findings: "Sequence[Finding]") -> None:
+def print_findings(file: str, findings: "Sequence[RecordFinding]") -> None:
     """Print what is in a record and what is wrong with it."""
     table = Table("", "channel", "sample", "finding", "what to do", title=escape(file))
     colour = {"error": "[bold red]error[/]", "warning": "[yellow]warning[/]", "info": "info"}
@@ -185,7 +185,7 @@ def print_findings(file: str, findings: "Sequence[Finding]") -> None:
     console.print(f"{counts['error']} errors, {counts['warning']} warnings")
 
 
-def print_sensor_findings(findings: "Sequence[SensorFinding]") -> None:
+def print_sensor_findings(findings: "Sequence[ConsistencyFinding]") -> None:
     """Print comparisons between sensors that stand out, and how many there were."""
     suspicious = [f for f in findings if f.verdict == "suspicious"]
     untested = sum(f.verdict == "untested" for f in findings)

@@ -8,7 +8,7 @@ from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import list_candidates
 from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
-from lhpost6_pin.identification.calibration.problem import Base
+from lhpost6_pin.identification.calibration.problem import OperatingPoint
 
 __all__ = ["baselines"]
 
@@ -23,7 +23,7 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
     """
     ready = prepare_problem(machine, records, sensors, calibration_numbers(), seed=seed, jobs=1)
     problem = ready.problem
-    base = Base(problem, np.zeros(len(problem.prior)))
+    base = OperatingPoint(problem, np.zeros(len(problem.prior)))
     rest = np.concatenate([r.ravel() for r in problem.rest(base)])
     best: dict[str, tuple[float, np.ndarray]] = {}
     for group in list_candidates(base.plant.machine):

@@ -184,7 +184,7 @@ def _family(family: Family, machine: Machine) -> str:
         facts.append(("in a search", "refitted always, never named: another form of the report's laws"))
     if family.search == "unnamed":
         facts.append(("in a search", "never a candidate: what a search writes for what it has no name for"))
-    if family.mimicked:
+    if family.confusable:
         facts.append(("in a search", "asked for more gain: another form of the report's own laws may pass for it"))
     parts.append(table(("", ""), facts))
     rows = [

@@ -1,16 +1,16 @@
 """Calibration: the parameters of a machine, and the errors of its sensors, from a campaign of tests."""
 
 from .fit import calibrate
-from .free_parameters import Knob, drawn_coordinates, machine_knobs, with_knobs
+from .free_parameters import FreeParameter, drawn_coordinates, machine_parameters, with_parameters
 from .result import Calibration, Subset, calibration_numbers
 
 __all__ = [
     "Calibration",
-    "Knob",
+    "FreeParameter",
     "Subset",
     "calibrate",
     "calibration_numbers",
     "drawn_coordinates",
-    "machine_knobs",
-    "with_knobs",
+    "machine_parameters",
+    "with_parameters",
 ]

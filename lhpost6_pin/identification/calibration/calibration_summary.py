@@ -2,26 +2,26 @@
 
 import numpy as np
 
-from .free_parameters import knob_changes
+from .free_parameters import parameter_changes
 from .result import Calibration
 from .verdicts import contradictions, out_of_range
 
-__all__ = ["alike_words", "chance", "contradiction_words", "cut_strokes", "range_words"]
+__all__ = ["correlation_summary", "chance", "contradiction_summary", "cut_strokes", "range_summary"]
 
 
 def cut_strokes(calibration: Calibration) -> list[str]:
     """A sentence on every stroke that had to give way to a chamber found shorter."""
-    machine, count = calibration.machine, len(calibration.knobs)
-    turned = {path for knob in calibration.knobs for path, _ in knob.paths}
+    machine, count = calibration.machine, len(calibration.parameters)
+    turned = {path for parameter in calibration.parameters for path, _ in parameter.paths}
     said = []
-    for path, value in knob_changes(machine, calibration.knobs, calibration.estimate[:count]).items():
+    for path, value in parameter_changes(machine, calibration.parameters, calibration.estimate[:count]).items():
         if path not in turned:
             stated = machine.parameters.number(path)
             said.append(f"{path}, stated as {stated:g} m, is cut to {value:.4g} m: a chamber was found to be shorter.")
     return said
 
 
-def range_words(calibration: Calibration) -> str:
+def range_summary(calibration: Calibration) -> str:
     """Whether sensors are off by more than their file allows, in words that follow their number."""
     wrong = out_of_range(calibration)
     if not wrong:
@@ -29,12 +29,12 @@ def range_words(calibration: Calibration) -> str:
     return f"beyond their stated ranges: {', '.join(calibration.names[i] for i in wrong)}"
 
 
-def alike_words(calibration: Calibration) -> str:
+def correlation_summary(calibration: Calibration) -> str:
     """How many pairs cannot be told apart, and whether parameters are among them."""
-    knobs, pairs = {knob.name for knob in calibration.knobs}, calibration.alike()
+    parameters, pairs = {parameter.name for parameter in calibration.parameters}, calibration.alike()
     if not pairs:
         return "All unknowns can be told apart."
-    named = sum(a in knobs or b in knobs for a, b, _ in pairs)
+    named = sum(a in parameters or b in parameters for a, b, _ in pairs)
     rest = len(pairs) - named
     said = "Parameters can be told apart from each other and from errors of sensors"
     if named:
@@ -44,7 +44,7 @@ def alike_words(calibration: Calibration) -> str:
     return f"{said}."
 
 
-def contradiction_words(calibration: Calibration) -> str:
+def contradiction_summary(calibration: Calibration) -> str:
     """How many estimates contradict all together, beside how many would by chance; empty where nothing is compared."""
     parts = {s.name: int(np.isfinite(s.sd).sum()) for s in calibration.subsets if s.part}
     if not parts:

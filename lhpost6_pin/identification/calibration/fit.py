@@ -1,4 +1,4 @@
-"""Weighted least squares of a machine's knobs and its sensors' errors on the residuals of a campaign.
+"""Weighted least squares of a machine's parameters and its sensors' errors on the residuals of a campaign.
 
     minimise  2 sum |W r(x)|^2 + sum (x / prior)^2
 
@@ -24,12 +24,12 @@ from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ..residuals import RESIDUALS
-from .normal_equations import Bias, Normal, bounded_step, positive
+from .normal_equations import NoiseBias, NormalEquations, bounded_step, positive
 from .prepare import prepare_problem
 from .problem import Problem
 from .result import Calibration, Subset, calibration_numbers
 from .simulated_residuals import by_simulation
-from .whitened_residuals import mean_squares, surprise
+from .whitened_residuals import mean_squares, negative_log_likelihood
 
 __all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
 
@@ -85,7 +85,7 @@ def calibrate(
         machine=problem.machine,
         campaign=campaign,
         tests=tuple(str(r.attrs.get("test", i)) for i, r in enumerate(records)),
-        knobs=problem.knobs,
+        parameters=problem.parameters,
         unknowns=problem.unknowns,
         prior=problem.prior,
         estimate=x,
@@ -93,7 +93,7 @@ def calibrate(
         alone=np.hypot(normal.alone(problem.prior), floor),
         subsets=(*_subsets(problem, normal, found.at, floor, told_below), *([] if simulated is None else [simulated])),
         misfit_before=found.misfit_before,
-        misfit_after=misfit(problem, found.rest),
+        misfit_after=misfit(problem, found.residual),
         rounds=found.rounds,
         converged=found.converged,
         numbers=numbers,
@@ -105,8 +105,8 @@ class Solution(NamedTuple):
 
     x: Array  # (p,) the unknowns
     at: Array  # (p,) where the normal equations are from
-    normal: Normal
-    rest: list[Complex]  # what is left at x: whitened bins (m, c) of every test
+    normal: NormalEquations
+    residual: list[Complex]  # what is left at x: whitened bins (m, c) of every test
     misfit_before: Array  # (n_tests, n_kinds), at the start
     rounds: int
     converged: bool
@@ -118,9 +118,9 @@ def solve(
     numbers: Parameters,
     start: Array,
     progress: Progress,
-    known: Normal | None = None,
+    known: NormalEquations | None = None,
     *,
-    first: Normal | None = None,
+    first: NormalEquations | None = None,
     frugal: bool = False,
     settled: bool = False,
     near: Mask | bool = False,
@@ -138,12 +138,12 @@ def solve(
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
-    bent = np.array([*(k.bends for k in problem.knobs), *(u.kind == "delay" for u in problem.unknowns)])
+    bent = np.array([*(k.bends for k in problem.parameters), *(u.kind == "delay" for u in problem.unknowns)])
     again = bent if frugal and not settled else fresh | near
     gain = np.inf  # of the last step, of log-likelihood and log-prior
-    bias: Bias | None = None
-    normal: Normal | None = None
-    held: Normal | None = None  # that of `at`, from where the last step went
+    bias: NoiseBias | None = None
+    normal: NormalEquations | None = None
+    held: NormalEquations | None = None  # that of `at`, from where the last step went
     least = np.inf
     converged = False
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
@@ -151,21 +151,21 @@ def solve(
         part = done - 1 if done == 1 else done - 1 + len(replicas)
         share = between(progress, shares[part], shares[part + 1])
         if normal is None:
-            normal = first or Normal(problem, x, share, known, None if settled else fresh | again)
-            before = misfit(problem, normal.rest)
+            normal = first or NormalEquations(problem, x, share, known, None if settled else fresh | again)
+            before = misfit(problem, normal.residual)
         else:
             renewed = not frugal or (
                 (settled or known is None)
                 and gain > numbers.number("fit.renew")
                 and done <= int(numbers.number("fit.renewals"))
             )
-            normal = Normal(problem, x, share, normal, again if renewed else np.zeros_like(again))
+            normal = NormalEquations(problem, x, share, normal, again if renewed else np.zeros_like(again))
         if done == (1 if frugal else 2):  # near enough to the end, and the same from there on
             parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
-            bias = Bias(normal, replicas, x, parts, known)
+            bias = NoiseBias(normal, replicas, x, parts, known)
         if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
-        value = objective(problem, normal.rest, x)
+        value = objective(problem, normal.residual, x)
         if held is not None and value > least + OVERSHOT:
             step, normal = 0.25 * step, held
             x = at + step
@@ -184,14 +184,16 @@ def solve(
     assert held is not None
     rest = problem.whitened(x)
     if objective(problem, rest, x) > least + OVERSHOT:
-        x, rest = at, held.rest
+        x, rest = at, held.residual
     return Solution(x, at, held, rest, before, done, converged)
 
 
 def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:
     """Negative log-likelihood and log-prior."""
     pairs = zip(rest, problem.frequency, strict=True)
-    likely = sum(float(surprise(*mean_squares(problem.whitener, np.abs(r) ** 2, f)).sum()) for r, f in pairs)
+    likely = sum(
+        float(negative_log_likelihood(*mean_squares(problem.whitener, np.abs(r) ** 2, f)).sum()) for r, f in pairs
+    )
     return likely + 0.5 * float(np.sum((x / problem.prior) ** 2))
 
 
@@ -205,7 +207,9 @@ def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
     return out
 
 
-def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array, told_below: float) -> tuple[Subset, ...]:
+def _subsets(
+    problem: Problem, normal: NormalEquations, x: Array, floor: Array, told_below: float
+) -> tuple[Subset, ...]:
     """What wrench along each axis, flows of each kind of actuator and gas law say by themselves, about normal's x (p,).
 
     Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
@@ -223,7 +227,7 @@ def _subsets(problem: Problem, normal: Normal, x: Array, floor: Array, told_belo
     for name, columns in groups:
         if not columns.any():
             continue
-        h, g = normal.of(range(len(normal.rest)), columns)
+        h, g = normal.of(range(len(normal.residual)), columns)
         h = positive(h, problem.prior)
         covariance = np.linalg.inv(h + np.diag(problem.prior**-2.0))
         sd = np.sqrt(np.diag(covariance))

@@ -1,8 +1,8 @@
-"""Knobs: the coordinates in which a machine is calibrated, each with its prior.
+"""Free parameters: the coordinates in which a machine is calibrated, each with its prior.
 
-A knob turns one number of the machine file, or several together where only their sum means anything (the heights of a
-kind's platen points). It is worth a coordinate: the share by which what is positive grows, a shift for the rest; zero
-is the machine as given, and its prior is normal with the stated standard deviation.
+A free parameter sets one number of the machine file, or several together where only their sum is identifiable (the
+heights of a kind's platen points). Its coordinate is the relative change of a positive number, a shift of any other:
+zero is the machine as given. The prior is normal with the stated standard deviation.
 """
 
 import math
@@ -17,7 +17,14 @@ from ...machine.machine import Machine
 from ...machine.parameters import Quantity
 from ..residuals import RESIDUALS
 
-__all__ = ["Knob", "drawn_coordinates", "machine_knobs", "plan_knobs", "scatter_knobs", "with_knobs"]
+__all__ = [
+    "FreeParameter",
+    "drawn_coordinates",
+    "machine_parameters",
+    "plan_parameters",
+    "scatter_parameters",
+    "with_parameters",
+]
 
 Array = NDArray[np.float64]
 
@@ -44,7 +51,7 @@ _SCATTER: Mapping[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True)
-class Knob:
+class FreeParameter:
     """One coordinate of the machine; `sd` is its prior standard deviation."""
 
     name: str  # such as "horizontal.flow", "platen.mass[x]", "horizontal.platen_height"
@@ -72,8 +79,8 @@ class Knob:
             return self.value + coordinate
         return self.value * (1.0 + coordinate if self.form == "factor" else math.exp(coordinate))
 
-    def within(self, low: float, high: float) -> "Knob":
-        """The same knob with its values between low and high, where its coordinate can say so."""
+    def within(self, low: float, high: float) -> "FreeParameter":
+        """The same parameter with its values between low and high, where its coordinate can say so."""
         bounds = (-math.inf if self.form == "log" and v <= 0.0 else self.coordinate(v) for v in (low, high))
         lowest, highest = bounds
         return replace(self, lowest=lowest, highest=highest)
@@ -85,8 +92,8 @@ class Knob:
         return value / self.value - 1.0 if self.form == "factor" else math.log(value / self.value)
 
 
-def machine_knobs(machine: Machine, travel: Mapping[str, float] | None = None) -> tuple[Knob, ...]:
-    """Knobs of all numbers of a machine that state an uncertainty: platen, oil, kinds, and heights of each kind.
+def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = None) -> tuple[FreeParameter, ...]:
+    """Parameters of all numbers of a machine that state an uncertainty: platen, oil, kinds, and heights of each kind.
 
     Numbers that a single component overrides stay with the component; other geometry is left alone. A chamber is no
     shorter than the `travel` [m] of its kind, how far it was seen to move either way; without that, than its stroke.
@@ -94,37 +101,39 @@ def machine_knobs(machine: Machine, travel: Mapping[str, float] | None = None) -
     parameters = machine.parameters
     kinds = list(dict.fromkeys(c.kind for c in machine.components))
     sections = ("platen", "hydraulics", *kinds)
-    found: list[Knob] = []
+    found: list[FreeParameter] = []
     for path, quantity in parameters.items():
         section, _, name = path.partition(".")
         if section not in sections or quantity.sd is None or name == "bearing_plane":
             continue
-        found += _knobs_of(path, name, quantity)
+        found += _parameters_of(path, name, quantity)
     for kind in kinds:
         found += _heights(machine, kind)
     free = "xyz" if machine.motion == "free" else machine.motion
     return tuple(_with_room(k, machine, travel or {}) for k in found if _felt(k, free))
 
 
-def _with_room(knob: Knob, machine: Machine, travel: Mapping[str, float]) -> Knob:
+def _with_room(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:
     """A chamber must hold oil where its piston has been."""
-    kind, _, name = knob.name.partition(".")
+    kind, _, name = parameter.name.partition(".")
     if not name.startswith("chamber_"):
-        return knob
+        return parameter
     stroke = max(a.stroke for a in machine.actuators if a.kind == kind)
-    return replace(knob, lowest=max(knob.lowest, min(0.0, knob.coordinate(_ROOM * travel.get(kind, stroke)))))
+    return replace(
+        parameter, lowest=max(parameter.lowest, min(0.0, parameter.coordinate(_ROOM * travel.get(kind, stroke))))
+    )
 
 
-def _felt(knob: Knob, free: str) -> bool:
+def _felt(parameter: FreeParameter, free: str) -> bool:
     """False for a mass or inertia about an axis in which a guided platen cannot move, and for its geometry."""
     if len(free) == 3:
         return True
-    if knob.name.startswith("platen."):
-        return knob.name == f"platen.mass[{free}]"
-    return not knob.name.endswith("_height")
+    if parameter.name.startswith("platen."):
+        return parameter.name == f"platen.mass[{free}]"
+    return not parameter.name.endswith("_height")
 
 
-def _knobs_of(path: str, name: str, quantity: Quantity) -> list[Knob]:
+def _parameters_of(path: str, name: str, quantity: Quantity) -> list[FreeParameter]:
     shows_in: tuple[str, ...] = ("flow",) if name in _OIL else ("wrench", "gas") if name in _GAS else ("wrench",)
     if name not in _OIL + _GAS + _MECHANICAL:
         shows_in = RESIDUALS
@@ -139,13 +148,15 @@ def _knobs_of(path: str, name: str, quantity: Quantity) -> list[Knob]:
         label = f"{path}[{'xyz'[i]}]" if vector else path
         at = ((path, i if vector else -1),)
         if value > 0.0 and name != "centre_of_gravity":
-            found.append(Knob(label, at, quantity.unit, value, sd / value, "factor", shows_in, lowest=_LEAST - 1.0))
+            found.append(
+                FreeParameter(label, at, quantity.unit, value, sd / value, "factor", shows_in, lowest=_LEAST - 1.0)
+            )
         else:
-            found.append(Knob(label, at, quantity.unit, value, sd, "shift", shows_in))
+            found.append(FreeParameter(label, at, quantity.unit, value, sd, "shift", shows_in))
     return found
 
 
-def _heights(machine: Machine, kind: str) -> list[Knob]:
+def _heights(machine: Machine, kind: str) -> list[FreeParameter]:
     """Height of the platen points and of the base points of a kind, its components moved together."""
     members = [c for c in machine.components if c.kind == kind]
     bearing = getattr(members[0], "mount", "swivel") == "bearing"
@@ -161,7 +172,7 @@ def _heights(machine: Machine, kind: str) -> list[Knob]:
         if sd is None:
             continue
         name = f"{kind}.{end.split('_')[0]}_height"
-        found.append(Knob(name, tuple(paths), "m", float(np.mean(heights)), sd, "shift", _GEOMETRY))
+        found.append(FreeParameter(name, tuple(paths), "m", float(np.mean(heights)), sd, "shift", _GEOMETRY))
     return found
 
 
@@ -172,8 +183,8 @@ def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None
     return float(np.mean(known)) if len(known) == len(paths) else None
 
 
-def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
-    """Knobs of where, in plan, the points of each kind's components are: mirror images of each other, moved alike.
+def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:
+    """Parameters of where, in plan, the points of each kind's components are: mirror images of each other, moved alike.
 
     A bearing and its foot move together.
     """
@@ -192,12 +203,12 @@ def plan_knobs(machine: Machine) -> tuple[Knob, ...]:
                     continue
                 value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
                 name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
-                found.append(Knob(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=True))
+                found.append(FreeParameter(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=True))
     return tuple(found)
 
 
-def scatter_knobs(machine: Machine, share: float, reach: float) -> tuple[Knob, ...]:
-    """Knobs of twins that are not quite alike: factors, about one, of numbers that components of a kind share.
+def scatter_parameters(machine: Machine, share: float, reach: float) -> tuple[FreeParameter, ...]:
+    """Parameters of twins that are not quite alike: factors, about one, of numbers that components of a kind share.
 
     share is their standard deviation, reach how many of it they may go. Components with numbers of their own are left
     out, and kinds of which there is one.
@@ -212,55 +223,57 @@ def scatter_knobs(machine: Machine, share: float, reach: float) -> tuple[Knob, .
                 continue
             most, place = share * reach, i if shows_in == ("flow",) else -1
             found.append(
-                Knob(own, ((own, -1),), "1", 1.0, share, "factor", shows_in, -most, most, of=kind, place=place)
+                FreeParameter(own, ((own, -1),), "1", 1.0, share, "factor", shows_in, -most, most, of=kind, place=place)
             )
     return tuple(found)
 
 
-def drawn_coordinates(knobs: Sequence[Knob], rng: np.random.Generator) -> Array:
-    """Coordinates (k,) drawn from the priors: normal within three deviations, no knob below its lowest."""
-    sd, lowest = np.array([k.sd for k in knobs]), np.array([k.lowest for k in knobs])
-    drawn = np.full(len(knobs), np.nan)
+def drawn_coordinates(parameters: Sequence[FreeParameter], rng: np.random.Generator) -> Array:
+    """Coordinates (k,) drawn from the priors: normal within three deviations, no parameter below its lowest."""
+    sd, lowest = np.array([k.sd for k in parameters]), np.array([k.lowest for k in parameters])
+    drawn = np.full(len(parameters), np.nan)
     while not np.all(drawn > lowest):
-        drawn = np.where(drawn > lowest, drawn, sd * np.clip(rng.standard_normal(len(knobs)), -3.0, 3.0))
+        drawn = np.where(drawn > lowest, drawn, sd * np.clip(rng.standard_normal(len(parameters)), -3.0, 3.0))
     return drawn
 
 
-def with_knobs(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> Machine:
-    """Copy of a machine with its knobs turned to coordinates (k,); raises ParameterError for what cannot be."""
-    return machine.with_params(knob_changes(machine, knobs, coordinates))
+def with_parameters(machine: Machine, parameters: Sequence[FreeParameter], coordinates: Array) -> Machine:
+    """Copy of a machine with its parameters turned to coordinates (k,); raises ParameterError for what cannot be."""
+    return machine.with_params(parameter_changes(machine, parameters, coordinates))
 
 
-def knob_changes(machine: Machine, knobs: Sequence[Knob], coordinates: Array) -> dict[str, float | list[float]]:
+def parameter_changes(
+    machine: Machine, parameters: Sequence[FreeParameter], coordinates: Array
+) -> dict[str, float | list[float]]:
     """New values by path for coordinates (k,), as `Machine.with_params` takes them."""
     values: dict[str, float | list[float]] = {}
-    turned = list(zip(knobs, coordinates, strict=True))
-    for knob, x in turned:
-        for path, i in knob.paths if not knob.of else ():
+    turned = list(zip(parameters, coordinates, strict=True))
+    for parameter, x in turned:
+        for path, i in parameter.paths if not parameter.of else ():
             if i < 0:
-                values[path] = knob.at(float(x))
+                values[path] = parameter.at(float(x))
                 continue
             now = machine.parameters[path].value
             vector = values.setdefault(path, list(now) if isinstance(now, tuple) else [now])
             assert isinstance(vector, list)
             # points of a kind may stand at different heights: each is shifted
-            side = math.copysign(1.0, vector[i]) * bool(vector[i]) if knob.mirrored else 1.0
-            vector[i] = knob.at(float(x)) if len(knob.paths) == 1 else vector[i] + side * float(x)
-    for knob, x in turned:
-        if knob.of:
-            shared = values.get(knob.of, machine.parameters[knob.of].value)
+            side = math.copysign(1.0, vector[i]) * bool(vector[i]) if parameter.mirrored else 1.0
+            vector[i] = parameter.at(float(x)) if len(parameter.paths) == 1 else vector[i] + side * float(x)
+    for parameter, x in turned:
+        if parameter.of:
+            shared = values.get(parameter.of, machine.parameters[parameter.of].value)
             assert isinstance(shared, float)
-            values[knob.paths[0][0]] = shared * knob.at(float(x))
+            values[parameter.paths[0][0]] = shared * parameter.at(float(x))
     return values | _cut_strokes(machine, values)
 
 
 def _cut_strokes(machine: Machine, values: Mapping[str, float | list[float]]) -> dict[str, float]:
     """Strokes that a chamber among new values is too short for, cut so that it holds oil; all others stay as stated.
 
-    Residuals tell how long a chamber is; nothing tells a stroke, and the shipped one is assumed. Chambers kept longer
-    than it would pass their error on to the oil: 0.70 m in truth beside 0.75 m stated made it 7 % stiffer, with little
-    more than noise left. So the bound of a chamber is where its piston has been (`machine_knobs`), and a stroke that no
-    machine could have with the chamber found is what gives way.
+    The length of a chamber is identifiable, a stroke is not, and the shipped stroke is assumed. A chamber bounded by it
+    would bias the oil: 0.70 m in truth beside 0.75 m stated made it 7 % stiffer, with little more than noise in the
+    residual. A chamber is thus bounded by its piston's measured travel (`machine_parameters`), and a stroke that is
+    inconsistent with the identified chamber is reduced.
     """
     cut: dict[str, float] = {}
     for path, length in values.items():

@@ -9,58 +9,63 @@ from numpy.typing import NDArray
 
 from ...core.progress import Progress
 from ...machine.parameters import Parameters
-from .problem import Base, Problem, Slopes
+from .problem import OperatingPoint, Problem, Slopes
 from .whitened_residuals import excess, real_bins, real_rows
 
-__all__ = ["Bias", "Normal", "bounded_step", "bounds_of", "positive", "squares"]
+__all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive", "squares"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
 
-class Normal:
+class NormalEquations:
     """Normal equations at x, H dx = -g: by test and column of the residuals, so that they can be summed as wanted."""
 
     def __init__(
-        self, problem: Problem, x: Array, report: Progress, known: "Normal | None" = None, again: Mask | None = None
+        self,
+        problem: Problem,
+        x: Array,
+        report: Progress,
+        known: "NormalEquations | None" = None,
+        again: Mask | None = None,
     ) -> None:
         """Evaluate residuals and their derivatives at x (p,).
 
         Derivatives by unknowns of `known` are taken from there, but for those to evaluate `again` (p,).
         """
         self.problem = problem
-        base = Base(problem, x)
-        self.rest = problem.rest(base)
+        base = OperatingPoint(problem, x)
+        self.residual = problem.residual(base)
         shared, fresh = _shared(problem, known, again)
         before = [] if known is None else known.slope
         found = problem.slopes(base, fresh, report)
         self.slope: list[list[Complex]] = _together(found, before, shared)  # (m, c) by test and unknown
-        self.power = [np.ones(r.shape) for r in self.rest]
-        self.bias: Bias | None = None
+        self.power = [np.ones(r.shape) for r in self.residual]
+        self.bias: NoiseBias | None = None
 
-    def only(self, places: Sequence[int]) -> "Normal":
+    def only(self, places: Sequence[int]) -> "NormalEquations":
         """The same of some of the tests, not corrected."""
         other = copy(self)
         other.problem = self.problem.only(places)
-        for name in ("rest", "slope", "power"):
+        for name in ("residual", "slope", "power"):
             setattr(other, name, [getattr(self, name)[i] for i in places])
         return other
 
-    def scaled(self, problem: Problem, scale: Array) -> "Normal":
+    def scaled(self, problem: Problem, scale: Array) -> "NormalEquations":
         """The same of a problem whose whitened residuals are (t, b, c) times larger, corrected as this."""
         times = [s[problem.whitener.band(f)] for s, f in zip(scale, problem.frequency, strict=True)]
         other = copy(self)
         other.problem = problem
-        other.rest = [r * s for r, s in zip(self.rest, times, strict=True)]
+        other.residual = [r * s for r, s in zip(self.residual, times, strict=True)]
         other.slope = [[j * s for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
         other.__dict__.pop("whole", None)
         return other if self.bias is None else other.less(self.bias.scaled(times))
 
-    def less(self, bias: "Bias") -> "Normal":
+    def less(self, bias: "NoiseBias") -> "NormalEquations":
         """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
         self.bias = bias
-        self.power = excess(self.problem.whitener, self.rest, self.problem.frequency)
+        self.power = excess(self.problem.whitener, self.residual, self.problem.frequency)
         return self
 
     def of(self, tests: Sequence[int], columns: slice | Mask = slice(None)) -> tuple[Array, Array]:
@@ -69,7 +74,7 @@ class Normal:
         matrix, right = np.zeros((count, count)), np.zeros(count)
         for t in tests:
             power = self.power[t][:, columns]
-            more, side = squares([j[:, columns] for j in self.slope[t]], self.rest[t][:, columns], power)
+            more, side = squares([j[:, columns] for j in self.slope[t]], self.residual[t][:, columns], power)
             matrix, right = matrix + more, right + side
             if self.bias is not None:
                 more, side = self.bias.of(t, columns, power)
@@ -79,7 +84,7 @@ class Normal:
     @cached_property
     def whole(self) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of all tests."""
-        return self.of(range(len(self.rest)))
+        return self.of(range(len(self.residual)))
 
     def posterior(self, prior: Array) -> Array:
         """Matrix (p, p) of all tests with the priors (p,) in it."""
@@ -88,42 +93,42 @@ class Normal:
     def alone(self, prior: Array) -> Array:
         """Predicted deviations (n_tests, p) from each test by itself."""
         found = []
-        for t in range(len(self.rest)):
+        for t in range(len(self.residual)):
             matrix = positive(self.of([t])[0], prior) + np.diag(prior**-2.0)
             found.append(np.sqrt(np.diag(np.linalg.inv(matrix))))
         return np.array(found)
 
 
-class Bias:
+class NoiseBias:
     """What noise adds to the normal equations: the mean product of its changes in slopes and residuals."""
 
     def __init__(
         self,
-        normal: Normal,
+        normal: NormalEquations,
         replicas: Sequence[Problem],
         x: Array,
         reports: Sequence[Progress],
-        known: Normal | None = None,
+        known: NormalEquations | None = None,
     ) -> None:
         """Evaluate the same at x with more noise in the tests, as often as there are replicas.
 
         Changes of derivatives by unknowns of `known`, which is corrected, are taken from there.
         """
         shared, fresh = _shared(normal.problem, known)
-        self.rest: list[list[Complex]] = []  # by replica and test
+        self.residual: list[list[Complex]] = []  # by replica and test
         self.slope: list[list[list[Complex]]] = []
         for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
-            base = Base(replica, x)
-            self.rest.append([r - r0 for r, r0 in zip(replica.rest(base), normal.rest, strict=True)])
+            base = OperatingPoint(replica, x)
+            self.residual.append([r - r0 for r, r0 in zip(replica.residual(base), normal.residual, strict=True)])
             noisy = zip(replica.slopes(base, fresh, report), normal.slope, strict=True)
             changes = [{k: j - clean[k] for k, j in slopes.items()} for slopes, clean in noisy]
             before = [] if known is None or known.bias is None else known.bias.slope[i]
             self.slope.append(_together(changes, before, shared))
 
-    def scaled(self, times: Sequence[Array]) -> "Bias":
+    def scaled(self, times: Sequence[Array]) -> "NoiseBias":
         """The same where whitened bins (m, c) of each test are so many times larger."""
         other = copy(self)
-        other.rest = [[r * s for r, s in zip(rest, times, strict=True)] for rest in self.rest]
+        other.residual = [[r * s for r, s in zip(rest, times, strict=True)] for rest in self.residual]
         other.slope = [
             [[j * s for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
         ]
@@ -131,13 +136,13 @@ class Bias:
 
     def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
-        pairs = zip(self.slope, self.rest, strict=True)
+        pairs = zip(self.slope, self.residual, strict=True)
         added = [squares([j[:, columns] for j in s[test]], r[test][:, columns], power) for s, r in pairs]
         matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
         return matrix, right
 
 
-def _shared(problem: Problem, known: Normal | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:
+def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:
     """Places in `known` by places in the problem, of unknowns to take from there; and which (p,) to evaluate.
 
     Those to evaluate again, if `again` says which; else those that `known` lacks.
@@ -174,12 +179,12 @@ def positive(matrix: Array, prior: Array) -> Array:
 
 def bounds_of(problem: Problem, numbers: Parameters) -> tuple[Array, Array]:
     """How far down and up every unknown may go (p,): within its own bounds, and the reach of its prior."""
-    known = np.arange(len(problem.prior)) < len(problem.knobs)
+    known = np.arange(len(problem.prior)) < len(problem.parameters)
     reach = np.where(known, numbers.number("fit.reach"), numbers.number("fit.sensor_reach")) * problem.prior
     return np.maximum(-reach, problem.lowest), np.minimum(reach, problem.highest)
 
 
-def bounded_step(normal: Normal, posterior: Array, x: Array, problem: Problem, numbers: Parameters) -> Array:
+def bounded_step(normal: NormalEquations, posterior: Array, x: Array, problem: Problem, numbers: Parameters) -> Array:
     """Gauss-Newton step (p,) from x (p,) within the trust region and the reach of every unknown.
 
     `posterior` (p, p) is `normal`'s matrix with the prior's share.
@@ -187,7 +192,7 @@ def bounded_step(normal: Normal, posterior: Array, x: Array, problem: Problem, n
     from scipy.optimize import lsq_linear
 
     prior = problem.prior
-    known = np.arange(len(prior)) < len(problem.knobs)
+    known = np.arange(len(prior)) < len(problem.parameters)
     trust = np.where(known, numbers.number("fit.trust"), numbers.number("fit.sensor_trust"))
     right = normal.whole[1]
     factor = np.linalg.cholesky(posterior * np.outer(prior, prior))

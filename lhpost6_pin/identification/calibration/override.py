@@ -6,7 +6,7 @@ from pathlib import Path
 from ...core.files import write_whole
 from ...machine.machine_toml import quantity_toml, section_of, sections_toml
 from ...machine.parameters import Quantity
-from .free_parameters import knob_changes
+from .free_parameters import parameter_changes
 from .result import Calibration
 
 __all__ = ["save_override"]
@@ -15,16 +15,16 @@ __all__ = ["save_override"]
 def save_override(calibration: Calibration, path: Path) -> Path:
     """Write the calibrated numbers as a TOML file for `--override`, whole or not at all.
 
-    Knobs that the campaign has told little of are written, too: they go together with those it has told much of; and
-    numbers that the machine had from an override before. A number's standard deviation is the predicted one; of a fit
-    that did not converge none is written, which leaves the machine file's.
+    Poorly identified parameters are written as well, since they are correlated with the others; so are numbers
+    from an earlier override. A number's standard deviation is the predicted one; a fit that did not converge
+    writes none, and the machine file's remains in force.
     """
-    machine, count = calibration.machine, len(calibration.knobs)
-    values = knob_changes(machine, calibration.knobs, calibration.estimate[:count])
+    machine, count = calibration.machine, len(calibration.parameters)
+    values = parameter_changes(machine, calibration.parameters, calibration.estimate[:count])
     deviations: dict[str, list[float]] = {}
-    for i, knob in enumerate(calibration.knobs):
-        sd = float(calibration.sd[i]) * (1.0 if knob.form == "shift" else knob.value)
-        for name, component in knob.paths:
+    for i, parameter in enumerate(calibration.parameters):
+        sd = float(calibration.sd[i]) * (1.0 if parameter.form == "shift" else parameter.value)
+        for name, component in parameter.paths:
             stated = machine.parameters[name].sd
             known = stated if isinstance(stated, tuple) else (stated or 0.0,)
             deviations.setdefault(name, list(known))[max(component, 0)] = sd

@@ -20,49 +20,49 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
-from ..residuals import Measured, make_measured
-from .free_parameters import Knob
-from .problem import KINDS, Comparison, Problem
+from ..residuals import MeasuredTest, make_measured_test
+from .free_parameters import FreeParameter
+from .problem import KINDS, Problem, ResidualBands
 from .sensor_errors import CHANNELS
 from .whitened_residuals import spectrum_of
 
-__all__ = ["Prepared", "prepare_problem"]
+__all__ = ["PreparedProblem", "prepare_problem"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedProblem:
     """A problem, and the same tests with more noise."""
 
     problem: Problem
     replicas: tuple[Problem, ...]  # each with all tests once more
-    noisy: tuple[Measured, ...]  # the tests in order, as often as the whitener has draws
+    noisy: tuple[MeasuredTest, ...]  # the tests in order, as often as the whitener has draws
 
-    def only(self, places: Sequence[int]) -> "Prepared":
+    def only(self, places: Sequence[int]) -> "PreparedProblem":
         """The same with some of the tests."""
         count = len(self.problem.tests)
         noisy = tuple(t for i, t in enumerate(self.noisy) if i % count in places)
-        return Prepared(self.problem.only(places), tuple(r.only(places) for r in self.replicas), noisy)
+        return PreparedProblem(self.problem.only(places), tuple(r.only(places) for r in self.replicas), noisy)
 
-    def scaled(self, scale: Array) -> "Prepared":
+    def scaled(self, scale: Array) -> "PreparedProblem":
         """The same with whitened residuals (t, b, c) times larger."""
         return self._each(lambda problem: problem.scaled(scale))
 
-    def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Prepared":
-        """The same tests and noise with another machine, or other knobs."""
-        return self._each(lambda problem: problem.with_machine(machine, knobs))
+    def with_machine(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "PreparedProblem":
+        """The same tests and noise with another machine, or other parameters."""
+        return self._each(lambda problem: problem.with_machine(machine, parameters))
 
-    def with_free(self, name: str, share: float) -> "Prepared":
+    def with_free(self, name: str, share: float) -> "PreparedProblem":
         """The same with one more unknown free of its prior."""
         return self._each(lambda problem: problem.with_free(name, share))
 
-    def without_free(self, name: str) -> "Prepared":
+    def without_free(self, name: str) -> "PreparedProblem":
         """The same with an unknown's prior as stated again."""
         return self._each(lambda problem: problem.without_free(name))
 
-    def _each(self, change: Callable[[Problem], Problem]) -> "Prepared":
-        return Prepared(change(self.problem), tuple(map(change, self.replicas)), self.noisy)
+    def _each(self, change: Callable[[Problem], Problem]) -> "PreparedProblem":
+        return PreparedProblem(change(self.problem), tuple(map(change, self.replicas)), self.noisy)
 
 
 def prepare_problem(
@@ -76,13 +76,13 @@ def prepare_problem(
     preload: float = 0.0,
     seed: int = 0,
     jobs: int = -1,
-) -> Prepared:
+) -> PreparedProblem:
     """Make a campaign ready; `numbers` are those of `models/procedures/calibration.toml`. Raises what `calibrate` does.
 
     others are what the machine may as well be, for all that is known: by how much they differ is noise, and so is what
     friction may hold when a test begins, a share `preload` of it. Deterministic for a seed (of the simulated noise).
     """
-    comparison = Comparison(
+    comparison = ResidualBands(
         bands=numbers.vector("comparison.bands"),
         edge=numbers.number("comparison.edge"),
         step=numbers.number("fit.step"),
@@ -105,10 +105,10 @@ def prepare_problem(
         machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, others=others(machine), preload=preload
     )
     replicas = tuple(problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again))
-    return Prepared(problem, replicas, tuple(noisy))
+    return PreparedProblem(problem, replicas, tuple(noisy))
 
 
-def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Comparison) -> None:
+def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: ResidualBands) -> None:
     """Raise what `calibrate` says, naming the test."""
     if not records:
         raise RecordError("no record to calibrate by")
@@ -141,7 +141,7 @@ def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> N
             raise RecordError(f"{test}: {what}; give absolute pressures, or take the channel out of all tests")
 
 
-def _refuse_short(test: str, record: xr.Dataset, comparison: Comparison) -> None:
+def _refuse_short(test: str, record: xr.Dataset, comparison: ResidualBands) -> None:
     n, bands = record.sizes["time"], comparison.bands
     length = float(record["time"][-1] - record["time"][0])
     dt = length / (n - 1)
@@ -156,7 +156,7 @@ def _refuse_short(test: str, record: xr.Dataset, comparison: Comparison) -> None
 
 def _ready(
     plant: Plant, record: xr.Dataset, sensors: SensorSet, numbers: Parameters, *, shares: bool = True
-) -> Measured:
+) -> MeasuredTest:
     """A record with its motion fused, and each platen channel's share in it.
 
     Fusion is linear in its channels: a share is what doubling a channel adds. Lengths stay out: the geometry that turns
@@ -165,7 +165,7 @@ def _ready(
     record = _slower(record, numbers.number("comparison.rate"))
     channels = [n for n in ("platen_displacement", "platen_velocity", "platen_acceleration") if n in record]
     fused = fuse_motion(plant, record, sensors)
-    ready = make_measured(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
+    ready = make_measured_test(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
     share = {}
     for name in channels if shares else ():
         more = fuse_motion(plant, record.assign({name: 2.0 * record[name]}), sensors).motion

@@ -1,6 +1,6 @@
 """A campaign made ready to be fitted: residuals of all tests and their derivatives by every unknown, whitened.
 
-Unknowns are the machine's knobs and the sensors' errors, in this order: x (p,), zero where nothing is off.
+Unknowns are the machine's parameters and the sensors' errors, in this order: x (p,), zero where nothing is off.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,12 +17,12 @@ from ...effects.registry import BOUC_WEN_1D, BOUC_WEN_2D
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
-from ..residuals import RESIDUALS, Measured, Residuals, evaluate_residuals, follow, states_of
-from .free_parameters import Knob, machine_knobs, with_knobs
+from ..residuals import RESIDUALS, MeasuredTest, Residuals, evaluate_residuals, follow, states_of
+from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .sensor_errors import corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
 
-__all__ = ["KINDS", "Base", "Comparison", "Problem", "Slopes", "Term"]
+__all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,7 +33,7 @@ KINDS = ("wrench", "flow", "gas", "force")
 """Kinds of residuals that are compared unless others are asked for."""
 
 
-class Comparison(NamedTuple):
+class ResidualBands(NamedTuple):
     """How residuals are compared."""
 
     bands: tuple[float, ...]  # edges [Hz] of bands of frequency, each with its own noise
@@ -41,7 +41,7 @@ class Comparison(NamedTuple):
     step: float  # of an unknown, for its derivative, in prior standard deviations
 
 
-class Term(NamedTuple):
+class EvaluationGroup(NamedTuple):
     """What is evaluated at once: unknowns that act on different rows."""
 
     members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut whose rows it acts on; -1: all rows
@@ -69,10 +69,10 @@ class Problem:
     def __init__(
         self,
         machine: Machine,
-        tests: Sequence[Measured],
-        noisy: Sequence[Measured],
+        tests: Sequence[MeasuredTest],
+        noisy: Sequence[MeasuredTest],
         sensors: SensorSet,
-        comparison: Comparison,
+        comparison: ResidualBands,
         *,
         jobs: int = -1,
         kinds: tuple[str, ...] = KINDS,
@@ -91,7 +91,7 @@ class Problem:
         self.unknowns = tuple(u for u in unknowns if told.get(u.channel, kinds[0]) in kinds)
         self.free: dict[str, float] = {}  # share of the stated deviation that priors of unknowns have, but for one
         plant = make_plant(machine)
-        self._turn(machine, machine_knobs(machine, _travel(plant, tests)))
+        self._turn(machine, machine_parameters(machine, _travel(plant, tests)))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
@@ -110,38 +110,38 @@ class Problem:
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
-    def _turn(self, machine: Machine, knobs: tuple[Knob, ...]) -> None:
-        self.machine, self.knobs = machine, knobs
-        self.names = (*(k.name for k in knobs), *(u.name for u in self.unknowns))
-        self.stated = np.array([*(k.sd for k in knobs), *(u.sd for u in self.unknowns)])
+    def _turn(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> None:
+        self.machine, self.parameters = machine, parameters
+        self.names = (*(k.name for k in parameters), *(u.name for u in self.unknowns))
+        self.stated = np.array([*(k.sd for k in parameters), *(u.sd for u in self.unknowns)])
         self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
         share = self.comparison.step
-        self.step = np.array([*(k.step or share * k.sd for k in knobs), *(share * u.sd for u in self.unknowns)])
-        self.lowest = np.array([*(k.lowest for k in knobs), *(-np.inf for _ in self.unknowns)])
-        self.highest = np.array([*(k.highest for k in knobs), *(np.inf for _ in self.unknowns)])
+        self.step = np.array([*(k.step or share * k.sd for k in parameters), *(share * u.sd for u in self.unknowns)])
+        self.lowest = np.array([*(k.lowest for k in parameters), *(-np.inf for _ in self.unknowns)])
+        self.highest = np.array([*(k.highest for k in parameters), *(np.inf for _ in self.unknowns)])
         self.terms = self._terms()
 
-    def with_machine(self, machine: Machine, knobs: tuple[Knob, ...]) -> "Problem":
-        """The same tests and noise with another machine, or other knobs."""
+    def with_machine(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
+        """The same tests and noise with another machine, or other parameters."""
         other = copy(self)
-        other._turn(machine, knobs)
+        other._turn(machine, parameters)
         return other
 
     def with_free(self, name: str, share: float) -> "Problem":
         """The same with one more unknown free of its prior, whose deviation is `share` of the stated one now."""
         other = copy(self)
         other.free = {**self.free, name: share}
-        other._turn(self.machine, self.knobs)
+        other._turn(self.machine, self.parameters)
         return other
 
     def without_free(self, name: str) -> "Problem":
         """The same with an unknown's prior as stated again."""
         other = copy(self)
         other.free = {free: share for free, share in self.free.items() if free != name}
-        other._turn(self.machine, self.knobs)
+        other._turn(self.machine, self.parameters)
         return other
 
-    def with_tests(self, tests: Sequence[Measured]) -> "Problem":
+    def with_tests(self, tests: Sequence[MeasuredTest]) -> "Problem":
         """The same problem, weighed by the same noise, with the same tests seen another time."""
         other = copy(self)
         other.tests = tuple(tests)
@@ -153,7 +153,7 @@ class Problem:
         other.whitener = self.whitener.scaled(scale)
         return other
 
-    def noise_at(self, noisy: Sequence[Measured], x: Array) -> Array:
+    def noise_at(self, noisy: Sequence[MeasuredTest], x: Array) -> Array:
         """Mean squares (t, b, c) of whitened noise with the unknowns at x; `noisy` as when the problem was made."""
         plant = self.plant_at(x)
         noise = self._noise(plant, noisy, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
@@ -163,7 +163,7 @@ class Problem:
             found[t, np.unique(self.whitener.band(f))] = mean_squares(self.whitener, squares, f)[0]
         return found
 
-    def _noise(self, plant: Plant, noisy: Sequence[Measured], clean: Sequence[Residuals]) -> list[list[Complex]]:
+    def _noise(self, plant: Plant, noisy: Sequence[MeasuredTest], clean: Sequence[Residuals]) -> list[list[Complex]]:
         """Bins (m, c) by which residuals of every test differ, each time that it is seen with more noise."""
         found: list[list[Complex]] = [[] for _ in clean]
         for i, test in enumerate(noisy):
@@ -189,9 +189,9 @@ class Problem:
 
     def whitened(self, x: Array) -> list[Complex]:
         """Whitened bins (m, c) of every test with the unknowns at x."""
-        return self.rest(Base(self, x))
+        return self.residual(OperatingPoint(self, x))
 
-    def rest(self, base: "Base") -> list[Complex]:
+    def residual(self, base: "OperatingPoint") -> list[Complex]:
         """Whitened bins (m, c) of every test where everything has been evaluated."""
         pairs = zip(base.residuals, base.tests, strict=True)
         return [self._whitened(i, self.bins(r, test.dt)[0]) for i, (r, test) in enumerate(pairs)]
@@ -199,7 +199,9 @@ class Problem:
     def _whitened(self, test: int, bins: Complex) -> Complex:
         return np.asarray(self.whitener.apply(test, bins[..., None], self.frequency[test])[..., 0])
 
-    def slopes(self, base: "Base", free: NDArray[np.bool_], progress: Callable[[float], None]) -> list[Slopes]:
+    def slopes(
+        self, base: "OperatingPoint", free: NDArray[np.bool_], progress: Callable[[float], None]
+    ) -> list[Slopes]:
         """Derivatives of the whitened bins of every test by the unknowns that are free, by differences from a base."""
         terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
         out: list[Slopes] = [{} for _ in self.tests]
@@ -211,16 +213,18 @@ class Problem:
                 progress((done + 1) / len(terms))
         return out
 
-    def _difference(self, base: "Base", term: Term, free: NDArray[np.bool_]) -> list[tuple[int, list[Complex]]]:
-        x, knobs = base.x, len(self.knobs)
+    def _difference(
+        self, base: "OperatingPoint", term: EvaluationGroup, free: NDArray[np.bool_]
+    ) -> list[tuple[int, list[Complex]]]:
+        x, parameters = base.x, len(self.parameters)
         step = np.where(x + self.step > self.highest, -self.step, self.step)
         more = np.zeros(len(x))
         for i, _ in term.members:
             more[i] = step[i]
-        if term.members[0][0] < knobs:
+        if term.members[0][0] < parameters:
             changes = self.change(base, self.plant_at(x + more), term.residuals)
         else:  # what is left of an error after correction is as good as the error itself
-            tests = [corrected(t, self.unknowns, more[knobs:]) for t in base.tests]
+            tests = [corrected(t, self.unknowns, more[parameters:]) for t in base.tests]
             changes = self.change(base, base.plant, term.residuals, tests)
         out = []
         for i, place in term.members:
@@ -234,7 +238,11 @@ class Problem:
         return out
 
     def change(
-        self, base: "Base", plant: Plant, residuals: tuple[str, ...], tests: Sequence[Measured] | None = None
+        self,
+        base: "OperatingPoint",
+        plant: Plant,
+        residuals: tuple[str, ...],
+        tests: Sequence[MeasuredTest] | None = None,
     ) -> list[Complex]:
         """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
         kinds = tuple(k for k in residuals if k in self.kinds)
@@ -248,11 +256,11 @@ class Problem:
         return changes
 
     def plant_at(self, x: Array) -> Plant:
-        """Plant with its knobs turned to x (p,)."""
-        return make_plant(with_knobs(self.machine, self.knobs, x[: len(self.knobs)]))
+        """Plant with its parameters turned to x (p,)."""
+        return make_plant(with_parameters(self.machine, self.parameters, x[: len(self.parameters)]))
 
-    def _corrected(self, x: Array) -> list[Measured]:
-        return [corrected(t, self.unknowns, x[len(self.knobs) :]) for t in self.tests]
+    def _corrected(self, x: Array) -> list[MeasuredTest]:
+        return [corrected(t, self.unknowns, x[len(self.parameters) :]) for t in self.tests]
 
     def bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
         """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
@@ -276,25 +284,25 @@ class Problem:
             rows |= self.rows("flow", len(names) + double.index(names[place]))
         return rows
 
-    def _terms(self) -> tuple[Term, ...]:
+    def _terms(self) -> tuple[EvaluationGroup, ...]:
         twins: dict[str, list[tuple[int, int]]] = {}
-        for i, knob in enumerate(self.knobs):
-            alone = knob.of.partition(".")[2] if knob.place >= 0 else knob.name
-            twins.setdefault(alone, []).append((i, knob.place))
-        terms = [Term(tuple(members), self.knobs[members[0][0]].shows_in) for members in twins.values()]
+        for i, parameter in enumerate(self.parameters):
+            alone = parameter.of.partition(".")[2] if parameter.place >= 0 else parameter.name
+            twins.setdefault(alone, []).append((i, parameter.place))
+        terms = [EvaluationGroup(tuple(members), self.parameters[members[0][0]].shows_in) for members in twins.values()]
         together: dict[str, list[tuple[int, int]]] = {}
         for i, unknown in enumerate(self.unknowns):
-            together.setdefault(unknown.alone[0], []).append((len(self.knobs) + i, unknown.alone[1]))
+            together.setdefault(unknown.alone[0], []).append((len(self.parameters) + i, unknown.alone[1]))
         for members in together.values():
-            channel = self.unknowns[members[0][0] - len(self.knobs)].channel
+            channel = self.unknowns[members[0][0] - len(self.parameters)].channel
             shows_in = _SHOWS_IN[channel]
             if self.tests[0].actuator_force is None and channel.startswith("chamber_pressure"):
                 shows_in = ("wrench", *shows_in)  # pressures stand in for forces
-            terms.append(Term(tuple(members), shows_in))
+            terms.append(EvaluationGroup(tuple(members), shows_in))
         return tuple(terms)
 
 
-class Base:
+class OperatingPoint:
     """What differences are taken from: everything evaluated once at x."""
 
     def __init__(self, problem: Problem, x: Array) -> None:
@@ -305,7 +313,7 @@ class Base:
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
 
 
-def _travel(plant: Plant, tests: Sequence[Measured]) -> dict[str, float]:
+def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
     """How far legs of each kind move either way in any test, and a little more [m]."""
     moved = [np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests]
     kinds = [c.kind for c in plant.machine.components]

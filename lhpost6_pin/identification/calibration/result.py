@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...core.files import models_folder
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
-from .free_parameters import Knob, with_knobs
+from .free_parameters import FreeParameter, with_parameters
 from .sensor_errors import SensorUnknown
 
 __all__ = ["Calibration", "Subset", "calibration_numbers"]
@@ -29,12 +29,12 @@ class Subset(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """Result of a calibration; p unknowns: knobs, then sensor errors."""
+    """Result of a calibration; p unknowns: parameters, then sensor errors."""
 
     machine: Machine
     campaign: str
     tests: tuple[str, ...]
-    knobs: tuple[Knob, ...]
+    parameters: tuple[FreeParameter, ...]
     unknowns: tuple[SensorUnknown, ...]
     prior: Array  # (p,) standard deviations
     estimate: Array  # (p,) coordinates
@@ -55,7 +55,7 @@ class Calibration:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the unknowns."""
-        return (*(k.name for k in self.knobs), *(u.name for u in self.unknowns))
+        return (*(k.name for k in self.parameters), *(u.name for u in self.unknowns))
 
     @property
     def limit(self) -> float:
@@ -74,17 +74,17 @@ class Calibration:
 
     @property
     def calibrated(self) -> Machine:
-        """The machine with its knobs turned to the estimates."""
-        return with_knobs(self.machine, self.knobs, self.estimate[: len(self.knobs)])
+        """The machine with its parameters turned to the estimates."""
+        return with_parameters(self.machine, self.parameters, self.estimate[: len(self.parameters)])
 
     def interval(self, i: int, probability: float = 0.9) -> tuple[float, float]:
-        """Confidence interval of knob i in its unit; NaN where the fit did not converge, which leaves none."""
+        """Confidence interval of parameter i in its unit; NaN where the fit did not converge, which leaves none."""
         from scipy.stats import norm
 
         if not self.converged:
             return np.nan, np.nan
         reach = float(norm.ppf(0.5 + 0.5 * probability)) * self.sd[i]
-        low, high = (self.knobs[i].at(self.estimate[i] + side * reach) for side in (-1.0, 1.0))
+        low, high = (self.parameters[i].at(self.estimate[i] + side * reach) for side in (-1.0, 1.0))
         return min(low, high), max(low, high)
 
     def alike(self) -> list[tuple[str, str, float]]:

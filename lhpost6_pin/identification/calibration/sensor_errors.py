@@ -23,7 +23,7 @@ from ...data.sensors import SensorSet
 from ...data.signals import align
 from ...machine.machine import Machine
 from ...mechanics.pose import PlatenMotion
-from ..residuals import Measured
+from ..residuals import MeasuredTest
 
 __all__ = ["CHANNELS", "SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
 
@@ -76,7 +76,7 @@ _DELAYED: Mapping[str, tuple[str, ...]] = {
 """Fields of a test that the delay of a group of channels is in."""
 
 
-def sensor_unknowns(machine: Machine, sensors: SensorSet, test: Measured) -> tuple[SensorUnknown, ...]:
+def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:
     """Unknown errors of the channels that a test has, for which the sensors state a range."""
     columns: dict[str, tuple[str, ...]] = {
         **dict.fromkeys(("platen_displacement", "platen_velocity", "platen_acceleration"), ()),
@@ -134,7 +134,7 @@ def _alone(machine: Machine, kind: str, channel: str, i: int, *, forces: bool) -
     return f"{kind} {channel} {i}", -1
 
 
-def corrected(test: Measured, unknowns: tuple[SensorUnknown, ...], values: Array) -> Measured:
+def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: Array) -> MeasuredTest:
     """The test as perfect sensors would have shown it, if their errors were `values`, one an unknown.
 
     What has no error is not copied.
@@ -206,5 +206,5 @@ def _add_delay(late: dict[str, Array], field: str, unknown: SensorUnknown, value
     delay[unknown.column if unknown.column >= 0 else slice(None)] += value
 
 
-def _field(test: Measured, field: str) -> Array:
+def _field(test: MeasuredTest, field: str) -> Array:
     return np.asarray(getattr(test, field))

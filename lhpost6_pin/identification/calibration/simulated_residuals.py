@@ -1,4 +1,4 @@
-"""What a campaign says of the knobs by simulation: the plant driven by recorded spools, against what was measured.
+"""What a campaign says of the parameters by simulation: the plant driven by recorded spools, against what was measured.
 
 Residuals ask each equation by itself and put measured motion into it; a simulation asks all of them together, and only
 the spool is measured. It tells less, since oil columns ring on the spool's noise and friction's memory starts unknown,
@@ -19,7 +19,7 @@ from ...mechanics.equilibrium import hydraulic_rows
 from ...mechanics.plant import Plant, State
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, simulate
-from ..residuals import Measured
+from ..residuals import MeasuredTest
 from .normal_equations import squares
 from .problem import Problem
 from .result import Subset
@@ -44,7 +44,7 @@ class _Drive(NamedTuple):
 
 def by_simulation(
     problem: Problem,
-    noisy: Sequence[Measured],
+    noisy: Sequence[MeasuredTest],
     x: Array,
     *,
     band: tuple[float, ...],
@@ -52,17 +52,17 @@ def by_simulation(
     told_below: float,
     progress: Callable[[float], None],
 ) -> Subset | None:
-    """Estimates of the knobs by open-loop simulation about x (p,), with the problem's priors; NaN for sensor errors.
+    """Estimates of the parameters by open-loop simulation about x (p,), under the problem's priors; NaN for sensors.
 
     noisy are the tests again, in order, any number of times, each with more noise. band are the edges [Hz] of bands of
     frequency; floor goes under the deviations, as a share of the priors'; what is not told below told_below of theirs
     is NaN. None where there is no such opinion: without spools and pressures, or if a run does not last.
     """
-    knobs, tests = len(problem.knobs), len(problem.tests)
+    count, tests = len(problem.parameters), len(problem.tests)
     if any(t.spool is None or t.pressure is None for t in problem.tests):
         return None
-    prior, step = problem.prior[:knobs], problem.comparison.step * problem.prior[:knobs]
-    drives = [_drive(corrected(t, problem.unknowns, x[knobs:])) for t in problem.tests]
+    prior, step = problem.prior[:count], problem.comparison.step * problem.prior[:count]
+    drives = [_drive(corrected(t, problem.unknowns, x[count:])) for t in problem.tests]
     plant = problem.plant_at(x)
     jobs = [(plant, [drive]) for drive in drives]
     jobs += [(plant, [_noisier(drives[i % tests], problem.tests[i % tests], t)]) for i, t in enumerate(noisy)]
@@ -84,21 +84,21 @@ def by_simulation(
             if result is None:
                 return None
             results.append(result)
-    rest, drawn, moved = [r[0] for r in results[:tests]], [r[0] for r in results[tests:-knobs]], results[-knobs:]
+    rest, drawn, moved = [r[0] for r in results[:tests]], [r[0] for r in results[tests:-count]], results[-count:]
     frequency = [_bins(d, d.measured, problem, band)[1] for d in drives]
     noise = [[more - rest[t] for more in drawn[t::tests]] for t in range(tests)]
     whitener = make_whitener(noise, frequency, np.array(band))
     white = [whitener.apply(t, rest[t][..., None], f)[..., 0] for t, f in enumerate(frequency)]
     power = excess(whitener, white, frequency)
-    matrix, side = np.diag(prior**-2.0), x[:knobs] / prior**2
+    matrix, side = np.diag(prior**-2.0), x[:count] / prior**2
     for t, f in enumerate(frequency):
         slope = np.stack([(m[t] - rest[t]) / h for m, h in zip(moved, step, strict=True)], axis=-1)
         more, change = squares(np.moveaxis(whitener.apply(t, slope, f), -1, 0), white[t], power[t])
         matrix, side = matrix + more, side + change
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))
-    told, silent = sd < told_below * prior, np.full(len(x) - knobs, np.nan)
-    estimate = np.where(told, x[:knobs] - covariance @ side, np.nan)
+    told, silent = sd < told_below * prior, np.full(len(x) - count, np.nan)
+    estimate = np.where(told, x[:count] - covariance @ side, np.nan)
     sd = np.where(told, np.hypot(sd, floor * prior), np.nan)
     return Subset("simulation", np.append(estimate, silent), np.append(sd, silent), part=False)
 
@@ -108,7 +108,7 @@ def _bins(drive: _Drive, values: Array, problem: Problem, band: tuple[float, ...
     return spectrum_of(values, dt, band[0], band[-1], problem.comparison.edge)
 
 
-def _drive(test: Measured) -> _Drive:
+def _drive(test: MeasuredTest) -> _Drive:
     assert test.spool is not None and test.pressure is not None
     time = np.asarray(test.dt * np.arange(test.samples), np.float64)
     steps = int(time[-1] * SAMPLE_RATE + 1e-6) * STEPS
@@ -116,7 +116,7 @@ def _drive(test: Measured) -> _Drive:
     return _Drive(resample_band_limited(test.spool, time, middle), _measured(test), time)
 
 
-def _noisier(drive: _Drive, test: Measured, other: Measured) -> _Drive:
+def _noisier(drive: _Drive, test: MeasuredTest, other: MeasuredTest) -> _Drive:
     """A drive with what more noise in its test adds."""
     assert test.spool is not None and other.spool is not None
     middle = (np.arange(len(drive.spool)) + 0.5) / (STEPS * SAMPLE_RATE)
@@ -125,7 +125,7 @@ def _noisier(drive: _Drive, test: Measured, other: Measured) -> _Drive:
     return drive._replace(spool=drive.spool + np.stack(noise, axis=1), measured=measured)
 
 
-def _measured(test: Measured) -> Array:
+def _measured(test: MeasuredTest) -> Array:
     assert test.pressure is not None
     return np.hstack([test.motion.velocity, test.pressure])
 

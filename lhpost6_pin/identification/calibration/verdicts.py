@@ -11,7 +11,7 @@ __all__ = [
     "Contradiction",
     "Verdict",
     "beyond",
-    "changed_knobs",
+    "changed_parameters",
     "contradictions",
     "far",
     "out_of_range",
@@ -31,7 +31,7 @@ def far(calibration: Calibration) -> Array:
 def beyond(calibration: Calibration) -> NDArray[np.bool_]:
     """Sensor errors that differ from zero by more than the limit; parameters that do so and by a material amount."""
     material = calibration.numbers.number("report.material") * calibration.prior
-    material[len(calibration.knobs) :] = 0.0
+    material[len(calibration.parameters) :] = 0.0
     return np.asarray((np.abs(far(calibration)) > calibration.limit) & (np.abs(calibration.estimate) > material))
 
 
@@ -41,11 +41,11 @@ def verdict_on(calibration: Calibration, i: int) -> Verdict:
     At its bound: as far from nominal as the fit lets it go, by its prior or by what can be built. Changed: `beyond`.
     Unchanged: the campaign has told something of it, and it is nearer than that.
     """
-    count, prior, x = len(calibration.knobs), calibration.prior[i], calibration.estimate[i]
+    count, prior, x = len(calibration.parameters), calibration.prior[i], calibration.estimate[i]
     reach = calibration.numbers.number("fit.reach" if i < count else "fit.sensor_reach") * prior
     low, high = -reach, reach
     if i < count:
-        low, high = max(low, calibration.knobs[i].lowest), min(high, calibration.knobs[i].highest)
+        low, high = max(low, calibration.parameters[i].lowest), min(high, calibration.parameters[i].highest)
     if not low + 1e-6 * prior < x < high - 1e-6 * prior:
         return "at its bound"
     if beyond(calibration)[i]:
@@ -53,9 +53,9 @@ def verdict_on(calibration: Calibration, i: int) -> Verdict:
     return "unchanged" if calibration.informed[i] else "not informed"
 
 
-def changed_knobs(calibration: Calibration) -> list[int]:
-    """Knobs that differ from nominal (`beyond`), the clearest first."""
-    distance, changed = np.abs(far(calibration))[: len(calibration.knobs)], beyond(calibration)
+def changed_parameters(calibration: Calibration) -> list[int]:
+    """Parameters that differ from nominal (`beyond`), the clearest first."""
+    distance, changed = np.abs(far(calibration))[: len(calibration.parameters)], beyond(calibration)
     return [int(i) for i in np.argsort(-distance, kind="stable") if changed[i]]
 
 
@@ -66,12 +66,12 @@ def out_of_range(calibration: Calibration) -> list[int]:
 
 
 def stated_range(calibration: Calibration) -> Array:
-    """Largest errors (p,) that the sensors' file allows: sqrt(3) deviations of a uniform one; infinite for knobs.
+    """Largest errors (p,) that the sensors' file allows: sqrt(3) deviations of a uniform one; infinite for parameters.
 
     A delay is against the platen's motion, which may be as late itself.
     """
     times = [2.0 if unknown.kind == "delay" else 1.0 for unknown in calibration.unknowns]
-    return np.append(np.full(len(calibration.knobs), np.inf), np.sqrt(3.0) * np.array(times)) * calibration.prior
+    return np.append(np.full(len(calibration.parameters), np.inf), np.sqrt(3.0) * np.array(times)) * calibration.prior
 
 
 class Contradiction(NamedTuple):

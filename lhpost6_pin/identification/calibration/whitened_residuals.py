@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 
 from ...core.errors import RecordError
 
-__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "real_rows", "spectrum_of", "surprise"]
+__all__ = [
+    "Whitener",
+    "excess",
+    "make_whitener",
+    "mean_squares",
+    "real_bins",
+    "real_rows",
+    "spectrum_of",
+    "negative_log_likelihood",
+]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -108,7 +117,7 @@ def mean_squares(whitener: Whitener, squares: Array, f: Array) -> tuple[Array, N
     return np.add.reduceat(squares, first, axis=0) / counts[:, None], counts
 
 
-def surprise(means: Array, counts: NDArray[np.intp]) -> Array:
+def negative_log_likelihood(means: Array, counts: NDArray[np.intp]) -> Array:
     """Negative log-likelihood (k,) of bins by their `mean_squares`.
 
     What is left counts as noise of unit power, or, where a band shows more of it, of a power in between: the stated

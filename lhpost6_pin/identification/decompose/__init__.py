@@ -7,14 +7,14 @@
 `record` prepares a record and calls `inverse_dynamics`; `agreement` judges; `dataset` lays out and writes.
 """
 
-from .agreement import Agreement, Level, Match, find_agreement
+from .agreement import Level, Match, WrenchAgreement, find_agreement
 from .dataset import ledger_dataset, save_ledger
-from .record import Comparison, Decomposed, decompose_numbers, decompose_record
+from .record import ComparisonBand, Decomposed, decompose_numbers, decompose_record
 from .work import Work, find_work
 
 __all__ = [
-    "Agreement",
-    "Comparison",
+    "WrenchAgreement",
+    "ComparisonBand",
     "Decomposed",
     "Level",
     "Match",

@@ -27,10 +27,10 @@ from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import leg_wrenches
-from ..residuals import Measured, evaluate_residuals, follow, make_measured
+from ..residuals import MeasuredTest, evaluate_residuals, follow, make_measured_test
 from .record import Decomposed, decompose_numbers, take_apart
 
-__all__ = ["Agreement", "Explanation", "Level", "Match", "find_agreement"]
+__all__ = ["WrenchAgreement", "Explanation", "Level", "Match", "find_agreement"]
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Level(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Agreement:
+class WrenchAgreement:
     """What was found about a decomposed record."""
 
     actuators: Match
@@ -104,19 +104,19 @@ class Agreement:
         return tuple(of_axis(k) for k in range(6))
 
 
-def find_agreement(found: Decomposed, *, seed: int = 0) -> Agreement:
+def find_agreement(found: Decomposed, *, seed: int = 0) -> WrenchAgreement:
     """Compare forces, and set the residual against what noise (drawn from seed), sensors and parameters allow."""
     numbers = decompose_numbers()
     forces = found.forces
     struts = forces.struts_measured
-    needed = numbers.number("judgement.correlation")
+    required = numbers.number("judgement.correlation")
 
     def match(measured: Array, modelled: Array) -> Match:
-        return _match(measured, modelled, found.dt, found.comparison.band, needed)
+        return _match(measured, modelled, found.dt, found.comparison.band, required)
 
     sensors = found.sensors
     none = np.zeros(6)
-    return Agreement(
+    return WrenchAgreement(
         actuators=match(forces.measured, forces.required),
         struts=None if struts is None else match(struts, forces.struts),
         dissipative=match(forces.dissipative_measured, forces.dissipative),
@@ -129,12 +129,12 @@ def find_agreement(found: Decomposed, *, seed: int = 0) -> Agreement:
     )
 
 
-def _match(measured: Array, modelled: Array, dt: float, band: Band, needed: float) -> Match:
+def _match(measured: Array, modelled: Array, dt: float, band: Band, required: float) -> Match:
     alike = correlation(measured, modelled)
     varying = rrmse(measured - measured.mean(axis=0), modelled - modelled.mean(axis=0))
     moving = Band(band.high / 16, band.high, band.order)  # above the window's lobe
     late, error = phase_delay(measured, modelled, dt, moving)
-    known = correlation(moving.apply(measured, dt), moving.apply(modelled, dt)) >= needed
+    known = correlation(moving.apply(measured, dt), moving.apply(modelled, dt)) >= required
     late, error = (np.where(known, x, np.nan) for x in (late, error))
     return Match(rrmse(measured, modelled), varying, peak_ratio(measured, modelled), alike, late, error)
 
@@ -178,7 +178,7 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
         scaled = [x.copy() for x in found.whole_motion]
         for x in scaled:
             x[:, axis] *= 1.0 + gain
-        other = Measured(**{**vars(measured), "motion": PlatenMotion(*scaled)})
+        other = MeasuredTest(**{**vars(measured), "motion": PlatenMotion(*scaled)})
         yield evaluate_residuals(found.plant, other, ("wrench",)).wrench - whole.residual
 
 
@@ -210,5 +210,5 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
             yield evaluate_residuals(plant, measured, ("wrench",), path=moved).wrench - found.whole.residual
 
 
-def _measured(found: Decomposed) -> Measured:
-    return make_measured(found.record, found.whole_motion, found.comparison.band.high, path=found.whole_path)
+def _measured(found: Decomposed) -> MeasuredTest:
+    return make_measured_test(found.record, found.whole_motion, found.comparison.band.high, path=found.whole_path)

@@ -6,20 +6,20 @@ from rich.table import Table
 
 from ...core.console import make_console
 from ...core.names import AXES
-from .agreement import Agreement
+from .agreement import WrenchAgreement
 from .record import Decomposed
 
 __all__ = ["print_agreement"]
 
 
-def print_agreement(found: Decomposed, agreement: Agreement) -> None:
+def print_agreement(found: Decomposed, agreement: WrenchAgreement) -> None:
     """Print errors of the forces, the residual and what it is to be expected of, axis by axis."""
     console = make_console()
     console.print(_errors(found, agreement))
     console.print(_residual(found, agreement))
 
 
-def _errors(found: Decomposed, agreement: Agreement) -> Table:
+def _errors(found: Decomposed, agreement: WrenchAgreement) -> Table:
     high = found.comparison.band.high
     heads = ["axis"]
     for what in ("actuators", "struts", "dissipative"):
@@ -35,7 +35,7 @@ def _errors(found: Decomposed, agreement: Agreement) -> Table:
     return table
 
 
-def _residual(found: Decomposed, agreement: Agreement) -> Table:
+def _residual(found: Decomposed, agreement: WrenchAgreement) -> Table:
     title = "Residual: required less measured actuator wrench [kN, kN m], with what is to be expected of it"
     expected = ["noise", "sd/noise", "sensors", "parameters", "sd is explained by", "mean by"]
     noisy = found.sensors is not None

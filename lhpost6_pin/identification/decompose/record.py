@@ -27,14 +27,14 @@ from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import Decomposition, inverse_dynamics
 
-__all__ = ["Comparison", "Decomposed", "decompose_numbers", "decompose_record", "filtered", "take_apart"]
+__all__ = ["ComparisonBand", "Decomposed", "decompose_numbers", "decompose_record", "filtered", "take_apart"]
 
 Array = NDArray[np.float64]
 
 MOTION = ("platen_displacement", "platen_velocity", "platen_acceleration")
 
 
-class Comparison(NamedTuple):
+class ComparisonBand(NamedTuple):
     """How forces are compared."""
 
     band: Band
@@ -47,7 +47,7 @@ class Decomposed:
 
     record: xr.Dataset  # aligned, if it was
     sensors: SensorSet | None  # None: the record is free of noise
-    comparison: Comparison
+    comparison: ComparisonBand
     whole: Decomposition
     whole_motion: PlatenMotion
     whole_path: Array | None  # (n, 6) displacement that friction followed, where it is not the motion's
@@ -192,12 +192,14 @@ def filtered(
 
 
 # ---------------------------------------------------------------------------------------------- helpers
-def _comparison(cutoff: float | None) -> Comparison:
+def _comparison(cutoff: float | None) -> ComparisonBand:
     numbers = decompose_numbers()
     high = numbers.number("comparison.cutoff") if cutoff is None else cutoff
     if not high > 0.0:
         raise RecordError(f"a cutoff of {high:g} Hz leaves nothing to compare; give one above zero")
-    return Comparison(Band(high=high, order=int(numbers.number("comparison.order"))), numbers.number("comparison.edge"))
+    return ComparisonBand(
+        Band(high=high, order=int(numbers.number("comparison.order"))), numbers.number("comparison.edge")
+    )
 
 
 def _check_machine(machine: Machine, record: xr.Dataset) -> None:

@@ -7,7 +7,7 @@
 from .band_spectra import Spectrum
 from .closed_loop import Lag
 from .metrics_file import metrics, save_metrics
-from .phase_agreement import Agreement, Pair
+from .phase_agreement import ColumnAgreement, ComparedQuantity
 from .phases import PHASES, Phase
 from .resonance import Peak, Resonance
 from .validate import Validation, validate
@@ -15,9 +15,9 @@ from .valve_agreement import Valves
 
 __all__ = [
     "PHASES",
-    "Agreement",
+    "ColumnAgreement",
     "Lag",
-    "Pair",
+    "ComparedQuantity",
     "Peak",
     "Phase",
     "Resonance",

@@ -16,7 +16,7 @@ from ...data.signals import differentiate, resample_band_limited
 from ...motions import Reference, Target
 from ...tuning.drives import load_drive
 
-__all__ = ["Lag", "drive_of", "settings_of", "whose_settings"]
+__all__ = ["Lag", "drive_of", "settings_of", "settings_source"]
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> Control
     raise RecordError(f"the record names {said}; give its settings as a TOML file with --controller")
 
 
-def whose_settings(record: xr.Dataset, settings: ControllerSettings, given: ControllerSettings | None) -> str:
+def settings_source(record: xr.Dataset, settings: ControllerSettings, given: ControllerSettings | None) -> str:
     """Where the settings of the closed loop come from, in words: others than the test's explain any difference."""
     named = record.attrs.get("controller")
     if given is None or named == settings.name:

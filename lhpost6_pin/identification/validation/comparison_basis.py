@@ -8,10 +8,10 @@ from ...data.sensors import SensorSet
 from ...mechanics.linearize import OilColumnMode
 from .metrics import Numbers
 
-__all__ = ["Bench"]
+__all__ = ["ComparisonBasis"]
 
 
-class Bench(NamedTuple):
+class ComparisonBasis(NamedTuple):
     """What all tests of a campaign are judged with."""
 
     sensors: SensorSet

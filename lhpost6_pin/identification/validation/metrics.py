@@ -34,7 +34,7 @@ class Resonances(NamedTuple):
     coherence: float  # of acceleration with spools, from which a peak counts
 
 
-class Transfer(NamedTuple):
+class ValveTransfer(NamedTuple):
     """How transfer functions of servovalves are estimated."""
 
     segment: float  # [s]
@@ -52,7 +52,7 @@ class Numbers:
     hardly: HardlyMoving
     spectra: Spectra
     resonance: Resonances
-    valves: Transfer
+    valves: ValveTransfer
     reference_high: float  # [Hz]
     stated: Parameters
 
@@ -74,7 +74,7 @@ def validation_numbers() -> Numbers:
         hardly=HardlyMoving(*(n(f"hardly_moving.{name}") for name in HardlyMoving._fields)),
         spectra=Spectra(stated.vector("spectra.edges"), n("spectra.segment"), n("spectra.noise")),
         resonance=Resonances(*(n(f"resonance.{name}") for name in Resonances._fields)),
-        valves=Transfer(n("valves.segment"), n("valves.coherence")),
+        valves=ValveTransfer(n("valves.segment"), n("valves.coherence")),
         reference_high=n("reference.high"),
         stated=stated,
     )

@@ -16,7 +16,7 @@ from ...data.channels import LAYOUT, channel_unit
 from ...data.signals import align, correlation, delay, drift_rate, peak_ratio, rrmse
 from .metrics import Numbers
 
-__all__ = ["MOTIONS", "Agreement", "Pair", "agree", "unit_of"]
+__all__ = ["MOTIONS", "ColumnAgreement", "ComparedQuantity", "agree", "unit_of"]
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ _PRELOADED = ("wrench", "struts", "dissipative", "actuator_force", "chamber_pres
 
 
 @dataclass(frozen=True)
-class Pair:
+class ComparedQuantity:
     """One quantity, measured and of the model; n samples, k columns, low-passed alike."""
 
     quantity: str  # a name of the units below: "displacement", ..., "wrench" at C in {c}, "actuator_force", ...
@@ -43,7 +43,7 @@ class Pair:
     calibration: Array | None = None  # (k,) that gains and offsets of sensors leave in its mean, where known
 
 
-class Agreement(NamedTuple):
+class ColumnAgreement(NamedTuple):
     """How one column agrees; not-a-number where it hardly moves, or for a ratio to nothing."""
 
     quantity: str
@@ -75,7 +75,7 @@ def unit_of(quantity: str, column: str) -> str:
     return channel_unit(f"{quantity}[{column}]", _UNITS.get(quantity))
 
 
-def agree(pairs: Sequence[Pair], dt: float, numbers: Numbers) -> tuple[Agreement, ...]:
+def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tuple[ColumnAgreement, ...]:
     """Agreement of every column of every pair, the ends of the test left out.
 
     Displacement, velocity and acceleration of an axis have one delay, that of the velocity: an open loop drifts, and a
@@ -83,7 +83,7 @@ def agree(pairs: Sequence[Pair], dt: float, numbers: Numbers) -> tuple[Agreement
     """
     edge = round(numbers.edge / dt)
     shared: dict[str, float] = {}
-    found: list[Agreement] = []
+    found: list[ColumnAgreement] = []
     for pair in sorted(pairs, key=lambda p: p.quantity != "velocity"):
         part = slice(edge, len(pair.measured) - edge)
         moves = _moving(pair, pair.measured[part], numbers)
@@ -100,7 +100,7 @@ def agree(pairs: Sequence[Pair], dt: float, numbers: Numbers) -> tuple[Agreement
     return tuple(sorted(found, key=lambda a: order[a.quantity]))
 
 
-def _moving(pair: Pair, measured: Array, numbers: Numbers) -> NDArray[np.bool_]:
+def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> NDArray[np.bool_]:
     """Which columns (k,) move enough to be judged by a ratio."""
     size = measured.std(axis=0)
     per = {"m": 1.0, "rad": numbers.hardly.radius, "N m": 1.0 / numbers.hardly.radius}
@@ -110,7 +110,7 @@ def _moving(pair: Pair, measured: Array, numbers: Numbers) -> NDArray[np.bool_]:
     return np.asarray(enough & (size >= numbers.hardly.noise * pair.heard))
 
 
-def _agree_one(pair: Pair, k: int, moves: bool, late: float, part: slice, dt: float) -> Agreement:
+def _agree_one(pair: ComparedQuantity, k: int, moves: bool, late: float, part: slice, dt: float) -> ColumnAgreement:
     measured, whole = pair.measured[part, k], pair.model[:, k]
     offset = float((whole[part] - measured).mean())
     if pair.quantity in _PRELOADED:
@@ -122,7 +122,7 @@ def _agree_one(pair: Pair, k: int, moves: bool, late: float, part: slice, dt: fl
     if moves:
         ratio, peak, alike = (float(f(measured, model)) for f in (rrmse, peak_ratio, correlation))
         ratio_aligned, alike_aligned = (float(f(measured, shifted)) for f in (rrmse, correlation))
-    return Agreement(
+    return ColumnAgreement(
         pair.quantity,
         pair.columns[k],
         unit_of(pair.quantity, pair.columns[k]),

@@ -20,12 +20,12 @@ from ...simulation.simulate import fastest_engine
 from ..decompose import decompose_record
 from ..inverse_dynamics import Decomposition
 from .band_spectra import Spectrum, estimate_spectrum
-from .closed_loop import Lag, drive_of, settings_of, whose_settings
-from .comparison_basis import Bench
-from .phase_agreement import Agreement, Pair, agree
-from .prepare_tests import Prepared, wrench_calibration
+from .closed_loop import Lag, drive_of, settings_of, settings_source
+from .comparison_basis import ComparisonBasis
+from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
+from .prepare_tests import PreparedTest, wrench_calibration
 from .resonance import Resonance
-from .simulated_phases import RunOverTest
+from .simulated_phases import SimulatedComparison
 
 __all__ = ["PHASES", "Phase", "run_phase"]
 
@@ -41,41 +41,41 @@ class Phase:
     number: int
     test: str
     time: Array  # (n,) [s]
-    pairs: tuple[Pair, ...] = ()
-    agreement: tuple[Agreement, ...] = ()
+    pairs: tuple[ComparedQuantity, ...] = ()
+    agreement: tuple[ColumnAgreement, ...] = ()
     spectrum: Spectrum | None = None
     resonances: tuple[Resonance, ...] = ()
     lags: tuple[Lag, ...] = ()  # of a closed loop behind its reference
     notes: tuple[str, ...] = ()
     reason: str | None = None
 
-    def pair(self, quantity: str) -> Pair | None:
+    def pair(self, quantity: str) -> ComparedQuantity | None:
         """Both sides of a quantity, if it was compared."""
         return next((p for p in self.pairs if p.quantity == quantity), None)
 
-    def of(self, quantity: str) -> tuple[Agreement, ...]:
+    def of(self, quantity: str) -> tuple[ColumnAgreement, ...]:
         """Agreement of a quantity's columns."""
         return tuple(a for a in self.agreement if a.quantity == quantity)
 
 
-def run_phase(number: int, test: Prepared, bench: Bench) -> Phase:
+def run_phase(number: int, test: PreparedTest, basis: ComparisonBasis) -> Phase:
     """One phase of one test; what a test lacks for it, or a run that fails, becomes the phase's reason."""
     phases = {1: _inverse_dynamics, 2: _open_loop, 3: _closed_loop}
     try:
-        return phases[number](test, bench)
+        return phases[number](test, basis)
     except LhpostError as error:
         return Phase(number, test.name, test.time, reason=str(error))
 
 
-def _inverse_dynamics(test: Prepared, bench: Bench) -> Phase:
-    numbers, axes = bench.numbers, test.plant.axes
+def _inverse_dynamics(test: PreparedTest, basis: ComparisonBasis) -> Phase:
+    numbers, axes = basis.numbers, test.plant.axes
     columns = tuple(AXES[k] for k in axes)
     apart = [
-        decompose_record(test.machine, one.record, bench.sensors, cutoff=numbers.band.high, align=False)
+        decompose_record(test.machine, one.record, basis.sensors, cutoff=numbers.band.high, align=False)
         for one in (test.test, test.again)
     ]
     found, again = (one.whole for one in apart)
-    calibration = wrench_calibration(test, bench.sensors)[axes]
+    calibration = wrench_calibration(test, basis.sensors)[axes]
     sides: list[tuple[str, Callable[[Decomposition], Array | None], Callable[[Decomposition], Array]]] = [
         ("wrench", lambda d: d.measured, lambda d: d.required),
         ("struts", lambda d: d.struts_measured, lambda d: d.struts),
@@ -88,36 +88,40 @@ def _inverse_dynamics(test: Prepared, bench: Bench) -> Phase:
             kept = [numbers.band.apply(x[:, axes], test.dt) for x in (ours, model(found), more, model(again))]
             heard, noise = kept[2] - kept[0], kept[3] - kept[2] - kept[1] + kept[0]
             known = calibration if quantity == "wrench" else None
-            pairs.append(Pair(quantity, columns, kept[0], kept[1], heard.std(axis=0), noise.std(axis=0), known))
+            pairs.append(
+                ComparedQuantity(quantity, columns, kept[0], kept[1], heard.std(axis=0), noise.std(axis=0), known)
+            )
     ours, theirs, noise = (x[:, axes] for x in (found.measured, found.required, again.measured - found.measured))
     spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.dt, numbers)
     return Phase(1, test.name, test.time, tuple(pairs), agree(pairs, test.dt, numbers), spectrum, notes=apart[0].notes)
 
 
-def _open_loop(test: Prepared, bench: Bench) -> Phase:
+def _open_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
     engine = fastest_engine(test.plant)
     ran, again = (replay(test.machine, m.record, attrs={}, engine=engine) for m in (test.test, test.again))
     channels = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
-    return _of_run(2, test, RunOverTest(test, ran, again, bench), channels, bench)
+    return _of_run(2, test, SimulatedComparison(test, ran, again, basis), channels, basis)
 
 
-def _closed_loop(test: Prepared, bench: Bench) -> Phase:
-    settings = settings_of(test.test.record, bench.settings)
-    target, drive = drive_of(test.test.record, settings, bench.numbers.reference_high)
+def _closed_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
+    settings = settings_of(test.test.record, basis.settings)
+    target, drive = drive_of(test.test.record, settings, basis.numbers.reference_high)
     engine = fastest_engine(test.plant)
     ran = rehearse(test.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
-    both = RunOverTest(test, ran, None, bench)
-    both.notes.append(whose_settings(test.test.record, settings, bench.settings))
-    phase = _of_run(3, test, both, ("spool_command",), bench)
+    both = SimulatedComparison(test, ran, None, basis)
+    both.notes.append(settings_source(test.test.record, settings, basis.settings))
+    phase = _of_run(3, test, both, ("spool_command",), basis)
     velocity = phase.pair("velocity")
     assert velocity is not None
     moving = [a.column for a in phase.of("velocity") if a.moves]
     return replace(phase, lags=both.lags(target.velocity, velocity, moving))
 
 
-def _of_run(number: int, test: Prepared, both: RunOverTest, channels: Sequence[str], bench: Bench) -> Phase:
+def _of_run(
+    number: int, test: PreparedTest, both: SimulatedComparison, channels: Sequence[str], basis: ComparisonBasis
+) -> Phase:
     pairs = both.pairs(channels)
-    found = agree(pairs, test.dt, bench.numbers)
+    found = agree(pairs, test.dt, basis.numbers)
     moving = {a.column for a in found if a.quantity == "acceleration" and a.moves}
     shown = tuple(r for r in both.resonances() if r.column in moving)
     return Phase(number, test.name, both.time, tuple(pairs), found, both.spectrum(), shown, notes=tuple(both.notes))

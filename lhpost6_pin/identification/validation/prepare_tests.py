@@ -20,7 +20,7 @@ from ...mechanics.pose import PlatenMotion, plant_motion
 from ..inverse_dynamics import leg_wrenches
 from .metrics import Numbers
 
-__all__ = ["Measured", "Prepared", "prepare", "too_short", "total_wrench", "wrench_calibration"]
+__all__ = ["MeasuredSignals", "PreparedTest", "prepare", "too_short", "total_wrench", "wrench_calibration"]
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ SEED = 1  # of the second draw of noise: results repeat
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredSignals:
     """What was measured of a test; n samples."""
 
     record: xr.Dataset
@@ -37,14 +37,14 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedTest:
     """A test, ready to be compared with the model of its machine."""
 
     name: str
     plant: Plant  # with the servovalves that were open
     time: Array  # (n,) from zero [s]
-    test: Measured
-    again: Measured  # with the stated noise added once more
+    test: MeasuredSignals
+    again: MeasuredSignals  # with the stated noise added once more
 
     @property
     def dt(self) -> float:
@@ -62,14 +62,14 @@ def too_short(seconds: float, numbers: Numbers) -> str:
     return f"{seconds:.3g} s are too short to compare; {numbers.shortest:.3g} s are needed"
 
 
-def prepare(machine: Machine, record: xr.Dataset, sensors: SensorSet) -> Prepared:
+def prepare(machine: Machine, record: xr.Dataset, sensors: SensorSet) -> PreparedTest:
     """Make a record ready. Raises RecordError naming the channels without which there is no platen motion."""
     require(record, "time")
     table = machine.as_tested(record.attrs, "the test")
     plant = make_plant(table)
     noisy = add_noise(record, sensors, np.random.default_rng(SEED))
-    both = (Measured(r, _motion(plant, r, sensors), _force(table, r)) for r in (record, noisy))
-    return Prepared(
+    both = (MeasuredSignals(r, _motion(plant, r, sensors), _force(table, r)) for r in (record, noisy))
+    return PreparedTest(
         str(record.attrs.get("test", "test")), plant, record["time"].values - float(record["time"][0]), *both
     )
 
@@ -96,7 +96,7 @@ def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
     return np.asarray(leg_wrenches(plant, plant_motion(plant, motion).q, force).sum(axis=1))
 
 
-def wrench_calibration(test: Prepared, sensors: SensorSet) -> Array:
+def wrench_calibration(test: PreparedTest, sensors: SensorSet) -> Array:
     """Standard deviation (6,) that gains and offsets of force sensors leave in the mean of the measured wrench at C.
 
     nan where forces were not measured.

@@ -12,32 +12,34 @@ from ...mechanics.pose import PlatenMotion
 from ...simulation.rehearse import SimulatedTest
 from .band_spectra import Spectrum, estimate_spectrum
 from .closed_loop import Lag
-from .comparison_basis import Bench
-from .phase_agreement import MOTIONS, Pair
-from .prepare_tests import Prepared, too_short, total_wrench, wrench_calibration
+from .comparison_basis import ComparisonBasis
+from .phase_agreement import MOTIONS, ComparedQuantity
+from .prepare_tests import PreparedTest, too_short, total_wrench, wrench_calibration
 from .resonance import Resonance, estimate_response, find_resonances
 
-__all__ = ["RunOverTest"]
+__all__ = ["SimulatedComparison"]
 
 Array = NDArray[np.float64]
 
 
-class RunOverTest:
+class SimulatedComparison:
     """A run and its test on the test's samples, as far as the run came.
 
     `again` is the run of the test with noise added once more, where the run depends on it: what that changes in the
     difference of model and measurement is the noise of a pair.
     """
 
-    def __init__(self, test: Prepared, ran: SimulatedTest, again: SimulatedTest | None, bench: Bench) -> None:
+    def __init__(
+        self, test: PreparedTest, ran: SimulatedTest, again: SimulatedTest | None, basis: ComparisonBasis
+    ) -> None:
         """Raise SimulationError for a run that ended too early to be compared."""
-        self.test, self.bench = test, bench
+        self.test, self.basis = test, basis
         same = again is not None and len(again.run.time) == len(ran.run.time)
         self.ran, self.again = ran.record, again.record if again is not None and same else ran.record
         self.clock = ran.record["time"].values
         self.n = int(np.searchsorted(test.time, self.clock[-1] + 1e-9, side="right"))
-        if self.n * test.dt < bench.numbers.shortest:
-            raise SimulationError(ran.run.trouble or too_short(self.n * test.dt, bench.numbers))
+        if self.n * test.dt < basis.numbers.shortest:
+            raise SimulationError(ran.run.trouble or too_short(self.n * test.dt, basis.numbers))
         self.notes = [ran.run.trouble] if ran.run.trouble else []
         if ran.run.clipped:
             self.notes.append(f"{ran.run.clipped} spool values beyond full stroke were clipped")
@@ -49,17 +51,17 @@ class RunOverTest:
         """Samples (n,) that are compared [s]."""
         return self.test.time[: self.n]
 
-    def pairs(self, channels: Sequence[str]) -> list[Pair]:
+    def pairs(self, channels: Sequence[str]) -> list[ComparedQuantity]:
         """Motion and total actuator force per axis, and channels per actuator; what is missing is noted."""
         found = [self._motion(quantity) for quantity in MOTIONS]
         if self.test.test.force is not None:
             found.append(self._wrench())
         return found + [self._channel(name) for name in channels if self._has(name)]
 
-    def lags(self, asked: Array, pair: Pair, moving: Sequence[str]) -> tuple[Lag, ...]:
+    def lags(self, asked: Array, pair: ComparedQuantity, moving: Sequence[str]) -> tuple[Lag, ...]:
         """Delays behind the velocity (m, 6) that was asked for at the run's samples, of the columns that move."""
-        wanted = self._brought(asked[: len(self.clock)], self.bench.numbers.band)
-        longest = self.bench.numbers.longest_delay
+        wanted = self._brought(asked[: len(self.clock)], self.basis.numbers.band)
+        longest = self.basis.numbers.longest_delay
         found = []
         for k, column in enumerate(pair.columns):
             if column in moving:
@@ -72,14 +74,14 @@ class RunOverTest:
         """Spectra of the platen's acceleration."""
         columns = self.test.plant.axes
         ours, noise = (x[:, columns] for x in self._accelerations())
-        theirs = self._brought(self.moved[0].acceleration[:, columns], self.bench.sensors.band)
-        return estimate_spectrum("acceleration", self.axes, ours, theirs, noise, self.test.dt, self.bench.numbers)
+        theirs = self._brought(self.moved[0].acceleration[:, columns], self.basis.sensors.band)
+        return estimate_spectrum("acceleration", self.axes, ours, theirs, noise, self.test.dt, self.basis.numbers)
 
     def resonances(self) -> tuple[Resonance, ...]:
         """Oil columns; none without spool positions."""
         if "spool_position" not in self.test.test.record:
             return ()
-        plant, numbers, wide = self.test.plant, self.bench.numbers, self.bench.sensors.band
+        plant, numbers, wide = self.test.plant, self.basis.numbers, self.basis.sensors.band
         spool, more = (m.record["spool_position"].values[: self.n] for m in (self.test.test, self.test.again))
         ours, noise = (x[:, plant.axes] for x in self._accelerations())
         heard = more - spool, noise
@@ -87,9 +89,9 @@ class RunOverTest:
         opened = self._brought(self.ran["spool_position"].values, wide)
         moved = self._brought(self.moved[0].acceleration[:, plant.axes], wide)
         model = estimate_response(plant, opened, moved, heard, self.test.dt, numbers)
-        return find_resonances(self.axes, measured, model, self.bench.modes, numbers)
+        return find_resonances(self.axes, measured, model, self.basis.modes, numbers)
 
-    def _motion(self, quantity: str) -> Pair:
+    def _motion(self, quantity: str) -> ComparedQuantity:
         axes = self.test.plant.axes
         tests = self.test.test, self.test.again
 
@@ -101,7 +103,7 @@ class RunOverTest:
 
         return self._pair(quantity, self.axes, measured, model)
 
-    def _wrench(self) -> Pair:
+    def _wrench(self) -> ComparedQuantity:
         plant = self.test.plant
         tests, runs = (self.test.test, self.test.again), (self.ran, self.again)
 
@@ -113,7 +115,7 @@ class RunOverTest:
         def model(draw: int) -> Array:
             return total_wrench(plant, self.moved[draw], runs[draw]["actuator_force"].values)[:, plant.axes]
 
-        calibration = wrench_calibration(self.test, self.bench.sensors)[plant.axes]
+        calibration = wrench_calibration(self.test, self.basis.sensors)[plant.axes]
         return self._pair("wrench", self.axes, measured, model, calibration)
 
     def _has(self, name: str) -> bool:
@@ -122,7 +124,7 @@ class RunOverTest:
         self.notes.append(f"{name} was not recorded")
         return False
 
-    def _channel(self, name: str) -> Pair:
+    def _channel(self, name: str) -> ComparedQuantity:
         tests, runs = (self.test.test.record, self.test.again.record), (self.ran, self.again)
         columns = [str(label) for label in self.ran[name][self.ran[name].dims[1]].values]
         return self._pair(name, columns, lambda i: tests[i][name].values, lambda i: runs[i][name].values)
@@ -134,13 +136,13 @@ class RunOverTest:
         measured: Callable[[int], Array],
         model: Callable[[int], Array],
         calibration: Array | None = None,
-    ) -> Pair:
+    ) -> ComparedQuantity:
         """Pair of a quantity; both sides are functions of the draw, 0 the test itself and 1 with more noise."""
-        band, ours = self.bench.numbers.band, measured(0)
+        band, ours = self.basis.numbers.band, measured(0)
         theirs, heard = model(0), band.apply(measured(1) - ours, self.test.dt)[: self.n]
         noise = heard if self.again is self.ran else self._brought(model(1) - theirs, band) - heard
         kept = band.apply(ours, self.test.dt)[: self.n], self._brought(theirs, band)
-        return Pair(quantity, tuple(columns), *kept, heard.std(axis=0), noise.std(axis=0), calibration)
+        return ComparedQuantity(quantity, tuple(columns), *kept, heard.std(axis=0), noise.std(axis=0), calibration)
 
     def _brought(self, values: Array, band: Band) -> Array:
         """A run's values, filtered, at the test's samples: picked where these are samples of the run, else between."""

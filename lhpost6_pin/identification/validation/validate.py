@@ -20,7 +20,7 @@ from ...data.sensors import SensorSet, load_sensors
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
-from .comparison_basis import Bench
+from .comparison_basis import ComparisonBasis
 from .metrics import Numbers, validation_numbers
 from .phases import PHASES, Phase, run_phase
 from .prepare_tests import prepare, too_short
@@ -85,7 +85,7 @@ def validate(
         for group, found in group_delays(plant, enough).items()
         if abs(found.delay) > numbers.significant_skew * found.standard_error
     }
-    bench = Bench(sensors, numbers, oil_column_modes(machine), settings)
+    basis = ComparisonBasis(sensors, numbers, oil_column_modes(machine), settings)
     done, lock = [0], threading.Lock()
 
     def count() -> None:
@@ -95,7 +95,7 @@ def validate(
                 progress(done[0] / (len(campaign.records) * len(phases)))
 
     def one(record: xr.Dataset) -> list[Phase]:
-        return _phases_of(machine, align_record(record, skews), bench, phases, count)
+        return _phases_of(machine, align_record(record, skews), basis, phases, count)
 
     found = Parallel(n_jobs=jobs, prefer="threads")(delayed(one)(record) for record in campaign.records)
     every = tuple(phase for test in found for phase in test)
@@ -125,17 +125,17 @@ def _check_names(campaign: Campaign) -> None:
 
 
 def _phases_of(
-    machine: Machine, record: xr.Dataset, bench: Bench, phases: Sequence[int], count: Callable[[], None]
+    machine: Machine, record: xr.Dataset, basis: ComparisonBasis, phases: Sequence[int], count: Callable[[], None]
 ) -> list[Phase]:
     found = []
     try:
-        if (length := _seconds(record)) < bench.numbers.shortest:
-            raise RecordError(too_short(length, bench.numbers))
-        test = prepare(machine, record, bench.sensors)
+        if (length := _seconds(record)) < basis.numbers.shortest:
+            raise RecordError(too_short(length, basis.numbers))
+        test = prepare(machine, record, basis.sensors)
     except LhpostError as error:
         name, time = str(record.attrs.get("test", "test")), record["time"].values
         test, why = None, str(error)
     for number in phases:
-        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test, bench))
+        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test, basis))
         count()
     return found

@@ -44,10 +44,10 @@ class Family:
     shows_in: tuple[str, ...]  # kinds of residuals
     confused_with: tuple[str, ...]
     tell_apart: str
-    twins: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
+    grouping: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
     named: str  # the family that it is a form of; usually itself
     search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
-    mimicked: bool  # whether another form of the report's own laws may pass for it
+    confusable: bool  # whether another form of the report's own laws may pass for it
 
     def components(self, machine: Structure) -> tuple[str, ...]:
         """Names of all components of a machine that it can act on; also ``platen``, its axes, and ``supply``."""
@@ -80,7 +80,7 @@ class Family:
         found = [tuple(name for name in names if not name.startswith("platen."))]
         if "level axis" in self.acts_on:
             found.append(names)
-        if self.twins == "kind":
+        if self.grouping == "kind":
             found += [tuple(members) for members in kinds.values()]
             found += [(name,) for name in names]
         return tuple(dict.fromkeys(group for group in found if group))
@@ -130,8 +130,8 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         shows_in=tuple(table["shows_in"]),
         confused_with=tuple(table["confused_with"]),
         tell_apart=table["tell_apart"],
-        twins=table.get("twins", "kind"),
+        grouping=table.get("grouping", "kind"),
         named=table.get("named", name),
         search=table.get("search", "named"),
-        mimicked=table.get("mimicked", False),
+        confusable=table.get("confusable", False),
     )

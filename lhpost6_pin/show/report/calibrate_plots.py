@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...identification.calibration import Calibration
-from ...identification.calibration.verdicts import changed_knobs, contradictions
+from ...identification.calibration.verdicts import changed_parameters, contradictions
 from .layout import stacked_layout, time_band
 from .page import Figure, Markup, figure, number, paragraph, shaded, table
 from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION
@@ -58,16 +58,16 @@ def _drawn(calibration: Calibration) -> str:
 
 
 def forest_block(calibration: Calibration) -> Markup:
-    """Return every knob's estimate with its interval beside its prior."""
-    count = len(calibration.knobs)
-    changed, informed = changed_knobs(calibration), calibration.informed
+    """Return every parameter's estimate with its interval beside its prior."""
+    count = len(calibration.parameters)
+    changed, informed = changed_parameters(calibration), calibration.informed
     groups = {
         "differs from nominal": (changed, VERMILLION, "diamond"),
         "does not differ": ([i for i in range(count) if informed[i] and i not in changed], BLUE, "circle"),
         "not informed": ([i for i in range(count) if not informed[i] and i not in changed], "#6e7781", "circle-open"),
     }
     where, reach = calibration.estimate / calibration.prior, _reach(calibration) * calibration.sd / calibration.prior
-    names = [knob.name for knob in calibration.knobs]
+    names = [parameter.name for parameter in calibration.parameters]
     dots = [
         Dots(name, rows, where[rows].tolist(), reach[rows].tolist(), [names[i] for i in rows], color, symbol)
         for name, (rows, color, symbol) in groups.items()
@@ -81,25 +81,25 @@ def forest_block(calibration: Calibration) -> Markup:
 
 
 def subset_block(calibration: Calibration) -> Markup:
-    """Return what each group of residuals says of each knob by itself, beside all together."""
-    count, prior, limit = len(calibration.knobs), calibration.prior, calibration.numbers.number("report.informed")
+    """Return what each group of residuals says of each parameter by itself, beside all together."""
+    count, prior, limit = len(calibration.parameters), calibration.prior, calibration.numbers.number("report.informed")
     own = calibration.numbers.number("simulation.deviations")
     groups = [s for s in calibration.subsets if np.any(s.sd[:count] < limit * prior[:count])]
     if not groups:
         return paragraph("No group tells of a parameter by itself.")
     tells = {s.name: [i for i in range(count) if s.sd[i] < limit * prior[i]] for s in groups}
-    told = sorted({i for knobs in tells.values() for i in knobs})
-    speakers = {i: [TOGETHER, *(name for name, knobs in tells.items() if i in knobs)] for i in told}
+    told = sorted({i for chosen in tells.values() for i in chosen})
+    speakers = {i: [TOGETHER, *(name for name, chosen in tells.items() if i in chosen)] for i in told}
     names = calibration.names
 
     def place(name: str, i: int) -> float:
-        """Place of a group's estimate up the figure: those of one knob stand close together."""
+        """Place of a group's estimate up the figure: those of one parameter stand close together."""
         spoken = speakers[i]
         return told.index(i) + 0.8 * ((spoken.index(name) + 0.5) / len(spoken) - 0.5)
 
-    def dots_of(name: str, knobs: Sequence[int], estimate: Array, sd: Array, color: str, symbol: str) -> Dots:
-        places, labels = [place(name, i) for i in knobs], [names[i] for i in knobs]
-        where, half = ([float(x[i] / prior[i]) for i in knobs] for x in (estimate, _reach(calibration) * sd))
+    def dots_of(name: str, chosen: Sequence[int], estimate: Array, sd: Array, color: str, symbol: str) -> Dots:
+        places, labels = [place(name, i) for i in chosen], [names[i] for i in chosen]
+        where, half = ([float(x[i] / prior[i]) for i in chosen] for x in (estimate, _reach(calibration) * sd))
         return Dots(name, places, where, half, labels, color, symbol)
 
     series = [dots_of(TOGETHER, told, calibration.estimate, calibration.sd, BLACK, "line-ns-open")]

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from ...identification.calibration import Calibration
-from ...identification.calibration.calibration_summary import chance, range_words
-from ...identification.calibration.verdicts import beyond, changed_knobs, contradictions, out_of_range, verdict_on
+from ...identification.calibration.calibration_summary import chance, range_summary
+from ...identification.calibration.verdicts import beyond, changed_parameters, contradictions, out_of_range, verdict_on
 from .calibrate_sections import (
     alike_blocks,
     change_of,
     group_blocks,
-    knob_blocks,
     misfit_blocks,
+    parameter_blocks,
     sensor_blocks,
     test_blocks,
 )
@@ -27,19 +27,19 @@ NAMED = 3  # parameters that the verdict names
 def write_calibrate_report(calibration: Calibration, path: Path | str, command: str = "") -> Path:
     """Write the self-contained HTML report of a calibration to `path` and return the path."""
     verdict, level = _judge(calibration)
-    knobs, tests = len(calibration.knobs), len(calibration.tests)
+    count, tests = len(calibration.parameters), len(calibration.tests)
     page = Page(
         kind="Calibration",
         title=f"{calibration.machine.name} calibrated by {calibration.campaign}",
         asked=(
-            f"Find {knobs} parameters of {load_of(calibration.machine)}, and {len(calibration.unknowns)} errors of its "
+            f"Find {count} parameters of {load_of(calibration.machine)}, and {len(calibration.unknowns)} errors of its "
             f"sensors, from {tests} test{'s' * (tests != 1)}: {', '.join(calibration.tests)}."
         ),
         verdict=verdict,
         level=level,
         headlines=_headlines(calibration),
         sections=[
-            Section("parameters", "Parameters", knob_blocks(calibration)),
+            Section("parameters", "Parameters", parameter_blocks(calibration)),
             Section("sensors", "Errors of the sensors", sensor_blocks(calibration)),
             Section("misfit", "What is left", misfit_blocks(calibration)),
             Section("information", "Which tests tell of what", test_blocks(calibration)),
@@ -54,14 +54,14 @@ def write_calibrate_report(calibration: Calibration, path: Path | str, command: 
 
 
 def _judge(calibration: Calibration) -> tuple[str, Level]:
-    knobs, changed = len(calibration.knobs), changed_knobs(calibration)
-    informed = int(np.sum(calibration.informed[:knobs]))
+    count, changed = len(calibration.parameters), changed_parameters(calibration)
+    informed = int(np.sum(calibration.informed[:count]))
     rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
     said = [
         f"The fit converged after {rounds}."
         if calibration.converged
         else f"The fit did not converge in {rounds}: estimates are where it stopped, and have no intervals.",
-        f"The campaign has told something of {informed} of {knobs} parameters.",
+        f"The campaign has told something of {informed} of {count} parameters.",
     ]
     if changed:
         most = ", ".join(f"{calibration.names[i]} ({change_of(calibration, i)})" for i in changed[:NAMED])
@@ -85,7 +85,7 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
         )
     if wrong:
         level = "attention"
-        said.append(f"Sensor errors {range_words(calibration)}.")
+        said.append(f"Sensor errors {range_summary(calibration)}.")
     if bounded:
         level = "attention"
         said.append(f"As far off as the fit lets it go, so that something else is wrong: {', '.join(bounded)}.")
@@ -93,7 +93,7 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
 
 
 def _headlines(calibration: Calibration) -> list[Headline]:
-    knobs, p = len(calibration.knobs), len(calibration.prior)
+    count, p = len(calibration.parameters), len(calibration.prior)
     informed, outside = calibration.informed, beyond(calibration)
     after = float(np.nanmax(calibration.misfit_after))
     before = float(np.nanmax(calibration.misfit_before))
@@ -105,13 +105,13 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     apart = len(contradictions(calibration))
     by_chance = number(chance(calibration), 1)
     wrong = len(out_of_range(calibration))
-    ranges = f"{wrong} beyond their stated ranges" if wrong else range_words(calibration)
+    ranges = f"{wrong} beyond their stated ranges" if wrong else range_summary(calibration)
     trust: Level = "attention" if wrong else "good"
     return [
         Headline("yes" if calibration.converged else "no", "Converged", f"rounds: {calibration.rounds}", good),
-        Headline(f"{np.sum(informed[:knobs])} of {knobs}", "Parameters informed", note),
-        Headline(f"{np.sum(outside[:knobs])} of {knobs}", "Parameters that differ from nominal", differ),
-        Headline(f"{np.sum(outside[knobs:])} of {p - knobs}", "Sensor errors found", ranges, trust),
+        Headline(f"{np.sum(informed[:count])} of {count}", "Parameters informed", note),
+        Headline(f"{np.sum(outside[:count])} of {count}", "Parameters that differ from nominal", differ),
+        Headline(f"{np.sum(outside[count:])} of {p - count}", "Sensor errors found", ranges, trust),
         Headline(number(after), "Worst misfit", f"1: noise alone; {number(before)} before", fits),
         Headline(str(apart), "Contradictions", f"groups against all together; by chance about {by_chance}"),
     ]

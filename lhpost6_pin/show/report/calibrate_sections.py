@@ -5,7 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...identification.calibration import Calibration
-from ...identification.calibration.calibration_summary import alike_words, contradiction_words, cut_strokes, range_words
+from ...identification.calibration.calibration_summary import (
+    contradiction_summary,
+    correlation_summary,
+    cut_strokes,
+    range_summary,
+)
 from ...identification.calibration.verdicts import beyond, contradictions, far, stated_range, verdict_on
 from ...identification.residuals import RESIDUALS
 from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
@@ -16,7 +21,7 @@ __all__ = [
     "alike_blocks",
     "change_of",
     "group_blocks",
-    "knob_blocks",
+    "parameter_blocks",
     "misfit_blocks",
     "sensor_blocks",
     "test_blocks",
@@ -27,20 +32,20 @@ KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force":
 
 
 # ---------------------------------------------------------------------------------------- parameters and sensors
-def knob_blocks(calibration: Calibration) -> list[Markup]:
+def parameter_blocks(calibration: Calibration) -> list[Markup]:
     """Return every parameter beside its prior, drawn and in numbers."""
     outside = far(calibration)
     informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
     rows = []
-    for i, knob in enumerate(calibration.knobs):
+    for i, parameter in enumerate(calibration.parameters):
         low, high = calibration.interval(i, PROBABILITY)
         rows.append(
             (
-                knob.name,
+                parameter.name,
                 _marked(calibration, i),
-                _plain(knob.value),
-                _plain(knob.at(float(calibration.estimate[i]))),
-                knob.unit,
+                _plain(parameter.value),
+                _plain(parameter.at(float(calibration.estimate[i]))),
+                parameter.unit,
                 change_of(calibration, i),
                 number(float(outside[i]), 2),
                 number(float(calibration.sd[i] / calibration.prior[i]), 2),
@@ -63,7 +68,7 @@ def knob_blocks(calibration: Calibration) -> list[Markup]:
 
 def sensor_blocks(calibration: Calibration) -> list[Markup]:
     """Return the errors of the sensors, those that stand out first."""
-    first, outside = len(calibration.knobs), beyond(calibration)
+    first, outside = len(calibration.parameters), beyond(calibration)
     order = sorted(range(first, len(calibration.prior)), key=lambda i: -abs(far(calibration)[i]))
     rows = [_sensor_row(calibration, i) for i in order]
     differ = sum(bool(outside[i]) for i in order)
@@ -71,7 +76,7 @@ def sensor_blocks(calibration: Calibration) -> list[Markup]:
         "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
         "parameters are free of these errors; the override file does not hold them. Every sensor is off by a little: "
         f"{differ} of {len(order)} errors are large enough to be found, beyond {calibration.limit:g} predicted "
-        f"deviations from zero, {range_words(calibration)}."
+        f"deviations from zero, {range_summary(calibration)}."
     )
     header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "In deviations", "Predicted over prior")
     caption = "Errors found, the clearest first"
@@ -84,7 +89,7 @@ def sensor_blocks(calibration: Calibration) -> list[Markup]:
 
 
 def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
-    unknown = calibration.unknowns[i - len(calibration.knobs)]
+    unknown = calibration.unknowns[i - len(calibration.parameters)]
     scale, unit = {"gain": (100.0, "%"), "delay": (1e3, "ms")}.get(unknown.kind, (1.0, unknown.unit))
     return (
         unknown.name,
@@ -118,14 +123,14 @@ def misfit_blocks(calibration: Calibration) -> list[Markup]:
 
 def test_blocks(calibration: Calibration) -> list[Markup]:
     """Return what each test alone would tell."""
-    knobs, p = len(calibration.knobs), len(calibration.prior)
+    count, p = len(calibration.parameters), len(calibration.prior)
     how = paragraph(
         "What would be known if a test were the only one: predicted deviation over the prior's, so 1 is nothing and "
         "0.1 ten times better than before. Sensor errors are unknown at the same time."
     )
-    blocks = [how, *information_blocks(calibration, range(knobs))]
-    if p > knobs:
-        blocks.append(details("Errors of the sensors", *information_blocks(calibration, range(knobs, p))))
+    blocks = [how, *information_blocks(calibration, range(count))]
+    if p > count:
+        blocks.append(details("Errors of the sensors", *information_blocks(calibration, range(count, p))))
     return blocks
 
 
@@ -136,11 +141,11 @@ def group_blocks(calibration: Calibration) -> list[Markup]:
     for one in found:
         i = one.unknown
         subset = next(s for s in calibration.subsets if s.name == one.subset)
-        unit = calibration.knobs[i].unit if i < len(calibration.knobs) else _unit(calibration, i)
+        unit = calibration.parameters[i].unit if i < len(calibration.parameters) else _unit(calibration, i)
         alone, together = (_plain(_value(calibration, i, float(x[i]))) for x in (subset.estimate, calibration.estimate))
         rows.append((calibration.names[i], one.subset, alone, together, unit, number(one.deviations, 2)))
     how = paragraph(
-        f"{contradiction_words(calibration)} Many more than by chance say that an equation lacks something. Noise that "
+        f"{contradiction_summary(calibration)} Many more than by chance indicate an incomplete equation. Noise that "
         "residuals share is taken off in the order wrench, flow, gas law, force: a later group holds a little of the "
         "earlier ones. "
         "Simulation drives the plant by the recorded spools, in open loop, and compares platen velocity and chamber "
@@ -160,11 +165,10 @@ def alike_blocks(calibration: Calibration) -> list[Markup]:
     limit = calibration.numbers.number("report.alike")
     if not pairs:
         return [paragraph(f"No two unknowns are correlated by {limit:g} or more.")]
-    own = {knob.name for knob in calibration.knobs}
+    own = {parameter.name for parameter in calibration.parameters}
     how = paragraph(
-        f"{alike_words(calibration)} These are pairs correlated by {limit:g} or more: the campaign tells their sum "
-        "(correlation negative) or difference (positive), in prior deviations, much better than either; do not read "
-        "one without the other."
+        f"{correlation_summary(calibration)} These are pairs correlated by {limit:g} or more: their sum "
+        "(correlation negative) or difference (positive), in prior deviations, is identified much better than either."
     )
     groups = (
         ("Parameters with each other", [p for p in pairs if p[0] in own and p[1] in own], LISTED),
@@ -207,16 +211,16 @@ def _plain(value: float) -> str:
 
 
 def _value(calibration: Calibration, i: int, coordinate: float) -> float:
-    return calibration.knobs[i].at(coordinate) if i < len(calibration.knobs) else coordinate
+    return calibration.parameters[i].at(coordinate) if i < len(calibration.parameters) else coordinate
 
 
 def _unit(calibration: Calibration, i: int) -> str:
-    return calibration.unknowns[i - len(calibration.knobs)].unit
+    return calibration.unknowns[i - len(calibration.parameters)].unit
 
 
 def change_of(calibration: Calibration, i: int) -> str:
-    """How far knob i is from nominal, signed: relative, or in its unit."""
-    knob, coordinate = calibration.knobs[i], float(calibration.estimate[i])
-    if knob.form == "factor":
+    """How far parameter i is from nominal, signed: relative, or in its unit."""
+    parameter, coordinate = calibration.parameters[i], float(calibration.estimate[i])
+    if parameter.form == "factor":
         return f"{'+' * (coordinate > 0)}{percent(coordinate)}"
-    return f"{'+' * (coordinate > 0)}{number(coordinate)}\N{NO-BREAK SPACE}{knob.unit}"
+    return f"{'+' * (coordinate > 0)}{number(coordinate)}\N{NO-BREAK SPACE}{parameter.unit}"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.names import AXES
-from ...identification.decompose import Agreement, Decomposed, Work
+from ...identification.decompose import Decomposed, Work, WrenchAgreement
 from ...identification.decompose.work import delivered_by
 from .charts import Curve, Plot, grid_figure
 from .page import Figure, Markup, details, figure
@@ -107,7 +107,7 @@ def _against(axis: str, against: str) -> str:
     return "Time [s]" if against == "time" else f"{against.capitalize()}, {axis} [{axis_scale(axis, against).unit}]"
 
 
-def effect_blocks(found: Decomposed, agreement: Agreement) -> list[Markup]:
+def effect_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]:
     """Return the wrench of every effect over time; axes that hardly moved are folded away."""
     effects, wrench = delivered_by(found)
     actuators = {e.name for e in found.plant.machine.effects if e.spools}

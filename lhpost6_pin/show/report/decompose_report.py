@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.names import AXES
-from ...identification.decompose import Agreement, Decomposed, Match, Work, decompose_numbers
+from ...identification.decompose import Decomposed, Match, Work, WrenchAgreement, decompose_numbers
 from ...identification.decompose.agreement import Explanation
 from .control_blocks import load_of
 from .decompose_plots import component_blocks, effect_blocks, force_scale, moved_axes, six_row_blocks, work_blocks
@@ -27,7 +27,7 @@ ORDER: Sequence[Explanation] = ("none needed", "noise", "sensors", "parameters",
 
 
 def write_decompose_report(
-    found: Decomposed, agreement: Agreement, work: Work, path: Path | str, *, command: str = ""
+    found: Decomposed, agreement: WrenchAgreement, work: Work, path: Path | str, *, command: str = ""
 ) -> Path:
     """Write the self-contained HTML report of a decomposed record to `path` and return the path."""
     record, machine = found.record, found.plant.machine
@@ -58,7 +58,7 @@ def write_decompose_report(
     return save_page(page, path)
 
 
-def _judge(found: Decomposed, agreement: Agreement) -> tuple[str, Level]:
+def _judge(found: Decomposed, agreement: WrenchAgreement) -> tuple[str, Level]:
     axes = found.plant.axes
     if found.sensors is None:
         left = np.abs(found.forces.residual).max(axis=0)[axes]
@@ -94,7 +94,7 @@ def _judge(found: Decomposed, agreement: Agreement) -> tuple[str, Level]:
     return " ".join(sentences), levels.get(ORDER[order], "good")
 
 
-def _headlines(found: Decomposed, agreement: Agreement) -> list[Headline]:
+def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     moved = [AXES.index(a) for a in moved_axes(found)] or list(found.plant.axes)
     tiles = []
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
@@ -111,7 +111,7 @@ def _headlines(found: Decomposed, agreement: Agreement) -> list[Headline]:
     return tiles
 
 
-def _residual_blocks(found: Decomposed, agreement: Agreement) -> list[Markup]:
+def _residual_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]:
     if found.sensors is None:
         rows = []
         for k in found.plant.axes:
@@ -148,7 +148,7 @@ def _residual_blocks(found: Decomposed, agreement: Agreement) -> list[Markup]:
     ]
 
 
-def _match_blocks(found: Decomposed, agreement: Agreement) -> list[Markup]:
+def _match_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]:
     blocks = [
         paragraph(
             "RRMSE = √(Σ error² ∕ Σ measured²); with the mean off, of both. The delay is that of the modelled force "

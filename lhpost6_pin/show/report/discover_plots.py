@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from ...discovery import Discovery
 from ...discovery.held_out import FLOOR
 from ...discovery.localise import gap_map
-from ...discovery.residual_function import Left
+from ...discovery.residual_function import ResidualFunction
 from ...discovery.search_state import Round
 from ...discovery.verdict_summary import where
 from .layout import log_ticks, stacked_layout
 from .page import Figure, Markup, paragraph, shaded, table, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
 
-__all__ = ["gain_figure", "gap_figure", "left_figure", "map_blocks"]
+__all__ = ["gain_figure", "gap_figure", "residual_function_figure", "map_blocks"]
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _KINDS = {
 def map_blocks(found: Discovery) -> list[Markup]:
     """Return, for each kind of residual, the misfit of every column in every band, before and after."""
     problem = found.search.problem
-    before, after = (gap_map(problem, rest) for rest in (found.search.refit.normal.rest, found.search.rest))
+    before, after = (gap_map(problem, rest) for rest in (found.search.refit.normal.residual, found.search.residual))
     blocks = [
         paragraph(
             "Mean square of the whitened residuals, known parameters and sensor errors refitted: one is sensor noise "
@@ -69,7 +69,7 @@ def _short(value: float) -> str:
     return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
 
 
-def gain_figure(one: Round, number: int, least: float, mimicked: float) -> Figure:
+def gain_figure(one: Round, number: int, least: float, confusable: float) -> Figure:
     """Return the best candidate of each family in one round: what it gains, and what is refused."""
     best = list(one.best.values())
     shown = [s for s in best if s.gain > 1.0][:SHOWN] or best[:3]
@@ -96,7 +96,7 @@ def gain_figure(one: Round, number: int, least: float, mimicked: float) -> Figur
     words = (
         "The best candidate of each family, everything known refitted beside it. "
         f"The dashed line is the least gain, {least:g}; families that another form of the report's laws may pass for "
-        f"need {mimicked:g}."
+        f"need {confusable:g}."
     )
     return Figure(f"gains-{number}", f"Round {number}: what could explain it", words, traces, layout, layout["height"])
 
@@ -130,7 +130,7 @@ def gap_figure(found: Discovery) -> Figure:
     return Figure("gap", "The gap on tests that were not searched", words, traces, layout, layout["height"])
 
 
-def left_figure(left: Left) -> Figure:
+def residual_function_figure(left: ResidualFunction) -> Figure:
     """Return a free function of a leg's state with two deviations on either side."""
     title = "Rate of elongation [m/s]" if left.state == "velocity" else f"Elongation: {left.words} [m]"
     layout = stacked_layout([f"Force along {where(left.components)} [kN]"], title, row_height=240)

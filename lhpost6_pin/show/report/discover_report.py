@@ -11,7 +11,7 @@ from ...discovery.verdict_summary import said, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .control_blocks import load_of
-from .discover_plots import gain_figure, gap_figure, left_figure, map_blocks
+from .discover_plots import gain_figure, gap_figure, map_blocks, residual_function_figure
 from .page import (
     Headline,
     Level,
@@ -112,8 +112,8 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         blocks += [paragraph("The campaign cannot tell these apart. What would:"), bullet_list(lines)]
     if found.next_tests:
         blocks.append(_next_tests(found))
-    if verdict.left is not None:
-        blocks.append(figure(left_figure(verdict.left)))
+    if verdict.residual_function is not None:
+        blocks.append(figure(residual_function_figure(verdict.residual_function)))
     elif verdict.word == "unexplained":
         blocks.append(paragraph("More than noise is left, and no leg's position or speed, now or lately, explains it."))
     if verdict.where:
@@ -129,7 +129,7 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
 def _next_tests(found: Discovery) -> Markup:
     """Tests simulated with the one effect and explained by the other."""
     rows = [
-        (one.test, " or ".join(map(title_of, one.families)), _margin(one.margin), "yes" if one.told else "no")
+        (one.test, " or ".join(map(title_of, one.families)), _margin(one.margin), "yes" if one.informative else "no")
         for one in found.next_tests
     ]
     header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood between them", "Tells them apart")
@@ -165,7 +165,7 @@ def _proof_blocks(found: Discovery) -> list[Markup]:
 
 
 def _considered(found: Discovery) -> list[Markup]:
-    gates = [found.numbers.number(f"accept.{gate}") for gate in ("gain", "mimicked")]
+    gates = [found.numbers.number(f"accept.{gate}") for gate in ("gain", "confusable")]
     blocks: list[Markup] = []
     for k, one in enumerate(found.search.rounds, start=1):
         blocks.append(figure(gain_figure(one, k, *gates)))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.names import AXES
-from ...identification.validation import Pair, Phase, Valves
+from ...identification.validation import ComparedQuantity, Phase, Valves
 from ...identification.validation.phase_agreement import MOTIONS
 from .charts import Curve, Panel, Plot, XAxis, chart_figure, grid_figure
 from .control_blocks import axis_title
@@ -167,7 +167,7 @@ def _over_time(
     return time_figure(name, title, words, rows, start=0.0, step=step, buckets=buckets, row_height=row_height)
 
 
-def _traces(pair: Pair, k: int) -> list[Trace]:
+def _traces(pair: ComparedQuantity, k: int) -> list[Trace]:
     return [Trace("measured", pair.measured[:, k], MEASURED), Trace("model", pair.model[:, k], MODEL)]
 
 
@@ -200,7 +200,14 @@ def _grid(
 
 
 def _loop(
-    phase: Phase, force: Pair | None, motion: Pair | None, side: str, axis: str, over: str, *, own: bool
+    phase: Phase,
+    force: ComparedQuantity | None,
+    motion: ComparedQuantity | None,
+    side: str,
+    axis: str,
+    over: str,
+    *,
+    own: bool,
 ) -> tuple[Array, Array]:
     """Return time, that side's own motion or that which was measured, and that side's force over it."""
     assert force is not None

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.names import AXES
-from ...identification.validation import PHASES, Agreement, Phase, Validation
+from ...identification.validation import PHASES, ColumnAgreement, Phase, Validation
 from .page import Markup, details, number, paragraph, shaded, table, text
 from .run_motion import percent, shown_as
 from .validate_plots import actuator_blocks, force_blocks, motion_blocks, scale_of, spectrum_block
@@ -44,7 +44,7 @@ def named(quantity: str) -> str:
     return _NAMES.get(quantity, quantity)
 
 
-def worst_of(found: Validation, phase: int) -> tuple[Phase, Agreement] | None:
+def worst_of(found: Validation, phase: int) -> tuple[Phase, ColumnAgreement] | None:
     """The worst of what the summary shows of a phase, among axes that moved; None if there is nothing."""
     rows = ((p, a) for p in found.phases if p.number == phase for a in _judged(p))
     return max(rows, key=lambda row: row[1].rrmse_aligned, default=None)
@@ -58,7 +58,7 @@ def why_not(found: Validation, phase: int) -> str:
     return "not done, see the notes" if reasons else "no axis moved enough to be judged"
 
 
-def _judged(phase: Phase) -> list[Agreement]:
+def _judged(phase: Phase) -> list[ColumnAgreement]:
     return [a for a in phase.agreement if a.quantity in SUMMED[phase.number] and a.moves]
 
 
@@ -122,7 +122,7 @@ def _noise_blocks(found: Validation) -> list[Markup]:
     return [paragraph(how), table("Residual of inverse dynamics over the noise predicted", header, rows)]
 
 
-def _span(tests: Sequence[Agreement]) -> str:
+def _span(tests: Sequence[ColumnAgreement]) -> str:
     """Least and greatest noise of one column over all tests, in words."""
     scale = scale_of(tests[0].quantity, tests[0].column)
     low, high = (number(end(a.noise for a in tests) * scale.factor, 2) for end in (min, max))
@@ -146,12 +146,12 @@ def _mean_blocks(found: Validation) -> list[Markup]:
     return [paragraph(how), table("Mean error of the total actuator force", header, [*rows, due])]
 
 
-def _mean_cell(one: Agreement) -> str:
+def _mean_cell(one: ColumnAgreement) -> str:
     beyond = abs(one.offset) > SENSED * one.offset_expected
     return f"{'! ' * beyond}{number(one.offset * scale_of(one.quantity, one.column).factor)}"
 
 
-def _cell(one: Agreement, worst: bool) -> Markup:
+def _cell(one: ColumnAgreement, worst: bool) -> Markup:
     if one.moves:
         shade = next(k for k, top in enumerate(_SHADES) if not one.rrmse_aligned > top)
         return shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", shade)

@@ -299,7 +299,7 @@ def test_run_that_diverges_stops_and_names_a_remedy(plant, rest, engine):
         ({"steps_per_second": 3000}, "3000 model steps"),
         ({"samples": 0}, "nothing to simulate"),
         ({"samples": 3}, "spool has 4 rows"),
-        ({"record_every": 0}, "every 0-th sample cannot be recorded"),
+        ({"record_every": 0}, "record_every must be at least 1"),
     ],
 )
 def test_what_cannot_be_run_is_refused(plant, rest, change, message):

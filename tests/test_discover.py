@@ -301,7 +301,7 @@ def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
             laid[t] -= real_bins(c, root) @ part @ amplitude
     rest = [r + more for r, more in zip(background.residual, laid, strict=True)]
     side = background.side + np.array([s.T @ more for s, more in zip(background.slope, laid, strict=True)])
-    more = replace(background, rest=rest, side=side)
+    more = replace(background, residual=rest, side=side)
     weigh = Reweighting(problem, more, squares_by_column(search.refit.normal.residual), numbers)
     candidates = [candidate("valve_deadband", "H1"), *hidden]
     pairs = score_pairs(problem, Linearisation(base, more, ()), weigh, candidates, numbers)

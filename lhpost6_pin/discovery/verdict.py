@@ -194,7 +194,7 @@ def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:
 
 def _more_than_noise(found: Search, numbers: Parameters) -> bool:
     """Whether more is left than noise, and than the form of the effects found."""
-    limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.residual")
+    limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
     doubt, heard = numbers.number("accept.doubt"), ~_hammered(found)
     for kind in found.problem.kinds:
         rows = found.problem.rows(kind) & heard
@@ -224,7 +224,7 @@ def _excess(rest: Sequence[NDArray[np.complex128]], doubt: float) -> float:
 
 def _leaves_much(added: AddedEffect, found: Search, numbers: Parameters) -> bool:
     """Whether much is left of what an effect should have explained, where it explained most of it: a wrong name."""
-    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.residual")
+    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
     where = (added.fall > 0.1 * added.fall.max()) & ~_hammered(found)
     left = squares_by_column(found.residual)[where]
     noise = float(sum(len(r) for r in found.residual) * left.size)
@@ -255,7 +255,7 @@ def reject_effects(
 def _its_form(free: ResidualFunction, one: AddedEffect, numbers: Parameters) -> bool:
     """Whether what has no name is so little of an effect found, there or elsewhere, that it is the form of that."""
     there = set(free.components) <= set(one.candidate.components)
-    return free.gain < numbers.number("verdict.residual" if there else "verdict.elsewhere") * one.gain
+    return free.gain < numbers.number("verdict.rest" if there else "verdict.elsewhere") * one.gain
 
 
 def _outweighed(one: AddedEffect, free: ResidualFunction, numbers: Parameters) -> bool:

@@ -9,6 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 from doc_pages import PAGES, ROOT, Links, snippets
+from test_structure import ORDER
 
 from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
@@ -112,7 +113,7 @@ def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site):
         page = (site / "theory" / f"{module}.html").read_text(encoding="utf-8")
         assert f'id="lhpost6_pin.laws.{module}.' in page  # its kernels
         assert 'class="quote"' in page or 'class="mkdocstrings-source"' in page  # their source
-        assert 'id="who-uses-it"' in page and "tests/test_l" in page
+        assert 'id="uses"' in page and "tests/test_l" in page
         by_hand = (PAGES / "theory" / f"{module}.md").read_text(encoding="utf-8")
         assert re.search(r"\*\*Sign\.\*\*", by_hand) and re.search(r"\*\*In a record\.\*\*", by_hand)
 
@@ -128,7 +129,7 @@ def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site):
         section, setting = key.split(".")
         assert f"<code>{setting}</code>" in pages["control"] or f"<code>{section}</code>" in pages["control"]
     for name, page in pages.items():
-        assert 'id="code"' in page and 'id="what-holds-it"' in page and "<code>tests/test_" in page
+        assert 'id="code"' in page and 'id="tests"' in page and "<code>tests/test_" in page
         by_hand = (PAGES / "theory" / f"{name}.md").read_text()
         assert all(f"**{word}.**" in by_hand for word in ("Where it acts", "Sign", "In a record"))
     assert 'id="lhpost6_pin.control.loop.control_step"' in pages["control"]
@@ -151,7 +152,7 @@ def test_the_stored_wait_of_a_newcomer_is_within_what_is_wanted(site):
     assert len(rows) == 4
     assert all(float(found) <= float(wanted) for found, wanted in rows[:3])  # seconds
     assert float(rows[3][0]) >= float(rows[3][1])  # frames a second
-    assert "How long a newcomer waits" in (site / "results" / "audit.html").read_text()
+    assert "Time to the first result" in (site / "results" / "audit.html").read_text()
 
 
 def test_every_example_is_on_its_page_with_its_code(site):
@@ -184,6 +185,34 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path):
     ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
     assert ended.returncode == 1 and "holds something else" in ended.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_the_folders_on_their_page_are_those_of_the_package_in_the_order_of_imports():
+    text = (PAGES / "develop" / "where.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `(\w+)/` \|", text, re.MULTILINE) == ORDER
+
+
+@pytest.mark.parametrize("page", BY_HAND, ids=name)
+def test_files_and_modules_that_pages_name_exist_with_the_names_given_in_them(page):
+    text, package = page.read_text(encoding="utf-8"), ROOT / "lhpost6_pin"
+    folders = "|".join(ORDER)
+    for path, names in re.findall(rf"`(?:lhpost6_pin/)?((?:{folders})/[\w./]*)`(?:: ((?:`\w+`(?:, )?)+))?", text):
+        assert (package / path).exists(), path
+        for given in re.findall(r"\w+", names):
+            assert re.search(rf"\b{given}\b", (package / path).read_text(encoding="utf-8")), f"{path}: {given}"
+    for path in re.findall(r"`((?:models|scripts|tests)/[\w./]+)`", text):
+        assert (ROOT / path).exists(), path
+    for module in re.findall(rf"`(?:lhpost6_pin\.)?((?:{folders})\.[\w.]+)`", text):
+        folder = package.joinpath(*module.split(".")[:-1])
+        assert folder.is_dir() or folder.with_suffix(".py").is_file(), module
+
+
+def test_identifiers_of_the_glossary_are_in_use():
+    sources = [*(ROOT / "lhpost6_pin").rglob("*.py"), *(ROOT / "models").rglob("*.toml")]
+    words = set(re.findall(r"\w+", "".join(path.read_text(encoding="utf-8") for path in sources)))
+    text = (PAGES / "glossary.md").read_text(encoding="utf-8")
+    given = {x for line in text.splitlines() if line.startswith("| ") for x in re.findall(r"`(\w+)`", line)}
+    assert len(given) > 90 and given <= words, given - words
 
 
 # --------------------------------------------------------------------------------------------------------- snippets

@@ -1,12 +1,14 @@
-"""What the README says runs, and what it lists is there."""
+"""The README: its example runs, its commands, files and numbers exist, and it is short."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
+import typer
 
 from lhpost6_pin import __version__
-from lhpost6_pin.cli import app
+from lhpost6_pin.cli.app import JOBS, app
 from lhpost6_pin.machine.machine import load_machine
 
 ROOT = Path(__file__).parent.parent
@@ -21,18 +23,37 @@ def test_python_example_runs():
     assert names["run"].trouble is None
 
 
-def test_commands_of_the_table_exist():
-    known = {c.name or c.callback.__name__ for c in app.registered_commands}
-    told = set(re.findall(r"`lhpost6 ([\w-]+)", README))
-    assert told == known  # all that exist are told, all that are told exist
+def test_it_fits_on_a_few_screens_with_small_pictures():
+    assert len(README.splitlines()) <= 160
+    pictures = re.findall(r"!\[(.+?)\]\((.+?)\)", README, re.DOTALL)
+    assert len(pictures) == 2 and all(len(alt) > 60 for alt, _ in pictures)
+    assert sum((ROOT / path).stat().st_size for _, path in pictures) < 600_000
 
 
-def test_every_assumed_number_is_listed_with_its_value():
+def test_the_table_of_commands_is_that_of_the_help():
+    rows = re.findall(r"^\| ([\w ]*?) ?\| `lhpost6 ([\w-]+)", README, re.MULTILINE)
+    jobs: dict[str, tuple[str, ...]] = {}
+    for job, command in rows:
+        last = job or next(reversed(jobs))
+        jobs[last] = (*jobs.get(last, ()), command)
+    assert list(jobs.items()) == list(JOBS.items())
+
+
+def test_examples_are_commands_with_options_that_exist():
+    group = typer.main.get_command(app)
+    blocks = "".join(re.findall(r"```bash\n(.*?)```", README, re.DOTALL)).replace(".venv/bin/", "")
+    lines = re.findall(r"(?:^|&& )lhpost6 (.+)", blocks, re.MULTILINE)
+    assert len(lines) > 8
+    for line in lines:
+        name, *words = shlex.split(line)
+        group.get_command(typer.Context(group), name).make_context(name, words)  # a UsageError for what does not exist
+
+
+def test_every_assumed_number_is_listed_with_its_value_and_unit():
     for path, quantity in load_machine().parameters.items():
         if quantity.assumed:
-            row = next((line for line in README.splitlines() if line.startswith("|") and f"`{path}`" in line), None)
-            assert row is not None, f"{path} is assumed; list it in the README"
-            assert f"{quantity.value:g}" in row
+            unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+            assert f"`{path}` {quantity.value:g}{unit}" in README, f"{path} is assumed; list it in the README"
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"\(?((?:models|scripts)/[\w./]+)", README))))

@@ -1,4 +1,4 @@
-"""Pages by hand with what is generated for them, put together in a folder that mkdocs builds.
+"""The pages by hand with their generated parts, assembled in a directory for mkdocs.
 
 A line `<!-- insert: NAME ... -->` of a page is replaced by what the generator NAME returns for the words behind it.
 """
@@ -26,7 +26,7 @@ _INSERT = re.compile(r"^<!-- insert: (.+) -->$", re.MULTILINE)
 
 
 def assemble(folder: Path) -> None:
-    """Write mkdocs.yml, pages and figures below `folder`; raises KeyError for an insert that there is not."""
+    """Write mkdocs.yml, pages and figures below `folder`; raises KeyError for an unknown insert."""
     for name in ("mkdocs.yml", "docstrings.py"):
         shutil.copy(HERE / name, folder / name)
     shutil.copytree(PAGES, folder / "pages")
@@ -43,12 +43,12 @@ def _generated(words: str) -> str:
 
 
 def _stored(name: str) -> str:
-    """What a script last printed, kept beside this module."""
+    """Output of a script, stored beside this module."""
     return (HERE / f"{name}.md").read_text(encoding="utf-8").strip()
 
 
 def _examples() -> str:
-    """The numbered examples: what each is, how it is called, and its code to unfold."""
+    """The numbered examples: title, call, and code to unfold."""
     parts = []
     for path in sorted((ROOT / "scripts").glob("example_*.py")):
         code = path.read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def _api(*modules: str) -> str:
 
 
 def _output(*command: str) -> str:
-    """A command of the package and what it prints; the folder for its results, if it leaves any, is thrown away."""
+    """A command of the package and its output; result files are deleted."""
     program = f"import sys; sys.argv = {list(command)!r}; from lhpost6_pin.cli import main; main()"
     env = {**os.environ, "COLUMNS": "96", "NO_COLOR": "1", "PYTHONPATH": str(ROOT)}
     ended = subprocess.run(
@@ -85,7 +85,7 @@ def _output(*command: str) -> str:
 
 
 def _shown(command: Sequence[str]) -> str:
-    """The command without the folder for its results."""
+    """The command without the directory of its results."""
     words = list(command)
     if "--out" in words:
         at = words.index("--out")

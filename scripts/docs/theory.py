@@ -1,4 +1,4 @@
-"""What a theory page says of its law beyond the words by hand: who uses it, its code, the tests that hold it."""
+"""Generated parts of a theory page: uses of its laws, code, tests."""
 
 import ast
 import re
@@ -30,7 +30,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "ball": ("ball", "smooth_ball"),
     "backlash": ("backlash",),
     "spring": ("spring", "end_stop", "drag"),
-    "table": ("by_position", "by_speed", "by_memory"),
+    "tabulated": ("by_position", "by_speed", "by_memory"),
     "leaks": ("turbulent_leakage", "null_leakage"),
     "bulk": ("entrained_air", "cavitation"),
     "spool": ("null_bias", "deadband", "flow_curve"),
@@ -41,7 +41,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "supply": ("supply_droop", "back_pressure", "valve_delay", "valve_lag"),
     "platen": ("constant", "thrust_direction", "more_inertia"),
 }
-"""Laws of `law_table` by the page that is about them; the first pages are modules of `laws/` of the same name."""
+"""Laws of the registry by their page; the first pages are modules of `laws/` of the same name."""
 
 
 def law_modules() -> tuple[str, ...]:
@@ -50,27 +50,25 @@ def law_modules() -> tuple[str, ...]:
 
 
 def page_of_law(name: str) -> str:
-    """The first page that is about a law; a law that is not among them is an error of this list."""
+    """Page of a law; StopIteration for a law that is missing in PAGES."""
     return next(page for page in reversed(PAGES) if name in PAGES[page])
 
 
 def laws_of(page: str) -> str:
-    """Who uses the laws of a page: effects of the nominal machine, and families of the library."""
+    """Uses of the laws of a page: effects of the nominal machine, families of the library."""
     mine = PAGES[page]
-    rows = [
-        (_numbers(law), "the machine's", code_cell(e.name), cell(e.source)) for law, e in _standard() if law in mine
-    ]
+    rows = [(_numbers(law), "machine", code_cell(e.name), cell(e.source)) for law, e in _standard() if law in mine]
     rows += [
         (
             _numbers(law),
-            "the library's",
+            "library",
             f"[`{family}`](../reference/library.md#{family})",
             cell(families()[family].title),
         )
         for law, family in _of_library()
         if law in mine
     ]
-    return table(("law and its numbers", "effect", "name", "what it is, or where it comes from"), rows)
+    return table(("law and its parameters", "used by", "name", "description or source"), rows)
 
 
 def _numbers(law: str) -> str:
@@ -98,14 +96,14 @@ def _of_library() -> tuple[tuple[str, str], ...]:
 
 
 def law(page: str) -> str:
-    """What is generated of a page about a module of `laws/`: use, tests, equation and code."""
+    """Generated part of a page on a module of `laws/`: equation and code, uses, tests."""
     return "\n\n".join(
         (
             "## Equation and code",
             _module(f"lhpost6_pin.laws.{page}"),
-            "## Who uses it",
+            "## Uses",
             laws_of(page),
-            "## What holds it",
+            "## Tests",
             tests_of(page),
         )
     )
@@ -118,7 +116,7 @@ def _module(path: str) -> str:
 
 # ---------------------------------------------------------------------------------------------------------- the tests
 class Battery(NamedTuple):
-    """A file of tests: the file that its cases are in, and how that calls cases of kernels and of laws."""
+    """A file of tests, the file of its cases, and the variable of its cases of laws."""
 
     file: str
     cases: str
@@ -130,11 +128,11 @@ BATTERIES = (
     Battery("test_library_mechanical.py", "test_library_mechanical.py", "CASES"),
     Battery("test_library_oil.py", "test_library_oil.py", "NUMBERS"),
 )
-"""Files of tests of laws: some tests run on all kernels of a file, some on all laws, some on single ones."""
+"""Test files of laws: tests on all kernels of a file, on all laws, and on single ones."""
 
 
 def tests_of(page: str) -> str:
-    """Tests that run on all kernels or laws of a file, a page's among them, and those that call its kernels."""
+    """Tests that cover the kernels or laws of a page, and those that call its kernels directly."""
     kernels = set(import_module(f"lhpost6_pin.laws.{page}").__all__)
     parts = []
     for battery in BATTERIES:
@@ -144,7 +142,7 @@ def tests_of(page: str) -> str:
         over = {f.name: _over(f, battery, page) for f in functions}
         single = [f for f in functions if over[f.name] is None and kernels & set(_of_module(f, page, battery.file))]
         for title, some in (
-            ("on every one of its kernels and laws", [f for f in functions if over[f.name]]),
+            ("on all kernels and laws of this page", [f for f in functions if over[f.name]]),
             ("on these kernels", single),
         ):
             if some:
@@ -154,7 +152,7 @@ def tests_of(page: str) -> str:
 
 
 def _over(function: ast.FunctionDef, battery: Battery, page: str) -> bool | None:
-    """Whether a test runs on a page's kernels or laws with all others; None if it is no such test."""
+    """Whether a parametrised test covers the kernels or laws of a page; None for other tests."""
     said = " ".join(ast.unparse(d) for d in function.decorator_list)
     words = set(re.findall(r"\w+", said))
     if "KERNELS" in words:
@@ -171,7 +169,7 @@ def _over(function: ast.FunctionDef, battery: Battery, page: str) -> bool | None
 
 @cache
 def _names_in(file: str, variable: str) -> frozenset[str]:
-    """Names and strings in what a file assigns to a variable."""
+    """Names and strings in the value of a variable of a test file."""
     nodes = [
         inner
         for n in tree(file).body
@@ -189,7 +187,7 @@ def tree(file: str) -> ast.Module:
 
 
 def _of_module(function: ast.FunctionDef, page: str, file: str) -> Iterator[str]:
-    """Names of a module's that a function uses, as `module.name` or imported as such."""
+    """Names of a module that a function uses, as `module.name` or imported."""
     direct = _imported(file).get(page, set())
     for node in ast.walk(function):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == page:
@@ -200,7 +198,7 @@ def _of_module(function: ast.FunctionDef, page: str, file: str) -> Iterator[str]
 
 @cache
 def _imported(file: str) -> dict[str, set[str]]:
-    """Modules of `laws` that a file of tests imports, with the names that it takes from each."""
+    """Modules of `laws` imported by a test file, with the imported names."""
     found: dict[str, set[str]] = {}
     for node in tree(file).body:
         if isinstance(node, ast.ImportFrom) and node.module == "lhpost6_pin.laws":

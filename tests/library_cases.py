@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from lhpost6_pin.identification.residuals import MeasuredTest, make_measured_test
+from lhpost6_pin.identification.prepare import AS_RECORDED, MeasuredTest, prepare_test
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
-from lhpost6_pin.mechanics.pose import PlatenMotion
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.simulate import OpenLoop, Run, simulate
 
@@ -29,9 +28,8 @@ def shaken(machine: Machine, samples: int = 1024, engine: str = "fused") -> Run:
 
 def measured_of(run: Run) -> MeasuredTest:
     """The run's record, free of noise, ready for residuals."""
-    record = record_of_run(run, {"test": "shaken"})
-    motion = PlatenMotion(*(record[f"platen_{x}"].values for x in ("displacement", "velocity", "acceleration")))
-    return make_measured_test(record, motion, 200.0)
+    policy = AS_RECORDED._replace(pressure_cutoff=200.0)
+    return prepare_test(run.plant, record_of_run(run, {"test": "shaken"}), None, policy)
 
 
 def rms(columns: np.ndarray) -> np.ndarray:

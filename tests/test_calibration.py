@@ -11,7 +11,6 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
-from lhpost6_pin.data.fusion import fuse_motion
 from lhpost6_pin.data.records import sample_interval
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import align
@@ -28,7 +27,7 @@ from lhpost6_pin.identification.calibration.fit import solve
 from lhpost6_pin.identification.calibration.free_parameters import FreeParameter, plan_parameters, scatter_parameters
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.override import save_override
-from lhpost6_pin.identification.calibration.prepare import _ready
+from lhpost6_pin.identification.calibration.prepare import policy_of
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem, ResidualBands
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
 from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
@@ -40,7 +39,8 @@ from lhpost6_pin.identification.calibration.whitened_residuals import (
     negative_log_likelihood,
     spectrum_of,
 )
-from lhpost6_pin.identification.residuals import RESIDUALS, MeasuredTest, evaluate_residuals, make_measured_test
+from lhpost6_pin.identification.prepare import AS_RECORDED, MeasuredTest, prepare_test
+from lhpost6_pin.identification.residuals import RESIDUALS, evaluate_residuals
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
@@ -287,8 +287,10 @@ def test_gains_of_platen_channels_take_their_share_of_the_motion(machine, sensor
     plant = make_plant(machine)
     record = campaign.records[1].drop_vars("actuator_displacement")
     numbers = calibration_numbers()
-    ready = _ready(plant, record, sensors, numbers)
-    scaled = _ready(plant, record.assign(platen_velocity=1.003 * record["platen_velocity"]), sensors, numbers)
+    ready, scaled = (
+        prepare_test(plant, r, sensors, policy_of(numbers))
+        for r in (record, record.assign(platen_velocity=1.003 * record["platen_velocity"]))
+    )
     unknowns = sensor_unknowns(machine, sensors, ready)
     values = np.array([0.003 * u.name.startswith("gain platen_velocity") for u in unknowns])
     right = corrected(scaled, unknowns, values)
@@ -298,7 +300,7 @@ def test_gains_of_platen_channels_take_their_share_of_the_motion(machine, sensor
 
 
 def test_errors_of_chambers_b_are_taken_out_where_spools_were_not_measured(problem, machine, sensors):
-    blind = replace(problem.tests[0], spool=None)
+    blind = problem.tests[0].with_channels(spool_position=None)
     unknowns = sensor_unknowns(machine, sensors, blind)
     values = np.array([1e4 * (u.name == "offset chamber_pressure_b[H3]") for u in unknowns])
     change = corrected(blind, unknowns, values).pressure - blind.pressure
@@ -317,7 +319,7 @@ def seen(machine, sensors, campaign) -> list[MeasuredTest]:
     record = campaign.records[1].drop_vars("actuator_displacement")
     rng = np.random.default_rng(5)
     return [
-        make_measured_test(r, fuse_motion(plant, r, sensors).motion, 60.0)
+        replace(prepare_test(plant, r, sensors, AS_RECORDED._replace(pressure_cutoff=60.0)), path=None)
         for r in (record, *(add_noise(record, sensors, rng) for _ in range(4)))
     ]
 
@@ -346,7 +348,7 @@ def test_unknowns_evaluated_together_have_the_derivatives_of_each_alone(problem)
 
 
 def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, sensors):
-    tests = [replace(t, actuator_force=None) for t in seen]
+    tests = [t.with_channels(actuator_force=None) for t in seen]
     without = Problem(machine, tests[:1], tests[1:], sensors, COMPARISON)
     x = np.zeros(len(without.prior))
     chosen = [without.names.index(n) for n in ("gain chamber_pressure_a[H2]", "offset chamber_pressure_b[H3]")]
@@ -519,7 +521,7 @@ def test_simulation_is_a_second_opinion_that_agrees(found, truth):
 
 
 def test_without_spools_there_is_no_second_opinion(problem):
-    blind = problem.with_tests([replace(t, spool=None) for t in problem.tests])
+    blind = problem.with_tests([t.with_channels(spool_position=None) for t in problem.tests])
     x = np.zeros(len(problem.prior))
     assert (
         by_simulation(blind, [], x, band=(0.3, 30.0), floor=0.05, told_below=0.9, progress=lambda share: None) is None

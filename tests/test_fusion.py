@@ -147,3 +147,13 @@ def test_what_cannot_be_fused_is_refused_by_name(plant) -> None:
     holed["platen_velocity"][7, 5] = np.nan
     with pytest.raises(RecordError, match=r"platen_velocity\[yaw\] at sample 7"):
         fuse_motion(plant, holed, SENSORS)
+
+
+@pytest.mark.parametrize("channels", [MOTION, MOTION[:3], ["platen_displacement", "platen_velocity"]])
+def test_the_shares_of_the_channels_add_up_to_the_motion(plant, channels) -> None:
+    record, _ = measured(plant)
+    fused = fuse_motion(plant, add_noise(record[channels], SENSORS, np.random.default_rng(3)), SENSORS, shares=True)
+    assert set(fused.share) == set(fused.used) == set(channels)
+    for k, whole in enumerate(fused.motion):
+        total = sum(share[k] for share in fused.share.values())
+        np.testing.assert_allclose(total, whole, atol=1e-9 * np.abs(whole).max())  # integrals that cancel

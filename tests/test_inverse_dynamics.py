@@ -7,7 +7,8 @@ from machine_cases import DATA, machine_named
 
 from lhpost6_pin.core.errors import RecordError, SimulationError
 from lhpost6_pin.identification.inverse_dynamics import Decomposition, inverse_dynamics, leg_wrenches, march_states
-from lhpost6_pin.identification.residuals import MeasuredTest, evaluate_residuals
+from lhpost6_pin.identification.prepare import MeasuredTest
+from lhpost6_pin.identification.residuals import evaluate_residuals
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.port_path import ports_along
 from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
@@ -90,7 +91,7 @@ def test_pin_rnea_and_the_compiled_dynamics_leave_the_same_residual(run: Run) ->
     motion, (force, struts) = motion_of(run), forces_of(run)
     wrong = 1.1 * force
     taken = inverse_dynamics(run.plant, run.time, motion, wrong, struts)
-    test = MeasuredTest("t", 1.0 / RATE, motion, wrong, None, None, struts, None)
+    test = MeasuredTest("t", 1.0 / RATE, motion, {"actuator_force": wrong, "strut_pressure": struts})
     other = evaluate_residuals(run.plant, test, ("wrench",)).wrench
     assert np.abs(taken.residual).max() > 1e5
     assert np.abs(other - taken.residual).max() < 1e-13 * np.abs(taken.component_wrench).max()  # rounding

@@ -20,14 +20,15 @@ from lhpost6_pin.effects import supply as common
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, state_rates
 from lhpost6_pin.effects.modifiers import supply_numbers
-from lhpost6_pin.effects.registry import HYDRAULIC_DOUBLE, LAWS
+from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.effects.table import effect_table, state_names
-from lhpost6_pin.identification.residuals import MeasuredTest, Residuals, evaluate_residuals
+from lhpost6_pin.identification.prepare import MeasuredTest
+from lhpost6_pin.identification.residuals import Residuals, evaluate_residuals
 from lhpost6_pin.laws import bulk, chamber, leaks, lines, orifice, play, spool
 from lhpost6_pin.machine.library import families
 from lhpost6_pin.machine.library.oil_families import BUILD
 from lhpost6_pin.machine.machine import Machine, load_machine
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium, hydraulic_rows
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.mechanics.schemes import spool_windows
@@ -393,22 +394,13 @@ def stirred(machine: Machine, engine: str = "fused", samples: int = 600, steps: 
 def as_measured(run: Run) -> MeasuredTest:
     """A run as perfect sensors see it; pressure rates by central differences, spools in the middle of jumps."""
     plant = run.plant
-    rows = plant.rows[hydraulic_rows(plant)]
-    columns = [*rows["state"], *(rows["state"][rows["law"] == HYDRAULIC_DOUBLE] + 1)]
-    pressure, position = run.z[:, columns], run.spool.copy()
+    position = run.spool.copy()
     position[1:] = 0.5 * (run.spool[1:] + run.spool[:-1])
     record = record_of_run(run, {"test": "t"})
-    return MeasuredTest(
-        name="t",
-        dt=1.0 / 2048,
-        motion=platen_motion(plant, run.q, run.v, run.a),
-        actuator_force=None,
-        pressure=pressure,
-        pressure_rate=np.gradient(pressure, run.time, axis=0),
-        strut_pressure=None,
-        spool=position,
-        supply_pressure=record["supply_pressure"].values[:, None],
-    )
+    pressure = {name: record[name].values for name in ("chamber_pressure_a", "chamber_pressure_b") if name in record}
+    channels = {**pressure, "spool_position": position, "supply_pressure": record["supply_pressure"].values[:, None]}
+    rates = {name: np.gradient(x, run.time, axis=0) for name, x in pressure.items()}
+    return MeasuredTest("t", 1.0 / 2048, platen_motion(plant, run.q, run.v, run.a), channels, rates)
 
 
 def seen(machine: Machine, test: MeasuredTest) -> Residuals:
@@ -563,10 +555,10 @@ def test_spools_are_late_in_a_closed_loop_and_not_again_in_a_replay(
 def test_servo_and_supply_are_residuals_where_they_were_measured(machine: Machine) -> None:
     run = stirred(machine, samples=200, steps=4)
     test = as_measured(run)
-    found = evaluate_residuals(run.plant, MeasuredTest(**{**vars(test), "spool_command": test.spool}))
+    found = evaluate_residuals(run.plant, test.with_channels(spool_command=test.channels["spool_position"]))
     assert found.servo.shape == (200, run.plant.spools) and found.supply.shape == (200, 1)
     late = make_plant(machine.with_effect("transport_delay", delay=-0.004))  # 5 ms, less 4
-    sooner = evaluate_residuals(late, MeasuredTest(**{**vars(test), "spool_command": test.spool}), ("servo",))
+    sooner = evaluate_residuals(late, test.with_channels(spool_command=test.channels["spool_position"]), ("servo",))
     assert rms(sooner.servo) < 0.3 * rms(found.servo)
     assert evaluate_residuals(run.plant, test).servo.shape == (200, 0)
 

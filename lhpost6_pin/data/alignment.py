@@ -158,6 +158,8 @@ def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay
 
 def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.Dataset:
     """Record whose groups are advanced by their delays [s]; what was done is written in its attribute `aligned`."""
+    if not delays:
+        return record
     channels, done = {}, []
     dt = sample_interval(record)
     for group, given in delays.items():

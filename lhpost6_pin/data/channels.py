@@ -6,7 +6,7 @@ import, checks, simulated campaigns, alignment, cross-checks and the sensor erro
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -150,7 +150,7 @@ def calibrated_channels() -> dict[str, Channel]:
     return {name: c for name, c in LAYOUT.items() if c.residuals and c.role != "command"}
 
 
-def residuals_of(name: str, present: Mapping[str, Any]) -> tuple[str, ...]:
+def residuals_of(name: str, present: Collection[str]) -> tuple[str, ...]:
     """Kinds of residuals that a channel (or a group of channels) enters in a test that has those `present`."""
     channel = LAYOUT.get(name) or LAYOUT[sensor_groups()[name][0]]
     stands_in = bool(channel.replaces) and channel.replaces not in present

@@ -16,6 +16,7 @@ in motion. Sensors are taken as calibrated and aligned: their gains and skews ar
 """
 
 import logging
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from ..core.errors import RecordError
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, forward_kinematics, leg_displacements
-from .channels import channel_name
+from .channels import MOTION, channel_name
 from .conditioning import WIDTHS, integrate, quieted
 from .records import sample_interval
 from .sensors import SensorSet, spectrum
@@ -47,6 +48,7 @@ class FusedMotion(NamedTuple):
     noise: PlatenMotion  # (6,) each
     path: Array  # (n, 6) displacement, still where it rests: for friction, whose memory noise would shake out of it
     used: tuple[str, ...]
+    share: Mapping[str, PlatenMotion]  # of each channel in the motion, which is their sum; empty if not wanted
 
 
 class _Sensor(NamedTuple):
@@ -68,6 +70,7 @@ def fuse_motion(
     *,
     crossover: float | None = None,
     band: Band | None = None,
+    shares: bool = False,
 ) -> FusedMotion:
     """Platen motion from actuator lengths, platen displacement, velocity and acceleration, whichever there are.
 
@@ -75,28 +78,39 @@ def fuse_motion(
     `crossover` [Hz] replaces the optimum weights (platen velocity then only serves where there is no acceleration).
     All three results are filtered by `band`, by default the sensors' own low-pass; without accelerometers give a
     narrower one, since differentiated noise grows with frequency. v and a are the derivatives of x within it.
+    `shares` adds what each channel contributes: fusion is linear in its channels, the weights given.
 
     Raises RecordError if there is neither displacement nor length, or a channel that is used is not finite.
     """
     time = record["time"].values
     dt = sample_interval(record)
     f = np.asarray(np.fft.rfftfreq(2 * (len(time) - 1), dt), np.float64)
-    displacement, used = _displacement(plant, record, sensors, f)
-    velocity, acceleration = (_sensor(record, sensors, f, n) for n in ("platen_velocity", "platen_acceleration"))
+    displacement, parts = _displacement(plant, record, sensors, f)
+    velocity, acceleration = (_sensor(record, sensors, f, n) for n in MOTION[1:])
     if crossover is not None and acceleration is not None:
         velocity = None
-    used += [n for n, s in (("platen_velocity", velocity), ("platen_acceleration", acceleration)) if s is not None]
+    signals = [None if s is None else s.signal for s in (displacement, velocity, acceleration)]
+    channels = [(name, 0, part) for name, part in parts.items()]
+    channels += [(n, k, x) for n, k, x in zip(MOTION[1:], (1, 2), signals[1:], strict=True) if x is not None]
+    used = tuple(name for name, *_ in channels)
     log.info("platen motion from %s", ", ".join(used))
     band = sensors.band if band is None else band
     weights = _weights(f, displacement, velocity, acceleration, crossover)
-    raw = _composite(f, displacement, velocity, acceleration, weights, dt)
-    motion = PlatenMotion(*(band.apply(x, dt) for x in raw))
+
+    def composed(signals: Sequence[Array | None]) -> PlatenMotion:
+        return PlatenMotion(*(band.apply(x, dt) for x in _composite(f, signals, weights, dt)))
+
+    def alone(order: int, part: Array) -> PlatenMotion:
+        return composed([None if x is None else part if k == order else 0.0 * x for k, x in enumerate(signals)])
+
+    motion = composed(signals)
     power = _noise(f, (displacement, velocity, acceleration), weights, band)
     omega = 2 * np.pi * f[:, None]
     noise = PlatenMotion(*(_deviation(f, power * omega ** (2 * k)) for k in range(3)))
     gains = [np.exp(-((omega * width) ** 2) / 2) for width in (0.0, *WIDTHS)]
     lost = [_deviation(f, power * (wider - narrower) ** 2) for narrower, wider in pairwise(gains)]
-    return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), tuple(used))
+    share = {name: alone(order, part) for name, order, part in channels} if shares else {}
+    return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), used, share)
 
 
 def kinematic_jacobian(plant: Plant) -> Array:
@@ -105,8 +119,8 @@ def kinematic_jacobian(plant: Plant) -> Array:
     return columns[:, : plant.spools].T
 
 
-def _displacement(plant: Plant, record: xr.Dataset, sensors: SensorSet, f: Array) -> tuple[_Sensor, list[str]]:
-    """Displacement by all sensors that measure it, each axis weighted by the inverse of their noise."""
+def _displacement(plant: Plant, record: xr.Dataset, sensors: SensorSet, f: Array) -> tuple[_Sensor, dict[str, Array]]:
+    """Displacement by all sensors that measure it, each axis weighted by the inverse of their noise; their parts."""
     found: dict[str, _Sensor] = {}
     if "actuator_displacement" in record:
         pose, _ = forward_kinematics(plant, record["actuator_displacement"].values)
@@ -122,11 +136,13 @@ def _displacement(plant: Plant, record: xr.Dataset, sensors: SensorSet, f: Array
         where = record.encoding.get("source", "the record")
         raise RecordError(f"{where}: has neither actuator_displacement nor platen_displacement; give one of them")
     if len(found) == 1:
-        return next(iter(found.values())), list(found)
+        ((name, only),) = found.items()
+        return only, {name: only.signal}
     one, two = found.values()
     weight = two.density / (one.density + two.density)  # of the first
-    signal = weight * one.signal + (1 - weight) * two.signal
-    return _Sensor(signal, weight**2 * one.spectrum + (1 - weight) ** 2 * two.spectrum), list(found)
+    parts = dict(zip(found, (weight * one.signal, (1 - weight) * two.signal), strict=True))
+    noise = weight**2 * one.spectrum + (1 - weight) ** 2 * two.spectrum
+    return _Sensor(np.add(*parts.values()), noise), parts
 
 
 def _sensor(record: xr.Dataset, sensors: SensorSet, f: Array, name: str) -> _Sensor | None:
@@ -154,19 +170,21 @@ def _weights(
 
 
 def _composite(
-    f: Array, x: _Sensor, v: _Sensor | None, a: _Sensor | None, weights: tuple[Array, Array, Array], dt: float
+    f: Array, signals: Sequence[Array | None], weights: tuple[Array, Array, Array], dt: float
 ) -> PlatenMotion:
-    """Motion by the sensor of highest order, integrated, and the weighted differences of the others from it."""
-    once = None if v is None else integrate(v.signal, dt)[0]
+    """Motion by the signal of highest order, integrated, and the weighted differences of the others from it."""
+    x, v, a = signals
+    assert x is not None
+    once = None if v is None else integrate(v, dt)[0]
     if a is not None:
-        speed, base = integrate(a.signal, dt)
-        motion = [base, speed, a.signal]
+        speed, base = integrate(a, dt)
+        motion = [base, speed, a]
     elif v is not None and once is not None:
-        base, motion = once, [once, v.signal, differentiate(v.signal, dt)]
+        base, motion = once, [once, v, differentiate(v, dt)]
     else:
-        rate = differentiate(x.signal, dt)
-        return PlatenMotion(x.signal, rate, differentiate(rate, dt))
-    differences = [(x.signal - base, weights[0])]
+        rate = differentiate(x, dt)
+        return PlatenMotion(x, rate, differentiate(rate, dt))
+    differences = [(x - base, weights[0])]
     if a is not None and once is not None:
         differences.append((once - base, weights[1]))
     return PlatenMotion(*(m + c for m, c in zip(motion, _weighted(differences, f, dt), strict=True)))

@@ -74,7 +74,8 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
     found: Columns = []
     for test, there in zip(base.tests, base.paths, strict=True):
         path = follow(plant, test, (base.plant, there))
-        z = path.z if test.actuator_force is None else with_loads(plant, path.z, test.actuator_force)
+        force = test.channels.get("actuator_force")
+        z = path.z if force is None else with_loads(plant, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
         changes = []
         for i in range(len(candidates)):

@@ -17,7 +17,7 @@ from ..effects.registry import NODES
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.calibration.whitened_residuals import spectrum_of
 from ..identification.inverse_dynamics import leg_wrenches
-from ..identification.residuals import MeasuredTest
+from ..identification.prepare import MeasuredTest
 from ..laws.lines import filter_shares
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters

@@ -11,35 +11,29 @@ All are zero where the model is right and sensors are perfect. The laws are thos
 tables; accelerations come from the fused engine's forward dynamics, whose oracle is Pinocchio.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
-from ..data.alignment import due_spools, gas_pressure, oil_force
-from ..data.records import require, sample_interval
-from ..data.signals import differentiate
+from ..data.alignment import due_spools, gas_pressure
 from ..effects.registry import GAS_HEAT, LAWS, OSCILLATOR, PORTS
 from ..mechanics.equilibrium import hydraulic_rows
 from ..mechanics.gas_pressure import gas_ratio
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
-from ..mechanics.pose import PlatenMotion, plant_motion
+from ..mechanics.pose import plant_motion
 from .inverse_dynamics import march_states, with_loads
 from .oil_residuals import oil_misses
+from .prepare import MeasuredTest, actuator_forces, oil_forces
 from .wrench_residuals import required_wrench, weigh_alike, wrench_residual
 
 __all__ = [
     "RESIDUALS",
-    "MeasuredTest",
     "Path",
     "Residuals",
     "evaluate_residuals",
     "follow",
-    "make_measured_test",
     "states_of",
 ]
 
@@ -47,29 +41,6 @@ Array = NDArray[np.float64]
 
 RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
 """Kinds of residuals."""
-
-
-@dataclass(frozen=True)
-class MeasuredTest:
-    """A measured test made ready for residuals; n samples. What was not measured is None."""
-
-    name: str
-    dt: float  # [s]
-    motion: PlatenMotion  # of C and Euler angles
-    actuator_force: Array | None  # (n, n_actuators) [N]
-    pressure: Array | None  # (n, n_chambers): A of every actuator, then B of the double-acting [Pa]
-    pressure_rate: Array | None  # [Pa/s]
-    strut_pressure: Array | None  # (n, n_struts) [Pa]
-    spool: Array | None  # (n, n_actuators) at the samples' instants [1]
-    spool_command: Array | None = None  # (n, n_actuators) [1]
-    supply_pressure: Array | None = None  # (n, 1) [Pa]
-    path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
-    share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
-
-    @property
-    def samples(self) -> int:
-        """Number of samples."""
-        return len(self.motion.displacement)
 
 
 class Residuals(NamedTuple):
@@ -85,40 +56,6 @@ class Residuals(NamedTuple):
     def stacked(self) -> Array:
         """All columns side by side (n, k)."""
         return np.hstack(self)
-
-
-def make_measured_test(
-    record: xr.Dataset, motion: PlatenMotion, cutoff: float, *, path: Array | None = None
-) -> MeasuredTest:
-    """Make a record ready, with the platen motion found from it; pressures are differentiated up to `cutoff` [Hz].
-
-    path (n, 6) is the displacement that friction follows, where it is not the motion's.
-
-    Raises RecordError if neither forces nor pressures were measured.
-    """
-    dt = sample_interval(record)
-
-    def values(name: str) -> Array | None:
-        return np.ascontiguousarray(record[name].values, float) if name in record else None
-
-    pressure_a, pressure_b = values("chamber_pressure_a"), values("chamber_pressure_b")
-    pressure = pressure_a if pressure_a is None or pressure_b is None else np.hstack([pressure_a, pressure_b])
-    force, supply = values("actuator_force"), values("supply_pressure")
-    if force is None and pressure is None:
-        require(record, "actuator_force")
-    return MeasuredTest(
-        name=str(record.attrs.get("test", "test")),
-        dt=dt,
-        motion=motion,
-        actuator_force=force,
-        pressure=pressure,
-        pressure_rate=None if pressure is None else differentiate(pressure, dt, cutoff),
-        strut_pressure=values("strut_pressure"),
-        spool=values("spool_position"),
-        spool_command=values("spool_command"),
-        supply_pressure=None if supply is None else supply[:, None],
-        path=path,
-    )
 
 
 class Path(NamedTuple):
@@ -214,39 +151,39 @@ def evaluate_residuals(
     """
     n, machine = test.samples, plant.machine
     path = path or follow(plant, test)
-    force = test.actuator_force
-    if test.pressure is not None:
-        oil = oil_force(machine, test.pressure[:, : plant.spools], test.pressure[:, plant.spools :])
-        force = oil if force is None else force
+    measured = test.channels
+    force = actuator_forces(machine, measured)
     wrench = np.zeros((n, 0))
     if "wrench" in only and force is not None:
         wrench = wrench_residual(plant, path.ports, path.required, with_loads(plant, path.z, force), force)
     flow, supplied = _of_oil(plant, test, path, only)
     gas = np.zeros((n, 0))
-    if "gas" in only and test.strut_pressure is not None:
+    if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
-        gas = np.log(test.strut_pressure / gas_pressure(machine, length) / gas_ratio(plant, path.z))
+        gas = np.log(measured["strut_pressure"] / gas_pressure(machine, length) / gas_ratio(plant, path.z))
     told, servo = np.zeros((n, 0)), np.zeros((n, 0))
-    if "force" in only and test.pressure is not None and test.actuator_force is not None:
-        told = test.actuator_force - oil
-    if "servo" in only and test.spool is not None and test.spool_command is not None:
-        servo = test.spool - due_spools(plant, test.spool_command, test.dt)
+    oil = oil_forces(machine, measured)
+    if "force" in only and oil is not None and "actuator_force" in measured:
+        told = measured["actuator_force"] - oil
+    if "servo" in only and {"spool_position", "spool_command"} <= measured.keys():
+        servo = measured["spool_position"] - due_spools(plant, measured["spool_command"], test.dt)
     return Residuals(wrench, flow, gas, told, servo, supplied)
 
 
 def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
     """Residuals `flow` and `supply`."""
     n, double = test.samples, np.isin(plant.machine.actuator_names, plant.machine.double_acting)
-    supply = test.supply_pressure if "supply" in only else None
+    supply = test.channels.get("supply_pressure") if "supply" in only else None
     none = np.zeros((n, 0))
-    if test.pressure is None or test.spool is None or ("flow" not in only and supply is None):
+    spool = test.channels.get("spool_position")
+    if test.pressure is None or spool is None or ("flow" not in only and supply is None):
         return none, none
     flow = np.zeros((n, plant.spools + int(double.sum()))) if "flow" in only else none
     chamber = np.full((plant.spools, 2), -1)
     chamber[:, 0] = np.arange(plant.spools)
     chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
     drooped, rows = np.zeros(n), plant.rows[hydraulic_rows(plant)]
-    measured = test.pressure, test.pressure_rate, test.spool
+    measured = test.pressure, test.pressure_rate, spool
     states = len(plant.states)
     oil_misses(rows, chamber, *measured, plant.supply, path.ports.s, path.ports.rate, states, test.dt, drooped, flow)
     return flow, none if supply is None else supply - drooped[:, None]

@@ -1,7 +1,7 @@
 """A campaign made ready to be fitted: aligned, fused, with noisier copies of every test."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -9,24 +9,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...core.errors import RecordError, SimulationError
-from ...data.alignment import align_record, group_delays
-from ...data.channels import channel_name
-from ...data.fusion import fuse_motion
+from ...data.channels import calibrated_channels, channel_name
 from ...data.layout_faults import layout_faults
-from ...data.records import sample_interval
 from ...data.sensors import SensorSet, add_noise
-from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
-from ...mechanics.plant import Plant, make_plant
-from ...mechanics.pose import PlatenMotion
-from ..residuals import MeasuredTest, make_measured_test
+from ...mechanics.plant import make_plant
+from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .free_parameters import FreeParameter
 from .problem import KINDS, Problem, ResidualBands
-from .sensor_errors import CHANNELS
 from .whitened_residuals import spectrum_of
 
-__all__ = ["PreparedProblem", "prepare_problem"]
+__all__ = ["PreparedProblem", "policy_of", "prepare_problem"]
 
 Array = NDArray[np.float64]
 
@@ -90,22 +84,28 @@ def prepare_problem(
     _refuse(machine, records, comparison)
     machine = machine.as_tested(records[0].attrs, "the first test")
     plant = make_plant(machine)
-    records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
-    skews = group_delays(plant, records)
-    skews.pop("strut_pressure", None)  # heat that leaves the gas would pass for a delay of its pressure
-    records = [align_record(r, skews) for r in records]
+    policy = policy_of(numbers)
+    records = align_records(plant, records, policy)
     rng = np.random.default_rng(seed)
-    tests = [_ready(plant, r, sensors, numbers) for r in records]
-    count, draws, again = len(tests), int(numbers.number("fit.draws")), int(numbers.number("fit.corrections"))
-    noisy = [
-        _ready(plant, add_noise(r, sensors, rng), sensors, numbers, shares=False) for _ in range(draws) for r in records
-    ]
-    more = [_ready(plant, add_noise(r, sensors, rng), sensors, numbers) for _ in range(again) for r in records]
+    draws, again = int(numbers.number("fit.draws")), int(numbers.number("fit.corrections"))
+
+    def noisier(policy: Policy) -> list[MeasuredTest]:
+        return [prepare_test(plant, add_noise(r, sensors, rng), sensors, policy) for r in records]
+
+    tests = [prepare_test(plant, r, sensors, policy) for r in records]
+    noisy = [test for _ in range(draws) for test in noisier(policy._replace(shares=False))]
+    more = [noisier(policy) for _ in range(again)]
     problem = Problem(
         machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, others=others(machine), preload=preload
     )
-    replicas = tuple(problem.with_tests(more[k * count : (k + 1) * count]) for k in range(again))
+    replicas = tuple(problem.with_tests(tests) for tests in more)
     return PreparedProblem(problem, replicas, tuple(noisy))
+
+
+def policy_of(numbers: Parameters) -> Policy:
+    """How records are prepared by the numbers of `models/procedures/calibration.toml`."""
+    rate, cutoff = (numbers.number(f"comparison.{key}") for key in ("rate", "pressure_cutoff"))
+    return CALIBRATION._replace(rate=rate, pressure_cutoff=cutoff)
 
 
 def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: ResidualBands) -> None:
@@ -121,7 +121,7 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
         machine.refuse_unmounted(record.attrs, test)
         _refuse_channels(test, record, double_acting=bool(machine.double_acting))
         _refuse_short(test, record, comparison)
-        if lacking := [c for c in CHANNELS if c not in record and any(c in other for other in records)]:
+        if lacking := [c for c in calibrated_channels() if c not in record and any(c in other for other in records)]:
             what = f"{test} has no {', '.join(lacking)}, which other tests have"
             raise RecordError(f"{what}; take that test out of the campaign, or the channel out of all")
 
@@ -152,33 +152,3 @@ def _refuse_short(test: str, record: xr.Dataset, comparison: ResidualBands) -> N
         if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
             what = f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
             raise RecordError(f"{test}: {what}; take it out of the campaign")
-
-
-def _ready(
-    plant: Plant, record: xr.Dataset, sensors: SensorSet, numbers: Parameters, *, shares: bool = True
-) -> MeasuredTest:
-    """A record with its motion fused, and each platen channel's share in it.
-
-    Fusion is linear in its channels: a share is what doubling a channel adds. Lengths stay out: the geometry that turns
-    them into a pose is to be calibrated.
-    """
-    record = _slower(record, numbers.number("comparison.rate"))
-    channels = [n for n in ("platen_displacement", "platen_velocity", "platen_acceleration") if n in record]
-    fused = fuse_motion(plant, record, sensors)
-    ready = make_measured_test(record, fused.motion, numbers.number("comparison.pressure_cutoff"), path=fused.path)
-    share = {}
-    for name in channels if shares else ():
-        more = fuse_motion(plant, record.assign({name: 2.0 * record[name]}), sensors).motion
-        share[name] = PlatenMotion(*(a - b for a, b in zip(more, fused.motion, strict=True)))
-    return replace(ready, share=share)
-
-
-def _slower(record: xr.Dataset, rate: float) -> xr.Dataset:
-    """The record at a whole fraction of its rate, as near above `rate` [Hz] as can be, without what would fold."""
-    dt = sample_interval(record)
-    every = int(1.0 / (rate * dt) + 1e-6)
-    if every < 2:
-        return record
-    band = Band(high=0.4 / (every * dt), order=16)
-    timed = {name: x.copy(data=band.apply(x.values, dt)) for name, x in record.items() if "time" in x.dims}
-    return record.assign(timed).isel(time=slice(None, None, every))

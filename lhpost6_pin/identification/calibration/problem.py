@@ -12,12 +12,14 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from ...data.channels import residuals_of
 from ...data.sensors import SensorSet
 from ...effects.registry import BOUC_WEN_1D, BOUC_WEN_2D
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
-from ..residuals import RESIDUALS, MeasuredTest, Residuals, evaluate_residuals, follow, states_of
+from ..prepare import MeasuredTest
+from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, states_of
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .sensor_errors import corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
@@ -48,21 +50,6 @@ class EvaluationGroup(NamedTuple):
     residuals: tuple[str, ...]  # kinds that it shows in
 
 
-_SHOWS_IN = {
-    "actuator_force": ("wrench", "force"),
-    "chamber_pressure": ("flow", "force"),
-    "chamber_pressure_a": ("flow", "force"),
-    "chamber_pressure_b": ("flow", "force"),
-    "strut_pressure": ("gas",),
-    "spool_position": ("flow", "servo"),
-    "supply_pressure": ("supply",),
-    "spool_command": ("servo",),
-    "platen_displacement": ("wrench", "flow", "gas"),
-    "platen_velocity": ("wrench", "flow", "gas"),
-    "platen_acceleration": ("wrench", "flow", "gas"),
-}
-
-
 class Problem:
     """Tests, unknowns with their priors, and the whitener of the sensors' noise."""
 
@@ -87,8 +74,8 @@ class Problem:
         """
         self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
         unknowns = sensor_unknowns(machine, sensors, tests[0])
-        told = {"supply_pressure": "supply", "spool_command": "servo"}  # by one kind of residual alone
-        self.unknowns = tuple(u for u in unknowns if told.get(u.channel, kinds[0]) in kinds)
+        self.present = frozenset(tests[0].channels)
+        self.unknowns = tuple(u for u in unknowns if set(residuals_of(u.channel, self.present)) & set(kinds))
         self.free: dict[str, float] = {}  # share of the stated deviation that priors of unknowns have, but for one
         plant = make_plant(machine)
         self._turn(machine, machine_parameters(machine, _travel(plant, tests)))
@@ -295,10 +282,7 @@ class Problem:
             together.setdefault(unknown.alone[0], []).append((len(self.parameters) + i, unknown.alone[1]))
         for members in together.values():
             channel = self.unknowns[members[0][0] - len(self.parameters)].channel
-            shows_in = _SHOWS_IN[channel]
-            if self.tests[0].actuator_force is None and channel.startswith("chamber_pressure"):
-                shows_in = ("wrench", *shows_in)  # pressures stand in for forces
-            terms.append(EvaluationGroup(tuple(members), shows_in))
+            terms.append(EvaluationGroup(tuple(members), residuals_of(channel, self.present)))
         return tuple(terms)
 
 

@@ -9,7 +9,7 @@ Displacement, velocity and acceleration of the platen are fused into one motion;
 in it, to first order. Their skews have been taken out; what the others are late against is the platen's motion.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,15 +17,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ...core.names import AXES
-from ...data.channels import sensor_groups
+from ...data.channels import LAYOUT, Channel, channel_unit, residuals_of, sensor_groups
 from ...data.records import sample_interval
 from ...data.sensors import SensorSet
 from ...data.signals import align
 from ...machine.machine import Machine
 from ...mechanics.pose import PlatenMotion
-from ..residuals import MeasuredTest
+from ..prepare import MeasuredTest
 
-__all__ = ["CHANNELS", "SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
+__all__ = ["SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
 
 Array = NDArray[np.float64]
 
@@ -37,101 +37,57 @@ class SensorUnknown:
     name: str  # such as "gain actuator_force[H1]", "delay spool_position"
     kind: str
     channel: str  # a group of channels for a delay
-    column: int  # in the fields of a test that the channel is in; -1 for the delay of a whole group
+    column: int  # of the channel; -1 for the delay of a whole group
     sd: float  # of the prior, about zero
     unit: str
     alone: tuple[str, int]  # evaluated together: unknowns of one `alone[0]` act on different rows, marked by alone[1]
 
 
-CHANNELS = {
-    "platen_displacement": "m | rad",
-    "platen_velocity": "m/s | rad/s",
-    "platen_acceleration": "m/s2 | rad/s2",
-    "actuator_force": "N",
-    "chamber_pressure_a": "Pa",
-    "chamber_pressure_b": "Pa",
-    "strut_pressure": "Pa",
-    "spool_position": "1",
-    "supply_pressure": "Pa",
-}
-"""Channels that a machine is calibrated by, with their units."""
-
-_FIELDS: Mapping[str, tuple[tuple[str, bool], ...]] = {
-    "actuator_force": (("actuator_force", True),),
-    "chamber_pressure_a": (("pressure", True), ("pressure_rate", False)),
-    "chamber_pressure_b": (("pressure", True), ("pressure_rate", False)),
-    "strut_pressure": (("strut_pressure", True),),
-    "spool_position": (("spool", True),),
-    "supply_pressure": (("supply_pressure", True),),
-}
-"""Fields of a test that a channel's error is in, and whether an offset is in them."""
-
-_DELAYED: Mapping[str, tuple[str, ...]] = {
-    "actuator_force": ("actuator_force",),
-    "chamber_pressure": ("pressure", "pressure_rate"),
-    "strut_pressure": ("strut_pressure",),
-    "spool_position": ("spool",),
-    "spool_command": ("spool_command",),
-}
-"""Fields of a test that the delay of a group of channels is in."""
-
-
 def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:
     """Unknown errors of the channels that a test has, for which the sensors state a range."""
-    columns: dict[str, tuple[str, ...]] = {
-        **dict.fromkeys(("platen_displacement", "platen_velocity", "platen_acceleration"), ()),
-        **dict.fromkeys(test.share, AXES),
-        "actuator_force": machine.actuator_names if test.actuator_force is not None else (),
-        "chamber_pressure_a": machine.actuator_names if test.pressure is not None else (),
-        "chamber_pressure_b": machine.double_acting if test.pressure is not None else (),
-        "strut_pressure": machine.strut_names if test.strut_pressure is not None else (),
-        "spool_position": machine.actuator_names if test.spool is not None else (),
-        "supply_pressure": ("",) if test.supply_pressure is not None else (),
-    }
+    labels = {"axis": AXES, **machine.labels}
+    present = {*test.share, *test.channels}
+    channels = {name: c for name, c in LAYOUT.items() if name in present and c.residuals}
     found = []
-    for channel, unit in CHANNELS.items():
-        first = len(machine.actuator_names) if channel == "chamber_pressure_b" else 0  # after chambers A
-        for kind, sd in (("gain", sensors.gain_sd(channel)), ("offset", sensors.offset_sd(channel))):
-            if channel.startswith("platen") and kind == "offset":
-                continue  # the control zero-position is where they are zero
-            for i, label in enumerate(columns[channel] if sd > 0.0 else ()):
-                if channel.startswith("platen") and not np.any(test.motion.displacement[:, i]):
+    for name, channel in channels.items():
+        columns = labels[channel.dims[1]] if len(channel.dims) > 1 else ("",)
+        for kind, sd in (("gain", sensors.gain_sd(name)), ("offset", sensors.offset_sd(name))):
+            for i, label in enumerate(columns if kind in channel.errors and sd > 0.0 else ()):
+                if channel.role == "motion" and not np.any(test.motion.displacement[:, i]):
                     continue  # a guided platen
-                found.append(
-                    SensorUnknown(
-                        f"{kind} {channel}[{label}]" if label else f"{kind} {channel}",
-                        kind,
-                        channel,
-                        first + i,
-                        sd,
-                        "1" if kind == "gain" else unit,
-                        _alone(machine, kind, channel, i, forces=test.actuator_force is not None),
-                    )
-                )
-    columns["spool_command"] = machine.actuator_names if test.spool_command is not None else ()
-    for group in _DELAYED:
-        # a command is no measurement, but what records it has a clock of its own beside the spool's, and holds it
-        sd = 2.0 * sensors.delay_sd("spool_position") if group == "spool_command" else sensors.delay_sd(group)
-        if sd > 0.0 and columns[{"chamber_pressure": "chamber_pressure_a"}.get(group, group)]:
-            found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
-    if sensors.delay_sd("spool_position") > 0.0:
-        held = 0.5 / sensors.rate / np.sqrt(3.0)
-        for i, label in enumerate(columns["spool_position"]):
-            name, alone = f"delay spool_position[{label}]", ("delay of a spool_position", i)
-            found.append(SensorUnknown(name, "delay", "spool_position", i, held, "s", alone))
+                full, unit = f"{name}[{label}]" if label else name, "1" if kind == "gain" else channel_unit(name)
+                together = _together(machine, kind, name, i, label, present)
+                found.append(SensorUnknown(f"{kind} {full}", kind, name, i, sd, unit, together))
+    for group, sd in _delays(sensors, channels).items():
+        found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
+    for name, channel in channels.items():
+        if channel.held and sensors.delay_sd(name) > 0.0:
+            held = 0.5 / sensors.rate / np.sqrt(3.0)
+            for i, label in enumerate(labels[channel.dims[1]]):
+                together = (f"delay of a {name}", i)
+                found.append(SensorUnknown(f"delay {name}[{label}]", "delay", name, i, held, "s", together))
     return tuple(found)
 
 
-def _alone(machine: Machine, kind: str, channel: str, i: int, *, forces: bool) -> tuple[str, int]:
-    """Spools and pressures act on one actuator's residuals, a strut's pressure on its own: one evaluation for all.
+def _delays(sensors: SensorSet, channels: Mapping[str, Channel]) -> dict[str, float]:
+    """Standard deviation of the delay of every group that may be late against the platen's motion."""
+    groups = {c.group or name: sensors.delay_sd(c.group or name) for name, c in channels.items() if c.role == "sensor"}
+    # a command is no measurement, but what records it has a clock of its own beside its companion's, and holds it
+    for name, channel in channels.items():
+        if channel.role == "command":
+            groups[name] = 2.0 * max(sensors.delay_sd(other) for other in channel.companions)
+    return {group: sd for group, sd in groups.items() if sd > 0.0}
+
+
+def _together(machine: Machine, kind: str, name: str, i: int, label: str, present: set[str]) -> tuple[str, int]:
+    """A sensor of one component that is not in the wrench acts on that component's residuals: one evaluation for all.
 
     Not so pressures that stand in for forces which were not measured: each is in the whole wrench.
     """
-    if channel in ("spool_position", "strut_pressure") or (channel == "chamber_pressure_a" and forces):
-        return f"{kind} {channel}", i
-    if channel == "chamber_pressure_b" and forces:
-        return f"{kind} {channel}", machine.actuator_names.index(machine.double_acting[i])
-    return f"{kind} {channel} {i}", -1
+    components = machine.strut_names if label in machine.strut_names else machine.actuator_names
+    if label not in components or "wrench" in residuals_of(name, present):
+        return f"{kind} {name} {i}", -1
+    return f"{kind} {name}", components.index(label)
 
 
 def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: Array) -> MeasuredTest:
@@ -140,26 +96,21 @@ def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: A
     What has no error is not copied.
     """
     off = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
-    arrays: dict[str, Array] = {}
-    for kind in ("offset", "gain"):
-        for unknown, value in off:
-            if unknown.kind != kind or unknown.channel in test.share:
-                continue
-            for field, shifted in _FIELDS[unknown.channel]:
-                if kind == "offset" and not shifted:
-                    continue
-                array = arrays.setdefault(field, _field(test, field).copy())
-                if kind == "gain":
-                    array[:, unknown.column] /= 1.0 + value
-                else:
-                    array[:, unknown.column] -= value
-    late: dict[str, Array] = {}
-    for unknown, value in off:
-        if unknown.kind == "delay":
-            for field in _DELAYED[unknown.channel]:
-                _add_delay(late, field, unknown, value, _field(test, field).shape[1])
-    for field, delay in late.items():
-        arrays[field] = align(arrays.get(field, _field(test, field)), delay, test.dt)
+    channels, rates = dict(test.channels), dict(test.rates)
+    for tables in (channels, rates):
+        for name in tables.keys() & {u.channel for u, _ in off if u.kind != "delay"}:
+            tables[name] = tables[name].copy()
+    for unknown, value in sorted(off, key=lambda one: one[0].kind != "offset"):
+        if unknown.kind == "offset":
+            channels[unknown.channel][:, unknown.column] -= value
+        elif unknown.kind == "gain" and unknown.channel not in test.share:
+            for table in (channels, rates):
+                if unknown.channel in table:
+                    table[unknown.channel][:, unknown.column] /= 1.0 + value
+    for name, delay in _late(off, {name: x.shape[1] for name, x in channels.items()}).items():
+        for table in (channels, rates):
+            if name in table:
+                table[name] = align(table[name], delay, test.dt)
     platen = [(u, v) for u, v in off if u.channel in test.share]
     motion, path = test.motion, test.path
     if platen:
@@ -171,28 +122,21 @@ def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: A
                 moved[:, k] -= part * share[:, k]
             if path is not None:
                 path[:, k] -= part * shares.displacement[:, k]
-    return replace(test, motion=motion, path=path, **arrays)  # type: ignore[arg-type]  # fields of arrays, by name
+    return replace(test, motion=motion, path=path, channels=channels, rates=rates)
 
 
 def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], errors: Array) -> xr.Dataset:
     """A record as perfect sensors would have shown it, if these were their errors, one an unknown."""
     out = record.copy(deep=True)
-    dt = sample_interval(record)
     off = [(u, float(v)) for u, v in zip(unknowns, errors, strict=True) if v != 0.0]
-    late: dict[str, Array] = {}
-    for unknown, value in off:
-        if unknown.kind == "delay":
-            for channel in sensor_groups().get(unknown.channel, (unknown.channel,)):
-                if channel in out:
-                    _add_delay(late, channel, unknown, value, out[channel].shape[-1])
-    for channel, delay in late.items():
-        out[channel].values[:] = align(out[channel].values, delay, dt)
+    columns = {str(name): int(np.prod(x.shape[1:])) for name, x in out.items()}
+    for channel, delay in _late(off, columns).items():
+        out[channel].values[:] = align(out[channel].values, delay, sample_interval(record))
     for unknown, value in off:
         if unknown.kind == "delay" or unknown.channel not in out:
             continue
-        first = len(record["actuator"]) if unknown.channel == "chamber_pressure_b" else 0
         values = out[unknown.channel].values
-        column = values[:, unknown.column - first] if values.ndim > 1 else values
+        column = values[:, unknown.column] if values.ndim > 1 else values
         if unknown.kind == "gain":
             column /= 1.0 + value
         else:
@@ -200,11 +144,14 @@ def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], er
     return out
 
 
-def _add_delay(late: dict[str, Array], field: str, unknown: SensorUnknown, value: float, columns: int) -> None:
-    """Add a delay to those (columns,) of a field."""
-    delay = late.setdefault(field, np.zeros(columns))
-    delay[unknown.column if unknown.column >= 0 else slice(None)] += value
-
-
-def _field(test: MeasuredTest, field: str) -> Array:
-    return np.asarray(getattr(test, field))
+def _late(off: Sequence[tuple[SensorUnknown, float]], columns: Mapping[str, int]) -> dict[str, Array]:
+    """Delays (columns,) of the channels that are late, of those with so many `columns`."""
+    late: dict[str, Array] = {}
+    groups = sensor_groups()
+    for unknown, value in off:
+        if unknown.kind == "delay":
+            for name in groups.get(unknown.channel, (unknown.channel,)):
+                if name in columns:
+                    delay = late.setdefault(name, np.zeros(columns[name]))
+                    delay[unknown.column if unknown.column >= 0 else slice(None)] += value
+    return late

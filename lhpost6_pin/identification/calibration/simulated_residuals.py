@@ -19,7 +19,7 @@ from ...mechanics.equilibrium import hydraulic_rows
 from ...mechanics.plant import Plant, State
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, simulate
-from ..residuals import MeasuredTest
+from ..prepare import MeasuredTest
 from .normal_equations import squares
 from .problem import Problem
 from .result import Subset
@@ -59,7 +59,7 @@ def by_simulation(
     is NaN. None where there is no such opinion: without spools and pressures, or if a run does not last.
     """
     count, tests = len(problem.parameters), len(problem.tests)
-    if any(t.spool is None or t.pressure is None for t in problem.tests):
+    if any(not {"spool_position", "chamber_pressure_a"} <= t.channels.keys() for t in problem.tests):
         return None
     prior, step = problem.prior[:count], problem.comparison.step * problem.prior[:count]
     drives = [_drive(corrected(t, problem.unknowns, x[count:])) for t in problem.tests]
@@ -109,18 +109,17 @@ def _bins(drive: _Drive, values: Array, problem: Problem, band: tuple[float, ...
 
 
 def _drive(test: MeasuredTest) -> _Drive:
-    assert test.spool is not None and test.pressure is not None
     time = np.asarray(test.dt * np.arange(test.samples), np.float64)
     steps = int(time[-1] * SAMPLE_RATE + 1e-6) * STEPS
     middle = (np.arange(steps) + 0.5) / (STEPS * SAMPLE_RATE)
-    return _Drive(resample_band_limited(test.spool, time, middle), _measured(test), time)
+    return _Drive(resample_band_limited(test.channels["spool_position"], time, middle), _measured(test), time)
 
 
 def _noisier(drive: _Drive, test: MeasuredTest, other: MeasuredTest) -> _Drive:
     """A drive with what more noise in its test adds."""
-    assert test.spool is not None and other.spool is not None
     middle = (np.arange(len(drive.spool)) + 0.5) / (STEPS * SAMPLE_RATE)
-    noise = [np.interp(middle, drive.time, column) for column in (other.spool - test.spool).T]  # small: lines will do
+    more = other.channels["spool_position"] - test.channels["spool_position"]
+    noise = [np.interp(middle, drive.time, column) for column in more.T]  # small: lines will do
     measured = drive.measured + _measured(other) - _measured(test)
     return drive._replace(spool=drive.spool + np.stack(noise, axis=1), measured=measured)
 

@@ -14,7 +14,7 @@ Linear propagation: what each error alone changes in the residual, added in squa
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -27,7 +27,8 @@ from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import leg_wrenches
-from ..residuals import MeasuredTest, evaluate_residuals, follow, make_measured_test
+from ..prepare import AS_RECORDED, prepare_test
+from ..residuals import evaluate_residuals, follow
 from .record import Decomposed, decompose_numbers, take_apart
 
 __all__ = ["WrenchAgreement", "Explanation", "Level", "Match", "find_agreement"]
@@ -152,7 +153,10 @@ def _summed(found: Decomposed, changes: Iterator[Array]) -> Level:
 
 
 def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Array:
-    noisier, *_ = take_apart(found.plant, add_noise(found.record, sensors, rng), sensors, found.comparison.band)
+    policy = AS_RECORDED._replace(band=found.comparison.band)
+    noisier, _ = take_apart(
+        found.plant, prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors, policy)
+    )
     change = noisier.residual - found.whole.residual
     return np.asarray(found.comparison.band.apply(change, found.dt)[found.inside].std(axis=0))
 
@@ -173,12 +177,11 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
     yield skew * differentiate(whole.measured, found.dt, sensors.band.high)
     used = [name for name in ("actuator_displacement", "platen_displacement", "platen_acceleration") if name in record]
     gain = max(sensors.gain_sd(name) for name in used)
-    measured = _measured(found)
     for axis in found.plant.axes:
-        scaled = [x.copy() for x in found.whole_motion]
+        scaled = [x.copy() for x in found.test.motion]
         for x in scaled:
             x[:, axis] *= 1.0 + gain
-        other = MeasuredTest(**{**vars(measured), "motion": PlatenMotion(*scaled)})
+        other = replace(found.test, motion=PlatenMotion(*scaled))
         yield evaluate_residuals(found.plant, other, ("wrench",)).wrench - whole.residual
 
 
@@ -193,7 +196,7 @@ def _pressures(machine: Machine, found: Decomposed) -> Iterator[tuple[str, int, 
 
 def _by_parameters(found: Decomposed) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each number of the platen and the kinds."""
-    machine, measured = found.plant.machine, _measured(found)
+    machine, measured = found.plant.machine, found.test
     as_it_is = follow(found.plant, measured)
     sections = {"platen", *(c.kind for c in machine.components)}
     for path, quantity in machine.parameters.items():
@@ -208,7 +211,3 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
             plant = make_plant(machine.with_params({path: value}))
             moved = follow(plant, measured, (found.plant, as_it_is))
             yield evaluate_residuals(plant, measured, ("wrench",), path=moved).wrench - found.whole.residual
-
-
-def _measured(found: Decomposed) -> MeasuredTest:
-    return make_measured_test(found.record, found.whole_motion, found.comparison.band.high, path=found.whole_path)

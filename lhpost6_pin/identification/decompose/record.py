@@ -1,11 +1,11 @@
-"""From a record to its forces: the motion that inverse dynamics starts from, and the band in which all is compared.
+"""From a record to its forces by inverse dynamics, and the band in which all is compared.
 
 A simulated record without noise is taken as it is. In a measured one groups of channels are aligned by their twins and
 the platen's motion is fused from all its sensors: hidden friction marched along raw displacement is shaken to nothing.
 Friction sees the motion in the sensors' whole band; what is compared is then filtered alike, and its edges are cut.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from ...core.errors import RecordError
 from ...core.files import models_folder
-from ...data.alignment import Delay, align_record, group_delays, hydraulic_force
-from ...data.channels import channel_name
-from ...data.fusion import fuse_motion
+from ...data.alignment import Delay, align_record
+from ...data.channels import MOTION
 from ...data.records import is_measured, require, sample_interval
 from ...data.sensors import SensorSet, load_sensors
 from ...data.signals import Band
@@ -26,12 +25,20 @@ from ...machine.parameters import Parameters, load_parameters
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import Decomposition, inverse_dynamics
+from ..prepare import (
+    AS_RECORDED,
+    EACH_TEST,
+    MeasuredTest,
+    actuator_forces,
+    check_usable,
+    find_delays,
+    prepare_test,
+    source_of,
+)
 
 __all__ = ["ComparisonBand", "Decomposed", "decompose_numbers", "decompose_record", "filtered", "take_apart"]
 
 Array = NDArray[np.float64]
-
-MOTION = ("platen_displacement", "platen_velocity", "platen_acceleration")
 
 
 class ComparisonBand(NamedTuple):
@@ -45,16 +52,19 @@ class ComparisonBand(NamedTuple):
 class Decomposed:
     """A record taken apart: `whole` has all samples in the sensors' band, `forces` and `motion` what is compared."""
 
-    record: xr.Dataset  # aligned, if it was
+    test: MeasuredTest  # aligned, if it was; its motion is in the sensors' band
     sensors: SensorSet | None  # None: the record is free of noise
     comparison: ComparisonBand
     whole: Decomposition
-    whole_motion: PlatenMotion
-    whole_path: Array | None  # (n, 6) displacement that friction followed, where it is not the motion's
     forces: Decomposition  # filtered, edges cut; its states are those of `whole`, cut
     motion: PlatenMotion  # the same
     delays: Mapping[str, Delay]  # taken out, by group
     notes: tuple[str, ...]  # where motion and forces come from, in words
+
+    @property
+    def record(self) -> xr.Dataset:
+        """The record, aligned, if it was."""
+        return self.test.record
 
     @property
     def plant(self) -> Plant:
@@ -97,70 +107,60 @@ def decompose_record(
     matter here. Raises RecordError for what is missing, not finite, of another machine, out of stroke or too short;
     SimulationError for a specimen with joints.
     """
-    _check_machine(machine, record)
+    check_usable(machine, record)
     comparison = _comparison(cutoff)
     if (rate := 1.0 / sample_interval(record)) <= comparison.band.high:
         raise RecordError(
-            f"{_source(record)}: {rate:g} samples a second are too few to compare forces up "
+            f"{source_of(record)}: {rate:g} samples a second are too few to compare forces up "
             f"to {comparison.band.high:g} Hz; lower the cutoff"
         )
     plant = make_plant(machine)
-    delays: Mapping[str, Delay] = {}
-    if is_measured(record):
-        sensors = load_sensors() if sensors is None else sensors
-        _check_finite(record)
-        if align:
-            delays = group_delays(plant, [record])
-            record = align_record(record, delays)
-    else:
+    policy = AS_RECORDED
+    if not is_measured(record):
         require(record, *MOTION)
-        _check_finite(record)
         sensors = None
-    whole, motion, path, notes = take_apart(plant, record, sensors, comparison.band)
+    else:
+        sensors = load_sensors() if sensors is None else sensors
+        policy = EACH_TEST if align else AS_RECORDED
+    delays = find_delays(plant, [record], policy)
+    test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=comparison.band))
+    whole, notes = take_apart(plant, test)
     if delays:
-        said = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
-        notes = (*notes, f"Skews taken out: {said}.")
-    n = len(whole.states.time)
-    dt = sample_interval(record)
-    cut = round(comparison.edge / dt)
+        taken = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
+        notes = (*notes, f"Skews taken out: {taken}.")
+    n, cut = test.samples, round(comparison.edge / test.dt)
     if n - 2 * cut < 4 * cut:
         raise RecordError(
-            f"{_source(record)}: {n * dt:.3g} s are too short; {comparison.edge:g} s at each end are left out"
+            f"{source_of(record)}: {n * test.dt:.3g} s are too short; {comparison.edge:g} s at each end are left out"
         )
-    inside = slice(cut, n - cut)
-    forces, seen = filtered(whole, motion, comparison.band, dt, inside)
-    return Decomposed(record, sensors, comparison, whole, motion, path, forces, seen, delays, notes)
+    forces, motion = filtered(whole, test.motion, comparison.band, test.dt, slice(cut, n - cut))
+    return Decomposed(test, sensors, comparison, whole, forces, motion, delays, notes)
 
 
-def take_apart(
-    plant: Plant, record: xr.Dataset, sensors: SensorSet | None, band: Band
-) -> tuple[Decomposition, PlatenMotion, Array | None, tuple[str, ...]]:
-    """Inverse dynamics of a record as it stands: forces, motion, path of friction, and where they came from in words.
-
-    The path is the displacement (n, 6) that friction followed; None: the motion's. With sensors the motion is fused,
-    in their band; without accelerometers in `band`, as noise grows with frequency.
-    """
-    force, source = _actuator_force(plant.machine, record)
-    struts = None
-    words = [source]
-    if "strut_pressure" in record and plant.machine.struts:
-        struts = record["strut_pressure"].values
-    elif plant.machine.struts:
+def take_apart(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[str, ...]]:
+    """Inverse dynamics of a test, and where its forces and motion come from in words."""
+    record, force = test.record, actuator_forces(plant.machine, test.channels)
+    if force is None:
+        if "chamber_pressure_a" in test.channels:
+            require(record, "chamber_pressure_b")
+        what = "has neither actuator_force nor chamber_pressure_a; forces come from one of them"
+        raise RecordError(f"{source_of(record)}: {what}")
+    by_pressures = "Actuator forces from their chamber pressures, P_A A_1 − P_B A_2."
+    words = ["Actuator forces as measured." if "actuator_force" in test.channels else by_pressures]
+    struts = test.channels.get("strut_pressure") if plant.machine.struts else None
+    if plant.machine.struts and struts is None:
         words.append("Strut pressures were not measured: the model's struts stand in for them.")
-    model_step, path = False, None
-    if sensors is None:
-        motion = PlatenMotion(*(record[name].values.astype(float) for name in MOTION))
-        model_step = _at_model_step(record)
+    at_steps = not test.used and _at_model_step(record)
+    if test.used:
+        words.append(f"Platen motion fused from {', '.join(test.used)}.")
+    else:
         words.append(
             "Simulated without noise: the platen's motion is the record's own"
-            + (", at the model's steps; forces see the velocity that they saw there." if model_step else ".")
+            + (", at the model's steps; forces see the velocity that they saw there." if at_steps else ".")
         )
-    else:
-        fused = fuse_motion(plant, record, sensors, band=None if "platen_acceleration" in record else band)
-        motion, path = fused.motion, fused.path
-        words.append(f"Platen motion fused from {', '.join(fused.used)}.")
-    found = inverse_dynamics(plant, record["time"].values, motion, force, struts, path=path, model_step=model_step)
-    return found, motion, path, tuple(words)
+    time, path = record["time"].values, test.path
+    found = inverse_dynamics(plant, time, test.motion, force, struts, path=path, model_step=at_steps)
+    return found, tuple(words)
 
 
 def filtered(
@@ -202,47 +202,8 @@ def _comparison(cutoff: float | None) -> ComparisonBand:
     )
 
 
-def _check_machine(machine: Machine, record: xr.Dataset) -> None:
-    """Refuse a record of another machine, or with a specimen that this one does not carry."""
-    require(record, "time")
-    machine.refuse_unmounted(record.attrs, "the record")
-    for dim, names in (("actuator", machine.actuator_names), ("strut", machine.strut_names)):
-        if dim in record.coords and [str(x) for x in record[dim].values] != list(names):
-            raise RecordError(
-                f"{_source(record)}: has {dim}s {' '.join(map(str, record[dim].values))}, {machine.name} has "
-                f"{' '.join(names)}; name its machine with --machine"
-            )
-
-
-def _check_finite(record: xr.Dataset) -> None:
-    used: Sequence[str] = (*MOTION, "actuator_displacement", "actuator_force", "strut_pressure")
-    used = (*used, "chamber_pressure_a", "chamber_pressure_b")
-    for name in (name for name in used if name in record):
-        bad = np.argwhere(~np.isfinite(record[name].values))
-        if bad.size:
-            where = f"{channel_name(record[name], int(bad[0, 1]))} at sample {bad[0, 0]}"
-            raise RecordError(f"{_source(record)}: {where} is not finite; mend or cut it")
-
-
-def _actuator_force(machine: Machine, record: xr.Dataset) -> tuple[Array, str]:
-    """Forces (n, n_actuators) [N], and where they come from in words."""
-    if "actuator_force" in record:
-        return record["actuator_force"].values.astype(float), "Actuator forces as measured."
-    if "chamber_pressure_a" not in record:
-        raise RecordError(
-            f"{_source(record)}: has neither actuator_force nor chamber_pressure_a; forces come from one of them"
-        )
-    if machine.double_acting:
-        require(record, "chamber_pressure_b")
-    return hydraulic_force(machine, record), "Actuator forces from their chamber pressures, P_A A_1 − P_B A_2."
-
-
 def _at_model_step(record: xr.Dataset) -> bool:
     """Whether the samples of a simulated record are the steps of a semi-implicit run."""
     rate = 1.0 / sample_interval(record)
     steps = float(record.attrs.get("steps_per_second", np.nan))
     return record.attrs.get("scheme") == "semi_implicit" and abs(rate - steps) < 1e-6 * steps
-
-
-def _source(record: xr.Dataset) -> str:
-    return str(record.encoding.get("source", "the record"))

@@ -56,7 +56,7 @@ def find_work(found: Decomposed) -> Work:
 
     effects, wrench = delivered_by(found, whole=True)
     part = found.inside
-    motion, states = found.whole_motion, found.whole.states
+    motion, states = found.test.motion, found.whole.states
     v = np.zeros((len(found.time), 6))
     v[:, found.plant.axes] = states.v[part]  # twist of B in platen axes, as forces saw it
     turn = rotation(motion.displacement[part, 3:])

@@ -17,7 +17,7 @@ from ...core.errors import LhpostError
 from ...core.names import AXES
 from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
-from ..decompose import decompose_record
+from ..decompose.record import take_apart
 from ..inverse_dynamics import Decomposition
 from .band_spectra import Spectrum, estimate_spectrum
 from .closed_loop import Lag, drive_of, settings_of, settings_source
@@ -70,11 +70,7 @@ def run_phase(number: int, test: PreparedTest, basis: ComparisonBasis) -> Phase:
 def _inverse_dynamics(test: PreparedTest, basis: ComparisonBasis) -> Phase:
     numbers, axes = basis.numbers, test.plant.axes
     columns = tuple(AXES[k] for k in axes)
-    apart = [
-        decompose_record(test.machine, one.record, basis.sensors, cutoff=numbers.band.high, align=False)
-        for one in (test.test, test.again)
-    ]
-    found, again = (one.whole for one in apart)
+    (found, notes), (again, _) = (take_apart(test.plant, one) for one in (test.test, test.again))
     calibration = wrench_calibration(test, basis.sensors)[axes]
     sides: list[tuple[str, Callable[[Decomposition], Array | None], Callable[[Decomposition], Array]]] = [
         ("wrench", lambda d: d.measured, lambda d: d.required),
@@ -93,7 +89,7 @@ def _inverse_dynamics(test: PreparedTest, basis: ComparisonBasis) -> Phase:
             )
     ours, theirs, noise = (x[:, axes] for x in (found.measured, found.required, again.measured - found.measured))
     spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.dt, numbers)
-    return Phase(1, test.name, test.time, tuple(pairs), agree(pairs, test.dt, numbers), spectrum, notes=apart[0].notes)
+    return Phase(1, test.name, test.time, tuple(pairs), agree(pairs, test.dt, numbers), spectrum, notes=notes)
 
 
 def _open_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:

@@ -10,6 +10,7 @@ from ...core.names import AXES
 from ...data.signals import Band, delay, resample_band_limited
 from ...mechanics.pose import PlatenMotion
 from ...simulation.rehearse import SimulatedTest
+from ..prepare import actuator_forces
 from .band_spectra import Spectrum, estimate_spectrum
 from .closed_loop import Lag
 from .comparison_basis import ComparisonBasis
@@ -54,7 +55,7 @@ class SimulatedComparison:
     def pairs(self, channels: Sequence[str]) -> list[ComparedQuantity]:
         """Motion and total actuator force per axis, and channels per actuator; what is missing is noted."""
         found = [self._motion(quantity) for quantity in MOTIONS]
-        if self.test.test.force is not None:
+        if actuator_forces(self.test.machine, self.test.test.channels) is not None:
             found.append(self._wrench())
         return found + [self._channel(name) for name in channels if self._has(name)]
 
@@ -108,7 +109,7 @@ class SimulatedComparison:
         tests, runs = (self.test.test, self.test.again), (self.ran, self.again)
 
         def measured(draw: int) -> Array:
-            force = tests[draw].force
+            force = actuator_forces(plant.machine, tests[draw].channels)
             assert force is not None
             return total_wrench(plant, tests[draw].motion, force)[:, plant.axes]
 

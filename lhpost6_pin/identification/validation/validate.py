@@ -14,12 +14,13 @@ from joblib import Parallel, delayed
 
 from ...control import ControllerSettings
 from ...core.errors import LhpostError, RecordError
-from ...data.alignment import Delay, align_record, group_delays
+from ...data.alignment import Delay, align_record
 from ...data.campaign import Campaign
 from ...data.sensors import SensorSet, load_sensors
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
+from ..prepare import SIGNIFICANT, find_delays
 from .comparison_basis import ComparisonBasis
 from .metrics import Numbers, validation_numbers
 from .phases import PHASES, Phase, run_phase
@@ -80,11 +81,7 @@ def validate(
     sensors, numbers = sensors or load_sensors(), validation_numbers()
     plant = make_plant(machine)
     enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
-    skews = {
-        group: found
-        for group, found in group_delays(plant, enough).items()
-        if abs(found.delay) > numbers.significant_skew * found.standard_error
-    }
+    skews = find_delays(plant, enough, SIGNIFICANT._replace(significance=numbers.significant_skew))
     basis = ComparisonBasis(sensors, numbers, oil_column_modes(machine), settings)
     done, lock = [0], threading.Lock()
 
@@ -131,7 +128,7 @@ def _phases_of(
     try:
         if (length := _seconds(record)) < basis.numbers.shortest:
             raise RecordError(too_short(length, basis.numbers))
-        test = prepare(machine, record, basis.sensors)
+        test = prepare(machine, record, basis)
     except LhpostError as error:
         name, time = str(record.attrs.get("test", "test")), record["time"].values
         test, why = None, str(error)

@@ -1,0 +1,192 @@
+"""From records to what identification works on: aligned channels, one fused motion with its shares, actuator forces.
+
+Decomposition, validation, calibration and discovery take this one road. Where they differ is a policy: which delays
+between groups of channels are taken out beforehand, and from what they are estimated.
+
+    AS_RECORDED   no delay is taken out
+    EACH_TEST     every delay that redundant channels show, by the test itself                              (decompose)
+    SIGNIFICANT   delays of the whole campaign that stand out of their standard errors                       (validate)
+    CALIBRATION   delays of the whole campaign, but not that of the struts' gas: heat that leaves it would pass for a
+                  delay of its pressure; actuator lengths stay out of the motion, as the geometry behind them is to be
+                  calibrated                                                                  (calibrate and discover)
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from ..core.errors import RecordError
+from ..data.alignment import Delay, align_record, group_delays, oil_force
+from ..data.channels import LAYOUT, MOTION, channel_name
+from ..data.fusion import fuse_motion
+from ..data.records import is_measured, require, sample_interval
+from ..data.sensors import SensorSet
+from ..data.signals import Band, differentiate
+from ..machine.machine import Machine
+from ..mechanics.plant import Plant
+from ..mechanics.pose import PlatenMotion
+
+__all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
+__all__ += ["actuator_forces", "find_delays", "oil_forces", "check_usable", "prepare", "prepare_test", "source_of"]
+
+Array = NDArray[np.float64]
+
+
+class Policy(NamedTuple):
+    """What is done to records before they are compared with a model."""
+
+    align: Literal["none", "each test", "campaign"]
+    significance: float = 0.0  # delays below so many standard errors are left in
+    as_recorded: tuple[str, ...] = ()  # groups of channels whose delay is left in
+    lengths: bool = True  # whether actuator lengths take part in the platen's motion
+    shares: bool = False  # whether each channel's share in the motion is found
+    rate: float = np.inf  # records faster than this are thinned to near above it [Hz]
+    band: Band | None = None  # of a motion without accelerometers; by default the sensors' own
+    pressure_cutoff: float | None = None  # up to which pressures are differentiated [Hz]; None: they are not
+
+
+AS_RECORDED = Policy("none")
+EACH_TEST = Policy("each test")
+SIGNIFICANT = Policy("campaign", significance=3.0)
+CALIBRATION = Policy("campaign", as_recorded=("strut_pressure",), lengths=False, shares=True)
+
+
+@dataclass(frozen=True)
+class MeasuredTest:
+    """A measured test ready for residuals; n samples. What was not measured is missing from `channels`."""
+
+    name: str
+    dt: float  # [s]
+    motion: PlatenMotion  # of C and Euler angles
+    channels: Mapping[str, Array]  # (n, k) each, by name of the layout
+    rates: Mapping[str, Array] = field(default_factory=dict)  # (n, k) of differentiated channels [unit/s]
+    path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
+    share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
+    used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
+    record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self.motion.displacement)
+
+    @property
+    def pressure(self) -> Array | None:
+        """Chamber pressures (n, n_chambers) [Pa]: A of every actuator, then B of the double-acting."""
+        return _chambers(self.channels)
+
+    @property
+    def pressure_rate(self) -> Array | None:
+        """Their rates [Pa/s]."""
+        return _chambers(self.rates)
+
+    def with_channels(self, **channels: Array | None) -> "MeasuredTest":
+        """The same test with other values of some channels; without those that are None."""
+        merged = {**self.channels, **channels}
+        return replace(self, channels={name: x for name, x in merged.items() if x is not None})
+
+
+def _chambers(channels: Mapping[str, Array]) -> Array | None:
+    sides = [channels[name] for name in ("chamber_pressure_a", "chamber_pressure_b") if name in channels]
+    return np.hstack(sides) if "chamber_pressure_a" in channels else None
+
+
+def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
+    """Forces (n, n_actuators) [N]: measured, else of the chamber pressures; None where neither is there."""
+    force = channels.get("actuator_force")
+    return oil_forces(machine, channels) if force is None else force
+
+
+def oil_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
+    """P_A A_1 - P_B A_2 (n, n_actuators) [N] of the measured pressures (Eq. 4-6); None where some are missing."""
+    a, b = (channels.get(f"chamber_pressure_{side}") for side in "ab")
+    if a is None or (b is None and machine.double_acting):
+        return None
+    return oil_force(machine, a, np.zeros((len(a), 0)) if b is None else b)
+
+
+def check_usable(machine: Machine, record: xr.Dataset) -> None:
+    """Refuse a record of another machine, with a specimen that this one does not carry, or with holes."""
+    require(record, "time")
+    machine.refuse_unmounted(record.attrs, "the record")
+    for dim, names in machine.labels.items():
+        if dim in record.coords and [str(x) for x in record[dim].values] != list(names):
+            raise RecordError(
+                f"{source_of(record)}: has {dim}s {' '.join(map(str, record[dim].values))}, {machine.name} has "
+                f"{' '.join(names)}; name its machine with --machine"
+            )
+    for name in (name for name in LAYOUT if name in record):
+        bad = np.argwhere(~np.isfinite(record[name].values))
+        if bad.size:
+            where = f"{channel_name(record[name], int(bad[0][-1]))} at sample {bad[0][0]}"
+            raise RecordError(f"{source_of(record)}: {where} is not finite; mend or cut it")
+
+
+def source_of(record: xr.Dataset) -> str:
+    """File that a record comes from."""
+    return str(record.encoding.get("source", "the record"))
+
+
+def prepare(
+    plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet | None, policy: Policy
+) -> tuple[MeasuredTest, ...]:
+    """The tests of a campaign by a policy; raises what `prepare_test` does."""
+    return tuple(prepare_test(plant, r, sensors, policy) for r in align_records(plant, records, policy))
+
+
+def align_records(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> list[xr.Dataset]:
+    """Records of a campaign with the channels that a policy uses, its delays taken out."""
+    if not policy.lengths:
+        records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
+    if policy.align == "each test":
+        return [align_record(r, find_delays(plant, [r], policy)) for r in records]
+    delays = find_delays(plant, records, policy)
+    return [align_record(r, delays) for r in records]
+
+
+def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> dict[str, Delay]:
+    """Delays that a policy takes out of these records, by group of channels."""
+    if policy.align == "none":
+        return {}
+    return {
+        group: delay
+        for group, delay in group_delays(plant, records).items()
+        if group not in policy.as_recorded
+        and (policy.significance == 0.0 or abs(delay.delay) > policy.significance * delay.standard_error)
+    }
+
+
+def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, policy: Policy) -> MeasuredTest:
+    """A test from its aligned record: thinned, its motion fused once. Without sensors the motion is the record's own.
+
+    Raises RecordError for a record without platen motion, or with a channel of it that is not finite.
+    """
+    record = _thinned(record, policy.rate)
+    dt = sample_interval(record)
+    columns = {n: record[n].values for n, c in LAYOUT.items() if n in record and c.residuals and c.role != "motion"}
+    channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}
+    cutoff, rates = policy.pressure_cutoff, {}
+    if cutoff is not None:
+        rates = {n: differentiate(x, dt, cutoff) for n, x in channels.items() if LAYOUT[n].differentiated}
+    name = str(record.attrs.get("test", "test"))
+    if sensors is None or (not is_measured(record) and set(MOTION) <= set(record.data_vars)):
+        motion = PlatenMotion(*(record[channel].values.astype(float) for channel in MOTION))
+        return MeasuredTest(name, dt, motion, channels, rates, record=record)
+    band = None if "platen_acceleration" in record else policy.band
+    fused = fuse_motion(plant, record, sensors, band=band, shares=policy.shares)
+    return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, record)
+
+
+def _thinned(record: xr.Dataset, rate: float) -> xr.Dataset:
+    """The record at a whole fraction of its rate, as near above `rate` [Hz] as can be, without what would fold."""
+    dt = sample_interval(record)
+    every = int(1.0 / (rate * dt) + 1e-6)
+    if every < 2:
+        return record
+    band = Band(high=0.4 / (every * dt), order=16)
+    timed = {name: x.copy(data=band.apply(x.values, dt)) for name, x in record.items() if "time" in x.dims}
+    return record.assign(timed).isel(time=slice(None, None, every))

@@ -44,10 +44,6 @@ def force_of(wrench):
     return pin.Force(kin.to_pinocchio_order(wrench))
 
 
-def se3_of(frame):
-    return pin.SE3(frame.rotation, frame.origin)
-
-
 def all_frames(machine, pose):
     """One frame of every kind of the report's Table 3.1."""
     swivel = [c for c in machine.components if not kin.is_bearing(c)]
@@ -115,9 +111,9 @@ def test_skew_matrix_is_the_cross_product(x, y):
 
 @given(angles, vectors, angles, vectors)
 def test_twist_jacobian_between_any_frames_is_pinocchios_action(euler_f, at_f, euler_g, at_g):
-    f = kin.Frame(kin.rotation(euler_f), np.array(at_f))
-    g = kin.Frame(kin.rotation(euler_g), np.array(at_g))
-    placement = se3_of(f).actInv(se3_of(g))  # f_M_g
+    f = pin.SE3(kin.rotation(euler_f), np.array(at_f))
+    g = pin.SE3(kin.rotation(euler_g), np.array(at_g))
+    placement = f.actInv(g)  # f_M_g
     jacobian = kin.f_J_g(f, g)
     action = placement.toActionMatrix()
     reordered = kin.to_pinocchio_order(kin.to_pinocchio_order(jacobian).T).T
@@ -133,11 +129,11 @@ def test_twists_in_all_frames_are_one_motion_to_pinocchio(name):
     machine = machine_named(name)
     for pose, twist in zip(random_poses(machine, 12), twists(12), strict=True):
         b = kin.frame_b(machine, pose)
-        assert np.allclose(se3_of(b).homogeneous, platen_se3(machine, pose).homogeneous, atol=ROUNDING)
-        in_world = se3_of(b).act(motion_of(twist))  # {s}
+        assert np.allclose(b.homogeneous, platen_se3(machine, pose).homogeneous, atol=ROUNDING)
+        in_world = b.act(motion_of(twist))  # {s}
         for frame in all_frames(machine, pose):
             mine = kin.f_J_g(frame, b) @ twist
-            assert np.allclose(mine, kin.to_report_order(se3_of(frame).actInv(in_world).vector), atol=ROUNDING)
+            assert np.allclose(mine, kin.to_report_order(frame.actInv(in_world).vector), atol=ROUNDING)
 
 
 @pytest.mark.parametrize("name", FREE_MACHINES)
@@ -160,7 +156,9 @@ def test_special_jacobians_are_the_general_one_between_their_frames(name):
         assert np.allclose(kin.c_J_b(machine, pose), kin.f_J_g(c, b), atol=ROUNDING)  # Eq. 3-18
         for component in machine.components:
             p = kin.frame_p(machine, pose, component)
-            assert np.allclose(kin.p_J_c(p.origin - c.origin), kin.f_J_g(p, c), atol=ROUNDING)  # Eqs. 3-14, 3-17
+            assert np.allclose(
+                kin.p_J_c(p.translation - c.translation), kin.f_J_g(p, c), atol=ROUNDING
+            )  # Eqs. 3-14, 3-17
 
 
 @pytest.mark.parametrize("name", FREE_MACHINES)
@@ -198,7 +196,7 @@ def test_twist_of_c_is_the_rate_of_the_pose(name):
     for pose, rate in zip(random_poses(machine, 8), twists(8)[:, ::-1], strict=True):
         twist = kin.twist_c(pose, rate)
         for component in machine.components:  # Eq. 3-13: velocity of the platen's particle, by finite differences
-            particle = kin.rotation(pose[3:]).T @ (kin.frame_p(machine, pose, component).origin - pose[:3])
+            particle = kin.rotation(pose[3:]).T @ (kin.frame_p(machine, pose, component).translation - pose[:3])
             speed = central(lambda p, at=particle: p[:3] + kin.rotation(p[3:]) @ at, pose, rate)
             r_CP = kin.rotation(pose[3:]) @ particle
             assert np.allclose((kin.p_J_c(r_CP) @ twist)[3:], speed, atol=DIFFERENCE)
@@ -277,7 +275,7 @@ def test_slip_is_how_fast_the_contact_point_walks_over_the_platen():
 
             def contact(p, bearing=bearing):
                 """Contact point in platen axes, from C."""
-                end = kin.frame_p(LHPOST6, p, bearing).origin
+                end = kin.frame_p(LHPOST6, p, bearing).translation
                 return kin.rotation(p[3:]).T @ (end - p[:3])
 
             walk = central(contact, pose, rate)  # the plate over the platen: the other way round

@@ -140,6 +140,13 @@ def test_the_ledger_has_every_effect_on_every_port(machine: Machine, ledger: Led
     assert len(set(ledger.rows)) == len(ledger.rows)
 
 
+def test_one_instant_is_a_pin_force_an_effect(ledger: Ledger) -> None:
+    wrenches = ledger.at(700)
+    assert tuple(wrenches) == ledger.effects
+    total = sum(wrenches.values(), pin.Force.Zero())
+    np.testing.assert_allclose(total.vector, ledger.wrench[700].sum(axis=0), rtol=1e-14)
+
+
 def test_rows_hold_the_forces_of_the_laws(shaken: Run, ledger: Ledger) -> None:
     plant = shaken.plant
     pressure = [shaken.z[:, plant.state_index("actuators_4_way", "H3", f"pressure_{c}")] for c in "ab"]

@@ -62,7 +62,7 @@ def test_leg_rows_are_the_reports_lengths_and_jacobians(name, thrust):
             assert s[i] == pytest.approx(np.linalg.norm(vector) - zero, abs=ROUNDING)
             row = kin.length_jacobian(machine, pose, component) @ c_J_b
             assert np.allclose(J[i], kin.to_pinocchio_order(row), rtol=0.0, atol=ROUNDING)
-            at = kin.frame_p(machine, pose, component).origin - pose[:3]
+            at = kin.frame_p(machine, pose, component).translation - pose[:3]
             column = row_of_force(machine, pose, at, kin.component_force(machine, pose, component, 1.0))
             assert np.allclose(B[i], column, rtol=0.0, atol=ROUNDING)
 
@@ -86,7 +86,7 @@ def test_pad_rows_are_the_reports_slip_and_friction():
         turn = kin.rotation(pose[3:])
         for bearing in machine.actuators[4:]:
             frame = kin.frame_n(machine, pose, bearing)
-            at = frame.origin - pose[:3]
+            at = frame.translation - pose[:3]
             # slip is linear in the twist: its matrix, column by column
             slip = np.array([kin.slip_velocity(machine, pose, bearing, b_J @ unit) for unit in np.eye(6)]).T
             moved = frame.rotation.T @ (turn @ bearing.platen_point - at)

@@ -15,7 +15,7 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 
 PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.kinematics", "mechanics.plant", "mechanics.equilibrium"),
-    *("mechanics.derivatives", "mechanics.linearize"),
+    *("mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
     *("show.bodies", "show.specimen_bodies", "show.viewer.scene", "show.viewer.live"),
 }

@@ -30,6 +30,8 @@ class Equilibrium(NamedTuple):
     state: State
     spool: Array
     force: Array
+    pose: pin.SE3  # of the platen's axes at C, in {s}
+    wrench: pin.Force  # of the actuators on the platen, at C in {c}
 
 
 def hydraulic_rows(plant: Plant) -> NDArray[np.int64]:
@@ -78,7 +80,8 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     for _ in range(_SUPPLY_TURNS if plant.supply.size > 2 else 0):  # what leaks at rest is drawn from the supply, too
         steady_supply(plant.rows, spool, plant.supply, z)
         _fill(plant, force, np.array(supply_pressures(plant.supply, z)), z, spool)
-    return Equilibrium(State(start.q, start.v, z), spool, force)
+    wrench = pin.SE3(np.eye(3), -plant.body[0]["rho_c"]).act(pin.Force(ws.JB[1][: plant.spools].T @ force))
+    return Equilibrium(State(start.q, start.v, z), spool, force, pin.SE3.Identity(), wrench)
 
 
 def _fill(plant: Plant, force: Array, supply: Array, z: Array, spool: Array) -> None:

@@ -6,14 +6,16 @@ order, ANGULAR FIRST; `to_pinocchio_order` and `to_report_order` are the one pla
 
 Symbols: pose (6,) is the displacement r_OC of C in {s} [m] and the Euler angles alpha, beta, gamma [rad]. Points in
 capitals: O origin of {s}, C centre of the top face, B centre of gravity, N foot of the normal from C on the bearing
-plane, A_i and P_i base and platen end of component i, P'_i the platen's particle at P_i. A name such as `f_J_g` is the
-report's superscript notation: it takes a twist of the platen in {g} to the same motion in {f}.
+plane, A_i and P_i base and platen end of component i, P'_i the platen's particle at P_i. A frame {f}, instantaneous and
+inertial, is its placement in {s}, a `pin.SE3`. A name such as `f_J_g` is the report's superscript notation: it takes a
+twist of the platen in {g} to the same motion in {f}.
 """
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import SimulationError
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from ..machine.components import Actuator, Strut
     from ..machine.machine import Machine
 
-__all__ = ["Frame", "b_J_E", "bearing_jacobian", "bearing_vector", "c_J_b", "component_force", "component_vector"]
+__all__ = ["b_J_E", "bearing_jacobian", "bearing_vector", "c_J_b", "component_force", "component_vector"]
 __all__ += ["external_wrench", "f_J_g", "forward_kinematics", "frame_b", "frame_c", "frame_n", "frame_p", "frame_s"]
 __all__ += ["inertial_wrench", "inverse_kinematics", "length_jacobian", "p_J_c", "plate_rotation", "pose_jacobian"]
 __all__ += ["rotation", "rotation_x", "rotation_y", "rotation_z", "s_J_E", "skew", "slip_velocity", "swivel_jacobian"]
@@ -95,50 +97,43 @@ def b_J_E(euler: ArrayLike) -> Array:
 # Frames, twists and wrenches (Sections 3.1, 3.3, 4.4) ----------------------------------------------------------------
 
 
-class Frame(NamedTuple):
-    """Instantaneous inertial frame {f}: rotation s_R_f (3, 3) and position of its origin r_OF in {s} (3,) [m]."""
-
-    rotation: Array
-    origin: Array
+def frame_s() -> pin.SE3:
+    """Placement in {s} of {s} itself: fixed at O."""
+    return pin.SE3.Identity()
 
 
-def frame_s() -> Frame:
-    """{s}: fixed at O."""
-    return Frame(np.eye(3), np.zeros(3))
-
-
-def frame_c(pose: Array) -> Frame:
+def frame_c(pose: Array) -> pin.SE3:
     """{c}: at C, axes of {s}."""
-    return Frame(np.eye(3), np.array(pose[:3]))
+    return pin.SE3(np.eye(3), np.array(pose[:3]))
 
 
-def frame_b(machine: "Machine", pose: Array) -> Frame:
+def frame_b(machine: "Machine", pose: Array) -> pin.SE3:
     """{b}: at B, axes of the platen."""
     turn = rotation(pose[3:])
-    return Frame(turn, pose[:3] + turn @ machine.platen.centre_of_gravity)
+    return pin.SE3(turn, pose[:3] + turn @ machine.platen.centre_of_gravity)
 
 
-def frame_p(machine: "Machine", pose: Array, component: Component) -> Frame:
+def frame_p(machine: "Machine", pose: Array, component: Component) -> pin.SE3:
     """{p'_i}: at the platen's particle P'_i of a component, axes of {s}."""
-    return Frame(np.eye(3), pose[:3] + _from_c(machine, pose, component))
+    return pin.SE3(np.eye(3), pose[:3] + _from_c(machine, pose, component))
 
 
-def frame_n(machine: "Machine", pose: Array, component: Component) -> Frame:
+def frame_n(machine: "Machine", pose: Array, component: Component) -> pin.SE3:
     """{n_i}: at P_i, axes of a bearing's surface plate (Eqs. 4-13, 4-14)."""
-    return Frame(plate_rotation(rotation(pose[3:])), pose[:3] + _from_c(machine, pose, component))
+    return pin.SE3(plate_rotation(rotation(pose[3:])), pose[:3] + _from_c(machine, pose, component))
 
 
-def f_J_g(f: Frame, g: Frame) -> Array:
+def f_J_g(f: pin.SE3, g: pin.SE3) -> Array:
     """Jacobian (6, 6) from the platen's twist in {g} to its twist in {f} (Eq. 3-15).
 
     Its inverse is the same with f and g exchanged (Eq. 3-16).
     """
     f_R_g = f.rotation.T @ g.rotation
-    f_r_FG = f.rotation.T @ (g.origin - f.origin)
+    f_r_FG = f.rotation.T @ (g.translation - f.translation)
     return np.block([[f_R_g, np.zeros((3, 3))], [skew(f_r_FG) @ f_R_g, f_R_g]])
 
 
-def wrench_transform(f: Frame, g: Frame) -> Array:
+def wrench_transform(f: pin.SE3, g: pin.SE3) -> Array:
     """Matrix (6, 6) from a wrench in {g} to the equal wrench in {f}: (f_J_g^-1)^T (Eq. 4-22)."""
     return f_J_g(g, f).T
 

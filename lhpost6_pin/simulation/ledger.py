@@ -69,6 +69,10 @@ class Ledger:
         """Number of an effect in `wrench`; raises UnknownNameError that lists the names."""
         return number_of("effect", name, self.effects)
 
+    def at(self, sample: int) -> dict[str, pin.Force]:
+        """Wrench of every effect on the platen at one sample, at C in {c}."""
+        return {effect: pin.Force(w) for effect, w in zip(self.effects, self.wrench[sample], strict=True)}
+
     def to_dataset(self) -> "xr.Dataset":
         """Lay out as a dataset with dims time, row, effect, axis and units."""
         import xarray as xr

@@ -46,8 +46,9 @@ from lhpost6_pin.core.errors import ControllerError
 from lhpost6_pin.core.files import refuse_folder
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
 from lhpost6_pin.data.signals import align, delay, lowpass_zero_phase, rrmse
+from lhpost6_pin.effects.registry import parameters_of
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.equilibrium import Equilibrium, find_equilibrium, hydraulic_rows, unloaded_speeds
+from lhpost6_pin.mechanics.equilibrium import Equilibrium, find_equilibrium, unloaded_speeds
 from lhpost6_pin.mechanics.linearize import linearize
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.pose import forward_kinematics, leg_displacements, platen_motion
@@ -233,7 +234,7 @@ def platen_model(plant: Plant) -> PlatenModel:
     # Force of the pressures, and the pressures of a force in the proportion in which the spool moves them
     force = np.zeros((plant.spools, len(smooth.states)))
     pressure = np.zeros_like(force.T)
-    for i, (row, actuator) in enumerate(zip(smooth.rows[hydraulic_rows(smooth)], machine.actuators, strict=True)):
+    for i, (row, actuator) in enumerate(zip(smooth.rows[smooth.tables.actuators], machine.actuators, strict=True)):
         force[i, row["state"]] = actuator.area_a
         if actuator.area_b is not None:
             force[i, row["state"] + 1] = -actuator.area_b
@@ -251,13 +252,13 @@ def platen_model(plant: Plant) -> PlatenModel:
 
 def valve_tables(plant: Plant, rest: Equilibrium) -> Valves:
     """Valves of a plant at rest."""
-    rows = plant.rows[hydraulic_rows(plant)]
-    more = 0.01 * plant.supply[0] * rows["p"][:, 0]  # [N] as good as any: the squares are linear in it
+    actuators = [parameters_of(row) for row in plant.rows[plant.tables.actuators]]
+    more = 0.01 * plant.supply.pressure * plant.actuators.area_a  # [N] as good as any: the squares are linear in it
     found = [
-        [unloaded_speeds(r, f, plant.supply) for r, f in zip(rows, rest.force + x, strict=True)] for x in (0, more)
+        [unloaded_speeds(p, f, plant.supply) for p, f in zip(actuators, rest.force + x, strict=True)] for x in (0, more)
     ]
     squares, pushed = np.square(found)
-    curve = rows["p"][:, 6]
+    curve = plant.actuators.flow_curve
     leak = np.copysign(-np.expm1(-curve * np.abs(rest.spool)), rest.spool)
     return Valves(squares, (pushed - squares) / more[:, None], curve, leak, -np.expm1(-curve))
 

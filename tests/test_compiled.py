@@ -18,10 +18,10 @@ PACKAGE = Path(lhpost6_pin.__file__).parent
 POSIX = pytest.mark.skipif(not hasattr(os, "getuid"), reason="ownership and permission bits are POSIX")
 
 FLOW = """
-from lhpost6_pin.laws.chamber import flows_single
-print(flows_single(1.0, 1e6, 2.0, 2.0, 0.0, 5e6, 0.0, 1.0)[0])
+from lhpost6_pin.laws.orifice import port_flow
+print(port_flow(1.0, 2.0, 2.0, 5e6, 0.0, 1e6, 1.0)[0])
 """
-"""Calls through two modules: `flows_single` in chamber.py, `signed_root` in orifice.py."""
+"""Calls through two functions: `port_flow` and `signed_root`."""
 
 WHERE = "from lhpost6_pin.core.compiled import cache_folder; print(cache_folder())"
 KEY = "from lhpost6_pin.core.compiled import source_key; print(source_key())"
@@ -89,12 +89,12 @@ def test_compiled_code_is_kept_in_the_cache_and_nothing_beside_the_package(copy:
     before = sorted(copy.rglob("*"))
     run(FLOW, copy, LHPOST6_CACHE_DIR=str(tmp_path / "cache"))
     assert sorted(copy.rglob("*")) == before
-    assert list((tmp_path / "cache").rglob("*.flows_single-*.nbc"))
+    assert list((tmp_path / "cache").rglob("*.port_flow-*.nbc"))
 
 
 def test_the_key_follows_what_compiled_code_is_made_of_and_nothing_else(copy: Path) -> None:
     keys = [run(KEY, copy)[0]]
-    for edited in ("laws/strut.py", "effects/evaluate.py", "effects/registry.py"):  # a law, a caller, constants
+    for edited in ("laws/stribeck.py", "effects/evaluate.py", "effects/registry.py"):  # a law, a caller, constants
         with (copy / edited).open("a") as handle:
             handle.write("# edited\n")
         keys.append(run(KEY, copy)[0])

@@ -7,14 +7,14 @@ import pytest
 from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
-from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, cancel, control_step
-from lhpost6_pin.control.plug import Feedback
+from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, Feedback, cancel, control_step
 from lhpost6_pin.core.errors import ControllerError, SimulationError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
 from lhpost6_pin.data.signals import align, delay, rrmse
+from lhpost6_pin.effects.registry import parameters_of
 from lhpost6_pin.laws.orifice import opening, spool_for_opening
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.equilibrium import hydraulic_rows, unloaded_speeds
+from lhpost6_pin.mechanics.equilibrium import unloaded_speeds
 from lhpost6_pin.mechanics.pose import leg_displacements, platen_motion
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.rehearse import rehearse
@@ -83,9 +83,9 @@ def test_valve_linearisation_gives_the_asked_piston_speed_in_the_steady_state(pl
 
 def test_unloaded_speed_is_where_both_chambers_take_the_same_stroke(plant, rest):
     """The closed form against the flow equations: pressures at that speed balance the rest force."""
-    row = plant.rows[hydraulic_rows(plant)][0]
-    area_a, area_b, k_pa, k_bt = row["p"][:4]
-    speed, _ = unloaded_speeds(row, float(rest.force[0]), plant.supply)
+    p = parameters_of(plant.rows[plant.tables.actuators][0])
+    area_a, area_b, k_pa, k_bt = p[:4]
+    speed, _ = unloaded_speeds(p, float(rest.force[0]), plant.supply)
     pressure_a = plant.supply[0] - (area_a * speed / k_pa) ** 2
     pressure_b = plant.supply[1] + (area_b * speed / k_bt) ** 2
     assert pressure_a * area_a == pytest.approx(pressure_b * area_b, rel=1e-9)
@@ -201,10 +201,13 @@ GAINS = {
 
 def call(function, plant, loop, sample, drive, displacement, acceleration, force, memory, command):
     """The compiled step, or its original in Python."""
-    tables = plant.legs, plant.body, plant.axes, loop.axis, loop.actuator, loop.balance, loop.canceller
+    tables, control = plant.tables, loop.tables
     if function is not control_step:
-        tables = tuple(t.view(np.recarray) if t.dtype.names else t for t in tables)
-    return function(sample, drive, displacement, acceleration, force, *tables, memory, command)
+        tables, control = (
+            type(bundle)(*(t.view(np.recarray) if isinstance(t, np.ndarray) and t.dtype.names else t for t in bundle))
+            for bundle in (tables, control)
+        )
+    return function(sample, drive, Feedback(displacement, acceleration, force), tables, control, memory, command)
 
 
 def signals(plant, rest, seed=4):

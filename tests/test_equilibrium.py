@@ -6,9 +6,10 @@ import pytest
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.registry import parameters_of
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium, hydraulic_rows, rest_pressures
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium, rest_pressures
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.mechanics.schemes import A
@@ -89,7 +90,7 @@ def test_in_equilibrium_nothing_accelerates_and_no_pressure_drifts(machine: Mach
     rest = find_equilibrium(plant)
     shut = make_workspace(plant, rest.state)
     evaluate_derivatives(plant, shut, np.zeros(plant.spools))
-    fed = plant.rows["state"][hydraulic_rows(plant)]
+    fed = plant.rows["state"][plant.tables.actuators]
     leaking = np.abs(shut.zd[fed]) > 1e3
     np.testing.assert_array_equal(leaking, rest.spool != 0.0)  # with closed valves the leak shows at once
 
@@ -97,9 +98,9 @@ def test_in_equilibrium_nothing_accelerates_and_no_pressure_drifts(machine: Mach
 @pytest.mark.parametrize("force", [-2e6, -3e5, 0.0, 4.6e5, 5e5, 1e6, 1.1e6, 3e6])
 def test_a_loaded_actuator_gets_pressures_that_give_its_force(plant: Plant, force: float) -> None:
     """Between 0.47 and 1.08 MN both chambers carry the same pressure: nothing leaks, the valve stays shut."""
-    row = plant.rows[hydraulic_rows(plant)][0]
-    (a, b), spool = rest_pressures(row, force, plant.supply)
-    assert a * row["p"][0] - b * row["p"][1] == pytest.approx(force, abs=1e-6)  # rounding of 1 MN
+    p = parameters_of(plant.rows[plant.tables.actuators][0])
+    (a, b), spool = rest_pressures(p, force, plant.supply)
+    assert a * p.area_a - b * p.area_b == pytest.approx(force, abs=1e-6)  # rounding of 1 MN
     assert plant.supply[1] < a < plant.supply[0]
     assert plant.supply[1] < b < plant.supply[0]
     assert spool * (a - b) > 0.0 or spool == a - b == 0.0  # oil comes in on the side that leaks

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from lhpost6_pin.effects.evaluate_added import advance_added, apply_added
 
 from lhpost6_pin.discovery.formula import sparse_formula
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, with_residual_function
 from lhpost6_pin.effects.effect import Effect
-from lhpost6_pin.effects.evaluate_added import advance_added, apply_added
 from lhpost6_pin.effects.registry import NODES
 from lhpost6_pin.effects.table import effect_table
 from lhpost6_pin.machine.machine import load_machine

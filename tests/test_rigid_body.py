@@ -20,15 +20,16 @@ from scipy.special import ellipk
 from lhpost6_pin.core.errors import ParameterError, SimulationError
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import wrench_on_platen
-from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.effects.registry import LAWS, law_of
 from lhpost6_pin.machine.port_names import PLATEN_PORTS
 from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics.forward_dynamics import platen_acceleration
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.platen_steps import integrate_platen, platen_difference
 from lhpost6_pin.mechanics.rigid_body import lumped_inertia, make_model, platen_inertia
 from lhpost6_pin.mechanics.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
 from lhpost6_pin.mechanics.workspace import make_workspace
-from lhpost6_pin.simulation.engine_fused import inertia_table, platen_acceleration
+from lhpost6_pin.simulation.engine_fused import refuse_joints
 
 PENDULUM = DATA / "pendulum.urdf"
 BOB, ARM, BOB_INERTIA, POST = 500.0, 2.0, 25.0, 200.0  # of pendulum.urdf: kg, m, kg m2 about Y, kg
@@ -54,11 +55,8 @@ def forces_at(plant, q, v, z):
     """Workspace with ports, ledger and torques at a state, as every scheme computes them."""
     ws = make_workspace(plant, plant.zero_state())
     ws.q[:], ws.z[:], ws.motion[V_SEEN] = q, z, v
-    pose_stage(ws.q, plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB)
-    forces_stage(
-        plant.axes, plant.legs, plant.body, plant.rows, plant.model.damping,
-        ws.frame, ws.port, ws.JB, ws.z, ws.force, ws.motion,
-    )  # fmt: skip
+    pose_stage(ws.q, plant.tables, ws)
+    forces_stage(plant.tables, ws, ws.z)
     return ws
 
 
@@ -70,7 +68,7 @@ def report_wrench(plant, pose, ws):
     pad = {c.name: np.zeros(2) for c in machine.components}
     for row, force in zip(plant.rows, ws.force, strict=True):
         name = plant.ports[row["port"]].split(".")[0]
-        if row["law"] == LAWS["bouc_wen_2d"].code:
+        if law_of(row) is LAWS["bouc_wen_2d"]:
             pad[name] += force[:2]
         elif name == "platen":
             at_c[(np.array(PLATEN_PORTS) == plant.ports[row["port"]])[[3, 4, 5, 0, 1, 2]]] += force[0]
@@ -132,7 +130,7 @@ def test_weight_is_straight_down_with_the_vertical_mass_at_any_tilt(name):
 @pytest.mark.parametrize("name", MACHINES)
 def test_fused_forward_dynamics_are_pinocchios(name):
     plant = plant_named(name)
-    table, data = inertia_table(plant), plant.model.createData()
+    table, data = plant.tables.inertia, plant.model.createData()
     a = np.zeros(plant.axes.size)
     for _, q, v, z in random_states(plant, 24):
         ws = forces_at(plant, q, v, z)
@@ -144,7 +142,7 @@ def test_fused_forward_dynamics_are_pinocchios(name):
 def test_fused_forward_dynamics_take_a_rigid_specimen_anywhere_on_the_platen():
     machine = machine_named("lhpost6").with_specimen(PENDULUM, (2.0, -1.0, 0.1), (0.1, -0.2, 0.7), locked=True)
     plant = make_plant(machine)
-    table, data = inertia_table(plant), plant.model.createData()
+    table, data = plant.tables.inertia, plant.model.createData()
     a = np.zeros(6)
     for _, q, v, z in random_states(plant, 12):
         ws = forces_at(plant, q, v, z)
@@ -370,7 +368,7 @@ def test_free_specimen_joins_the_same_model_with_its_joints():
     assert plant.axes.size == 6
     assert pin.computeTotalMass(plant.model) == pytest.approx(168060.0 + POST + BOB)
     with pytest.raises(SimulationError, match="free joints"):
-        inertia_table(plant)
+        refuse_joints(plant)
 
 
 def pendulum_rate():

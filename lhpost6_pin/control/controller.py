@@ -1,21 +1,22 @@
 """A controller made ready for a plant: the tables that the compiled step reads, and the step for one sample."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import ControllerError
 from ..core.names import SAMPLE_RATE
-from ..effects.registry import HYDRAULIC_DOUBLE
+from ..effects.registry import actuator_rows, parameters_of
+from ..laws.hydraulic import Hydraulic
 from ..laws.orifice import opening
-from ..mechanics.equilibrium import Equilibrium, hydraulic_rows, unloaded_speeds
+from ..mechanics.equilibrium import Equilibrium, unloaded_speeds
 from ..mechanics.plant import Plant
 from ..mechanics.pose import leg_jacobian
 from ..mechanics.rigid_body import platen_inertia
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
-from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, control_step_flat
-from .plug import Feedback, Wanted
+from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, ControlTables, Feedback, control_step, pack_control
+from .plug import Wanted
 from .settings import ControllerSettings
 
 __all__ = ["Controller", "make_controller"]
@@ -34,6 +35,11 @@ class Controller(NamedTuple):
     canceller: NDArray[np.void]  # loop.CANCELLER, empty but in sine tests
     jacobian: Array  # (n_actuators, 6) leg rates per motion of C and Euler angles, zero-position
     lever: Array  # (6, 6) motion of C and Euler angles per twist at B, zero-position
+
+    @property
+    def tables(self) -> ControlTables:
+        """Its tables as compiled code reads them, packed anew."""
+        return pack_control(self.axis, self.actuator, self.balance, self.canceller)
 
     @property
     def columns(self) -> int:
@@ -59,22 +65,13 @@ class Controller(NamedTuple):
         if not 0 <= sample < len(drive):
             raise ControllerError(f"{self.settings.name}: sample {sample} is none of the drive's {len(drive)}")
         command = np.empty(self.plant.spools)
-        arguments: Any = (sample, drive, *sensors, *self.flat_tables(), memory, command)
-        control_step_flat(*arguments)
+        control_step(sample, drive, Feedback(*sensors), self.plant.tables, self.tables, memory, command)
         return command
 
     def _check(self, name: str, values: Array, shape: tuple[int, ...]) -> None:
         if not isinstance(values, np.ndarray) or values.shape != shape:
             what = f"{type(values).__name__} of shape {np.shape(values)}"
             raise ControllerError(f"{self.settings.name}: {name} is {what}; an array of shape {shape} is needed")
-
-    def flat_tables(self) -> tuple[NDArray[Any], ...]:
-        """Legs, body, axes, axis, actuator, balance and canceller as plain numbers."""
-        plant = self.plant
-        legs, body, axis, actuator, canceller = (
-            t.view(float) for t in (plant.legs, plant.body, self.axis, self.actuator, self.canceller)
-        )
-        return legs, body, plant.axes, axis, actuator, self.balance, canceller
 
     def drive_for(self, displacement: Array, velocity: Array, acceleration: Array) -> Array:
         """Drive (n, 6) whose reference is the given motion, (n, 6) each (see `filters.drive_for`).
@@ -104,14 +101,15 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
     scratch = np.zeros(ports), np.zeros((ports, 6)), np.zeros((ports, 6)), np.zeros((8, 3))
     leg_jacobian(np.zeros(6), plant.legs, plant.body, *scratch, jacobian)
     jacobian = jacobian[:n]
-    rows = plant.rows[hydraulic_rows(plant)]
+    rows = plant.rows[actuator_rows(plant.rows)]
     actuator = np.zeros(n, ACTUATOR)
     actuator["limit"] = settings.spool_limit
     for row, out, force, spool in zip(rows, actuator, rest.force, rest.spool, strict=True):
-        out["extend"], out["retract"] = unloaded_speeds(row, float(force), plant.supply)
-        curve = float(row["p"][6])
+        p = parameters_of(row)
+        out["extend"], out["retract"] = unloaded_speeds(p, float(force), plant.supply)
+        curve = p.flow_curve
         out["flow_curve"], out["bias"], out["force"] = curve, opening(spool, curve), force
-    oil = np.array([_oil_stiffness(row) for row in rows])
+    oil = np.array([_oil_stiffness(parameters_of(row)) for row in rows])
     stiffness = (jacobian.T * oil) @ jacobian
     mass = _mass_about_c(plant)
     axis = np.zeros(axes.size, AXIS)
@@ -145,11 +143,10 @@ def _fill_axis(out: np.void, settings: ControllerSettings, k: int) -> None:
     out["notches"] = len(acting)
 
 
-def _oil_stiffness(row: np.void) -> float:
+def _oil_stiffness(p: Hydraulic) -> float:
     """Stiffness of an actuator's oil column with the valve closed, zero-position [N/m]."""
-    area_a, area_b, chamber_a, chamber_b, bulk = (float(row["p"][i]) for i in (0, 1, 8, 9, 10))
-    stiffness = bulk * area_a / chamber_a
-    return stiffness + (bulk * area_b / chamber_b if row["law"] == HYDRAULIC_DOUBLE else 0.0)
+    stiffness = p.bulk_modulus * p.area_a / p.chamber_a
+    return stiffness + (p.bulk_modulus * p.area_b / p.chamber_b if p.area_b > 0.0 else 0.0)
 
 
 def _mass_about_c(plant: Plant) -> Array:

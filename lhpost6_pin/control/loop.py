@@ -16,17 +16,24 @@ opening at rest feeds the leak.
 For sine tests a canceller adds harmonics to the drive before the reference generator (`sine`).
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.compiled import compiled, compiled_inline
+from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
-from ..mechanics.ports import BODY, LEG
 from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
 from ..mechanics.schemes import A, S, V, spool_windows
+from ..mechanics.tables import unpack_tables
+from ..mechanics.workspace import unpack_workspace
 from .filters import NOTCHES
 
-__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "MEMORY_ROWS"]
-__all__ += ["control_sample", "control_sample_flat", "control_step", "control_step_flat", "sense", "sense_flat"]
+__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "MEMORY_ROWS", "ControlTables", "Feedback", "control_packed"]
+__all__ += ["control_sample", "control_step", "pack_control", "sense", "sense_packed"]
+
+Array = NDArray[np.float64]
 
 AXIS = np.dtype(
     [
@@ -78,6 +85,54 @@ CANCELLER = np.dtype(
     ]
 )
 """Table row of a sine canceller: one harmonic of one axis."""
+
+
+class ControlTables(NamedTuple):
+    """Tables of a controller; treat the arrays as read only."""
+
+    packed: Array  # all that follow, one behind the other
+    axis: NDArray[np.void]  # AXIS, one row a free axis
+    actuator: NDArray[np.void]  # ACTUATOR
+    balance: Array  # (n_actuators, n_actuators) leg rate [m/s] per force [N] in the null space of the motion
+    canceller: NDArray[np.void]  # CANCELLER, empty but in sine tests
+
+
+class Feedback(NamedTuple):
+    """What the table gives its controller at one sample; a run fills the same arrays each time: copy what you keep."""
+
+    displacement: Array  # (n_actuators,) from the zero-position [m]
+    acceleration: Array  # (6,) of C in {s} and Euler angles [m/s2, rad/s2]
+    force: Array  # (n_actuators,) [N]
+
+
+def pack_control(
+    axis: NDArray[np.void], actuator: NDArray[np.void], balance: Array, canceller: NDArray[np.void]
+) -> ControlTables:
+    """Tables of a controller, with all of them packed."""
+    parts = [np.ascontiguousarray(x) for x in (axis, actuator, balance, canceller)]
+    sizes = np.array([len(axis), len(actuator), len(canceller)], float)
+    packed = np.concatenate([sizes, *(x.view(float).ravel() for x in parts)])
+    return ControlTables._make([packed, *parts])
+
+
+_AXIS_SIZE, _ACTUATOR_SIZE, _CANCELLER_SIZE = (d.itemsize // 8 for d in (AXIS, ACTUATOR, CANCELLER))
+
+
+@compiled_inline
+def unpack_control(packed):
+    """Controller's tables from `ControlTables.packed`."""
+    axes, n, cancellers = int(packed[0]), int(packed[1]), int(packed[2])
+    actuator = 3 + _AXIS_SIZE * axes
+    balance = actuator + _ACTUATOR_SIZE * n
+    canceller = balance + n * n
+    return ControlTables(
+        packed,
+        packed[3:actuator].view(AXIS),
+        packed[actuator:balance].view(ACTUATOR),
+        packed[balance:canceller].reshape((n, n)),
+        packed[canceller : canceller + _CANCELLER_SIZE * cancellers].view(CANCELLER),
+    )
+
 
 _POSE, _RESET, _FORCE, _HIGH_PASSED, _CLIPPED = range(5)
 _GENERATOR, _FEEDBACK, _NOTCH = 5, 9, 12
@@ -148,29 +203,17 @@ def cancel(canceller, sample, a, error, level, weights):
 
 
 @compiled
-def control_step(
-    sample,
-    drive,
-    displacement,
-    acceleration,
-    force,
-    legs,
-    body,
-    axes,
-    axis,
-    actuator,
-    balance,
-    canceller,
-    memory,
-    command,
-):
+def control_step(sample, drive, feedback, tables, control, memory, command):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
     drive (n, 6 or 13): what goes into the reference generators, in their mode's quantity; a canceller reads the wanted
     acceleration from columns 6 to 11 and from column 12 the level, 0 to 1, at which it acts. It does not learn while
-    commands are clipped. displacement, force (n_actuators,) the actuators' [m, N]; acceleration (6,) the
-    platen's, of C and Euler angles. Commands beyond their limit are clipped to it. Returns how many.
+    commands are clipped. feedback (`Feedback`), tables the plant's, control the controller's (`ControlTables`).
+    Commands beyond their limit are clipped to it. Returns how many.
     """
+    legs, body, axes = tables.legs, tables.body, tables.axes
+    axis, actuator, balance, canceller = control.axis, control.actuator, control.balance, control.canceller
+    displacement, acceleration, force = feedback.displacement, feedback.acceleration, feedback.force
     n = command.size
     ports = legs.size
     for i in range(legs.size):
@@ -244,126 +287,40 @@ def control_step(
 
 
 @compiled
-def sense(port, force, fed, body, axes, frame, motion, displacement, acceleration, measured):
-    """What the sensors say of a running plant: fill displacement, measured (n_actuators,) and acceleration (6,).
-
-    port, force, frame, motion are the plant's (see `schemes`, `stage`), fed (n_actuators,) the rows of force that are
-    actuators.
-    """
-    for i in range(fed.size):
-        displacement[i] = port[S, i]
-        measured[i] = force[fed[i], 0]
-    pose_acceleration(frame, body, axes, motion[V], motion[A], acceleration)
+def sense(tables, ws, feedback):
+    """Fill what the sensors of a running plant give its controller, `Feedback`, from its workspace."""
+    for i in range(tables.actuators.size):
+        feedback.displacement[i] = ws.port[S, i]
+        feedback.force[i] = ws.force[tables.actuators[i], 0]
+    pose_acceleration(ws.frame, tables.body, tables.axes, ws.motion[V], ws.motion[A], feedback.acceleration)
 
 
 @compiled
-def control_sample(
-    sample,
-    drive,
-    port,
-    force,
-    fed,
-    frame,
-    motion,
-    legs,
-    body,
-    axes,
-    axis,
-    actuator,
-    balance,
-    canceller,
-    memory,
-    command,
-    delays,
-    rate,
-    window,
-):
+def control_sample(sample, drive, tables, ws, control, memory, command, window):
     """One controller sample of a run: measure, command, and the delayed spools of its model steps.
 
-    The plant's arrays are those of `sense`. Fills row `sample` of command (n, n_actuators) and window (n_steps,
-    n_actuators). Returns how many commands were clipped.
+    Fills row `sample` of command (n, n_actuators) and window (n_steps, n_actuators). Returns how many commands were
+    clipped.
     """
-    displacement = np.empty(fed.size)
-    measured = np.empty(fed.size)
-    acceleration = np.empty(6)
-    sense(port, force, fed, body, axes, frame, motion, displacement, acceleration, measured)
-    clipped = control_step(
-        sample,
-        drive,
-        displacement,
-        acceleration,
-        measured,
-        legs,
-        body,
-        axes,
-        axis,
-        actuator,
-        balance,
-        canceller,
-        memory,
-        command[sample],
-    )
-    spool_windows(command, 0, sample, delays, rate, window)
+    n = tables.actuators.size
+    feedback = Feedback(np.empty(n), np.empty(6), np.empty(n))
+    sense(tables, ws, feedback)
+    clipped = control_step(sample, drive, feedback, tables, control, memory, command[sample])
+    spool_windows(command, 0, sample, tables.delays, float(SAMPLE_RATE), window)
     return clipped
 
 
-# Tables of records are costly to hand over from Python: these take them as plain numbers (`flat`).
+# Called once a sample from Python: these take tables and workspace packed, which are cheaper to hand over.
 
 
 @compiled
-def control_sample_flat(
-    sample,
-    drive,
-    port,
-    force,
-    fed,
-    frame,
-    motion,
-    legs,
-    body,
-    axes,
-    axis,
-    actuator,
-    balance,
-    canceller,
-    memory,
-    command,
-    delays,
-    rate,
-    window,
-):
-    """`control_sample` with its tables as plain numbers."""
-    tables = legs.view(LEG), body.view(BODY), axes, axis.view(AXIS), actuator.view(ACTUATOR)
-    plant = port, force, fed, frame, motion
-    return control_sample(
-        sample, drive, *plant, *tables, balance, canceller.view(CANCELLER), memory, command, delays, rate, window
-    )
+def control_packed(sample, drive, tables, buffer, control, memory, command, window):
+    """`control_sample` with its tables and workspace packed."""
+    plant, ws = unpack_tables(tables), unpack_workspace(buffer)
+    return control_sample(sample, drive, plant, ws, unpack_control(control), memory, command, window)
 
 
 @compiled
-def control_step_flat(
-    sample,
-    drive,
-    displacement,
-    acceleration,
-    force,
-    legs,
-    body,
-    axes,
-    axis,
-    actuator,
-    balance,
-    canceller,
-    memory,
-    command,
-):
-    """`control_step` with its tables as plain numbers."""
-    sensors = displacement, acceleration, force
-    tables = legs.view(LEG), body.view(BODY), axes, axis.view(AXIS), actuator.view(ACTUATOR)
-    return control_step(sample, drive, *sensors, *tables, balance, canceller.view(CANCELLER), memory, command)
-
-
-@compiled
-def sense_flat(port, force, fed, body, axes, frame, motion, displacement, acceleration, measured):
-    """`sense` with its table as plain numbers."""
-    sense(port, force, fed, body.view(BODY), axes, frame, motion, displacement, acceleration, measured)
+def sense_packed(tables, buffer, displacement, acceleration, force):
+    """`sense` with tables and workspace packed."""
+    sense(unpack_tables(tables), unpack_workspace(buffer), Feedback(displacement, acceleration, force))

@@ -23,19 +23,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.errors import ControllerError, LhpostError
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant
+from .loop import Feedback
 
 __all__ = ["Feedback", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
 __all__ += ["start_plugged", "step_plugged", "wanted_from"]
 
 Array = NDArray[np.float64]
-
-
-class Feedback(NamedTuple):
-    """What the table tells its controller at one sample; a run fills the same arrays each time: copy what you keep."""
-
-    displacement: Array  # (n_actuators,) from the zero-position [m]
-    acceleration: Array  # (6,) of C in {s} and Euler angles [m/s2, rad/s2]
-    force: Array  # (n_actuators,) [N]
 
 
 class Wanted(NamedTuple):

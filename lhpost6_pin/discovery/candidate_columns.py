@@ -34,9 +34,9 @@ def columns_of(problem: Problem, base: OperatingPoint, candidates: Sequence[Cand
     legs = {c.name for c in base.plant.machine.components}
     alone = sorted({name for c in candidates for name in c.components})
     together = set(alone) <= legs and len(first.amplitudes) == 1
-    if together and first.family.shows_in == ("wrench",) and not LAWS[effect.law].alters:
+    if together and first.family.shows_in == ("wrench",) and not LAWS[effect.law].modifies:
         columns = _by_force(problem, base, [first.at((name,)) for name in alone])
-    elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].alters == "oil":
+    elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].modifies == "oil":
         columns = _by_oil(problem, base, first.at(tuple(alone)))
     else:
         columns = side_by_side([_by_difference(problem, base, c) for c in candidates])

@@ -13,12 +13,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.registry import NODES
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.calibration.whitened_residuals import spectrum_of
 from ..identification.inverse_dynamics import leg_wrenches
 from ..identification.prepare import MeasuredTest
 from ..laws.lines import filter_shares
+from ..laws.tabulated import NODES
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.pose import leg_displacements, plant_motion

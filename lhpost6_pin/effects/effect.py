@@ -1,6 +1,6 @@
 """Effects: what law acts on which ports with which numbers.
 
-An `Effect` with rows is one entry of the force ledger; one without alters rows of others (`registry`).
+An effect whose law makes forces is one entry of the force ledger; a modifier changes rows of others.
 """
 
 from dataclasses import dataclass
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.errors import ParameterError, UnknownNameError
+from ..laws.contract import parameter_units
 from .registry import LAWS
 
 __all__ = ["Effect"]
@@ -18,8 +19,8 @@ class Effect:
     """A named effect: where it acts, what law it obeys, its numbers, and where they come from.
 
     ports: one name per row (``H1``, ``S2``, ``platen.z``); a two-port law takes the stem of a pad (``V1``), or
-    two names with a space between, the second a dash where one port is enough; a three-port law two or three. One
-    that alters takes the names of what it alters.
+    two names with a space between, the second a dash where one port is enough; a three-port law two or three. A
+    modifier takes the names of what it modifies.
     params: one tuple per row, in the law's order. spools: for a hydraulic law, the number of its spool per row.
     """
 
@@ -39,8 +40,8 @@ class Effect:
         if len(self.params) != len(self.ports):
             raise ParameterError(f"{self.name}: {len(self.params)} sets of numbers for {len(self.ports)} ports")
         for port, numbers in zip(self.ports, self.params, strict=True):
-            if len(numbers) != len(law.params):
-                wanted = ", ".join(f"{name} [{unit}]" for name, unit in law.params)
+            if len(numbers) != len(units := parameter_units(law)):
+                wanted = ", ".join(f"{name} [{unit}]" for name, unit in units)
                 raise ParameterError(f"{self.name} on {port}: {len(numbers)} numbers given; {self.law} takes {wanted}")
             if not np.all(np.isfinite(numbers)):
                 raise ParameterError(f"{self.name} on {port}: {numbers!r} is not finite")

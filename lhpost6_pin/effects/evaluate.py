@@ -1,25 +1,17 @@
-"""The stage: every force effect of a machine at one instant, or over one step, in compiled code.
+"""Every force effect of a machine at one instant, or over one step, in compiled code.
 
 Four loops run around these functions: the per-step Pinocchio engine, the fused engine, inverse dynamics and the
-search for missing effects. Each function walks the effect table and calls the law's kernel.
+search for missing effects. Each function walks the effect table and calls the law's functions.
 
 Arrays: s (n_ports,) port coordinates, sd rates, z (n_states,) hidden states, spool (n_actuators,) valve spools -1..1,
-supply the supply's numbers, pressures first (`supply`), force (n_rows, 3) the ledger: force of each row on its first,
-second and third port [N or N m], port_force (n_ports,) their sum per port.
+supply the shared supply (`laws.supply.Supply`), force (n_rows, 3) the ledger: force of each row on its first, second
+and third port [N or N m], port_force (n_ports,) their sum per port.
 """
 
 from ..core.compiled import compiled, compiled_inline
-from ..laws.bouc_wen import advance as bouc_wen_advance
-from ..laws.bouc_wen import advance_1d as bouc_wen_advance_1d
-from ..laws.bouc_wen import friction_force
-from ..laws.bouc_wen import rate as bouc_wen_rate
-from ..laws.chamber import advance_double, advance_single, chamber_rate, flows_double, flows_single, piston_force
-from ..laws.orifice import opening
-from ..laws.strut import strut_force
-from ..laws.viscous import viscous_force
-from .actuator import advance_oil, oil_rates
-from .evaluate_added import added_rates, advance_added, apply_added
-from .registry import BOUC_WEN_1D, BOUC_WEN_2D, HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT, VISCOUS
+from ..laws.supply import varies
+from .actuator import advance_actuator, advance_modified, fill_rates
+from .dispatch import HYDRAULIC, INLINED, advance_called, advance_inlined, force_called, force_inlined, rates
 from .supply import close_supply, open_supply, supply_pressures, supply_rates
 
 __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
@@ -28,40 +20,15 @@ __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
 @compiled
 def state_rates(rows, s, sd, spool, supply, z, zd):
     """Fill zd (n_states,) with the rates of all hidden states (schemes `euler` and `rk4`)."""
-    more = altered = False
-    high, low = supply[0], supply[1]
-    if supply.size > 2:
-        high, low = supply_pressures(supply, z)
+    high, low = supply_pressures(supply, z)
+    if varies(supply):
         supply_rates(rows, spool, supply, z, zd)
     for i in range(rows.size):
         row = rows[i]
-        k = row.state
-        if k < 0:
-            continue
-        law = row.law
-        p = row.p
-        a = row.port
-        if law == BOUC_WEN_1D:
-            zd[k], _ = bouc_wen_rate(sd[a], 0.0, z[k], 0.0, p[1], p[2])
-        elif law == BOUC_WEN_2D:
-            zd[k], zd[k + 1] = bouc_wen_rate(sd[a], sd[row.port_2], z[k], z[k + 1], p[1], p[2])
-        elif row.altered != 0:
-            altered = True
-        elif law == HYDRAULIC_DOUBLE:
-            opened = opening(spool[row.input], p[6])
-            q_a, q_b, _, _ = flows_double(opened, z[k], z[k + 1], p[2], p[3], p[4], p[5], p[7], high, low, p[11])
-            zd[k] = chamber_rate(q_a, p[0], sd[a], p[8] + s[a], p[10])
-            zd[k + 1] = chamber_rate(q_b, p[1], -sd[a], p[9] - s[a], p[10])
-        elif law == HYDRAULIC_SINGLE:
-            opened = opening(spool[row.input], p[6])
-            q_a, _ = flows_single(opened, z[k], p[2], p[4], p[7], high, low, p[11])
-            zd[k] = chamber_rate(q_a, p[0], sd[a], p[8] + s[a], p[10])
-        else:
-            more = True
-    if altered:
-        oil_rates(rows, s, sd, spool, high, low, z, zd)
-    if more:
-        added_rates(rows, s, sd, z, zd)
+        if row.law == HYDRAULIC:
+            fill_rates(row, s, sd, spool, high, low, z, zd)
+        elif row.state >= 0:
+            rates(row, s, sd, z, zd)
 
 
 @compiled_inline
@@ -70,109 +37,44 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
 
     This is the one-step rule that inverse dynamics marches along a measured motion, too.
     """
-    more = altered = False
-    high, low = supply[0], supply[1]
     before = (0.0, 0.0, 0.0, 0.0)
-    if supply.size > 2:
+    if varies(supply):
         before = open_supply(rows, spool, supply, dt, z)
-        high, low = supply_pressures(supply, z)
+    high, low = supply_pressures(supply, z)
     for i in range(rows.size):
         row = rows[i]
-        k = row.state
-        if k < 0:
+        if row.state < 0:
             continue
-        law = row.law
-        p = row.p
-        a = row.port
-        if law == BOUC_WEN_1D:
-            z[k] = bouc_wen_advance_1d(ds[a], z[k], p[1], p[2])
-        elif law == BOUC_WEN_2D:
-            z[k], z[k + 1] = bouc_wen_advance(ds[a], ds[row.port_2], z[k], z[k + 1], p[1], p[2])
-        elif row.altered != 0:
-            altered = True
-        elif law == HYDRAULIC_DOUBLE:
-            opened = opening(spool[row.input], p[6])
-            z[k], z[k + 1] = advance_double(
-                opened,
-                z[k],
-                z[k + 1],
-                p[8] + s[a],
-                p[9] - s[a],
-                ds[a],
-                dt,
-                p[0],
-                p[1],
-                p[2],
-                p[3],
-                p[4],
-                p[5],
-                p[7],
-                p[10],
-                high,
-                low,
-                p[11],
-            )
-        elif law == HYDRAULIC_SINGLE:
-            opened = opening(spool[row.input], p[6])
-            z[k] = advance_single(
-                opened,
-                z[k],
-                p[8] + s[a],
-                ds[a],
-                dt,
-                p[0],
-                p[2],
-                p[4],
-                p[7],
-                p[10],
-                high,
-                low,
-                p[11],
-            )
+        if row.law >= INLINED:
+            advance_called(row, s, ds, dt, z)
+        elif row.law != HYDRAULIC:
+            advance_inlined(row, s, ds, dt, z)
+        elif row.modified == 0:
+            advance_actuator(row, False, s, ds, dt, spool, high, low, z)
         else:
-            more = True
-    if altered:
-        advance_oil(rows, s, ds, dt, spool, high, low, z)
-    if supply.size > 2:
+            advance_modified(row, s, ds, dt, spool, high, low, z)
+    if varies(supply):
         close_supply(rows, spool, supply, dt, before, z)
-    if more:
-        advance_added(rows, s, ds, dt, z)
 
 
 @compiled_inline
 def apply_forces(rows, s, sd, z, force, port_force):
     """Fill the ledger force (n_rows, 3) and its sum per port."""
-    more = False
     port_force[:] = 0.0
     for i in range(rows.size):
         row = rows[i]
-        law = row.law
-        p = row.p
-        a = row.port
-        k = row.state
-        second = 0.0
-        if law == BOUC_WEN_1D:
-            first = friction_force(p[0], z[k])
-        elif law == BOUC_WEN_2D:
-            first = friction_force(p[0], z[k])
-            second = friction_force(p[0], z[k + 1])
-            port_force[row.port_2] += second
-        elif law == HYDRAULIC_DOUBLE:
-            first = piston_force(z[k], z[k + 1], p[0], p[1])
-        elif law == HYDRAULIC_SINGLE:
-            first = piston_force(z[k], 0.0, p[0], 0.0)
-        elif law == NITROGEN_STRUT:
-            first = strut_force(s[a], p[0], p[1], p[2], p[3])
-        elif law == VISCOUS:
-            first = viscous_force(sd[a], p[0])
+        if row.law < INLINED:
+            first, second, third = force_inlined(row, s, sd, z)
         else:
-            more = True
-            continue
+            first, second, third = force_called(row, s, sd, z)
         force[i, 0] = first
         force[i, 1] = second
-        port_force[a] += first
-    if more:
-        apply_added(rows, s, sd, z, force, port_force)
+        force[i, 2] = third
+        port_force[row.port] += first
+        if row.port_2 >= 0:
+            port_force[row.port_2] += second
+        if row.port_3 >= 0:
+            port_force[row.port_3] += third
 
 
 @compiled_inline

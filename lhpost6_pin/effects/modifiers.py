@@ -1,114 +1,77 @@
-"""Effects that make no force of their own: they change numbers of actuators, of the supply, of valves' command paths.
+"""Modifiers: effects that make no force of their own but change actuators, the supply, valves, bearings or the platen.
 
-Amplitudes, the first of an effect's numbers, of several effects on one thing add up; its other numbers are those of the
-last one. An amplitude of zero changes nothing.
+Amplitudes, the first of an effect's parameters, of several effects on one thing add up; its other parameters are those
+of the last one. An amplitude of zero changes nothing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import ParameterError, UnknownNameError
 from ..laws.chamber import side_shares
+from ..laws.hydraulic import Hydraulic
+from ..laws.platen_body import MoreInertia
+from ..laws.supply import Supply
 from .effect import Effect
-from .registry import (
-    AIR,
-    AREA_A,
-    AREA_B,
-    BACK,
-    BACK_TIME,
-    CHAMBER_A,
-    CHAMBER_B,
-    CURVE_ERROR,
-    DEADBAND,
-    DRAWN,
-    DROOP,
-    DROOP_TIME,
-    EXTERNAL,
-    FEED_INERTANCE,
-    LAWS,
-    LEAKAGE,
-    LINE_TIME,
-    NULL_BIAS,
-    NULL_LEAKAGE,
-    PLAY,
-    RETURNED,
-    TURBULENT,
-    VOIDS,
-    WEIGHT,
-)
+from .registry import LAWS
 
-__all__ = ["alter_rows", "command_path", "supply_numbers"]
+__all__ = ["added_inertias", "command_path", "modify_rows", "supply_of", "thrust_shares"]
 
-_PLACE = {
-    "turbulent_leakage": TURBULENT,
-    "external_leakage": EXTERNAL,
-    "null_leakage": NULL_LEAKAGE,
-    "null_bias": NULL_BIAS,
-    "deadband": DEADBAND,
-    "entrained_air": AIR,
-    "cavitation": VOIDS,
-    "flow_curve": CURVE_ERROR,
-    "line": LINE_TIME,
-    "play": PLAY,
-    "supply_line": FEED_INERTANCE,
-}
-"""Where an actuator's row keeps the numbers of a law, one behind the other."""
-
-_SUPPLY_PLACE = {"supply_droop": (DROOP, DROOP_TIME, DRAWN), "back_pressure": (BACK, BACK_TIME, RETURNED)}
+_PLACE = {name: i for i, name in enumerate(Hydraulic._fields)}
 
 
-def alter_rows(rows: NDArray[np.void], effects: Sequence[Effect], at: Mapping[str, int], states: int) -> None:
-    """Change rows in place as the effects among `effects` say that alter oil.
-
-    at are the rows of actuators and struts by name; `states` hidden states are taken, alterations have the next ones.
-    Raises UnknownNameError for a component that does not exist.
-    """
+def _acting(effects: Sequence[Effect], kind: str) -> Iterator[tuple[Effect, str, tuple[float, ...]]]:
+    """Effect, component and numbers of all modifiers of a kind."""
     for effect in effects:
-        law = LAWS[effect.law]
-        if not law.alters:
+        if LAWS[effect.law].modifies == kind:
+            for component, numbers in zip(effect.ports, effect.params, strict=True):
+                yield effect, component, numbers
+
+
+def modify_rows(rows: NDArray[np.void], effects: Sequence[Effect], at: Mapping[str, int], states: int) -> None:
+    """Change the rows of actuators in place as modifiers of their oil say.
+
+    at are the rows of actuators by name; `states` hidden states are taken, modifiers have the next ones. Raises
+    UnknownNameError for an actuator that does not exist.
+    """
+    modifiers = [e for e in effects if LAWS[e.law].modifies]
+    firsts = {}
+    for effect in modifiers:
+        for port in effect.ports:
+            firsts[effect.name, port], states = states, states + len(LAWS[effect.law].states)
+    for effect, component, numbers in _acting(modifiers, "oil"):
+        if component not in at:
+            raise UnknownNameError("component", component, list(at))
+        row, law = rows[at[component]], LAWS[effect.law]
+        if numbers[0] == 0.0:
             continue
-        for port, numbers in zip(effect.ports, effect.params, strict=True):
-            first, states = states, states + len(law.states)
-            if law.alters != "oil":
-                continue
-            if port not in at:
-                raise UnknownNameError("component", port, list(at))
-            row, amplitude = rows[at[port]], numbers[0]
-            if amplitude == 0.0:
-                continue
-            p = row["p"]
-            if effect.law == "extra_leakage":
-                p[LEAKAGE] += amplitude
-            elif effect.law == "dead_volume":
-                share_a, share_b = side_shares(numbers[1])
-                p[CHAMBER_A] += amplitude * share_a / p[AREA_A]
-                if p[AREA_B] > 0.0:
-                    p[CHAMBER_B] += amplitude * share_b / p[AREA_B]
-            else:
-                place = _PLACE[effect.law]
-                p[place] += amplitude
-                p[place + 1 : place + len(numbers)] = numbers[1:]
-                row["altered"] = 1
-                if law.states:
-                    row["feed" if effect.law == "supply_line" else "more"] = first
+        if effect.law == "dead_volume":
+            for side, share in zip("ab", side_shares(numbers[1]), strict=True):
+                if (area := row["numbers"][_PLACE[f"area_{side}"]]) > 0.0:
+                    row["numbers"][_PLACE[f"chamber_{side}"]] += numbers[0] * share / area
+            continue
+        amplitude, *others = (_PLACE[field] for field in law.fields)
+        row["numbers"][amplitude] += numbers[0]
+        row["numbers"][others] = numbers[1:]
+        row["modified"] |= law.fields[0] in Hydraulic._field_defaults
+        if law.states:
+            before = law.fields[0].startswith("supply")
+            row["supply_line_state" if before else "line_state"] = firsts[effect.name, component]
 
 
-def supply_numbers(effects: Sequence[Effect], states: Sequence[str]) -> tuple[float, ...]:
-    """Numbers of the supply behind its two pressures, in the places of `law_table`; none without effects on it."""
-    found = np.zeros(9)
-    found[[DRAWN, RETURNED]], found[WEIGHT] = -1.0, 1.0
-    acting = [e for e in effects if LAWS[e.law].alters == "supply"]
-    for effect in acting:
-        size, time, state = _SUPPLY_PLACE[effect.law]
-        found[size] += effect.params[0][0]
-        found[time] = effect.params[0][1]
-        if effect.law == "supply_droop":
-            found[WEIGHT] = effect.params[0][2]
-        if found[state] < 0.0:
-            found[state] = states.index(f"{effect.name}.{effect.ports[0]}.{LAWS[effect.law].states[0]}")
-    return tuple(float(x) for x in found[2:]) if acting else ()
+def supply_of(effects: Sequence[Effect], states: Sequence[str], pressure: float, return_pressure: float) -> Supply:
+    """Supply with what modifiers make of its stated pressures [Pa]; states are the names of all hidden states."""
+    found: dict[str, Any] = {}
+    for effect, component, numbers in _acting(effects, "supply"):
+        law = LAWS[effect.law]
+        amplitude, *others, state = law.fields
+        found[amplitude] = found.get(amplitude, 0.0) + numbers[0]
+        found |= zip(others, numbers[1:], strict=True)
+        found.setdefault(state, float(states.index(f"{effect.name}.{component}.{law.states[0]}")))
+    return Supply(pressure, return_pressure, **found)
 
 
 def command_path(effects: Sequence[Effect], delays: Mapping[str, float]) -> tuple[list[float], list[float]]:
@@ -116,15 +79,28 @@ def command_path(effects: Sequence[Effect], delays: Mapping[str, float]) -> tupl
 
     Raises UnknownNameError for an actuator that does not exist, ParameterError for a delay below zero.
     """
-    late, lag = dict(delays), dict.fromkeys(delays, 0.0)
-    for effect in effects:
-        if LAWS[effect.law].alters != "valve":
-            continue
-        path = late if effect.law == "valve_delay" else lag
-        for port, numbers in zip(effect.ports, effect.params, strict=True):
-            if port not in path:
-                raise UnknownNameError("component", port, list(path))
-            path[port] += numbers[0]
-            if path[port] < 0.0:
-                raise ParameterError(f"{effect.name}: the valve of {port} would act {-path[port]:g} s ahead of it")
-    return list(late.values()), list(lag.values())
+    path = {"delay": dict(delays), "lag": dict.fromkeys(delays, 0.0)}
+    for effect, component, (value,) in _acting(effects, "valve"):
+        (kind,) = LAWS[effect.law].fields
+        if component not in path[kind]:
+            raise UnknownNameError("component", component, list(delays))
+        path[kind][component] += value
+        if path[kind][component] < 0.0:
+            early = -path[kind][component]
+            raise ParameterError(f"{effect.name}: the valve of {component} would act {early:g} s ahead of it")
+    return list(path["delay"].values()), list(path["lag"].values())
+
+
+def thrust_shares(effects: Sequence[Effect], components: Sequence[str]) -> list[float]:
+    """By which share the thrust of each component turns to the other direction; raises UnknownNameError."""
+    shares = dict.fromkeys(components, 0.0)
+    for _, component, (share,) in _acting(effects, "leg"):
+        if component not in shares:
+            raise UnknownNameError("bearing", component, list(components))
+        shares[component] += share
+    return list(shares.values())
+
+
+def added_inertias(effects: Sequence[Effect]) -> list[tuple[str, MoreInertia]]:
+    """Inertias that effects add to the platen, with the names of the effects."""
+    return [(effect.name, MoreInertia(*numbers)) for effect, _, numbers in _acting(effects, "inertia")]

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import UnknownNameError
+from ..laws.contract import Law
+from .dispatch import CODES
 from .effect import Effect
-from .modifiers import alter_rows
-from .registry import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT, PORTS, ROW, Law
+from .modifiers import modify_rows
+from .registry import LAWS, PORTS, ROW, parameters_of
 
 __all__ = ["effect_table", "state_names"]
 
@@ -19,11 +21,11 @@ __all__ = ["effect_table", "state_names"]
 def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.void]:
     """Rows of all effects for compiled code; raises UnknownNameError for a port that does not exist."""
     number = {name: i for i, name in enumerate(ports)}
-    acting = [e for e in effects if not LAWS[e.law].alters]
+    acting = [e for e in effects if not LAWS[e.law].modifies]
     rows = np.zeros(sum(len(e.ports) for e in acting), ROW)
-    for column in (*PORTS, "link", "more", "feed"):
+    for column in (*PORTS, "actuator_state", "line_state", "supply_line_state"):
         rows[column] = -1
-    base: dict[int, int] = {}  # row of the actuator or strut on a port
+    actuator: dict[str, int] = {}  # row of the actuator on a port
     i = state = 0
     for ledger, effect in enumerate(acting):
         law = LAWS[effect.law]
@@ -32,38 +34,47 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
             for name in names:
                 if name not in number:
                     raise UnknownNameError("port", name, list(ports))
-            leg = number.get(names[0].split(".")[0], -1)
             row = rows[i]
-            row["law"], row["effect"] = law.code, ledger
+            row["law"], row["effect"] = CODES[effect.law], ledger
             for column, name in zip(PORTS, names, strict=False):
                 row[column] = number[name]
-            row["state"] = state if law.states else -1
-            row["input"] = effect.spools[k] if effect.spools else -1
-            row["p"][: len(law.params)] = effect.params[k]
-            if law.code in (HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, NITROGEN_STRUT):
-                base[number[names[0]]] = i
-            if leg in base and rows[base[leg]]["input"] >= 0:
-                row["link"] = rows[base[leg]]["state"]
-            i, state = i + 1, state + len(law.states)
-    alter_rows(rows, effects, {port: base[number[port]] for port in ports if number[port] in base}, state)
+            row["spool"] = effect.spools[k] if effect.spools else -1
+            row["numbers"][: len(effect.params[k])] = effect.params[k]
+            states = _states(law, row)
+            row["state"] = state if states else -1
+            if law.takes_spool:
+                actuator[names[0]] = i
+            if (leg := names[0].split(".")[0]) in actuator:
+                row["actuator_state"] = rows[actuator[leg]]["state"]
+            i, state = i + 1, state + len(states)
+    modify_rows(rows, effects, actuator, state)
     return rows
 
 
 def _port_names(port: str, law: Law) -> tuple[str, ...]:
-    if law.ports == 1:
+    if law.ports[1] == 1:
         return (port,)
     return tuple(port.removesuffix(" -").split()) if " " in port else (f"{port}.x", f"{port}.y")
 
 
+def _states(law: Law, row: np.void) -> tuple[str, ...]:
+    """Hidden states of a row, whose law and numbers are filled."""
+    if not law.state_needs:
+        return law.states
+    p, needs = parameters_of(row), dict(law.state_needs)
+    return tuple(name for name in law.states if name not in needs or getattr(p, needs[name]) > 0.0)
+
+
 def state_names(effects: Sequence[Effect]) -> tuple[str, ...]:
-    """Names of all hidden states in table order, such as ``actuators_4_way.H1.pressure_a``; alterations' come last.
+    """Names of all hidden states in table order, such as ``actuators_4_way.H1.pressure_a``; modifiers' come last.
 
     Of two ports named, the first counts.
     """
-    in_order = sorted(effects, key=lambda effect: bool(LAWS[effect.law].alters))
-    return tuple(
-        f"{effect.name}.{port.split()[0]}.{state}"
-        for effect in in_order
-        for port in effect.ports
-        for state in LAWS[effect.law].states
-    )
+    row, names = np.zeros(1, ROW)[0], []
+    for effect in sorted(effects, key=lambda effect: bool(LAWS[effect.law].modifies)):
+        law = LAWS[effect.law]
+        for port, numbers in zip(effect.ports, effect.params, strict=True):
+            if law.state_needs:
+                row["law"], row["numbers"][: len(numbers)] = CODES[effect.law], numbers
+            names += [f"{effect.name}.{port.split()[0]}.{state}" for state in _states(law, row)]
+    return tuple(names)

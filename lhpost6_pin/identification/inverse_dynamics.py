@@ -7,7 +7,7 @@ From the motion of C and the Euler angles follow the platen's twist and its rate
 inertia (Eq. 4-26), weight, struts (Eq. 4-8), friction and viscous forces (Eqs. 4-9 to 4-19). What then balances the
 inertia is the wrench that the actuators must have given; what they did give is measured.
 
-Hidden friction states are marched along the motion by the simulation's own step rule (`stage.advance_states`), so that
+Hidden friction states are marched along the motion by the simulation's own step rule, `evaluate.advance_states`: so
 a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
 """
 
@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..core.compiled import compiled
 from ..core.errors import SimulationError
 from ..effects.evaluate import advance_states
-from ..effects.registry import LAWS, LOAD_FRICTION
-from ..mechanics.equilibrium import hydraulic_rows
+from ..effects.registry import LAWS, actuator_rows, law_of
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import PlantMotion, PlatenMotion, plant_motion
@@ -31,9 +30,6 @@ from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
 __all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity", "with_loads"]
 
 Array = NDArray[np.float64]
-
-_GAS = ("nitrogen_strut", "gas_leak", "gas_heat")
-"""Laws of the struts' gas."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +61,7 @@ class Decomposition:
     @property
     def struts(self) -> Array:
         """Wrench of the struts (n, 6), of the model (Eq. 4-8), with what effects do to their gas."""
-        return self._of(*(e.name for e in self.states.plant.machine.effects if e.law in _GAS))
+        return self._of(*(e.name for e in self.states.plant.machine.effects if LAWS[e.law].acts_on_gas))
 
     @property
     def struts_measured(self) -> Array | None:
@@ -78,7 +74,7 @@ class Decomposition:
     def dissipative(self) -> Array:
         """Friction and viscous wrench of the model (n, 6), with all that effects add beside oil and gas."""
         effects = self.states.plant.machine.effects
-        return self._of(*(e.name for e in effects if e.law not in _GAS and not LAWS[e.law].takes_spool))
+        return self._of(*(e.name for e in effects if not (LAWS[e.law].acts_on_gas or LAWS[e.law].takes_spool)))
 
     @property
     def dissipative_measured(self) -> Array:
@@ -141,11 +137,10 @@ def with_loads(plant: Plant, z: Array, actuator_force: Array) -> Array:
 
     Each force stands as pressure in chamber A, with none in B. Where nothing feels them z comes back as it is.
     """
-    if not np.any(plant.rows["law"] == LOAD_FRICTION):
+    if not any(law_of(row).feels_load for row in plant.rows):
         return z
-    fed = plant.rows[hydraulic_rows(plant)]
     out = z.copy()
-    out[:, fed["state"]] = actuator_force / fed["p"][:, 0]
+    out[:, plant.rows["state"][actuator_rows(plant.rows)]] = actuator_force / plant.actuators.area_a
     return out
 
 
@@ -182,7 +177,7 @@ def march_states(
     """
     moved = plant.rows if rows is None else rows
     if spool is None:
-        moved = moved[moved["input"] < 0]
+        moved = moved[moved["spool"] < 0]
         spool = np.zeros((1, plant.spools))
     z = np.zeros((len(ports.s), len(plant.states)))
     if start is not None:
@@ -204,16 +199,14 @@ def leg_wrenches(plant: Plant, q: Array, force: Array) -> Array:
     """Wrenches (n, k, 6) on the platen at C in {c} of forces (n, k) [N] along the first k legs at poses q (n, nq)."""
     out = np.zeros((*force.shape, 6))
     ws = make_workspace(plant, plant.zero_state())
-    arrays = plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB
-    _leg_wrenches(np.ascontiguousarray(q), np.ascontiguousarray(force), *arrays, out)
+    _leg_wrenches(np.ascontiguousarray(q), np.ascontiguousarray(force), plant.tables, ws, out)
     return out
 
 
 @compiled
-def _leg_wrenches(q, force, axes, legs, body, frame, port, JB, out):
-    rho = body[0].rho_c
-    B = JB[1]
+def _leg_wrenches(q, force, tables, ws, out):
+    rho = tables.body[0].rho_c
     for k in range(q.shape[0]):
-        pose_stage(q[k], axes, legs, body, frame, port, JB)
+        pose_stage(q[k], tables, ws)
         for i in range(force.shape[1]):
-            add_at_c(force[k, i], B, i, rho, frame, out[k, i])
+            add_at_c(force[k, i], ws.JB[1], i, rho, ws.frame, out[k, i])

@@ -4,89 +4,95 @@ Pressures and spools are measured; what else the oil remembers, flow through lin
 them by the simulation's kernels.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.compiled import compiled
-from ..effects.actuator import advance_line, bulk_modulus, net_flows, rod_advance, rod_ahead, start_line
-from ..effects.registry import HYDRAULIC_DOUBLE
+from ..effects.actuator import advance_line, start_line, supplied
+from ..effects.dispatch import view_hydraulic
 from ..effects.supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
-from ..laws.chamber import chamber_rate, flows_double, flows_single
-from ..laws.orifice import opening
+from ..laws.hydraulic import leak_flows, oil_modulus, rod_travel, rod_velocity
+from ..laws.supply import varies
 
-__all__ = ["oil_misses"]
+__all__ = ["MeasuredOil", "oil_misses"]
+
+Array = NDArray[np.float64]
+
+
+class MeasuredOil(NamedTuple):
+    """What is measured of the oil along a test of n samples."""
+
+    chamber: NDArray[np.int64]  # (n_actuators, 2) columns of pressure, -1 without chamber B
+    pressure: Array  # (n, n_chambers) [Pa]
+    pressure_rate: Array  # (n, n_chambers) [Pa/s]
+    spool: Array  # (n, n_actuators) [1]
+    dt: float  # [s]
 
 
 @compiled
-def oil_misses(rows, chamber, pressure, pressure_rate, spool, supply, s, rate, states, dt, drooped, flow):
+def oil_misses(rows, supply, oil, ports, z, drooped, flow):
     """Fill drooped (n,), the supply's pressure [Pa], and flow (n, n_chambers) [m3/s], which may have no columns.
 
-    rows are the actuators', chamber (n_actuators, 2) their columns of pressure (n, n_chambers); s and rate (n, n_ports)
-    the path of the ports, states the number of the plant's hidden states.
+    rows are the actuators', oil is `MeasuredOil`, ports the path of the ports, z (n_states,) scratch.
     """
-    z, last = np.zeros(states), np.zeros(4)
-    for k in range(s.shape[0]):
-        high, low = _follow_supply(k, rows, chamber, pressure, spool, supply, dt, z, last)
+    last = np.zeros(4)
+    for k in range(oil.pressure.shape[0]):
+        high, low = _follow_supply(k, rows, oil, supply, z, last)
         drooped[k] = high
         if flow.shape[1] > 0:
-            _flow_misses(k, rows, chamber, pressure, pressure_rate, spool, high, low, dt, s[k], rate[k], z, flow)
+            for i in range(rows.size):
+                at, speed = ports.s[k, rows[i].port], ports.rate[k, rows[i].port]
+                _flow_misses(k, rows[i], oil, (high, low), (at, speed), z, flow[k])
 
 
 @compiled
-def _follow_supply(k, fed, chamber, pressure, spool, supply, dt, z, last):
+def _follow_supply(k, rows, oil, supply, z, last):
     """Put the oil of sample k into z (n_states,), pressures as measured; returns supply and return pressure [Pa].
 
-    fed are the actuators' rows, chamber (n_actuators, 2) their columns of pressure (n, n_chambers); last (4,) keeps
-    the supply's flows for the next sample.
+    last (4,) keeps the supply's flows for the next sample.
     """
-    for i in range(fed.size):
-        z[fed[i].state] = pressure[k, chamber[i, 0]]
-        if chamber[i, 1] >= 0:
-            z[fed[i].state + 1] = pressure[k, chamber[i, 1]]
-    if supply.size > 2:
+    for i in range(rows.size):
+        z[rows[i].state] = oil.pressure[k, oil.chamber[i, 0]]
+        if oil.chamber[i, 1] >= 0:
+            z[rows[i].state + 1] = oil.pressure[k, oil.chamber[i, 1]]
+    if varies(supply):
         if k == 0:
-            steady_supply(fed, spool[k], supply, z)
+            steady_supply(rows, oil.spool[k], supply, z)
         else:
-            close_supply(fed, spool[k], supply, dt, (last[0], last[1], last[2], last[3]), z)
+            close_supply(rows, oil.spool[k], supply, oil.dt, (last[0], last[1], last[2], last[3]), z)
         last[0], last[1] = shared_states(supply, z)
-        last[2], last[3], _, _ = flows_exchanged(fed, spool[k], supply, z)
+        last[2], last[3], _, _ = flows_exchanged(rows, oil.spool[k], supply, z)
     return supply_pressures(supply, z)
 
 
 @compiled
-def _flow_misses(k, fed, chamber, pressure, pressure_rate, spool, high, low, dt, s, sd, z, flow):
-    """Fill row k of flow (n, n_chambers) from the oil in z: V / beta dP/dt + A dL/dt - Q, per chamber [m3/s]."""
-    for i in range(fed.size):
-        row = fed[i]
-        p = row.p
-        at, speed = s[row.port], sd[row.port]
-        at_a, at_b = chamber[i, 0], chamber[i, 1]
-        x = spool[k, row.input]
-        pressure_a = pressure[k, at_a]
-        pressure_b = pressure[k, at_b] if at_b >= 0 else 0.0
-        if row.altered != 0:
-            if k == 0:
-                start_line(fed, i, x, pressure_a, pressure_b, high, low, z)
-            else:
-                advance_line(fed, i, x, pressure_a, pressure_b, high, low, 0.5 * dt, z)
-            q_a, q_b, _, _, _ = net_flows(fed, i, x, pressure_a, pressure_b, high, low, z)
-            rate_b = pressure_rate[k, at_b] if at_b >= 0 else 0.0
-            at += rod_ahead(p, pressure_a, pressure_b)
-            speed += rod_advance(p, pressure_a, pressure_b, pressure_rate[k, at_a], rate_b)
-            bulk, left = bulk_modulus(p, pressure_a)
-            flow[k, at_a] = pressure_rate[k, at_a] * p[0] * (p[8] + at) / bulk - left * (q_a - p[0] * speed)
-            if at_b >= 0:
-                bulk, left = bulk_modulus(p, pressure_b)
-                flow[k, at_b] = pressure_rate[k, at_b] * p[1] * (p[9] - at) / bulk - left * (q_b + p[1] * speed)
-            advance_line(fed, i, x, pressure_a, pressure_b, high, low, 0.5 * dt, z)
-            continue
-        opened = opening(x, p[6])
-        if row.law == HYDRAULIC_DOUBLE:
-            q_a, q_b, _, _ = flows_double(
-                opened, pressure_a, pressure_b, p[2], p[3], p[4], p[5], p[7], high, low, p[11]
-            )
-            rate = chamber_rate(q_b, p[1], -speed, p[9] - at, p[10])
-            flow[k, at_b] = (pressure_rate[k, at_b] - rate) * p[1] * (p[9] - at) / p[10]
-        else:
-            q_a, _ = flows_single(opened, pressure_a, p[2], p[4], p[7], high, low, p[11])
-        rate = chamber_rate(q_a, p[0], speed, p[8] + at, p[10])
-        flow[k, at_a] = (pressure_rate[k, at_a] - rate) * p[0] * (p[8] + at) / p[10]
+def _flow_misses(k, row, oil, supply, rod, z, flow):
+    """Fill a row's chambers in flow (n_chambers,): V / beta dP/dt + A dL/dt - Q [m3/s].
+
+    supply holds its two pressures [Pa], rod its actuator's elongation [m] and velocity [m/s].
+    """
+    p, x, i = view_hydraulic(row.numbers), oil.spool[k, row.spool], row.spool
+    (high, low), (at, speed) = supply, rod
+    at_a, at_b = oil.chamber[i, 0], oil.chamber[i, 1]
+    pressure_a, rate_a = oil.pressure[k, at_a], oil.pressure_rate[k, at_a]
+    pressure_b = rate_b = 0.0
+    if at_b >= 0:
+        pressure_b, rate_b = oil.pressure[k, at_b], oil.pressure_rate[k, at_b]
+    if k == 0:
+        start_line(row, x, pressure_a, pressure_b, high, low, z)
+    else:
+        advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)
+    flow_a, flow_b, _, _ = supplied(row, p, True, x, pressure_a, pressure_b, high, low, z)
+    across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
+    at += rod_travel(p, True, pressure_a, pressure_b)
+    speed += rod_velocity(p, True, pressure_a, pressure_b, rate_a, rate_b)
+    bulk, left = oil_modulus(p, True, pressure_a)
+    net = flow_a - across - out_a
+    flow[at_a] = rate_a * p.area_a * (p.chamber_a + at) / bulk - left * (net - p.area_a * speed)
+    if at_b >= 0:
+        bulk, left = oil_modulus(p, True, pressure_b)
+        net = flow_b + across - out_b
+        flow[at_b] = rate_b * p.area_b * (p.chamber_b - at) / bulk - left * (net + p.area_b * speed)
+    advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)

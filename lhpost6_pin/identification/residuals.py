@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.alignment import due_spools, gas_pressure
-from ..effects.registry import GAS_HEAT, LAWS, OSCILLATOR, PORTS
-from ..mechanics.equilibrium import hydraulic_rows
+from ..effects.registry import PORTS, actuator_rows, law_of, shapes_of, states_of
 from ..mechanics.gas_pressure import gas_ratio
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import plant_motion
 from .inverse_dynamics import march_states, with_loads
-from .oil_residuals import oil_misses
+from .oil_residuals import MeasuredOil, oil_misses
 from .prepare import MeasuredTest, actuator_forces, oil_forces
 from .wrench_residuals import required_wrench, weigh_alike, wrench_residual
 
@@ -34,7 +33,6 @@ __all__ = [
     "Residuals",
     "evaluate_residuals",
     "follow",
-    "states_of",
 ]
 
 Array = NDArray[np.float64]
@@ -96,7 +94,7 @@ def follow(
     # oscillators and heat average noise, and feel what a still path lacks
     parts: tuple[list[np.void], list[np.void]] = [], []
     for row in fresh.values():
-        parts[test.path is not None and int(row["law"]) in (OSCILLATOR, GAS_HEAT)].append(row)
+        parts[test.path is not None and law_of(row).follows_motion].append(row)
     for some, way in zip(parts, (along, ports), strict=True):
         if some:
             marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
@@ -112,28 +110,20 @@ def follow(
     return Path(ports, along, required, z)
 
 
-_WIDTH = {law.code: len(law.states) for law in LAWS.values() if law.code >= 0}
-
-
 def _moving(plant: Plant) -> Array:
     """Rows with hidden states that the motion alone drives."""
-    return np.asarray(plant.rows[(plant.rows["state"] >= 0) & (plant.rows["input"] < 0)])
+    return np.asarray(plant.rows[(plant.rows["state"] >= 0) & (plant.rows["spool"] < 0)])
 
 
 def _marched(row: np.void) -> tuple[object, ...]:
-    """What hidden states of a row depend on: the first number is the amplitude of its force, which they do not feel."""
-    return int(row["law"]), *(int(row[port]) for port in PORTS), row["p"][1:].tobytes()
+    """What hidden states of a row depend on."""
+    return int(row["law"]), *(int(row[port]) for port in PORTS), shapes_of(row).tobytes()
 
 
 def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
     """Whether two tables leave hidden states that are alike."""
-    same = some.shape == others.shape and (some["p"][:, 1:] == others["p"][:, 1:])[some["input"] < 0].all()
-    return bool(same) and all((some[k] == others[k]).all() for k in ("law", *PORTS, "state", "input"))
-
-
-def states_of(row: np.void) -> slice:
-    """Hidden states of a row of the effect table, which has some."""
-    return slice(int(row["state"]), int(row["state"]) + _WIDTH[int(row["law"])])
+    same = some.shape == others.shape and all((some[k] == others[k]).all() for k in ("law", *PORTS, "state", "spool"))
+    return same and bool((shapes_of(some) == shapes_of(others))[some["spool"] < 0].all())
 
 
 def _geometry(plant: Plant) -> bytes:
@@ -176,14 +166,13 @@ def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...])
     supply = test.channels.get("supply_pressure") if "supply" in only else None
     none = np.zeros((n, 0))
     spool = test.channels.get("spool_position")
-    if test.pressure is None or spool is None or ("flow" not in only and supply is None):
+    if test.pressure is None or test.pressure_rate is None or spool is None or ("flow" not in only and supply is None):
         return none, none
     flow = np.zeros((n, plant.spools + int(double.sum()))) if "flow" in only else none
     chamber = np.full((plant.spools, 2), -1)
     chamber[:, 0] = np.arange(plant.spools)
     chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
-    drooped, rows = np.zeros(n), plant.rows[hydraulic_rows(plant)]
-    measured = test.pressure, test.pressure_rate, spool
-    states = len(plant.states)
-    oil_misses(rows, chamber, *measured, plant.supply, path.ports.s, path.ports.rate, states, test.dt, drooped, flow)
+    drooped, rows = np.zeros(n), plant.rows[actuator_rows(plant.rows)]
+    oil = MeasuredOil(chamber, test.pressure, test.pressure_rate, spool, test.dt)
+    oil_misses(rows, plant.supply, oil, path.ports, np.zeros(len(plant.states)), drooped, flow)
     return flow, none if supply is None else supply - drooped[:, None]

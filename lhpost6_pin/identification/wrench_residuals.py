@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from ..core.compiled import compiled
 from ..effects.evaluate import apply_forces, wrench_on_platen
 from ..effects.registry import PORTS
+from ..mechanics.forward_dynamics import platen_acceleration
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath
 from ..mechanics.pose import PlantMotion
 from ..mechanics.rigid_body import platen_inertia
 from ..mechanics.schemes import set_twist
-from ..simulation.engine_fused import inertia_table, platen_acceleration
+from ..simulation.engine_fused import refuse_joints
 from ..simulation.ledger import add_at_c, add_row_at_c
 
 __all__ = ["wrench_residual", "required_wrench", "row_wrenches", "weigh_alike"]
@@ -37,12 +38,14 @@ def required_wrench(plant: Plant, motion: PlantMotion, turn: Array) -> Array:
     required = np.zeros((len(motion.q), 6))
     _, mass = platen_inertia(plant.model, plant.machine)
     v, a = (np.ascontiguousarray(x) for x in (motion.v, motion.a))
-    _required(v, a, turn, plant.axes, plant.body, inertia_table(plant), mass, required)
+    refuse_joints(plant)
+    _required(v, a, turn, plant.tables, mass, required)
     return required
 
 
 @compiled
-def _required(v, a, turn, axes, body, inertia, mass, required):
+def _required(v, a, turn, tables, mass, required):
+    axes, body, inertia = tables.axes, tables.body, tables.inertia
     frame, work = np.zeros((8, 3)), np.zeros((2, 6))
     column, force = np.zeros((1, 6)), np.zeros(1)
     tau, miss = np.zeros(axes.size), np.zeros(axes.size)
@@ -65,19 +68,19 @@ def wrench_residual(plant: Plant, ports: PortPath, required: Array, z: Array, me
 
     required is that of `required_wrench`, z (n, n_states) hidden states, measured (n, n_actuators) forces [N].
     """
-    rows = plant.rows[plant.rows["input"] < 0]
+    rows = plant.rows[plant.rows["spool"] < 0]
     missed = np.zeros((len(z), 6))
-    rest = ports.s, ports.rate, ports.column, ports.turn, required, z, np.ascontiguousarray(measured)
-    _residual(rows, plant.axes, plant.body, *rest, missed)
+    _residual(rows, plant.tables, ports, required, z, np.ascontiguousarray(measured), missed)
     return missed
 
 
 @compiled
-def _residual(rows, axes, body, s, rate, column, turn, required, z, measured, missed):
+def _residual(rows, tables, ports, required, z, measured, missed):
+    s, axes, column = ports.s, tables.axes, ports.column
     force, port_force = np.zeros((rows.size, len(PORTS))), np.zeros(s.shape[1])
     frame, left = np.zeros((8, 3)), np.zeros((1, 6))
     for k in range(s.shape[0]):
-        apply_forces(rows, s[k], rate[k], z[k], force, port_force)
+        apply_forces(rows, s[k], ports.rate[k], z[k], force, port_force)
         for i in range(measured.shape[1]):
             port_force[i] += measured[k, i]
         for j in range(axes.size):
@@ -85,23 +88,24 @@ def _residual(rows, axes, body, s, rate, column, turn, required, z, measured, mi
             for i in range(port_force.size):
                 given += column[k, i, axes[j]] * port_force[i]
             left[0, axes[j]] = required[k, axes[j]] - given
-        frame[:3] = turn[k]
-        add_at_c(1.0, left, 0, body[0].rho_c, frame, missed[k])
+        frame[:3] = ports.turn[k]
+        add_at_c(1.0, left, 0, tables.body[0].rho_c, frame, missed[k])
 
 
 def row_wrenches(plant: Plant, ports: PortPath, z: Array, rows: NDArray[np.void]) -> Array:
     """Wrenches (n, k, 6) at C in {c} [N, N m] of k rows of the plant's effects, that take no spool."""
     out = np.zeros((len(z), len(rows), 6))
-    _row_wrenches(np.ascontiguousarray(rows), plant.body, ports.s, ports.rate, ports.column, ports.turn, z, out)
+    _row_wrenches(np.ascontiguousarray(rows), plant.body, ports, z, out)
     return out
 
 
 @compiled
-def _row_wrenches(rows, body, s, rate, column, turn, z, out):
+def _row_wrenches(rows, body, ports, z, out):
+    s = ports.s
     force, port_force = np.zeros((rows.size, len(PORTS))), np.zeros(s.shape[1])
     frame, rho = np.zeros((8, 3)), body[0].rho_c
     for k in range(s.shape[0]):
-        apply_forces(rows, s[k], rate[k], z[k], force, port_force)
-        frame[:3] = turn[k]
+        apply_forces(rows, s[k], ports.rate[k], z[k], force, port_force)
+        frame[:3] = ports.turn[k]
         for i in range(rows.size):
-            add_row_at_c(force[i], column[k], rows[i], rho, frame, out[k, i])
+            add_row_at_c(force[i], ports.column[k], rows[i], rho, frame, out[k, i])

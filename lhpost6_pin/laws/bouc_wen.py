@@ -1,5 +1,7 @@
 """Bouc-Wen hysteresis in two dimensions (Eqs. 4-9 to 4-12); with v_y = Z_y = 0 it is the seal law (Eq. 4-18).
 
+Kernels of `bouc_wen_1d`, `bouc_wen_2d` and of all friction that has the same hysteresis.
+
 Y dZ/dt = v - H Z,  H = tau v.Z + (1 - tau) (|v_x Z_x| + |v_y Z_y|),  f = -F_mu Z
 
 v [m/s] slip velocity, Y [m] yield displacement, tau [1] loop shape, Z [1] hysteretic state with |Z_i| <= 1,
@@ -9,10 +11,19 @@ as recoverable: Z.v = d/dt (Y |Z|^2 / 2) + H |Z|^2.)
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled
 
-__all__ = ["advance", "advance_1d", "friction_force", "rate"]
+__all__ = ["Friction", "advance_along", "advance_planar", "friction_force", "planar_rates"]
+
+
+class Friction(NamedTuple):
+    """Parameters of friction with Bouc-Wen hysteresis."""
+
+    friction: Annotated[float, "N"]  # sliding force F_mu
+    yield_slip: Annotated[float, "m"]  # yield displacement Y
+    shape: Annotated[float, "1"]  # loop shape tau
 
 
 _SEGMENTS = 12
@@ -33,7 +44,9 @@ def friction_force(friction: float, z: float) -> float:
 
 
 @compiled
-def rate(v_x: float, v_y: float, z_x: float, z_y: float, yield_slip: float, shape: float) -> tuple[float, float]:
+def planar_rates(
+    v_x: float, v_y: float, z_x: float, z_y: float, yield_slip: float, shape: float
+) -> tuple[float, float]:
     """Rates of Z_x and Z_y [1/s] (Eq. 4-9); v [m/s], yield_slip [m], shape tau [1]."""
     p_x = v_x * z_x
     p_y = v_y * z_y
@@ -85,7 +98,9 @@ def _crossing(z: float, a: float, curvature: float, slope: float, t: float) -> f
 
 
 @compiled
-def advance(dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, shape: float) -> tuple[float, float]:
+def advance_planar(
+    dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, shape: float
+) -> tuple[float, float]:
     """Z_x and Z_y after a straight slip (dx, dy) [m]: the exact solution of Eq. 4-9, whatever the step.
 
     While no product v_i Z_i changes sign H is linear in Z, dZ/dt = a - (b.Z) Z, a = slip/Y, b_i = a_i where slip
@@ -138,14 +153,14 @@ def advance(dx: float, dy: float, z_x: float, z_y: float, yield_slip: float, sha
 
 
 @compiled
-def advance_1d(dx: float, z: float, yield_slip: float, shape: float) -> float:
-    """Z after a slip dx [m] along one direction: `advance` with dy = Z_y = 0, faster (a test holds them together).
+def advance_along(dx: float, z: float, yield_slip: float, shape: float) -> float:
+    """Z after a slip dx [m] along one direction: `advance_planar` with dy = Z_y = 0, faster (a test compares them).
 
     Where slip and Z agree, dZ/dx = (1 - Z^2)/Y adds the slip inside a hyperbolic tangent.
     """
     a = dx / yield_slip
     if a * z < 0.0:
-        return advance(dx, 0.0, z, 0.0, yield_slip, shape)[0]
+        return advance_planar(dx, 0.0, z, 0.0, yield_slip, shape)[0]
     if abs(a) < 0.03:  # Taylor series of tanh: the next term is below 1e-15
         x = a * a
         t = a * (1.0 - x * (1.0 / 3.0 - x * (2.0 / 15.0 - x * (17.0 / 315.0))))

@@ -11,10 +11,32 @@ Source: Merritt (1967), Section 2.2; energy derived here.
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled
+from .contract import Law
 
-__all__ = ["ATMOSPHERE", "air_modulus", "enthalpy_of", "void_share"]
+__all__ = ["ATMOSPHERE", "Cavitation", "EntrainedAir", "LAWS", "air_modulus", "enthalpy_of", "void_share"]
+
+
+class EntrainedAir(NamedTuple):
+    """Parameters of air in the oil."""
+
+    air: Annotated[float, "1"]
+    polytropic_index: Annotated[float, "1"]
+
+
+class Cavitation(NamedTuple):
+    """Parameters of voids."""
+
+    share: Annotated[float, "1"]
+    vapour_pressure: Annotated[float, "Pa"]
+
+
+LAWS = {
+    "entrained_air": Law(EntrainedAir, modifies="oil", fields=("air", "air_index")),
+    "cavitation": Law(Cavitation, modifies="oil", fields=("voids", "vapour_pressure")),
+}
 
 ATMOSPHERE = 101325.0
 """Standard atmosphere [Pa], by definition: at it the share of air is counted."""

@@ -11,22 +11,31 @@ dE/dt = h(P) Q - P A dL_c/dt exactly. Source: report Section 4.1.3; energy deriv
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled, compiled_inline
-from .orifice import port_flow
+from .contract import Law
 
 __all__ = [
-    "advance_double",
-    "advance_single",
+    "DeadVolume",
+    "LAWS",
     "chamber_energy",
     "chamber_rate",
     "flow_enthalpy",
-    "flows_double",
-    "flows_single",
     "piston_force",
     "pressure_rises",
     "side_shares",
 ]
+
+
+class DeadVolume(NamedTuple):
+    """Parameters of a volume that adds to the chambers'."""
+
+    volume: Annotated[float, "m3"]
+    side: Annotated[float, "1"]  # 0 both chambers, 1 A alone, -1 B alone
+
+
+LAWS = {"dead_volume": Law(DeadVolume, modifies="oil", fields=("dead_volume",))}
 
 
 @compiled
@@ -51,50 +60,6 @@ def flow_enthalpy(pressure: float, bulk: float) -> float:
 def chamber_energy(pressure: float, area: float, length: float, bulk: float) -> float:
     """Elastic energy of the oil in a chamber [J]: V (h(P) - P)."""
     return area * length * (flow_enthalpy(pressure, bulk) - pressure)
-
-
-@compiled
-def flows_double(
-    opened: float,
-    pressure_a: float,
-    pressure_b: float,
-    k_pa: float,
-    k_bt: float,
-    k_at: float,
-    k_pb: float,
-    leakage: float,
-    supply: float,
-    back: float,
-    linear_below: float,
-) -> tuple[float, float, float, float]:
-    """Net flows into chambers A and B of a 4-way valve's actuator, and the valve's slopes (Eqs. 4-2, 4-3).
-
-    Returns (Q_A, Q_B) [m3/s] with the leak counted, and dQ_A/dP_A, dQ_B/dP_B of the orifices alone [m3/s/Pa].
-    k_* [m3/s/sqrt(Pa)] are the four flow paths: supply to A, B to return, A to return, supply to B.
-    """
-    flow_a, slope_a = port_flow(opened, k_pa, k_at, supply, back, pressure_a, linear_below)
-    flow_b, slope_b = port_flow(-opened, k_pb, k_bt, supply, back, pressure_b, linear_below)
-    leak = leakage * (pressure_a - pressure_b)
-    return flow_a - leak, flow_b + leak, slope_a, slope_b
-
-
-@compiled
-def flows_single(
-    opened: float,
-    pressure_a: float,
-    k_pa: float,
-    k_at: float,
-    leakage: float,
-    supply: float,
-    back: float,
-    linear_below: float,
-) -> tuple[float, float]:
-    """Net flow into chamber A of a 3-way valve's actuator [m3/s] and the orifice's slope [m3/s/Pa].
-
-    A 3-way valve is Eq. 4-3 with w1 = w3, w2 = w4 = 0 and P_B = 0, so the leak is C_L P_A.
-    """
-    flow, slope = port_flow(opened, k_pa, k_at, supply, back, pressure_a, linear_below)
-    return flow - leakage * pressure_a, slope
 
 
 @compiled
@@ -133,72 +98,3 @@ def pressure_rises(
     m_bb = 1.0 - half_b * (slope_b - across)
     scale = 1.0 / (m_aa * m_bb - m_ab * m_ba)
     return scale * (m_bb * rise_a - m_ab * rise_b), scale * (m_aa * rise_b - m_ba * rise_a)
-
-
-@compiled
-def advance_double(
-    opened: float,
-    pressure_a: float,
-    pressure_b: float,
-    length_a: float,
-    length_b: float,
-    stroke: float,
-    dt: float,
-    area_a: float,
-    area_b: float,
-    k_pa: float,
-    k_bt: float,
-    k_at: float,
-    k_pb: float,
-    leakage: float,
-    bulk: float,
-    supply: float,
-    back: float,
-    linear_below: float,
-) -> tuple[float, float]:
-    """Pressures of chambers A and B one step on [Pa], while the piston moves by `stroke` [m].
-
-    Linearly implicit midpoint (one-stage Rosenbrock, order 2, A-stable for a linear orifice) on Eq. 4-5, with chamber
-    lengths at mid-step; length_a, length_b [m] are those at the start of the step. On the square root of a vanishing
-    drop it may flutter within some (dt beta k / (L A))^2 / 10, a few kPa at 1/2048 s.
-    """
-    q_a, q_b, slope_a, slope_b = flows_double(
-        opened, pressure_a, pressure_b, k_pa, k_bt, k_at, k_pb, leakage, supply, back, linear_below
-    )
-    rise_a, rise_b = pressure_rises(
-        q_a,
-        q_b,
-        slope_a,
-        slope_b,
-        leakage,
-        stroke,
-        dt,
-        area_a,
-        area_b,
-        bulk / (area_a * (length_a + 0.5 * stroke)),
-        bulk / (area_b * (length_b - 0.5 * stroke)),
-    )
-    return pressure_a + rise_a, pressure_b + rise_b
-
-
-@compiled
-def advance_single(
-    opened: float,
-    pressure_a: float,
-    length_a: float,
-    stroke: float,
-    dt: float,
-    area_a: float,
-    k_pa: float,
-    k_at: float,
-    leakage: float,
-    bulk: float,
-    supply: float,
-    back: float,
-    linear_below: float,
-) -> float:
-    """Pressure of the only chamber one step on [Pa]; the step rule of `advance_double` with P_B = 0."""
-    q_a, slope = flows_single(opened, pressure_a, k_pa, k_at, leakage, supply, back, linear_below)
-    rise_per_oil = bulk / (area_a * (length_a + 0.5 * stroke))
-    rise = rise_per_oil * (dt * q_a - area_a * stroke)
-    return pressure_a + rise / (1.0 - 0.5 * dt * rise_per_oil * (slope - leakage))

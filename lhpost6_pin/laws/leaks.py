@@ -9,11 +9,47 @@ Stored energy: none; leaks dissipate. Source: Merritt (1967), Sections 3.4 and 5
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled
+from .contract import Law
 from .orifice import signed_root
 
-__all__ = ["null_leak", "turbulent_leak"]
+__all__ = ["ExternalLeakage", "ExtraLeakage", "LAWS", "NullLeakage", "TurbulentLeakage", "null_leak", "turbulent_leak"]
+
+
+class ExtraLeakage(NamedTuple):
+    """Parameters of more laminar leakage across the piston."""
+
+    leakage: Annotated[float, "m3/s/Pa"]
+
+
+class TurbulentLeakage(NamedTuple):
+    """Parameters of turbulent leakage across the piston."""
+
+    coefficient: Annotated[float, "m3/s/Pa^0.5"]
+
+
+class ExternalLeakage(NamedTuple):
+    """Parameters of laminar leakage out of the chambers."""
+
+    leakage: Annotated[float, "m3/s/Pa"]
+    side: Annotated[float, "1"]  # 0 both chambers, 1 A alone, -1 B alone
+
+
+class NullLeakage(NamedTuple):
+    """Parameters of leakage past a worn spool."""
+
+    leakage: Annotated[float, "m3/s/Pa^0.5"]
+    width: Annotated[float, "1"]
+
+
+LAWS = {
+    "extra_leakage": Law(ExtraLeakage, modifies="oil", fields=("leakage",)),
+    "turbulent_leakage": Law(TurbulentLeakage, modifies="oil", fields=("turbulent",)),
+    "external_leakage": Law(ExternalLeakage, modifies="oil", fields=("external", "external_side")),
+    "null_leakage": Law(NullLeakage, modifies="oil", fields=("null_leakage", "null_width")),
+}
 
 
 @compiled

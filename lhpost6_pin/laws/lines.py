@@ -7,10 +7,43 @@ y, q, u are flows [m3/s] here, but any unit does. Stored energy: none that is co
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled
+from .contract import Law
 
-__all__ = ["filter_shares", "line_step"]
+__all__ = ["LAWS", "Line", "SupplyLine", "filter_shares", "line_step"]
+
+
+class Line(NamedTuple):
+    """Parameters of lines between valve and chambers."""
+
+    time: Annotated[float, "s"]
+    damping: Annotated[float, "1"]
+
+
+class SupplyLine(NamedTuple):
+    """Parameters of the line before a valve."""
+
+    inertance: Annotated[float, "Pa s2/m3"]
+    frequency: Annotated[float, "Hz"]
+    damping: Annotated[float, "1"]
+
+
+LAWS = {
+    "line": Law(
+        Line,
+        states=("flow_a", "flow_rate_a", "flow_b", "flow_rate_b"),
+        modifies="oil",
+        fields=("line_time", "line_damping"),
+    ),
+    "supply_line": Law(
+        SupplyLine,
+        states=("line_pressure", "line_flow"),
+        modifies="oil",
+        fields=("supply_inertance", "supply_frequency", "supply_damping"),
+    ),
+}
 
 
 @compiled

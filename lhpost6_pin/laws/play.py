@@ -10,10 +10,22 @@ Source: derived here; contact of a pin in a bush, rod without mass.
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled
+from .contract import Law
 
-__all__ = ["play_energy", "play_slope", "play_travel"]
+__all__ = ["LAW", "Play", "play_energy", "play_slope", "play_travel"]
+
+
+class Play(NamedTuple):
+    """Parameters."""
+
+    half_play: Annotated[float, "m"]
+    closing_force: Annotated[float, "N"]
+
+
+LAW = Law(Play, modifies="oil", fields=("play", "play_force"))
 
 
 @compiled

@@ -8,11 +8,40 @@ Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); the curve's 
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 from ..core.compiled import compiled
 from .chamber import side_shares
+from .contract import Law
 
-__all__ = ["corrected_opening", "dead_zone"]
+__all__ = ["Deadband", "FlowCurve", "LAWS", "NullBias", "corrected_opening", "dead_zone"]
+
+
+class NullBias(NamedTuple):
+    """Parameters of a spool off its null."""
+
+    bias: Annotated[float, "1"]
+
+
+class Deadband(NamedTuple):
+    """Parameters of an overlapped spool."""
+
+    overlap: Annotated[float, "1"]
+
+
+class FlowCurve(NamedTuple):
+    """Parameters of an error of the flow curve."""
+
+    error: Annotated[float, "1"]
+    side: Annotated[float, "1"]
+    power: Annotated[float, "1"]
+
+
+LAWS = {
+    "null_bias": Law(NullBias, modifies="oil", fields=("null_bias",)),
+    "deadband": Law(Deadband, modifies="oil", fields=("overlap",)),
+    "flow_curve": Law(FlowCurve, modifies="oil", fields=("curve_error", "curve_side", "curve_power")),
+}
 
 
 @compiled

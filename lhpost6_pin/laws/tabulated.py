@@ -1,24 +1,32 @@
 """A force that is given by a table: linear between equally spaced values, and as at its end beyond them.
 
-    f = -f_k (1 - w) - f_k+1 w,   w and k from (x - x_0) / (x_1 - x_0) (n - 1)
+    f = -a (f_k (1 - w) + f_k+1 w),   w and k from (x - x_0) / (x_1 - x_0) (n - 1)
 
-x [m or m/s] position or speed, or of a fading memory of positions, T dy/dt + y = s, what it holds, y, or by how much s
-is away from it; x_0 and x_1 the table's ends, f [N] its n values. What a search has found and has no name for is such a
-force. No potential is declared: all work counts as dissipated, and may be negative.
+x [m or m/s] what the force depends on, x_0 and x_1 the table's ends, f [N] its n values, a [1] its share. What a search
+has found and has no name for is such a force. No potential is declared: all work counts as dissipated, and may be
+negative. Kernel of `by_position`, `by_speed` and `by_memory`.
 """
+
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import compiled
 
-__all__ = ["remembered", "table_force"]
+__all__ = ["NODES", "Table", "table_force"]
+
+NODES = 24
+"""Values of a table."""
 
 
-@compiled
-def remembered(position: float, past: float, which: float) -> float:
-    """The remembered position [m] where `which` is 1, by how much the position is away from it where it is 0."""
-    return which * past + (1.0 - which) * (position - past)
+class Table(NamedTuple):
+    """Parameters."""
+
+    share: Annotated[float, "1"]
+    first: Annotated[float, "m | m/s"]
+    last: Annotated[float, "m | m/s"]
+    force: Annotated[NDArray[np.float64], "N", NODES]
 
 
 @compiled

@@ -1,11 +1,23 @@
 """Linear viscous damping (Eq. 4-19): f = -C_v v, C_v [N s/m], v [m/s]. Stored energy: none; dissipates C_v v^2."""
 
-from ..core.compiled import compiled
+from typing import Annotated, NamedTuple
 
-__all__ = ["viscous_force"]
+from ..core.compiled import compiled
+from .contract import Law
+
+__all__ = ["LAW", "Viscous", "force"]
+
+
+class Viscous(NamedTuple):
+    """Parameters."""
+
+    coefficient: Annotated[float, "N s/m"]
+
+
+LAW = Law(Viscous, inlined=True)
 
 
 @compiled
-def viscous_force(velocity: float, coefficient: float) -> float:
+def force(p: Viscous, v: float) -> float:
     """Viscous force [N] (or [N m] on a rotation) (Eq. 4-19)."""
-    return -coefficient * velocity
+    return -p.coefficient * v

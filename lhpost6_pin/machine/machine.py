@@ -37,13 +37,13 @@ class Machine(Structure):
     @property
     def effects(self) -> tuple[Effect, ...]:
         """All effects that make forces, in ledger order: the report's, then those added."""
-        added = (e for e in self.added_effects if not LAWS[e.law].alters)
+        added = (e for e in self.added_effects if not LAWS[e.law].modifies)
         return (*standard_effects(self.actuators, self.struts, self.hydraulics), *added)
 
     @property
-    def alterations(self) -> tuple[Effect, ...]:
-        """Effects added that make no force of their own but alter what is there."""
-        return tuple(e for e in self.added_effects if LAWS[e.law].alters)
+    def modifiers(self) -> tuple[Effect, ...]:
+        """Effects added that make no force of their own but modify what is there."""
+        return tuple(e for e in self.added_effects if LAWS[e.law].modifies)
 
     @cached_property
     def added_effects(self) -> tuple[Effect, ...]:
@@ -74,7 +74,7 @@ class Machine(Structure):
         Raises ParameterError; UnknownNameError for a family that the library has not.
         """
         label = name or (effect if isinstance(effect, str) else effect.name)
-        if label in {e.name for e in (*self.effects, *self.alterations)}:
+        if label in {e.name for e in (*self.effects, *self.modifiers)}:
             raise ParameterError(f"an effect named {label!r} is in this machine already; give it another name")
         if isinstance(effect, Effect):
             return replace(self, own_effects=(*self.own_effects, effect))

@@ -12,13 +12,13 @@ __all__ = ["standard_effects"]
 def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil: Hydraulics) -> tuple[Effect, ...]:
     """The report's effects (Chapter 4) for these components, in ledger order; friction of zero has no row."""
     found = []
-    for law, valve in (("hydraulic_double", "4-way"), ("hydraulic_single", "3-way")):
+    for valve in ("4-way", "3-way"):
         fed = [(i, a) for i, a in enumerate(actuators) if a.valve == valve]
         if fed:
             found.append(
                 Effect(
                     f"actuators_{valve.replace('-', '_')}",
-                    law,
+                    "hydraulic",
                     tuple(a.name for _, a in fed),
                     tuple(_hydraulic_numbers(a, oil) for _, a in fed),
                     "Eqs. 4-1 to 4-6",

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
+from ..effects.registry import parameters_of
 from ..laws.orifice import opening
 from ..machine.machine import Machine
-from .equilibrium import find_equilibrium, hydraulic_rows, unloaded_speeds
+from .equilibrium import find_equilibrium, unloaded_speeds
 from .plant import Plant, make_plant
 from .pose import leg_displacements
 from .rigid_body import platen_inertia
@@ -45,9 +46,10 @@ def leg_speeds(plant: Plant) -> Array:
     """Steady unloaded piston speeds at full spool, extending and retracting, (n_actuators, 2) [m/s]."""
     rest = find_equilibrium(plant)
     speeds = np.empty((plant.spools, 2))
-    for i, row in enumerate(plant.rows[hydraulic_rows(plant)]):
-        speeds[i] = unloaded_speeds(row, float(rest.force[i]), plant.supply)
-        speeds[i] *= opening(1.0, float(row["p"][6]))
+    for i, row in enumerate(plant.rows[plant.tables.actuators]):
+        p = parameters_of(row)
+        speeds[i] = unloaded_speeds(p, float(rest.force[i]), plant.supply)
+        speeds[i] *= opening(1.0, p.flow_curve)
     return speeds
 
 
@@ -93,9 +95,8 @@ def _forces(plant: Plant) -> list[Capacity]:
     machine, par = plant.machine, plant.machine.parameters
     high, low = plant.supply[:2]
     jacobian = _zero_jacobian(plant)
-    rows = plant.rows[hydraulic_rows(plant)]
-    push = high * rows["p"][:, 0] - low * rows["p"][:, 1]
-    pull = low * rows["p"][:, 0] - high * rows["p"][:, 1]
+    area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
+    push, pull = high * area_a - low * area_b, low * area_a - high * area_b
     hold_down = sum(s.pressure * s.area for s in machine.struts)
     printed = par.vector("table_2_2.force_actuators")
     lines = []
@@ -105,7 +106,7 @@ def _forces(plant: Plant) -> list[Capacity]:
     up = float(jacobian[:, 2] @ np.where(jacobian[:, 2] > 0.0, push, pull)) - hold_down
     lines.append(Capacity("peak force Z up", up, printed[2], "N", "supply in all chambers, less hold-down"))
     left = par.number("table_2_2.chamber_pressure_down")
-    down = hold_down - float(jacobian[:, 2] @ (left * rows["p"][:, 0]))
+    down = hold_down - float(jacobian[:, 2] @ (left * area_a))
     lines.append(
         Capacity(
             "peak force Z down",

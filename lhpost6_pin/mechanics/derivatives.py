@@ -4,9 +4,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from ..core.compiled import compiled
 from .plant import Plant
 from .schemes import TAU, V_SEEN, A, V, rates_stage
-from .workspace import Workspace
+from .tables import unpack_tables
+from .workspace import Workspace, unpack_workspace
 
 __all__ = ["evaluate", "rates_at", "evaluate_derivatives"]
 
@@ -24,25 +26,14 @@ def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
 def evaluate(plant: Plant, ws: Workspace, spool: Array) -> int:
     """Ports, forces and rates at the state in `ws`; returns the stage status."""
     ws.motion[V_SEEN] = ws.motion[V]
-    return int(rates_at(plant, ws, ws.q, ws.z, spool))
+    return rates_at(plant, ws, ws.q, ws.z, spool)
 
 
 def rates_at(plant: Plant, ws: Workspace, q: Array, z: Array, spool: Array) -> int:
     """Ports, forces and rates at (q, z) for the velocity `motion[V_SEEN]` of `ws`; returns the stage status."""
-    return rates_stage(
-        q,
-        plant.axes,
-        plant.legs,
-        plant.body,
-        plant.rows,
-        plant.model.damping,
-        spool,
-        ws.supply,
-        ws.frame,
-        ws.port,
-        ws.JB,
-        z,
-        ws.zd,
-        ws.force,
-        ws.motion,
-    )
+    return int(_rates(q, z, plant.tables.packed, ws.buffer, spool))
+
+
+@compiled
+def _rates(q, z, packed, buffer, spool):  # type: ignore[no-untyped-def]
+    return rates_stage(q, z, unpack_tables(packed), unpack_workspace(buffer), spool)

@@ -8,17 +8,21 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from ..core.errors import SimulationError
-from ..effects.actuator import leak_flows, start_line, valve_flows
-from ..effects.registry import AREA_A, AREA_B, EXTERNAL, HYDRAULIC_DOUBLE, LEAKAGE, NULL_BIAS, NULL_LEAKAGE, TURBULENT
+from ..effects.actuator import start_line
+from ..effects.registry import actuator_rows, parameters_of
 from ..effects.supply import steady_supply, supply_pressures
+from ..laws.hydraulic import Hydraulic, leak_flows, valve_flows
 from ..laws.orifice import spool_for_opening
+from ..laws.supply import varies
 from .plant import Plant, State
 from .schemes import TAU, forces_stage, pose_stage
 from .workspace import make_workspace
 
-__all__ = ["Equilibrium", "find_equilibrium", "hydraulic_rows", "rest_pressures", "unloaded_speeds"]
+__all__ = ["Equilibrium", "find_equilibrium", "rest_pressures", "unloaded_speeds"]
 
 Array = NDArray[np.float64]
+Pressures = tuple[float, ...]
+"""Supply and return pressure [Pa], perhaps with what follows in `laws.supply.Supply`."""
 
 _SUPPLY_TURNS = 8
 """Rounds of pressures at rest and flow drawn: leaks lower the supply by a thousandth of its pressure."""
@@ -34,12 +38,6 @@ class Equilibrium(NamedTuple):
     wrench: pin.Force  # of the actuators on the platen, at C in {c}
 
 
-def hydraulic_rows(plant: Plant) -> NDArray[np.int64]:
-    """Rows of the effect table that are actuators, in the order of their spools."""
-    fed = np.flatnonzero(plant.rows["input"] >= 0)
-    return fed[np.argsort(plant.rows["input"][fed], kind="stable")]
-
-
 def find_equilibrium(plant: Plant) -> Equilibrium:
     """Least-squares actuator forces that hold the platen at rest, and the pressures and spools that give them.
 
@@ -49,20 +47,8 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     start = plant.zero_state()
     ws = make_workspace(plant, start)
     ws.z[:] = 0.0
-    pose_stage(ws.q, plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB)
-    forces_stage(
-        plant.axes,
-        plant.legs,
-        plant.body,
-        plant.rows,
-        plant.model.damping,
-        ws.frame,
-        ws.port,
-        ws.JB,
-        ws.z,
-        ws.force,
-        ws.motion,
-    )
+    pose_stage(ws.q, plant.tables, ws)
+    forces_stage(plant.tables, ws, ws.z)
     free = plant.axes.size
     gravity = pin.rnea(
         plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)
@@ -77,20 +63,19 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
         )
     z, spool = ws.z.copy(), np.zeros(plant.spools)
     _fill(plant, force, plant.supply[:2], z, spool)
-    for _ in range(_SUPPLY_TURNS if plant.supply.size > 2 else 0):  # what leaks at rest is drawn from the supply, too
+    for _ in range(_SUPPLY_TURNS if varies(plant.supply) else 0):  # what leaks at rest is drawn from the supply, too
         steady_supply(plant.rows, spool, plant.supply, z)
-        _fill(plant, force, np.array(supply_pressures(plant.supply, z)), z, spool)
+        _fill(plant, force, supply_pressures(plant.supply, z), z, spool)
     wrench = pin.SE3(np.eye(3), -plant.body[0]["rho_c"]).act(pin.Force(ws.JB[1][: plant.spools].T @ force))
     return Equilibrium(State(start.q, start.v, z), spool, force, pin.SE3.Identity(), wrench)
 
 
-def _fill(plant: Plant, force: Array, supply: Array, z: Array, spool: Array) -> None:
+def _fill(plant: Plant, force: Array, supply: Pressures, z: Array, spool: Array) -> None:
     """Fill pressures, flows through lines and spools at which nothing flows into any chamber."""
     high, low = supply
-    for i, at in enumerate(hydraulic_rows(plant)):
-        row = plant.rows[at]
-        solve = rest_pressures if row["altered"] == 0 else _rest_of_altered
-        pressures, spool[i] = solve(row, float(force[i]), supply)
+    for i, row in enumerate(plant.rows[actuator_rows(plant.rows)]):
+        solve = rest_pressures if row["modified"] == 0 else _rest_of_modified
+        pressures, spool[i] = solve(parameters_of(row), float(force[i]), supply)
         k = row["state"]
         z[k : k + len(pressures)] = pressures
         if not all(low <= p <= high for p in pressures):
@@ -100,22 +85,21 @@ def _fill(plant: Plant, force: Array, supply: Array, z: Array, spool: Array) -> 
                 f"{', '.join(f'{p / 1e6:.3g}' for p in pressures)} MPa is not between {low / 1e6:.3g} and "
                 f"{high / 1e6:.3g} MPa; lighten the specimen or raise hydraulics.supply_pressure"
             )
-        start_line(plant.rows, at, spool[i], pressures[0], pressures[-1], high, low, z)
+        start_line(row, spool[i], pressures[0], pressures[-1], high, low, z)
 
 
-def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[float, ...], float]:
-    """As `rest_pressures` with all that alterations add; a spool of full stroke where none is enough."""
+def _rest_of_modified(p: Hydraulic, force: float, supply: Pressures) -> tuple[tuple[float, ...], float]:
+    """As `rest_pressures` with all that modifiers add; a spool of full stroke where none is enough."""
     from scipy.optimize import brentq
 
-    p, double = row["p"], bool(row["law"] == HYDRAULIC_DOUBLE)
     high, low = (float(x) for x in supply)
-    if not p[[LEAKAGE, TURBULENT, EXTERNAL, NULL_LEAKAGE]].any():  # nothing leaks: the spool rests at its null
-        pressures, spool = rest_pressures(row, force, supply)
-        return pressures, spool - float(p[NULL_BIAS])
+    if not (p.leakage or p.turbulent or p.external or p.null_leakage):  # nothing leaks: the spool rests at its null
+        pressures, spool = rest_pressures(p, force, supply)
+        return pressures, spool - p.null_bias
 
     def flows(pressure_a: float, pressure_b: float, spool: float) -> tuple[float, float]:
-        flow_a, flow_b, _, _ = valve_flows(p, double, spool, pressure_a, pressure_b, high, low)
-        across, _, out_a, out_b, _, _ = leak_flows(p, double, pressure_a, pressure_b, low)
+        flow_a, flow_b, _, _ = valve_flows(p, True, spool, pressure_a, pressure_b, high, low)
+        across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
         return flow_a - across - out_a, flow_b + across - out_b
 
     def spool_for(pressure_a: float, pressure_b: float) -> float:
@@ -126,8 +110,8 @@ def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[f
             brentq(lambda x: flows(pressure_a, pressure_b, x)[0], -1.0, 1.0, xtol=1e-18, rtol=1e-15, maxiter=1000)
         )
 
-    area_a, area_b = float(p[AREA_A]), float(p[AREA_B])
-    if not double:
+    area_a, area_b = p.area_a, p.area_b
+    if area_b == 0.0:
         return (force / area_a,), spool_for(force / area_a, 0.0)
 
     def other(pressure_a: float) -> float:
@@ -140,18 +124,18 @@ def _rest_of_altered(row: np.void, force: float, supply: Array) -> tuple[tuple[f
     if least < most and miss(least) > 0.0 > miss(most):
         a = float(brentq(miss, least, most, xtol=1e-6, rtol=1e-15, maxiter=1000))
     else:  # no pressures within the supply's: what the report's law has, which says so
-        a = float(rest_pressures(row, force, supply)[0][0])
+        a = float(rest_pressures(p, force, supply)[0][0])
     return (a, other(a)), spool_for(a, other(a))
 
 
-def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[float, ...], float]:
+def rest_pressures(p: Hydraulic, force: float, supply: Pressures) -> tuple[tuple[float, ...], float]:
     """Pressures [Pa] and spool [1] at which an actuator gives `force` [N] with no net flow into its chambers.
 
     The spool feeds the leak across the piston; with no leak, its limit as the leak vanishes.
     """
-    area_a, area_b, k_pa, k_bt, k_at, k_pb, curve, leakage = row["p"][:8]
+    area_a, area_b, k_pa, k_bt, k_at, k_pb, curve, leakage = p[:8]
     high, low = supply[:2]
-    if row["law"] != HYDRAULIC_DOUBLE:
+    if area_b == 0.0:
         pressure = force / area_a
         drop = max(high - pressure, np.finfo(float).tiny)
         return (pressure,), float(spool_for_opening(leakage * pressure / (k_pa * math.sqrt(drop)), curve))
@@ -173,11 +157,11 @@ def rest_pressures(row: np.void, force: float, supply: Array) -> tuple[tuple[flo
     return (pressure, pressure), 0.0
 
 
-def unloaded_speeds(row: np.void, force: float, supply: Array) -> tuple[float, float]:
+def unloaded_speeds(p: Hydraulic, force: float, supply: Pressures) -> tuple[float, float]:
     """Steady piston speeds [m/s] at full opening under the rest force: extending, retracting (Eqs. 4-2, 4-5)."""
-    area_a, area_b, k_pa, k_bt, k_at, k_pb = (float(v) for v in row["p"][:6])
+    area_a, area_b, k_pa, k_bt, k_at, k_pb = p[:6]
     high, low = supply[:2]
-    if row["law"] != HYDRAULIC_DOUBLE:
+    if area_b == 0.0:
         pressure = force / area_a
         return k_pa * math.sqrt(high - pressure) / area_a, k_at * math.sqrt(pressure - low) / area_a
     speeds = []

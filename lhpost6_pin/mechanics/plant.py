@@ -1,21 +1,23 @@
 """The plant: a machine made ready to evaluate; tables for compiled code, the Pinocchio model, the zero state."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from ..effects.modifiers import command_path, supply_numbers
-from ..effects.registry import PORTS
+from ..effects.modifiers import command_path, supply_of
+from ..effects.registry import PORTS, actuator_rows, columns_of
 from ..effects.table import effect_table, state_names
+from ..laws.supply import Supply
+from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from .forward_dynamics import inertia_table
 from .ports import body_table, leg_table
 from .rigid_body import free_axes, make_model
-
-if TYPE_CHECKING:
-    from ..machine.machine import Machine
+from .tables import Tables, pack_tables
 
 __all__ = ["Plant", "State", "make_plant"]
 
@@ -34,17 +36,30 @@ class State(NamedTuple):
 class Plant:
     """Tables of a machine for compiled code, beside its Pinocchio model. Treat the arrays as read only."""
 
-    machine: "Machine"
+    machine: Machine
     model: Any
     axes: NDArray[np.int64]  # (n_axes,) free twist components of the platen
     legs: NDArray[np.void]  # ports.LEG, actuators then struts
     body: NDArray[np.void]  # ports.BODY, one row
-    rows: NDArray[np.void]  # effects.ROW
+    rows: NDArray[np.void]  # registry.ROW
     ports: tuple[str, ...]  # those that its arrays hold; platen's and swivels' only where an effect acts on them
     states: tuple[str, ...]
-    supply: Array  # supply and return pressure [Pa]; behind them what `supply` needs where flow changes them
+    supply: Supply  # supply and return pressure [Pa], and how flow changes them
     delays: Array  # (n_actuators,) valve delay [s]
     lags: Array  # (n_actuators,) time constant [s] with which a spool follows its delayed command
+
+    @cached_property
+    def tables(self) -> Tables:
+        """All tables as compiled code reads them."""
+        inertia = inertia_table(self.model, self.machine, self.axes)
+        damping, actuators = np.array(self.model.damping), actuator_rows(self.rows)
+        rest = damping, actuators, self.command_path, inertia, self.supply
+        return pack_tables(self.axes, self.legs, self.body, self.rows, *rest)
+
+    @cached_property
+    def actuators(self) -> Any:
+        """Parameters of the actuators by name (`laws.hydraulic.Hydraulic`), each (n_actuators,)."""
+        return columns_of(self.rows[actuator_rows(self.rows)])
 
     @property
     def spools(self) -> int:
@@ -73,10 +88,10 @@ class Plant:
         return self.states.index(f"{effect}.{port}.{state}")
 
 
-def make_plant(machine: "Machine") -> Plant:
+def make_plant(machine: Machine) -> Plant:
     """Build tables and model of a machine; raises ParameterError or UnknownNameError."""
     ports = port_names(machine.actuators, machine.struts)
-    effects = (*machine.effects, *machine.alterations)
+    effects = (*machine.effects, *machine.modifiers)
     rows = effect_table(effects, ports)
     used = max(rows[port].max() for port in PORTS) if len(rows) else len(ports)
     swivels = sum(port.endswith(SWIVEL_TURNS) for port in ports)
@@ -95,7 +110,7 @@ def make_plant(machine: "Machine") -> Plant:
         rows=rows,
         ports=ports,
         states=states,
-        supply=np.array([oil.supply_pressure, oil.return_pressure, *supply_numbers(effects, states)]),
+        supply=supply_of(effects, states, oil.supply_pressure, oil.return_pressure),
         delays=np.array(delays),
         lags=np.array(lags),
     )

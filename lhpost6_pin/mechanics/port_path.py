@@ -37,35 +37,36 @@ def ports_along(plant: Plant, motion: PlantMotion) -> PortPath:
     s, rate, slip = np.zeros((n, count)), np.zeros((n, count)), np.zeros((n, count))
     column, turn = np.zeros((n, count, 6)), np.zeros((n, 3, 3))
     ws = make_workspace(plant, plant.zero_state())
-    arrays = plant.axes, plant.legs, plant.body, ws.frame, ws.port, ws.JB
     q, v = (np.ascontiguousarray(x) for x in (motion.q, motion.v))
-    sample, status = _ports_along(q, v, *arrays, s, rate, slip, column, turn)
+    path = PortPath(s, rate, slip, column, turn)
+    sample, status = _ports_along(q, v, plant.tables, ws, path)
     if status:
         names = (*plant.machine.actuator_names, *plant.machine.strut_names)
         what = f"{names[status - 1]} is out of its stroke" if status > 0 else "the motion is not finite"
         raise RecordError(f"platen_displacement at sample {sample}: {what}; check its channels, units and offsets")
-    return PortPath(s, rate, slip, column, turn)
+    return path
 
 
 @compiled
-def _ports_along(q, v, axes, legs, body, frame, port, JB, s, rate, slip, column, turn):
-    """Fill the arrays; returns (sample, status) of the first pose that cannot be, or (n, 0)."""
+def _ports_along(q, v, tables, ws, path):
+    """Fill the path; returns (sample, status) of the first pose that cannot be, or (n, 0)."""
+    axes, frame, port, J = tables.axes, ws.frame, ws.port, ws.JB[0]
     step = np.zeros(axes.size)
     for k in range(q.shape[0]):
         if k > 0:
             platen_difference(q[k - 1], q[k], axes, step)
             set_twist(step, axes, frame)
-            port_rates(JB[0], frame, port[DS])
-        status = pose_stage(q[k], axes, legs, body, frame, port, JB)
+            port_rates(J, frame, port[DS])
+        status = pose_stage(q[k], tables, ws)
         if status != 0:
             return k, status
         if k > 0:  # the mean of the rates at both ends
-            port_rates(JB[0], frame, port[SD])
-            for i in range(s.shape[1]):
-                slip[k, i] = 0.5 * (port[DS, i] + port[SD, i])
+            port_rates(J, frame, port[SD])
+            for i in range(port.shape[1]):
+                path.slip[k, i] = 0.5 * (port[DS, i] + port[SD, i])
         set_twist(v[k], axes, frame)
-        port_rates(JB[0], frame, rate[k])
-        s[k] = port[S]
-        column[k] = JB[1]
-        turn[k] = frame[:3]
+        port_rates(J, frame, path.rate[k])
+        path.s[k] = port[S]
+        path.column[k] = ws.JB[1]
+        path.turn[k] = frame[:3]
     return q.shape[0], 0

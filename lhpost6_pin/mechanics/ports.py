@@ -12,17 +12,14 @@ One compiled function evaluates all ports of a pose. It is written in body axes,
 """
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import compiled, compiled_inline
-from ..core.errors import UnknownNameError
+from ..effects.modifiers import thrust_shares
+from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS
-
-if TYPE_CHECKING:
-    from ..machine.machine import Machine
 
 __all__ = [
     "BODY",
@@ -64,7 +61,7 @@ BODY = np.dtype(
 """Table (one row) of the platen."""
 
 
-def leg_table(machine: "Machine") -> NDArray[np.void]:
+def leg_table(machine: Machine) -> NDArray[np.void]:
     """Table of actuators, then struts, as `evaluate_ports` reads it; raises UnknownNameError for an effect's leg."""
     centre = np.array(machine.platen.centre_of_gravity)
     legs = np.zeros(len(machine.actuators) + len(machine.struts), LEG)
@@ -85,23 +82,12 @@ def leg_table(machine: "Machine") -> NDArray[np.void]:
         elif mount == "swivel":
             row["swivel"] = turn
             turn += len(SWIVEL_TURNS)
-    _alter_legs(legs, machine)
+    turned = thrust_shares(machine.modifiers, [c.name for c in machine.components])
+    legs["normal_thrust"] += np.multiply(-1.0 if machine.thrust == "normal" else 1.0, turned)
     return legs
 
 
-def _alter_legs(legs: NDArray[np.void], machine: "Machine") -> None:
-    """Turn the thrust of bearings as effects say: by their share, from the machine's direction to the other one."""
-    names = [c.name for c in machine.components]
-    other = -1.0 if machine.thrust == "normal" else 1.0
-    for effect in machine.alterations:
-        if effect.law == "thrust_direction":
-            for name, (share,) in zip(effect.ports, effect.params, strict=True):
-                if name not in names:
-                    raise UnknownNameError("bearing", name, names)
-                legs[names.index(name)]["normal_thrust"] += other * share
-
-
-def body_table(machine: "Machine") -> NDArray[np.void]:
+def body_table(machine: Machine) -> NDArray[np.void]:
     """Table (one row) of the platen: C, bearing plane, and what an Inertia cannot hold (see `rigid_body`)."""
     platen = machine.platen
     body = np.zeros(1, BODY)

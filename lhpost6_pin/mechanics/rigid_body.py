@@ -7,30 +7,29 @@ added as a wrench by `stage.wrench_on_platen`. Together they are the report's eq
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from ..core.errors import ParameterError
+from ..effects.modifiers import added_inertias
+from ..machine.machine import Machine
 from ..machine.specimen import Specimen
 from ..machine.urdf_numbers import check_urdf
-
-if TYPE_CHECKING:
-    from ..machine.machine import Machine
 
 __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
 
 Array = NDArray[np.float64]
 
 
-def free_axes(machine: "Machine") -> NDArray[np.int64]:
+def free_axes(machine: Machine) -> NDArray[np.int64]:
     """Twist components (linear first) that the platen can have: all six, or one guided axis."""
     return np.arange(6) if machine.motion == "free" else np.array(["xyz".index(machine.motion)])
 
 
-def make_model(machine: "Machine") -> Any:
+def make_model(machine: Machine) -> Any:
     """Build the pin.Model of platen and specimen; the platen is joint 1, its frame {b} at B.
 
     q starts with the position of B in {s} and a quaternion (x, y, z, w), or with the guided displacement; v with the
@@ -47,7 +46,7 @@ def make_model(machine: "Machine") -> Any:
         placement = pin.SE3(np.eye(3), np.array(platen.centre_of_gravity))
     index = model.addJoint(0, joint, placement, "platen")
     model.addJointFrame(index)
-    inertia = _altered(pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia)), machine)
+    inertia = _with_added(pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia)), machine)
     model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
     top = pin.SE3(np.eye(3), -np.array(platen.centre_of_gravity))
     model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
@@ -62,23 +61,27 @@ def make_model(machine: "Machine") -> Any:
     return model
 
 
-def _altered(inertia: Any, machine: "Machine") -> Any:
+def _with_added(inertia: Any, machine: Machine) -> Any:
     """Inertia of the platen with what effects add to it: mass with its weight, first and second moments about B."""
-    for effect in machine.alterations:
-        if effect.law == "more_inertia":
-            for mass, x, y, z, xx, yy, zz, xy, xz, yz in effect.params:
-                total = inertia.mass + mass
-                if total <= 0.0:
-                    raise ParameterError(f"{effect.name}: {mass:g} kg leave the platen no mass")
-                if machine.motion != "free":  # what turns has no part
-                    inertia = pin.Inertia(total, inertia.lever, inertia.inertia)
-                    continue
-                lever = (inertia.mass * inertia.lever + np.array([x, y, z])) / total
-                about_b = inertia.matrix()[3:, 3:] + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-                about_middle = about_b + total * pin.skew(lever) @ pin.skew(lever)
-                if np.linalg.eigvalsh(about_middle)[0] <= 0.0:
-                    raise ParameterError(f"{effect.name}: its moments and products leave the platen no inertia")
-                inertia = pin.Inertia(total, lever, about_middle)
+    for name, more in added_inertias(machine.modifiers):
+        total = inertia.mass + more.mass
+        if total <= 0.0:
+            raise ParameterError(f"{name}: {more.mass:g} kg leave the platen no mass")
+        if machine.motion != "free":  # what turns has no part
+            inertia = pin.Inertia(total, inertia.lever, inertia.inertia)
+            continue
+        lever = (inertia.mass * inertia.lever + np.array([more.first_x, more.first_y, more.first_z])) / total
+        about_b = inertia.matrix()[3:, 3:] + np.array(
+            [
+                [more.second_xx, more.second_xy, more.second_xz],
+                [more.second_xy, more.second_yy, more.second_yz],
+                [more.second_xz, more.second_yz, more.second_zz],
+            ]
+        )
+        about_middle = about_b + total * pin.skew(lever) @ pin.skew(lever)
+        if np.linalg.eigvalsh(about_middle)[0] <= 0.0:
+            raise ParameterError(f"{name}: its moments and products leave the platen no inertia")
+        inertia = pin.Inertia(total, lever, about_middle)
     return inertia
 
 
@@ -106,7 +109,7 @@ def _mount(model: Any, specimen: Specimen) -> Any:
     return joined
 
 
-def platen_inertia(model: Any, machine: "Machine") -> tuple[Array, Array]:
+def platen_inertia(model: Any, machine: Machine) -> tuple[Array, Array]:
     """Spatial inertia of the platen body (6, 6) at B, linear first, and the same with the directional mass added.
 
     The first includes a rigid specimen; the fused engine uses both. [kg, kg m, kg m2]
@@ -117,9 +120,7 @@ def platen_inertia(model: Any, machine: "Machine") -> tuple[Array, Array]:
     return plain, plain + np.diag(extra)
 
 
-def lumped_inertia(
-    platen_mass: Sequence[float], platen_inertia: Sequence[float], machine: "Machine"
-) -> dict[str, Array]:
+def lumped_inertia(platen_mass: Sequence[float], platen_inertia: Sequence[float], machine: Machine) -> dict[str, Array]:
     """Compose platen alone and the moving parts of actuators and struts at their connection points (Table 4.1).
 
     Isotropic parts are Pinocchio point masses at the platen points; what differs along and across a component adds

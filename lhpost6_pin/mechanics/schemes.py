@@ -7,8 +7,9 @@
 
 An engine brings two things: integrate(q, dq), and the forward dynamics a = f(q, v, tau), ABA.
 
-Arrays: motion (6, nv) and port (4, n_ports), whose rows are named below; JB (2, n_ports, 6) the ports' J and B; frame
-(8, 3) as in `ports`. A stage returns 0, or the number (from 1) of a leg out of its stroke, or -1 if not finite.
+tables are those of the plant (`tables`), ws its `workspace`: motion (6, nv) and port (4, n_ports), whose rows are named
+below, JB (2, n_ports, 6) the ports' J and B, frame (8, 3) as in `ports`, force (n_rows, 3) the ledger. A
+stage returns 0, or the number (from 1) of a leg out of its stroke, or -1 if not finite.
 """
 
 import math
@@ -78,12 +79,13 @@ def leg_out_of_stroke(legs, s):
 
 
 @compiled_inline
-def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, motion):
-    """Forces at the pose and ports in place, for the velocity V_SEEN; fills port[SD], port[FORCE], force, TAU."""
+def forces_stage(tables, ws, z):
+    """Forces at the pose and ports in place, for V_SEEN and states z; fills port[SD], port[FORCE], force, TAU."""
+    motion, port, frame, axes = ws.motion, ws.port, ws.frame, tables.axes
     set_twist(motion[V_SEEN], axes, frame)
-    port_rates(JB[0], frame, port[SD])
-    apply_forces(rows, port[S], port[SD], z, force, port[FORCE])
-    wrench_on_platen(frame, body, JB[1], port[FORCE])
+    port_rates(ws.JB[0], frame, port[SD])
+    apply_forces(tables.rows, port[S], port[SD], z, ws.force, port[FORCE])
+    wrench_on_platen(frame, tables.body, ws.JB[1], port[FORCE])
     if axes.size == 6:
         for k in range(3):
             motion[TAU, k] = frame[6, k]
@@ -91,15 +93,15 @@ def forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, mot
     else:
         motion[TAU, 0] = frame[6, axes[0]]
     for k in range(axes.size, motion.shape[1]):  # specimen joints
-        motion[TAU, k] = -damping[k] * motion[V_SEEN, k]
+        motion[TAU, k] = -tables.damping[k] * motion[V_SEEN, k]
 
 
 @compiled_inline
-def pose_stage(q, axes, legs, body, frame, port, JB):
+def pose_stage(q, tables, ws):
     """Ports at the pose q; returns the stage's status."""
-    platen_pose(q, axes, body, frame)
-    evaluate_ports(frame, legs, body, port[S], JB[0], JB[1])
-    return leg_out_of_stroke(legs, port[S])
+    platen_pose(q, tables.axes, tables.body, ws.frame)
+    evaluate_ports(ws.frame, tables.legs, tables.body, ws.port[S], ws.JB[0], ws.JB[1])
+    return leg_out_of_stroke(tables.legs, ws.port[S])
 
 
 @compiled
@@ -123,37 +125,38 @@ def kick(motion, acceleration, dt):
 
 
 @compiled_inline
-def staggered_stage(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, force, motion):
+def staggered_stage(q, dt, tables, ws, spool):
     """Semi-implicit, after the drift to q: hidden states over the step, then forces at its end.
 
     On entry JB and port[S] are those of the step's start. Each port's slip is the mean of
     its rates at start and end of the step; forces see V_MID extrapolated by dt/2 A to the end.
     """
-    set_twist(motion[V_MID], axes, frame)
+    motion, port, frame, JB = ws.motion, ws.port, ws.frame, ws.JB
+    set_twist(motion[V_MID], tables.axes, frame)
     port_rates(JB[0], frame, port[DS])
     start = port[FORCE]  # free until the forces are known
     start[:] = port[S]
-    status = pose_stage(q, axes, legs, body, frame, port, JB)
+    status = pose_stage(q, tables, ws)
     if status != 0:
         return status
     port_rates(JB[0], frame, port[SD])
     for i in range(start.size):
         port[DS, i] = 0.5 * dt * (port[DS, i] + port[SD, i])
-    advance_states(rows, start, port[DS], dt, spool, supply, z)
+    advance_states(tables.rows, start, port[DS], dt, spool, tables.supply, ws.z)
     for k in range(motion.shape[1]):
         motion[V_SEEN, k] = motion[V_MID, k] + 0.5 * dt * motion[A, k]
-    forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, motion)
+    forces_stage(tables, ws, ws.z)
     return 0
 
 
 @compiled
-def rates_stage(q, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion):
-    """Euler, RK4: forces and rates of hidden states at (q, V_SEEN, z)."""
-    status = pose_stage(q, axes, legs, body, frame, port, JB)
+def rates_stage(q, z, tables, ws, spool):
+    """Euler, RK4: forces and rates of hidden states at (q, V_SEEN, z), which need not be those of ws."""
+    status = pose_stage(q, tables, ws)
     if status != 0:
         return status
-    forces_stage(axes, legs, body, rows, damping, frame, port, JB, z, force, motion)
-    state_rates(rows, port[S], port[SD], spool, supply, z, zd)
+    forces_stage(tables, ws, z)
+    state_rates(tables.rows, ws.port[S], ws.port[SD], spool, tables.supply, z, ws.zd)
     return 0
 
 

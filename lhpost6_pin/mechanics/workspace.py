@@ -1,23 +1,24 @@
 """The arrays that a run works in: made once, changed in place by compiled code."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.compiled import compiled_inline
 from ..effects.registry import PORTS
 from .plant import Plant, State
 from .schemes import V
 
-__all__ = ["Workspace", "make_workspace"]
+__all__ = ["Workspace", "make_workspace", "unpack_workspace"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass
-class Workspace:
+class Workspace(NamedTuple):
     """State and scratch of one running plant; array rows are named in `schemes`."""
 
+    buffer: Array  # all that follow, one behind the other; code that is called once a step takes this alone
     q: Array  # (nq,)
     z: Array  # (n_states,)
     zd: Array  # (n_states,)
@@ -26,22 +27,46 @@ class Workspace:
     JB: Array  # (2, n_ports, 6)
     frame: Array  # (8, 3)
     force: Array  # (n_rows, 3)
-    supply: Array  # the plant's
+
+
+_HEAD = 6
+"""Numbers at the start of a buffer: its sizes nq, n_states, nv, n_ports, n_rows, and one to spare."""
 
 
 def make_workspace(plant: Plant, start: State) -> Workspace:
     """Arrays sized for a plant, holding a copy of the start state."""
-    n = len(plant.ports)
-    motion = np.zeros((6, plant.model.nv))
-    motion[V] = start.v
+    states, n, rows = len(plant.states), len(plant.ports), plant.rows.size
+    nq, nv = plant.model.nq, plant.model.nv
+    shapes = [(nq,), (states,), (states,), (6, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS))]
+    ends = np.cumsum([_HEAD, *(int(np.prod(shape)) for shape in shapes)])
+    buffer = np.zeros(ends[-1])
+    buffer[:_HEAD] = nq, states, nv, n, rows, 0
+    views = (buffer[a:b].reshape(shape) for a, b, shape in zip(ends[:-1], ends[1:], shapes, strict=True))
+    ws = Workspace(buffer, *views)
+    ws.q[:], ws.motion[V], ws.z[:] = start
+    return ws
+
+
+@compiled_inline
+def unpack_workspace(buffer):
+    """Workspace from its buffer."""
+    nq, states, nv = int(buffer[0]), int(buffer[1]), int(buffer[2])
+    n, rows = int(buffer[3]), int(buffer[4])
+    z = _HEAD + nq
+    zd = z + states
+    motion = zd + states
+    port = motion + 6 * nv
+    JB = port + 4 * n
+    frame = JB + 12 * n
+    force = frame + 24
     return Workspace(
-        q=np.array(start.q, float),
-        z=np.array(start.z, float),
-        zd=np.zeros(len(plant.states)),
-        motion=motion,
-        port=np.zeros((4, n)),
-        JB=np.zeros((2, n, 6)),
-        frame=np.zeros((8, 3)),
-        force=np.zeros((plant.rows.size, len(PORTS))),
-        supply=plant.supply.copy(),
+        buffer,
+        buffer[_HEAD:z],
+        buffer[z:zd],
+        buffer[zd:motion],
+        buffer[motion:port].reshape((6, nv)),
+        buffer[port:JB].reshape((4, n)),
+        buffer[JB:frame].reshape((2, n, 6)),
+        buffer[frame:force].reshape((8, 3)),
+        buffer[force : force + 3 * rows].reshape((rows, 3)),
     )

@@ -39,7 +39,7 @@ Entries = dict[str, Any]
 
 def machine_entries(machine: Machine) -> Entries:
     """Every quantity of a machine with unit, deviation, evidence and source, and its effects."""
-    every = (*machine.effects, *machine.alterations)
+    every = (*machine.effects, *machine.modifiers)
     return {
         "name": machine.name,
         "title": machine.title,

@@ -52,21 +52,20 @@ def machine_rows(machine: Machine) -> list[tuple[str, str, str, str, bool]]:
 def report_limits(plant: "Plant") -> dict[str, Any]:
     """Limits that a run report draws: Table 2.2, strokes, speeds and forces of the actuators, supply, strut areas."""
     from ..mechanics.capacity import leg_speeds
-    from ..mechanics.equilibrium import hydraulic_rows
 
     machine = plant.machine
-    rows = plant.rows[hydraulic_rows(plant)]
+    area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
     speeds = leg_speeds(plant)
     return {
         "displacement": machine.limits.displacement,
         "velocity": machine.limits.velocity,
         "acceleration": machine.limits.acceleration,
         "actuator_stroke": [a.stroke for a in machine.actuators],
-        "actuator_force": plant.supply[0] * rows["p"][:, 0] - plant.supply[1] * rows["p"][:, 1],
-        "actuator_pull": np.maximum(0.0, plant.supply[0] * rows["p"][:, 1] - plant.supply[1] * rows["p"][:, 0]),
+        "actuator_force": plant.supply.pressure * area_a - plant.supply.return_pressure * area_b,
+        "actuator_pull": np.maximum(0.0, plant.supply.pressure * area_b - plant.supply.return_pressure * area_a),
         "actuator_extending": speeds[:, 0],
         "actuator_retracting": speeds[:, 1],
-        "supply_pressure": plant.supply[0],
+        "supply_pressure": plant.supply.pressure,
         "strut_area": [s.area for s in machine.struts],
     }
 
@@ -89,8 +88,8 @@ def print_machine(machine: Machine) -> None:
     console.print(table)
     console.print("* assumed: nobody has published this number; change it with --override")
     console.print(_effects_table("Force effects, in ledger order", machine.effects))
-    if machine.alterations:
-        console.print(_effects_table("Effects that alter oil, valves, supply or inertia", machine.alterations))
+    if machine.modifiers:
+        console.print(_effects_table("Effects that alter oil, valves, supply or inertia", machine.modifiers))
     if "estimates.platen_alone.mass" in machine.parameters:
         console.print(_inertia_table(machine))
 

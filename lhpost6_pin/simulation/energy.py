@@ -28,14 +28,10 @@ from numpy.typing import NDArray
 
 from ..core.compiled import compiled
 from ..effects.actuator import oil_power
-from ..effects.evaluate_added import added_power
-from ..effects.registry import HYDRAULIC_DOUBLE, HYDRAULIC_SINGLE, LAWS, NITROGEN_STRUT
+from ..effects.dispatch import HYDRAULIC, LAWS, power
 from ..effects.supply import supply_pressures
-from ..laws.chamber import chamber_energy, flow_enthalpy, flows_double, flows_single
-from ..laws.orifice import opening
-from ..laws.strut import strut_energy
 from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
-from .ledger import number_of, stage_arguments
+from .ledger import history_of, number_of
 from .simulate import Run
 
 if TYPE_CHECKING:
@@ -114,7 +110,7 @@ def energy_audit(run: Run) -> Audit:
     created = np.zeros((n, len(CREATED)))
     spool = np.ascontiguousarray(run.spool)  # over the interval after each sample; before it, that of the last one
     before = np.concatenate([spool[:1], spool[:-1]])
-    _powers(*stage_arguments(run, spool, before, plant.supply, flows, created))
+    _powers(*history_of(run), spool, before, flows, created)
     inflow, inflow_before, dissipated, delivered, stored = np.moveaxis(flows, 2, 0)
     dt = 1.0 / run.rate
     entries, powers, energies = [], [], []
@@ -156,60 +152,25 @@ def _integral(after: Array, before: Array, dt: float) -> Array:
 @compiled
 def row_power(row, s, z, work, spool, supply):
     """Inflow and dissipated power [W] and stored energy [J] of one row that does `work` [W] on its ports."""
-    p = row.p
-    a = row.port
-    k = row.state
-    if row.law == NITROGEN_STRUT:
-        return 0.0, 0.0, strut_energy(s[a], p[0], p[1], p[2], p[3])
-    high, low = supply_pressures(supply, z)
-    if row.altered != 0:
-        return oil_power(row, s[a], z, spool[row.input], high, low)
-    if row.law == HYDRAULIC_DOUBLE:
-        # without leakage these are the flows of the orifices alone
-        q_a, q_b, _, _ = flows_double(
-            opening(spool[row.input], p[6]), z[k], z[k + 1], p[2], p[3], p[4], p[5], 0.0, high, low, p[11]
-        )
-        h_a, h_b = flow_enthalpy(z[k], p[10]), flow_enthalpy(z[k + 1], p[10])
-        oil = chamber_energy(z[k], p[0], p[8] + s[a], p[10]) + chamber_energy(z[k + 1], p[1], p[9] - s[a], p[10])
-        return h_a * q_a + h_b * q_b, (h_a - h_b) * p[7] * (z[k] - z[k + 1]), oil
-    if row.law == HYDRAULIC_SINGLE:
-        q_a, _ = flows_single(opening(spool[row.input], p[6]), z[k], p[2], p[4], 0.0, high, low, p[11])
-        h_a = flow_enthalpy(z[k], p[10])
-        return h_a * q_a, h_a * p[7] * z[k], chamber_energy(z[k], p[0], p[8] + s[a], p[10])
-    dissipated, held = added_power(row, s, z, work)
+    if row.law == HYDRAULIC:
+        high, low = supply_pressures(supply, z)
+        return oil_power(row, s[row.port], z, spool[row.spool], high, low)
+    dissipated, held = power(row, s, z, work)
     return 0.0, dissipated, held
 
 
 @compiled
-def _powers(
-    q,
-    v,
-    z,
-    axes,
-    legs,
-    body,
-    rows,
-    damping,
-    frame,
-    port,
-    JB,
-    force,
-    motion,
-    spool,
-    spool_before,
-    supply,
-    flows,
-    created,
-):
+def _powers(q, v, z, tables, ws, spool, spool_before, flows, created):
     """Fill flows (n, n_effects, 5) and created (n, 3), in the order of CREATED [W].
 
     Flows: inflow just after and just before the sample, dissipated, delivered [W], stored [J].
     """
+    port, force, rows, JB = ws.port, ws.force, tables.rows, ws.JB
     s, sd = port[S], port[SD]
     for k in range(q.shape[0]):
-        motion[V_SEEN] = v[k]
-        pose_stage(q[k], axes, legs, body, frame, port, JB)
-        forces_stage(axes, legs, body, rows, damping, frame, port, JB, z[k], force, motion)
+        ws.motion[V_SEEN] = v[k]
+        pose_stage(q[k], tables, ws)
+        forces_stage(tables, ws, z[k])
         for i in range(rows.size):
             row = rows[i]
             work = force[i, 0] * sd[row.port]
@@ -217,24 +178,24 @@ def _powers(
                 work += force[i, 1] * sd[row.port_2]
             if row.port_3 >= 0:
                 work += force[i, 2] * sd[row.port_3]
-            inflow, dissipated, stored = row_power(row, s, z[k], work, spool[k], supply)
-            before, _, _ = row_power(row, s, z[k], work, spool_before[k], supply)
+            inflow, dissipated, stored = row_power(row, s, z[k], work, spool[k], tables.supply)
+            before, _, _ = row_power(row, s, z[k], work, spool_before[k], tables.supply)
             out = flows[k, row.effect]
             out[0] += inflow
             out[1] += before
             out[2] += dissipated
             out[3] += work
             out[4] += stored
-        linear, turn = frame[4], frame[5]
+        linear, turn = ws.frame[4], ws.frame[5]
         for p in range(s.size):
             apart = JB[1, p] - JB[0, p]
             rate = 0.0
             for j in range(3):
                 rate += apart[j] * linear[j] + apart[3 + j] * turn[j]
-            created[k, 0 if p < legs.size else 2] += port[FORCE, p] * rate
+            created[k, 0 if p < tables.legs.size else 2] += port[FORCE, p] * rate
         for j in range(3):
             i, m = (j + 1) % 3, (j + 2) % 3
-            created[k, 1] -= body[0].mass_extra[j] * linear[j] * (turn[i] * linear[m] - turn[m] * linear[i])
+            created[k, 1] -= tables.body[0].mass_extra[j] * linear[j] * (turn[i] * linear[m] - turn[m] * linear[i])
 
 
 def _rigid_energies(run: Run) -> tuple[Array, Array]:

@@ -4,28 +4,64 @@ It calls the same stages as the per-step engine; only the rigid-body algebra is 
 specimen), and Pinocchio is its oracle.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..control.loop import control_sample
-from ..core.compiled import compiled, compiled_inline
+from ..core.compiled import compiled
 from ..core.errors import SimulationError
+from ..mechanics.forward_dynamics import platen_acceleration
 from ..mechanics.plant import Plant
 from ..mechanics.platen_steps import integrate_platen
-from ..mechanics.rigid_body import platen_inertia
-from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
+from ..mechanics.schemes import (
+    DQ,
+    TAU,
+    V_SEEN,
+    A,
+    V,
+    dexp_inverse,
+    kick,
+    open_step,
+    rates_stage,
+    staggered_stage,
+)
 
-__all__ = ["INERTIA", "inertia_table", "platen_acceleration", "refuse_joints", "run_fused"]
+__all__ = ["Log", "Signals", "Span", "refuse_joints", "run_fused"]
 
 Array = NDArray[np.float64]
 
-INERTIA = np.dtype(
-    [
-        ("plain", np.float64, (6, 6)),  # spatial inertia of the platen body at B, linear first
-        ("inverse", np.float64, (6, 6)),  # of plain plus directional mass, on the free axes, zero elsewhere
-        ("gravity", np.float64),  # [m/s2]
-    ]
-)
+
+class Span(NamedTuple):
+    """The samples that one call runs, and how."""
+
+    scheme: int  # 0 semi_implicit, 1 euler, 2 rk4
+    first: int  # controller samples first..last (exclusive)
+    last: int
+    steps: int  # model steps a sample
+    dt: float  # of one [s]
+    closed: bool  # the controller drives; else recorded spools
+    every: int  # so many samples a row of the log
+
+
+class Signals(NamedTuple):
+    """What drives a run, and what it commands."""
+
+    drive: Array  # (n, columns) of the controller's reference generators, closed loop
+    memory: Array  # of the controller
+    command: Array  # (n, n_actuators) of every sample, closed loop
+    spool: Array  # closed: (steps, n_actuators) of the last sample; open: (n * k, n_actuators), k rows a sample
+
+
+class Log(NamedTuple):
+    """What a run leaves, one row a recorded sample."""
+
+    q: Array  # (n, nq)
+    v: Array  # (n, nv)
+    a: Array  # (n, nv)
+    z: Array  # (n, n_states)
+    spool: Array  # (n, n_actuators) mean over the sample
 
 
 def refuse_joints(plant: Plant) -> None:
@@ -37,117 +73,32 @@ def refuse_joints(plant: Plant) -> None:
         )
 
 
-def inertia_table(plant: Plant) -> NDArray[np.void]:
-    """Table (one row) of the rigid body; raises SimulationError for an articulated specimen."""
-    refuse_joints(plant)
-    plain, full = platen_inertia(plant.model, plant.machine)
-    table = np.zeros(1, INERTIA)
-    table["plain"] = plain
-    block = np.ix_(plant.axes, plant.axes)
-    inverse = np.zeros((6, 6))
-    inverse[block] = np.linalg.inv(full[block])
-    table["inverse"] = inverse
-    table["gravity"] = plant.machine.platen.gravity
-    return table
-
-
-@compiled_inline
-def platen_acceleration(inertia, axes, frame, tau, work, a):
-    """Forward dynamics of the platen body: fill a (n_axes,) from tau at the pose and twist in frame (ABA's oracle).
-
-    M a = tau + I g_b - v x* (I v), g_b gravity in platen axes, I the Inertia's part of M. work (2, 6) is scratch.
-    """
-    plain = inertia[0].plain
-    inverse = inertia[0].inverse
-    g = inertia[0].gravity
-    momentum, total = work[0], work[1]
-    v0, v1, v2 = frame[4, 0], frame[4, 1], frame[4, 2]
-    w0, w1, w2 = frame[5, 0], frame[5, 1], frame[5, 2]
-    gx, gy, gz = -g * frame[2, 0], -g * frame[2, 1], -g * frame[2, 2]
-    for i in range(6):
-        momentum[i] = (
-            plain[i, 0] * v0
-            + plain[i, 1] * v1
-            + plain[i, 2] * v2
-            + plain[i, 3] * w0
-            + plain[i, 4] * w1
-            + plain[i, 5] * w2
-        )
-        total[i] = plain[i, 0] * gx + plain[i, 1] * gy + plain[i, 2] * gz
-    for k in range(axes.size):
-        total[axes[k]] += tau[k]
-    p0, p1, p2 = momentum[0], momentum[1], momentum[2]
-    h0, h1, h2 = momentum[3], momentum[4], momentum[5]
-    total[0] -= w1 * p2 - w2 * p1
-    total[1] -= w2 * p0 - w0 * p2
-    total[2] -= w0 * p1 - w1 * p0
-    total[3] -= w1 * h2 - w2 * h1 + v1 * p2 - v2 * p1
-    total[4] -= w2 * h0 - w0 * h2 + v2 * p0 - v0 * p2
-    total[5] -= w0 * h1 - w1 * h0 + v0 * p1 - v1 * p0
-    for k in range(axes.size):
-        i = axes[k]
-        value = 0.0
-        for j in range(6):
-            value += inverse[i, j] * total[j]
-        a[k] = value
+@compiled
+def _accelerate(tables, ws, a):
+    """Fill a (n_axes,) from the torque, pose and twist in ws."""
+    platen_acceleration(tables.inertia, tables.axes, ws.frame, ws.motion[TAU], np.empty((2, 6)), a)
 
 
 @compiled
-def _euler_step(
-    q,
-    dt,
-    axes,
-    legs,
-    body,
-    rows,
-    damping,
-    spool,
-    supply,
-    frame,
-    port,
-    JB,
-    z,
-    zd,
-    force,
-    motion,
-    inertia,
-    work,
-):
+def _euler_step(dt, tables, ws, spool):
+    motion, q, z = ws.motion, ws.q, ws.z
     motion[V_SEEN] = motion[V]
-    status = rates_stage(q, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, zd, force, motion)
+    status = rates_stage(q, z, tables, ws, spool)
     if status != 0:
         return status
-    platen_acceleration(inertia, axes, frame, motion[TAU], work, motion[A])
+    _accelerate(tables, ws, motion[A])
     motion[DQ] = dt * motion[V]
-    integrate_platen(q, motion[DQ], axes, q)
+    integrate_platen(q, motion[DQ], tables.axes, q)
     for k in range(motion.shape[1]):
         motion[V, k] += dt * motion[A, k]
     for k in range(z.size):
-        z[k] += dt * zd[k]
+        z[k] += dt * ws.zd[k]
     return 0
 
 
 @compiled
-def _rk4_step(
-    q,
-    dt,
-    axes,
-    legs,
-    body,
-    rows,
-    damping,
-    spool,
-    supply,
-    frame,
-    port,
-    JB,
-    z,
-    zd,
-    force,
-    motion,
-    inertia,
-    work,
-):
+def _rk4_step(dt, tables, ws, spool):
+    motion, q, z, zd, axes = ws.motion, ws.q, ws.z, ws.zd, tables.axes
     n = motion.shape[1]
     v0, z0, q_at = motion[V].copy(), z.copy(), q.copy()
     z_at = z.copy()
@@ -166,16 +117,14 @@ def _rk4_step(
             motion[DQ, :] = 0.0
         for k in range(n):
             motion[V_SEEN, k] = v0[k] + reach * dt * dv[k]
-        status = rates_stage(
-            q_at, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z_at, zd, force, motion
-        )
+        status = rates_stage(q_at, z_at, tables, ws, spool)
         if status != 0:
             return status
         if n == 6:
             dexp_inverse(motion[DQ], motion[V_SEEN], step)
         else:
             step[:] = motion[V_SEEN]
-        platen_acceleration(inertia, axes, frame, motion[TAU], work, dv)
+        _accelerate(tables, ws, dv)
         if stage == 0:
             motion[A] = dv
         for k in range(n):
@@ -193,140 +142,56 @@ def _rk4_step(
 
 
 @compiled
-def run_fused(
-    scheme,
-    first,
-    last,
-    steps,
-    dt,
-    axes,
-    legs,
-    body,
-    rows,
-    damping,
-    supply,
-    delays,
-    inertia,
-    q,
-    z,
-    zd,
-    motion,
-    port,
-    JB,
-    frame,
-    force,
-    fed,
-    closed,
-    axis,
-    actuator,
-    balance,
-    canceller,
-    memory,
-    drive,
-    command,
-    spool,
-    every,
-    out_q,
-    out_v,
-    out_a,
-    out_z,
-    out_spool,
-):
-    """Run controller samples first..last (exclusive) of `steps` model steps each.
+def run_fused(span, tables, ws, control, signals, log):
+    """Run the samples of a span; tables and ws are the plant's, control the controller's.
 
-    scheme 0 semi_implicit, 1 euler, 2 rk4. closed: the controller (axis, actuator, balance, canceller, memory) fills
-    command (n, nu) from drive and spool (steps, nu) holds those of the last sample; otherwise spool (n * k, nu) drives,
-    k rows a sample. fed (nu,) are the actuators' rows.
-    Every `every`-th sample is written to out_*. The other arrays are those of `Plant` and `Workspace`.
     Returns (status, samples done, commands clipped).
     """
-    nu = command.shape[1]
-    window = spool if closed else np.zeros((steps, nu))
-    work = np.zeros((2, 6))
-    a = np.zeros(motion.shape[1])
-    per_sample = spool.shape[0] // max(1, command.shape[0])
+    dt, steps, motion, q = span.dt, span.steps, ws.motion, ws.q
+    nu = signals.command.shape[1]
+    window = signals.spool if span.closed else np.zeros((steps, nu))
+    work, a = np.zeros((2, 6)), np.zeros(motion.shape[1])
+    per_sample = signals.spool.shape[0] // max(1, signals.command.shape[0])
     clipped = 0
-    if scheme == 0:
+    if span.scheme == 0:
         open_step(motion, dt)
-    for sample in range(first, last):
-        if closed:
-            if scheme != 0:  # the other schemes leave the ports of their last stage behind
+    for sample in range(span.first, span.last):
+        if span.closed:
+            if span.scheme != 0:  # the other schemes leave the ports of their last stage behind
                 motion[V_SEEN] = motion[V]
-                rates_stage(
-                    q,
-                    axes,
-                    legs,
-                    body,
-                    rows,
-                    damping,
-                    window[0],
-                    supply,
-                    frame,
-                    port,
-                    JB,
-                    z,
-                    zd,
-                    force,
-                    motion,
-                )
-                platen_acceleration(inertia, axes, frame, motion[TAU], work, motion[A])
+                rates_stage(q, ws.z, tables, ws, window[0])
+                _accelerate(tables, ws, motion[A])
             clipped += control_sample(
-                sample,
-                drive,
-                port,
-                force,
-                fed,
-                frame,
-                motion,
-                legs,
-                body,
-                axes,
-                axis,
-                actuator,
-                balance,
-                canceller,
-                memory,
-                command,
-                delays,
-                1.0 / (steps * dt),
-                window,
+                sample, signals.drive, tables, ws, control, signals.memory, signals.command, window
             )
         else:
             for j in range(steps):
                 row = sample * per_sample + j * per_sample // steps
                 for i in range(nu):
-                    window[j, i] = spool[row, i]
-        if sample % every == 0:
-            at = sample // every
-            out_q[at] = q
-            out_v[at] = motion[V]
-            out_a[at] = motion[A]
-            out_z[at] = z
+                    window[j, i] = signals.spool[row, i]
+        if sample % span.every == 0:
+            at = sample // span.every
+            log.q[at] = q
+            log.v[at] = motion[V]
+            log.a[at] = motion[A]
+            log.z[at] = ws.z
             for i in range(nu):
-                out_spool[at, i] = window[:, i].sum() / steps
+                log.spool[at, i] = window[:, i].sum() / steps
         status = 0
         for j in range(steps):
-            if scheme == 0:
-                integrate_platen(q, motion[DQ], axes, q)
-                status = staggered_stage(
-                    q, dt, axes, legs, body, rows, damping, window[j], supply, frame, port, JB, z, force, motion
-                )
+            if span.scheme == 0:
+                integrate_platen(q, motion[DQ], tables.axes, q)
+                status = staggered_stage(q, dt, tables, ws, window[j])
                 if status != 0:
                     break
-                platen_acceleration(inertia, axes, frame, motion[TAU], work, a)
+                platen_acceleration(tables.inertia, tables.axes, ws.frame, motion[TAU], work, a)
                 kick(motion, a, dt)
-            elif scheme == 1:
-                status = _euler_step(
-                    q, dt, axes, legs, body, rows, damping, window[j], supply, frame, port, JB, z, zd, force, motion,
-                    inertia, work,
-                )  # fmt: skip
+            elif span.scheme == 1:
+                status = _euler_step(dt, tables, ws, window[j])
             else:
-                status = _rk4_step(
-                    q, dt, axes, legs, body, rows, damping, window[j], supply, frame, port, JB, z, zd, force, motion,
-                    inertia, work,
-                )  # fmt: skip
+                status = _rk4_step(dt, tables, ws, window[j])
             if status != 0:
                 break
         if status != 0:
             return status, sample + 1, clipped
-    return 0, last, clipped
+    return 0, span.last, clipped

@@ -11,12 +11,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from ..core.compiled import compiled
-from ..effects.registry import ROW
 from ..mechanics.derivatives import rates_at
 from ..mechanics.plant import Plant
-from ..mechanics.ports import BODY, LEG
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, staggered_stage
-from ..mechanics.workspace import Workspace
+from ..mechanics.tables import unpack_tables
+from ..mechanics.workspace import Workspace, unpack_workspace
 
 __all__ = ["Stepper", "make_stepper"]
 
@@ -31,26 +30,23 @@ def make_stepper(plant: Plant, scheme: str, dt: float) -> Stepper:
 
 
 @compiled
-def _staggered(q, dt, axes, legs, body, rows, damping, spool, supply, frame, port, JB, z, force, motion):  # type: ignore[no-untyped-def]
-    """`staggered_stage` with its tables as plain numbers, which are cheaper to hand over than records."""
-    tables = legs.view(LEG), body.view(BODY), rows.view(ROW)
-    return staggered_stage(q, dt, axes, *tables, damping, spool, supply, frame, port, JB, z, force, motion)
+def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
+    """`staggered_stage` with tables and workspace packed, which are cheaper to hand over."""
+    return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
 
 def _semi_implicit(plant: Plant, dt: float) -> Stepper:
-    model, data = plant.model, plant.model.createData()
-    axes, damping = plant.axes, np.array(model.damping)
-    legs, body, rows = (table.view(float) for table in (plant.legs, plant.body, plant.rows))
+    model, data, packed = plant.model, plant.model.createData(), plant.tables.packed
     aba, integrate = pin.aba, pin.integrate
 
     def advance(ws: Workspace, spool: Array) -> int:
-        motion, frame, port, JB, z, force, supply = ws.motion, ws.frame, ws.port, ws.JB, ws.z, ws.force, ws.supply
+        motion, buffer = ws.motion, ws.buffer
         dq, v_seen, tau = motion[DQ], motion[V_SEEN], motion[TAU]
         open_step(motion, dt)  # after a kick this changes nothing
         q, status = ws.q, 0
         for held in spool:
             q = integrate(model, q, dq)
-            status = _staggered(q, dt, axes, legs, body, rows, damping, held, supply, frame, port, JB, z, force, motion)
+            status = _staggered(q, dt, packed, buffer, held)
             if status:
                 break
             kick(motion, aba(model, data, q, v_seen, tau), dt)
@@ -64,7 +60,7 @@ def _euler(plant: Plant, dt: float) -> Stepper:
     model, data = plant.model, plant.model.createData()
 
     def advance(ws: Workspace, spool: Array) -> int:
-        motion = ws.motion
+        motion, z = ws.motion, ws.z
         for held in spool:
             motion[V_SEEN] = motion[V]
             status = rates_at(plant, ws, ws.q, ws.z, held)
@@ -73,7 +69,7 @@ def _euler(plant: Plant, dt: float) -> Stepper:
             motion[A] = pin.aba(model, data, ws.q, motion[V], motion[TAU])
             ws.q[:] = pin.integrate(model, ws.q, dt * motion[V])
             motion[V] += dt * motion[A]
-            ws.z += dt * ws.zd
+            z += dt * ws.zd
         return 0
 
     return advance

@@ -10,7 +10,7 @@ Inertia = sum of all effects and the weight (Eqs. 4-24 to 4-26), each as a wrenc
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,13 +21,14 @@ from ..core.errors import UnknownNameError
 from ..effects.registry import PORTS
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import V_SEEN, forces_stage, pose_stage
-from ..mechanics.workspace import make_workspace
+from ..mechanics.tables import Tables
+from ..mechanics.workspace import Workspace, make_workspace
 from .simulate import Run
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Ledger", "States", "add_at_c", "add_row_at_c", "force_ledger", "number_of", "stage_arguments"]
+__all__ = ["Ledger", "States", "add_at_c", "add_row_at_c", "force_ledger", "number_of", "history_of"]
 
 Array = NDArray[np.float64]
 
@@ -104,7 +105,7 @@ def force_ledger(run: "Run | States") -> Ledger:
     by_row = np.zeros((n, plant.rows.size, len(PORTS)))
     by_effect = np.zeros((n, len(effects), 6))
     turn = np.zeros((n, 3, 3))
-    _forces(*stage_arguments(run, by_row, by_effect, turn))
+    _forces(*history_of(run), by_row, by_effect, turn)
     inertia, gravity = (_at_c(turn, plant, w) for w in _rigid_wrenches(run))
     names = [e.name for e in effects]
     wrench = np.concatenate([by_effect, gravity[:, None]], axis=1)
@@ -128,28 +129,25 @@ def number_of(kind: str, name: str, valid: Sequence[str]) -> int:
     return list(valid).index(name)
 
 
-def stage_arguments(run: "Run | States", *more: Array) -> tuple[Any, ...]:
-    """States of a run, tables and scratch for the stages, and more, in the order of the compiled loops below."""
+def history_of(run: "Run | States") -> tuple[Array, Array, Array, Tables, Workspace]:
+    """States q, v, z of a run, the plant's tables and a workspace, as the compiled loops below take them."""
     plant = run.plant
-    ws = make_workspace(plant, plant.zero_state())
-    states = (np.ascontiguousarray(x) for x in (run.q, run.v, run.z))
-    tables = (plant.axes, plant.legs, plant.body, plant.rows, np.array(plant.model.damping))
-    return (*states, *tables, ws.frame, ws.port, ws.JB, ws.force, ws.motion, *more)
+    q, v, z = (np.ascontiguousarray(x) for x in (run.q, run.v, run.z))
+    return q, v, z, plant.tables, make_workspace(plant, plant.zero_state())
 
 
 @compiled
-def _forces(q, v, z, axes, legs, body, rows, damping, frame, port, JB, force, motion, by_row, by_effect, turn):
+def _forces(q, v, z, tables, ws, by_row, by_effect, turn):
     """Fill by_row (n, n_rows, 3), by_effect (n, n_effects, 6) at C in {c} and turn (n, 3, 3), the rotation s_R_b."""
-    rho = body[0].rho_c
-    B = JB[1]
+    rho = tables.body[0].rho_c
     for k in range(q.shape[0]):
-        motion[V_SEEN] = v[k]
-        pose_stage(q[k], axes, legs, body, frame, port, JB)
-        forces_stage(axes, legs, body, rows, damping, frame, port, JB, z[k], force, motion)
-        by_row[k] = force
-        turn[k] = frame[:3]
-        for i in range(rows.size):
-            add_row_at_c(force[i], B, rows[i], rho, frame, by_effect[k, rows[i].effect])
+        ws.motion[V_SEEN] = v[k]
+        pose_stage(q[k], tables, ws)
+        forces_stage(tables, ws, z[k])
+        by_row[k] = ws.force
+        turn[k] = ws.frame[:3]
+        for i in range(tables.rows.size):
+            add_row_at_c(ws.force[i], ws.JB[1], tables.rows[i], rho, ws.frame, by_effect[k, tables.rows[i].effect])
 
 
 @compiled_inline

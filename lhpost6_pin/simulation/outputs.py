@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 
 from ..data.channels import LAYOUT
 from ..data.records import make_record
-from ..effects.actuator import rods_ahead
-from ..effects.supply import supply_pressures
-from ..laws.strut import gas_pressure
-from ..mechanics.equilibrium import hydraulic_rows
+from ..effects.actuator import rod_travels
+from ..laws.nitrogen_strut import gas_pressure
 from ..mechanics.gas_pressure import gas_ratio
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
@@ -33,15 +31,15 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     plant, machine = run.plant, run.plant.machine
     motion = platen_motion(plant, run.q, run.v, run.a)
     legs, _ = leg_displacements(plant, motion.displacement)
-    rows = plant.rows[hydraulic_rows(plant)]
+    rows, oil = plant.rows[plant.tables.actuators], plant.actuators
     states = rows["state"]
     ahead = np.zeros((len(run.z), plant.spools))
-    rods_ahead(rows, run.z, ahead)  # a stroke is measured between barrel and rod
+    rod_travels(rows, run.z, ahead)  # a stroke is measured between barrel and rod
     double = np.array([name in machine.double_acting for name in machine.actuator_names])
     pressure_a = run.z[:, states]
     pressure_b = run.z[:, states[double] + 1]
-    force = pressure_a * rows["p"][:, 0]
-    force[:, double] -= pressure_b * rows["p"][double, 1]
+    force = pressure_a * oil.area_a
+    force[:, double] -= pressure_b * oil.area_b[double]
     channels: dict[str, Any] = {
         "platen_displacement": motion.displacement,
         "platen_velocity": motion.velocity,
@@ -97,8 +95,9 @@ def _strut_pressure(run: Run, elongation: Array) -> Array:
 
 
 def _supply_pressure(run: Run) -> Array:
-    supply, law = run.plant.supply, supply_pressures.py_func  # type: ignore[attr-defined]
-    return np.broadcast_to(law(supply, run.z.T)[0], len(run.time)).copy()
+    supply = run.plant.supply
+    drawn = run.z[:, int(supply.drawn)] if supply.drawn >= 0.0 else np.zeros(len(run.time))
+    return supply.pressure - supply.droop * drawn
 
 
 def _hidden_states(run: Run) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from ..data.records import require
 from ..data.signals import resample_band_limited
 from ..machine.machine import Machine
 from ..mechanics.capacity import make_leg_check
-from ..mechanics.equilibrium import find_equilibrium, hydraulic_rows
+from ..mechanics.equilibrium import find_equilibrium
 from ..mechanics.plant import Plant, State, make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import LimitsSummary, MotionLimits, Target, check_limits
@@ -165,7 +165,7 @@ def _start(plant: Plant, record: xr.Dataset) -> State:
     """Zero pose at rest with the chamber pressures of the record's first sample."""
     zero = plant.zero_state()
     z = zero.z.copy()
-    for name, row in zip(plant.machine.actuator_names, plant.rows[hydraulic_rows(plant)], strict=True):
+    for name, row in zip(plant.machine.actuator_names, plant.rows[plant.tables.actuators], strict=True):
         z[row["state"]] = float(record["chamber_pressure_a"].sel(actuator=name)[0])
         if name in plant.machine.double_acting:
             z[row["state"] + 1] = float(record["chamber_pressure_b"].sel(horizontal=name)[0])

@@ -10,12 +10,12 @@ The same compiled stages, in the same order, as a run of `simulate` in the Pinoc
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.loop import sense_flat
+from ..control.loop import sense_packed
 from ..control.plug import Feedback
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE, SCHEMES
 from ..mechanics.derivatives import evaluate_derivatives
-from ..mechanics.equilibrium import Equilibrium, hydraulic_rows
+from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import V, spool_windows, steps_a_sample
 from ..mechanics.workspace import make_workspace
@@ -50,7 +50,7 @@ class RunningPlant:
         self._ws = make_workspace(plant, rest.state)
         self._window = np.zeros((steps, plant.spools))
         self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))
-        self._path, self._fed = plant.command_path, hydraulic_rows(plant)
+        self._path = plant.command_path
         evaluate_derivatives(plant, self._ws, np.ascontiguousarray(rest.spool))
 
     @property
@@ -69,24 +69,12 @@ class RunningPlant:
         return np.asarray(self._window.mean(axis=0))
 
     def sensors(self) -> Feedback:
-        """Sensors at the next sample, in new arrays."""
+        """Feedback at the next sample, in new arrays."""
         ws, plant = self._ws, self.plant
         if self.scheme != SCHEMES[0]:  # the other schemes leave the ports of their last stage behind
             evaluate_derivatives(plant, ws, self._window[0])
         found = Feedback(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
-        body = plant.body.view(float)
-        sense_flat(
-            ws.port,
-            ws.force,
-            self._fed,
-            body,
-            plant.axes,
-            ws.frame,
-            ws.motion,
-            found.displacement,
-            found.acceleration,
-            found.force,
-        )
+        sense_packed(plant.tables.packed, ws.buffer, *found)
         return found
 
     def snapshot(self) -> Snapshot:

@@ -13,21 +13,20 @@ stops; what was computed is kept, and `Run.trouble` says when, which component, 
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..control.loop import ACTUATOR, AXIS, CANCELLER, control_sample_flat, sense_flat
+from ..control.loop import ACTUATOR, AXIS, CANCELLER, control_packed, pack_control, sense_packed
 from ..control.plug import Feedback, start_plugged, step_plugged, wanted_from
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from ..mechanics.derivatives import evaluate_derivatives
-from ..mechanics.equilibrium import hydraulic_rows
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import A, V, spool_windows
 from ..mechanics.workspace import Workspace, make_workspace
 from .drives import ClosedLoop, Drive, OpenLoop, PluggedLoop, check_drive, check_options, check_run
-from .engine_fused import inertia_table, run_fused
+from .engine_fused import Log, Signals, Span, run_fused
 from .engine_pinocchio import make_stepper
 from .snapshot import EVERY, Watch, take_snapshot
 
@@ -107,7 +106,7 @@ def simulate(
         first = drive.rest.spool
         spool = np.tile(first, (steps, 1))
     ws = make_workspace(plant, start)
-    log_ = _Log(plant, -(-samples // record_every))
+    log_ = _make_log(plant, -(-samples // record_every))
     command = np.tile(first, (samples, 1)) if closed else np.zeros((samples, plant.spools))
     status = evaluate_derivatives(plant, ws, np.ascontiguousarray(first))
     done = 0
@@ -147,19 +146,16 @@ def fastest_engine(plant: Plant) -> str:
     return "pinocchio" if plant.articulated else "fused"
 
 
-class _Log:
-    """Arrays that a run fills, one row a recorded sample."""
+def _make_log(plant: Plant, n: int) -> Log:
+    """Arrays that a run of n recorded samples fills."""
+    widths = plant.model.nq, plant.model.nv, plant.model.nv, len(plant.states), plant.spools
+    return Log(*(np.zeros((n, width)) for width in widths))
 
-    def __init__(self, plant: Plant, n: int) -> None:
-        self.q = np.zeros((n, plant.model.nq))
-        self.v = np.zeros((n, plant.model.nv))
-        self.a = np.zeros((n, plant.model.nv))
-        self.z = np.zeros((n, len(plant.states)))
-        self.spool = np.zeros((n, plant.spools))
 
-    def take(self, at: int, ws: Workspace, spool: Array) -> None:
-        self.q[at], self.v[at], self.a[at], self.z[at] = ws.q, ws.motion[V], ws.motion[A], ws.z
-        self.spool[at] = spool
+def _take(log_: Log, at: int, ws: Workspace, spool: Array) -> None:
+    """Fill row `at` of the log."""
+    log_.q[at], log_.v[at], log_.a[at], log_.z[at] = ws.q, ws.motion[V], ws.motion[A], ws.z
+    log_.spool[at] = spool
 
 
 def _clip(spool: Array) -> tuple[Array, int]:
@@ -173,7 +169,7 @@ class _Job(NamedTuple):
     plant: Plant
     drive: Drive
     ws: Workspace
-    log: _Log
+    log: Log
     scheme: str
     samples: int
     steps: int  # model steps a sample
@@ -202,7 +198,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
             evaluate_derivatives(plant, ws, window[0])  # the other schemes leave the ports of their last stage behind
         clipped += spools(sample, window)
         if sample % job.every == 0:
-            job.log.take(sample // job.every, ws, window.sum(axis=0) / steps)
+            _take(job.log, sample // job.every, ws, window.sum(axis=0) / steps)
         job.look(sample)
         status = advance(ws, window)
         if status:
@@ -217,7 +213,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
 def _spools_from(job: _Job) -> Callable[[int, Array], int]:
     """Function that fills a sample's window (steps, n_actuators) of spools and returns how many were clipped."""
     plant, drive, ws, command = job.plant, job.drive, job.ws, job.command
-    fed, rate = hydraulic_rows(plant), float(SAMPLE_RATE)
+    packed, buffer = plant.tables.packed, ws.buffer
     if isinstance(drive, OpenLoop):
         rows = len(job.spool) // job.samples
 
@@ -227,24 +223,22 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
 
         return recorded
     if isinstance(drive, ClosedLoop):
-        loop = drive.controller
-        state = ws.port, ws.force, fed, ws.frame, ws.motion
-        call: Any = control_sample_flat
+        loop, call = drive.controller, control_packed
         values = np.ascontiguousarray(drive.drive, float)  # any other kind would be compiled for anew
-        rest = (values, *state, *loop.flat_tables(), loop.init(), command, plant.command_path, rate)
+        control, memory = loop.tables.packed, loop.init()
 
         def compiled_loop(sample: int, window: Array) -> int:
-            return int(call(sample, *rest, window))
+            return int(call(sample, values, packed, buffer, control, memory, command, window))
 
         return compiled_loop
     users = drive.controller
     wanted = wanted_from(drive.displacement, drive.velocity, drive.acceleration)
     own = start_plugged(users, plant, drive.rest)
     sensors = Feedback(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
-    body, path = plant.body.view(float), plant.command_path
+    path, rate = plant.command_path, float(SAMPLE_RATE)
 
     def plugged(sample: int, window: Array) -> int:
-        sense_flat(ws.port, ws.force, fed, body, plant.axes, ws.frame, ws.motion, *sensors)
+        sense_packed(packed, buffer, *sensors)
         asked = step_plugged(users, own, sample, wanted(sample), sensors)
         command[sample], clipped = _clip(asked)
         spool_windows(command, 0, sample, path, rate, window)
@@ -255,54 +249,22 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
 
 def _run_fused(job: _Job) -> tuple[int, int, int]:
     """Run all samples in compiled chunks; returns (status, samples done, commands clipped)."""
-    plant, drive, ws, log_ = job.plant, job.drive, job.ws, job.log
-    inertia = inertia_table(plant)
-    damping = np.array(plant.model.damping)
-    fed = hydraulic_rows(plant)
+    plant, drive = job.plant, job.drive
+    none = np.zeros((1, 1))
     if isinstance(drive, ClosedLoop):
         loop = drive.controller
-        values = np.ascontiguousarray(drive.drive, float)
-        tables = (True, loop.axis, loop.actuator, loop.balance, loop.canceller, loop.init(), values)
+        control, memory, values = loop.tables, loop.init(), np.ascontiguousarray(drive.drive, float)
     else:
-        none = np.zeros((1, 1))
-        tables = (False, np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER), none, none)
+        control = pack_control(np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER))
+        memory = values = none
+    signals = Signals(values, memory, job.command, job.spool)
+    scheme, closed = SCHEMES.index(job.scheme), isinstance(drive, ClosedLoop)
     clipped, chunk = 0, _CHUNK if job.watch is None else EVERY
     for first in range(0, job.samples, chunk):
         last = min(first + chunk, job.samples)
         job.look(first)
-        status, done, more = run_fused(
-            SCHEMES.index(job.scheme),
-            first,
-            last,
-            job.steps,
-            job.dt,
-            plant.axes,
-            plant.legs,
-            plant.body,
-            plant.rows,
-            damping,
-            ws.supply,
-            plant.command_path,
-            inertia,
-            ws.q,
-            ws.z,
-            ws.zd,
-            ws.motion,
-            ws.port,
-            ws.JB,
-            ws.frame,
-            ws.force,
-            fed,
-            *tables,
-            job.command,
-            job.spool,
-            job.every,
-            log_.q,
-            log_.v,
-            log_.a,
-            log_.z,
-            log_.spool,
-        )
+        span = Span(scheme, first, last, job.steps, job.dt, closed, job.every)
+        status, done, more = run_fused(span, plant.tables, job.ws, control, signals, job.log)
         clipped += more
         if status:
             return status, done, clipped

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mechanics.equilibrium import hydraulic_rows
 from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..mechanics.schemes import A, V
@@ -36,4 +35,4 @@ def take_snapshot(plant: Plant, ws: Workspace, time: float) -> Snapshot:
     """The snapshot of a plant whose workspace is at a time [s]."""
     displacement = platen_motion(plant, ws.q[None], ws.motion[V][None], ws.motion[A][None]).displacement[0]
     struts = [ws.force[plant.rows["port"] == i, 0].sum() for i in range(plant.spools, plant.legs.size)]
-    return Snapshot(time, displacement, np.array([*ws.force[hydraulic_rows(plant), 0], *struts]))
+    return Snapshot(time, displacement, np.array([*ws.force[plant.tables.actuators, 0], *struts]))

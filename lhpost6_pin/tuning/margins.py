@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..control import Controller
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import opening
-from ..mechanics.equilibrium import find_equilibrium, hydraulic_rows
+from ..mechanics.equilibrium import find_equilibrium
 from ..mechanics.linearize import SPOOL_STEP, linearize
 from ..mechanics.plant import make_plant
 
@@ -64,18 +64,18 @@ def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> L
     keep = [*range(2 * nv), *oil]
     a, b = linear.A[np.ix_(keep, keep)], linear.B[keep]
     # spool per leg rate: the controller inverts the flow curve about the opening at rest
-    rows = plant.rows[hydraulic_rows(plant)]
-    for i, (row, valve) in enumerate(zip(rows, controller.actuator, strict=True)):
-        curve, at = float(row["p"][6]), float(rest.spool[i])
+    actuators = plant.actuators
+    for i, valve in enumerate(controller.actuator):
+        curve, at = float(actuators.flow_curve[i]), float(rest.spool[i])
         slope = (opening(at + SPOOL_STEP, curve) - opening(at - SPOOL_STEP, curve)) / (2.0 * SPOOL_STEP)
         b[:, i] /= slope * (valve["extend"] if valve["bias"] >= 0.0 else valve["retract"])
     to_c = np.zeros((axes.size, len(keep)))
     to_c[:, : axes.size] = controller.lever[np.ix_(axes, axes)]
     pressure = {name: k for k, name in enumerate(plant.states[i - 2 * nv] for i in keep[2 * nv :])}
     to_force = np.zeros((plant.spools, len(keep)))
-    for i, row in enumerate(rows):
-        for offset, area in enumerate((row["p"][0], -row["p"][1])):
-            name = plant.states[row["state"] + offset] if offset == 0 or area != 0.0 else None
+    for i, first in enumerate(plant.rows["state"][plant.tables.actuators]):
+        for offset, area in enumerate((actuators.area_a[i], -actuators.area_b[i])):
+            name = plant.states[first + offset] if offset == 0 or area != 0.0 else None
             if name in pressure:
                 to_force[i, 2 * nv + pressure[name]] = area
     s = 2j * np.pi * frequency[:, None, None]

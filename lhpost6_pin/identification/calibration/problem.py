@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from ...data.channels import residuals_of
 from ...data.sensors import SensorSet
-from ...effects.registry import BOUC_WEN_1D, BOUC_WEN_2D
+from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
 from ..prepare import MeasuredTest
-from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, states_of
+from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .sensor_errors import corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
@@ -308,7 +308,9 @@ def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
 def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
     """Hidden states (n_states,) of friction that holds a share of its force, one standard deviation either way."""
     out = np.zeros(len(plant.states))
-    for row in plant.rows[np.isin(plant.rows["law"], (BOUC_WEN_1D, BOUC_WEN_2D))]:
+    for row in plant.rows:
+        if not law_of(row).friction_memory:
+            continue
         both = states_of(row)
         out[both] = np.clip(share * rng.standard_normal(len(out[both])), -0.7, 0.7)  # within the unit disc
     return out

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ...core.names import SAMPLE_RATE
 from ...data.signals import resample_band_limited
-from ...mechanics.equilibrium import hydraulic_rows
 from ...mechanics.plant import Plant, State
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, simulate
@@ -149,6 +148,6 @@ def _outputs(plant: Plant, drive: _Drive) -> Array | None:
 
 def _pressure_states(plant: Plant) -> Array:
     """Places of the pressures in z: chamber A of every actuator, then B of the double-acting."""
-    first = plant.rows[hydraulic_rows(plant)]["state"]
+    first = plant.rows["state"][plant.tables.actuators]
     double = [name in plant.machine.double_acting for name in plant.machine.actuator_names]
     return np.concatenate([first, first[double] + 1])

@@ -22,7 +22,7 @@ from ... import __version__
 from ...core.errors import SimulationError
 from ...core.names import AXES, SAMPLE_RATE, SCHEMES
 from ...machine.machine import Machine
-from ...mechanics.equilibrium import find_equilibrium, hydraulic_rows
+from ...mechanics.equilibrium import find_equilibrium
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import platen_motion
 from ...simulation.running import RunningPlant
@@ -242,7 +242,7 @@ def _outputs(machine: Machine) -> list[tuple[str, str, str]]:
 def _measure(table: RunningPlant) -> np.ndarray:
     """Values of `_outputs` at a plant's next sample."""
     plant, state, sensors = table.plant, table.state, table.sensors()
-    chamber = plant.rows["state"][hydraulic_rows(plant)]
+    chamber = plant.rows["state"][plant.tables.actuators]
     double = [a.area_b is not None for a in plant.machine.actuators]
     platen = platen_motion(plant, state.q[None], state.v[None], np.zeros((1, len(state.v))))
     return np.concatenate(

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...effects.registry import NODES
+from ...laws.tabulated import NODES
 from ..structure import Structure
 
 __all__ = ["BUILD"]

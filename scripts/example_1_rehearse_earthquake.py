@@ -2,7 +2,7 @@
 
     python scripts/example_1_rehearse_earthquake.py [MOTION] [--scale 0.5] [--out DIR]
 
-What `lhpost6 run` does, in seven steps to copy from.
+The steps of `lhpost6 run` in Python.
 """
 
 from pathlib import Path
@@ -24,12 +24,12 @@ from lhpost6_pin.simulation.rehearse import rehearse
 
 
 def main(
-    motion: Annotated[str, typer.Argument(help="Name, as `lhpost6 motions` lists them.")] = "ridgecrest",
-    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
-    out: Annotated[Path, typer.Option(help="Folder for record.nc and report.html.")] = Path("out/example"),
+    motion: Annotated[str, typer.Argument(help="Name; `lhpost6 motions` lists them.")] = "ridgecrest",
+    scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0,
+    out: Annotated[Path, typer.Option(help="Directory of record.nc and report.html.")] = Path("out/example"),
 ) -> None:
-    """Rehearse MOTION and say how closely the platen followed it."""
-    # 1. The machine, a ground motion, and what the table is asked to do, sampled at the controller's rate
+    """Rehearse MOTION and print the tracking errors."""
+    # 1. The machine, a ground motion, and its target, sampled at the rate of the controller
     machine = load_machine("lhpost6")
     target = make_target(find_motion(motion), scale=scale)
 
@@ -42,19 +42,19 @@ def main(
     # 4. The report: one HTML file
     summary = write_run_report(test.record, out / "report.html", limits=report_limits(test.run.plant))
 
-    # 5. Or straight from the arrays: how far the platen's displacement is from what was asked
+    # 5. The same from the arrays: error of the platen displacement against the target
     errors = rrmse(test.record["reference_displacement"], test.record["platen_displacement"])
-    for axis, error, asked in zip(AXES, errors, target.displacement.any(axis=0), strict=True):
-        if asked:
+    for axis, error, moves in zip(AXES, errors, target.displacement.any(axis=0), strict=True):
+        if moves:
             print(f"{axis}: displacement RRMSE {100 * error:.2f} %")
 
-    # 6. Where the energy went
+    # 6. The energy balance
     audit = energy_audit(test.run)
     for kind in ("inflow", "stored", "dissipated", "created"):
         print(f"energy {kind}: {audit.total(kind)[-1] / 1e3:.1f} kJ")
-    print(f"not accounted for: {abs(audit.residual).max() / 1e3:.3f} kJ")
+    print(f"energy residual: {abs(audit.residual).max() / 1e3:.3f} kJ")
 
-    # 7. Where to look
+    # 7. The verdict, and the file of the report
     print(summary.verdict)
     print(summary.path)
 

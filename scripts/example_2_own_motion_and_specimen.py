@@ -1,9 +1,9 @@
-"""A motion of your own and a specimen: whether it fits, and what the specimen does to the table.
+"""A motion of your own and a specimen: the limits, and the effect of the specimen on the table.
 
     python scripts/example_2_own_motion_and_specimen.py [FILE...] [--specimen pendulum] [--scale 1] [--out DIR]
 
-FILE is a ground motion (PEER .AT2, COSMOS V1, CSV), or three of them for x, y and z. Without one a pulse is written as
-CSV, to see what such a file looks like. The table runs it bare and loaded; an animation lays one over the other.
+FILE is a ground motion (PEER .AT2, COSMOS V1, CSV), or three of them for x, y and z. Without one a pulse is written
+as an example of a CSV file. The table runs it bare and loaded; an animation overlays both.
 """
 
 from pathlib import Path
@@ -34,31 +34,31 @@ def write_pulse(path: Path) -> Path:
     return path
 
 
-def what_it_needs(machine: Machine, target: Target) -> None:
-    """Say how much of each limit a target takes; more than there is raises an error that says the scale that fits."""
-    needs = target_within_limits(make_plant(machine), target)
-    for what, share in needs.utilisation.items():
-        most = max(share, key=lambda name: share[name])
-        print(f"{what}: {100 * share[most]:.0f} % of what {most} has")
+def print_demand(machine: Machine, target: Target) -> None:
+    """Print demand over capacity of a target; beyond one, an error with the scale that fits is raised."""
+    checked = target_within_limits(make_plant(machine), target)
+    for quantity, demand in checked.utilisation.items():
+        governing = max(demand, key=lambda name: demand[name])
+        print(f"{quantity}: {100 * demand[governing]:.0f} % of capacity ({governing})")
 
 
 def main(
-    files: Annotated[list[Path] | None, typer.Argument(help="Ground motion; else a pulse is made.")] = None,
+    files: Annotated[list[Path] | None, typer.Argument(help="Ground motion; default: a generated pulse.")] = None,
     specimen: Annotated[str, typer.Option(help="URDF file, or the shipped pendulum.")] = "pendulum",
-    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
-    out: Annotated[Path, typer.Option(help="Folder for records and animation.")] = Path("out/own"),
+    scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0,
+    out: Annotated[Path, typer.Option(help="Directory of records and animation.")] = Path("out/own"),
 ) -> None:
-    """Run FILE on the bare table and under a specimen."""
-    # 1. The motion: accelerations or displacements, whichever the file holds, become a target that starts at rest
+    """Run FILE on the bare table and with a specimen."""
+    # 1. The motion, from accelerations or displacements, becomes a target that starts at rest
     motion = load_motion(files or [write_pulse(out / "pulse.csv")])
     target = make_target(motion, scale=scale)
 
     # 2. The specimen stands at C with its joints locked; position, orientation and free joints are options
     bare = load_machine("lhpost6")
     loaded = bare.with_specimen(specimen, position=(0.0, 0.0, 0.0), locked=True)
-    what_it_needs(loaded, target)
+    print_demand(loaded, target)
 
-    # 3. The same controller with and without it: a panel tuned on the bare table is a start for a loaded one
+    # 3. The same controller with and without it: settings tuned on the bare table are initial values for a loaded one
     records: dict[str, xr.Dataset] = {}
     for name, machine in (("bare", bare), ("loaded", loaded)):
         facts = {"test": name, "title": f"{motion.name}, {name}"}
@@ -74,7 +74,7 @@ def main(
         )
         records[name] = record
 
-    # 4. The loaded table, and the bare one as an outline that differs ten times as much as it does
+    # 4. The loaded table, and the bare one as an outline with tenfold deviation
     picture = show_record(loaded, records["loaded"], [records["bare"]], Look(gap=10.0))
     picture.save(out / "view.html")
     print(out / "view.html")

@@ -1,8 +1,8 @@
-"""The forces behind a test by inverse dynamics: what `lhpost6 decompose` does, with the Python interface.
+"""Force decomposition of a test by inverse dynamics: `lhpost6 decompose` in Python.
 
     python scripts/example_3_decompose_forces.py [RECORD] [--out DIR]
 
-Without a record it makes one: a triangular wave in x, as test TX5 in kind, simulated and passed through noisy sensors.
+Without a record it simulates one with sensor noise: a triangular wave in x, of the kind of test TX5.
 """
 
 from pathlib import Path
@@ -25,7 +25,7 @@ from lhpost6_pin.simulation.rehearse import rehearse
 
 
 def triangular_test(machine: Machine) -> xr.Dataset:
-    """A triangular wave in x, as sensors show it."""
+    """A triangular wave in x with sensor noise."""
     wave = find_motion("triangle", amplitude=0.2, velocity=0.25, axis="x")
     facts = {"test": "TX", "title": "Triangular wave in x, simulated"}
     test = rehearse(machine, make_target(wave), load_controller("lhpost6"), attrs=facts, record_every=4, engine="fused")
@@ -33,21 +33,21 @@ def triangular_test(machine: Machine) -> xr.Dataset:
 
 
 def main(
-    record: Annotated[Path | None, typer.Argument(help="Record of a test; else one is simulated.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder for ledger.nc and report.html.")] = Path("out/forces"),
+    record: Annotated[Path | None, typer.Argument(help="Record of a test; default: a simulated one.")] = None,
+    out: Annotated[Path, typer.Option(help="Directory of ledger.nc and report.html.")] = Path("out/forces"),
 ) -> None:
-    """Take RECORD apart, say how well the model explains it, and draw the six rows of Section 6.1."""
+    """Decompose RECORD, print the agreement with the model, and draw the six rows of Section 6.1."""
     machine = load_machine("lhpost6")
     test = load_record(record) if record else triangular_test(machine)
 
-    # 1. Motion from all sensors, forces from the motion, in the band that is compared
+    # 1. Motion from all sensors, forces from the motion, in the band of the comparison
     found = decompose_record(machine, test)
 
-    # 2. Errors axis by axis, and what is left against noise, calibration errors and uncertain parameters
+    # 2. Errors by axis, and the residual against noise, calibration errors and uncertain parameters
     agreement = find_agreement(found)
     print_agreement(found, agreement)
 
-    # 3. Straight from the arrays: how much of the actuators' work dry friction takes
+    # 3. From the arrays: the energy of every effect, dry friction among them
     work = find_work(found)
     for effect, energy in zip(work.effects, work.energy[-1], strict=True):
         print(f"{effect}: {energy / 1e3:+.2f} kJ into the platen")

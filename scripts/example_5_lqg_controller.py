@@ -1,24 +1,24 @@
-"""A controller of one's own at the plug point: LQG in place of the 469D's displacement loop, and both compared.
+"""A controller of your own: LQG in place of the displacement loop of the 469D, and a comparison of both.
 
     lhpost6 run ridgecrest --controller scripts/example_5_lqg_controller.py:Lqg
     python scripts/example_5_lqg_controller.py [MOTION] [--scale 1] [--axes xyz] [--out DIR]
 
-Needs python-control (`pip install control`). The linearised plant, without dry friction, is brought down to three
-quantities per free axis: pose p of C and Euler angles, its rate v, and the compression s of the oil columns as the
-platen sees it [m, rad]. A platen speed u is commanded:
+Requires python-control (`pip install control`). The linearised plant, without dry friction, is reduced to three states
+per free axis: pose p of C and Euler angles, its rate v, and the compression s of the oil columns at the platen [m,
+rad]. The input is a platen velocity u:
 
     p' = v,    v' = a(p, v, s) + f,    s' = u + d + g(p, v, s),    g near -v.
 
-f (friction and what else the model lacks) and d (leaks, valve gains) are taken for constants and estimated with the
-state: the integral action. Python-control gives the Kalman filter's gain and the regulator's, K:
+f (friction and other unmodelled forces) and d (leakage, valve gains) are modelled as constants and estimated with the
+state: the integral action. python-control gives the gains of the Kalman filter and of the regulator, K:
 
     u = u_r - K (x^ - x_r) - d^.
 
-x_r is the state that goes with the wanted motion less the share of f^, u_r what leads from one sample's to the next's:
-the model's inverse. x^ is the estimate for the time when the command reaches the valves, 5 ms from now; the commands
-on their way are known. So the platen is late by the valves' delay and one sample, and by little else. The rest is as
-in the 469D: rates of the actuators by the Jacobian at the pose, internal forces let go, the valve's flow curve
-inverted; but with the speed at full opening that it has under the force which the wanted motion needs.
+x_r is the state of the target motion minus the share of f^, u_r the input between its samples: the inverse of the
+model. x^ is the prediction for the time when the command reaches the valves, 5 ms later; commands under way are known.
+The platen lags by the valve delay and one sample. The rest is as in the 469D: actuator velocities by the Jacobian at
+the pose, decay of internal forces, inverse of the flow curve of the valve; but with the velocity at full opening under
+the force required by the target motion.
 """
 
 import math
@@ -64,7 +64,7 @@ EACH = np.eye(6)
 
 
 class PlatenModel(NamedTuple):
-    """dx/dt = a x + b u of x = (p, v, s), (m,) each, and platen speeds u (m,); m free axes, zero-position."""
+    """dx/dt = a x + b u of x = (p, v, s), (m,) each, and platen velocities u (m,); m free axes, zero-position."""
 
     a: Array  # (3 m, 3 m)
     b: Array  # (3 m, m)
@@ -72,9 +72,9 @@ class PlatenModel(NamedTuple):
 
 
 class Valves(NamedTuple):
-    """What turns the speed of an actuator into its spool: squares of speeds are linear in its force."""
+    """From actuator velocity to spool: squared velocities are linear in the force."""
 
-    squares: Array  # (n, 2) squared speed at full opening under the rest force: extending, retracting [m2/s2]
+    squares: Array  # (n, 2) squared velocity at full opening under the rest force: extending, retracting [m2/s2]
     slopes: Array  # (n, 2) their change with the force [m2/s2/N]
     curve: Array  # (n,) lambda of the flow curve [1]
     leak: Array  # (n,) opening at rest [1]
@@ -82,7 +82,7 @@ class Valves(NamedTuple):
 
 
 class Design(NamedTuple):
-    """All that stays the same during a run."""
+    """Constants of a run."""
 
     plant: Plant
     rest: Equilibrium
@@ -90,31 +90,31 @@ class Design(NamedTuple):
     valves: Valves
     legs: Array  # (n, m) Jacobian in the zero-position
     share: Array  # (n, m) forces of the actuators per compression, least norm
-    balance: Array  # (n, n) speed per force in the null space of the motion
+    balance: Array  # (n, n) velocity per force in the null space of the motion
     lag: Array  # (m, m) compression per acceleration
     regulator: Array  # (m, 3 m)
-    filter: Array  # (5 m, 3 m) on what the sensors say: pose, acceleration, wrench
-    advance: Array  # (5 m, 7 m) next estimate from this one and the two commands that act meanwhile
+    filter: Array  # (5 m, 3 m) gain on the measured pose, acceleration, wrench
+    advance: Array  # (5 m, 7 m) next estimate from this one and the two commands in effect
     ahead: Array  # (5 m, ...) estimate for the time when a command given now arrives
 
 
 @dataclass
 class Memory:
-    """What changes from sample to sample."""
+    """State of the controller."""
 
     design: Design
     estimate: Array  # (5 m,) p, v, s, d, f
-    sent: deque[Array]  # commands on their way, (m,) each, oldest first
-    asked: Array | None = None  # (3 m,) state wanted at the last sample
+    sent: deque[Array]  # commands under way, (m,) each, oldest first
+    asked: Array | None = None  # (3 m,) target state at the last sample
 
 
 @dataclass(frozen=True)
 class Lqg:
-    """A controller (`lhpost6_pin.control.plug`) by its weights; a rotation counts by what it does at the lever [m].
+    """A controller (`lhpost6_pin.control.plug`) by its weights; rotations are weighted by displacement at the lever [m].
 
-    The regulator's errors and speed are equally bad. Speed over pose error is the loop's bandwidth, speed over
-    compression error what damps the oil columns: 100 1/s is much at 9 to 12 Hz and little at 35 to 46 Hz, which the
-    valves' delay puts out of reach. The filter's are noise of the sensors, and how fast the model's errors wander.
+    Errors and velocity of the regulator are of equal weight. Velocity over pose error is the bandwidth of the loop,
+    velocity over compression error the damping of the oil columns: 100 1/s is much at 9 to 12 Hz and little at 35 to
+    46 Hz, beyond reach with the valve delay. Weights of the filter are sensor noise and the drift of model errors.
     """
 
     lever: float = 5.0  # [m]
@@ -131,7 +131,7 @@ class Lqg:
     balance: float = 3.0  # rate at which internal forces decay [1/s]
 
     def init(self, plant: Plant, rest: Equilibrium) -> Memory:
-        """Design for a plant; raises ControllerError for delays or joints that the model has no place for."""
+        """Design for a plant; raises ControllerError for delays or joints beyond this model."""
         late = float(plant.delays[0]) * SAMPLE_RATE
         if np.ptp(plant.delays) or late <= 1.0:
             raise ControllerError(f"valves with one delay, above {STEP:.2g} s, are needed; these have {plant.delays}")
@@ -155,7 +155,7 @@ class Lqg:
         whole_a, whole_b = held(a, b, STEP)
         gain, *_ = control.dlqe(whole_a, np.eye(5 * m, 4 * m, -m), sees, drift, noise)
 
-        # A command acts from `late` samples after it was given: within a sample, the one before it acts at first
+        # A command acts `late` samples after it was given; within that sample, the preceding one acts first
         samples = math.ceil(late) - 1
         part = late - samples
         (first_a, first_b), (last_a, last_b) = held(a, b, part * STEP), held(a, b, (1.0 - part) * STEP)
@@ -185,7 +185,7 @@ class Lqg:
         """Spool commands (n,) of one sample."""
         d = memory.design
         axes, m = d.plant.axes, d.plant.axes.size
-        # What the table does: measured, estimated, and predicted for the time when this command arrives
+        # State of the table: measured, estimated, and predicted for the time when this command arrives
         pose = forward_kinematics(d.plant, sensors.displacement)[0][0]
         legs = leg_jacobian(d.plant, pose)
         wrench = legs.T @ sensors.force - d.legs.T @ d.rest.force
@@ -193,7 +193,7 @@ class Lqg:
         sent = memory.sent
         memory.estimate = d.advance @ np.concatenate([memory.estimate, sent[0], sent[1]]) + d.filter @ seen
         there = d.ahead @ np.concatenate([memory.estimate, *list(sent)[1:]])
-        # What it should do then: the state wanted, and the speed that leads from the last sample's to this one's
+        # Target state at that time, and the velocity from the last target state to this one
         now = wanted_state(d, wanted)
         last = now if memory.asked is None else memory.asked
         memory.asked = now
@@ -201,10 +201,10 @@ class Lqg:
         goal = last.copy()
         goal[2 * m :] -= d.lag @ there[4 * m :]
         speed -= d.regulator @ (there[: 3 * m] - goal) + there[3 * m : 4 * m]
-        # From platen speeds to spools
+        # From platen velocities to spools
         rates = legs @ speed - d.balance @ (sensors.force - d.rest.force)
         spool, given = spools(d.valves, rates, d.share @ goal[2 * m :])
-        if given is not rates:  # beyond full stroke: the filter is to know what the valves can do
+        if given is not rates:  # beyond full stroke: the filter receives the achievable velocity
             speed = np.linalg.lstsq(legs, given, rcond=None)[0]
         sent.append(speed)
         return spool
@@ -321,11 +321,11 @@ def tracked(record: xr.Dataset, quantity: str, axis: str) -> Tracked:
 
 
 def main(
-    motion: Annotated[str, typer.Argument(help="Name, as `lhpost6 motions` lists them.")] = "ridgecrest",
-    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
-    axes: Annotated[str | None, typer.Option(help="Axes to use, such as xyz, x, x=y.")] = None,
+    motion: Annotated[str, typer.Argument(help="Name; `lhpost6 motions` lists them.")] = "ridgecrest",
+    scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0,
+    axes: Annotated[str | None, typer.Option(help="Axes, such as xyz, x, or x=y.")] = None,
     settings: Annotated[str, typer.Option(help="Settings of the 469D: name or TOML file.")] = "lhpost6",
-    out: Annotated[Path, typer.Option(help="Folder for lqg.html.")] = Path("out/lqg"),
+    out: Annotated[Path, typer.Option(help="Directory of lqg.html.")] = Path("out/lqg"),
 ) -> None:
     """Run MOTION with the 469D and with the LQG controller, and compare them."""
     refuse_folder(out)

@@ -1,9 +1,9 @@
-"""How sure is a rehearsal, when numbers of the machine are uncertain? Many machines, one motion, all at once.
+"""Uncertainty of a rehearsal: many machines with uncertain parameters, one motion.
 
     python scripts/example_6_uncertain_machine.py [MOTION] [--machines 30] [--scale 1] [--out DIR]
 
-Every uncertain number of the machine is drawn from its stated distribution, all runs go over threads in compiled code,
-and what is wanted from them gets an interval, with the numbers of the machine that it follows most.
+Every uncertain parameter is drawn from its prior, all runs are distributed over threads in compiled code, and each
+result gets an interval and the parameters that it correlates with most.
 """
 
 from pathlib import Path
@@ -32,11 +32,11 @@ from lhpost6_pin.simulation.simulate import ClosedLoop
 
 
 def figures(record: xr.Dataset) -> dict[str, float]:
-    """What is wanted of a run."""
-    asked, achieved = record["reference_acceleration"].values, record["platen_acceleration"].values
-    moved = asked.any(axis=0)
+    """Results of a run."""
+    target, achieved = record["reference_acceleration"].values, record["platen_acceleration"].values
+    moved = target.any(axis=0)
     return {
-        "acceleration RRMSE, worst axis [%]": 100 * float(rrmse(asked[:, moved], achieved[:, moved]).max()),
+        "acceleration RRMSE, worst axis [%]": 100 * float(rrmse(target[:, moved], achieved[:, moved]).max()),
         "largest actuator force [kN]": float(abs(record["actuator_force"]).max()) / 1e3,
         "largest spool [%]": 100 * float(abs(record["spool_position"]).max()),
         "highest chamber pressure [MPa]": float(record["chamber_pressure_a"].max()) / 1e6,
@@ -44,40 +44,38 @@ def figures(record: xr.Dataset) -> dict[str, float]:
 
 
 def main(
-    motion: Annotated[str, typer.Argument(help="Name, as `lhpost6 motions` lists them.")] = "ridgecrest",
-    machines: Annotated[int, typer.Option(min=4, help="How many are drawn.")] = 30,
-    scale: Annotated[float, typer.Option(help="Factor on the motion.")] = 1.0,
-    seed: Annotated[int, typer.Option(help="Of what is drawn.")] = 1,
-    out: Annotated[Path, typer.Option(help="Folder for drawn.csv: numbers drawn and what came of them.")] = Path(
-        "out/uncertain"
-    ),
+    motion: Annotated[str, typer.Argument(help="Name; `lhpost6 motions` lists them.")] = "ridgecrest",
+    machines: Annotated[int, typer.Option(min=4, help="Number of machines.")] = 30,
+    scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Seed of the random draws.")] = 1,
+    out: Annotated[Path, typer.Option(help="Directory of drawn.csv: parameters and results.")] = Path("out/uncertain"),
 ) -> None:
-    """Run MOTION on machines drawn from what is stated of the LHPOST6."""
+    """Run MOTION on machines drawn from the priors of the LHPOST6."""
     nominal = load_machine("lhpost6")
     target = make_target(find_motion(motion), scale=scale)
 
-    # 1. Machines: every number that states an uncertainty is a parameter; twins stay alike
+    # 1. Machines: every number with a standard deviation is a parameter; identical components stay identical
     parameters = machine_parameters(nominal)
     rng = np.random.default_rng(seed)
     drawn = np.array([drawn_coordinates(parameters, rng) for _ in range(machines)])
 
     # 2. A controller with the same settings for each, at rest before the motion
-    asked = PlatenMotion(target.displacement, target.velocity, target.acceleration)
+    wanted = PlatenMotion(target.displacement, target.velocity, target.acceleration)
     jobs = []
     for coordinates in drawn:
         plant = make_plant(with_parameters(nominal, parameters, coordinates))
         rest = find_equilibrium(plant)
         controller = make_controller(plant, rest, load_controller(nominal.controller))
-        jobs.append((plant, ClosedLoop(controller, controller.drive_for(*asked), rest)))
+        jobs.append((plant, ClosedLoop(controller, controller.drive_for(*wanted), rest)))
 
     # 3. All runs at once; the order of results is that of the jobs, whatever the number of threads
     runs = simulate_many(jobs, samples=len(target.time))
-    found = [figures(record_of_run(run, {"test": motion}, asked)) for run in runs]
+    found = [figures(record_of_run(run, {"test": motion}, wanted)) for run in runs]
 
-    # 4. An interval for each figure, and what it follows: the correlation of ranks with each number drawn, where it is
-    #    larger than the largest that chance would give among so many numbers
+    # 4. An interval for each result, and its rank correlation with each parameter, if larger than the largest
+    #    expected by chance among that many parameters
     chance = np.sqrt(2.0 * np.log(2.0 * len(parameters)) / machines)
-    table = Table("figure", "median", "5 to 95 %", "follows most (correlation of ranks)")
+    table = Table("result", "median", "5 to 95 %", "largest rank correlations")
     for name in found[0]:
         values = np.array([one[name] for one in found])
         low, middle, high = np.percentile(values, [5, 50, 95])
@@ -88,7 +86,7 @@ def main(
         table.add_row(escape(name), f"{middle:.4g}", f"{low:.4g} to {high:.4g}", escape(follows))
     Console(width=120).print(table)
 
-    # 5. Everything in a table for other tools
+    # 5. All parameters and results as a table for other tools
     header = ",".join([*(f"{k.name} [{k.unit}]" for k in parameters), *found[0]])
     rows = [
         [*(k.at(x) for k, x in zip(parameters, coordinates, strict=True)), *one.values()]

@@ -90,7 +90,7 @@ def test_5_lqg_is_compared_with_the_469d(tmp_path):
 
 def test_6_uncertain_numbers_give_an_interval(tmp_path):
     said = run(6, "sine", "--scale", "0.2", "--machines", "4", "--out", tmp_path)
-    assert "largest actuator force [kN]" in said and "platen.mass" not in said.split("figure")[0]
+    assert "largest actuator force [kN]" in said and "platen.mass" not in said.split("result")[0]
     with (tmp_path / "drawn.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 4

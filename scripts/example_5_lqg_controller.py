@@ -110,7 +110,7 @@ class Memory:
 
 @dataclass(frozen=True)
 class Lqg:
-    """A controller (`lhpost6_pin.control.plug`) by its weights; rotations are weighted by displacement at the lever [m].
+    """A controller (`lhpost6_pin.control.plug`) by its weights; rotations weigh as displacements at the lever [m].
 
     Errors and velocity of the regulator are of equal weight. Velocity over pose error is the bandwidth of the loop,
     velocity over compression error the damping of the oil columns: 100 1/s is much at 9 to 12 Hz and little at 35 to

@@ -19,14 +19,18 @@ settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile("fixed")
 
 
-FIRST = ("test_discover", "test_report", "test_records", "test_parameters", "test_motions_process")
-FIRST += ("test_motions_library", "test_structure", "test_importing", "test_motions_readers", "test_panel", "test_fuzz")
+FIRST = ("test_discover", "test_docs", "test_examples", "test_calibration", "test_fuzz", "test_cli", "test_scripts")
+"""The files that take longest: begun first, they leave no worker alone at the end."""
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the file that compiles most before those that compile nothing: two workers do not compile the same twice."""
+    """Put the longest files first; a test that is neither `long` nor `slow` is `fast`."""
     place = {name: k for k, name in enumerate(FIRST)}
     items.sort(key=lambda item: place.get(item.path.stem, len(place)))
+    for item in items:
+        if not any(item.iter_markers("long")) and not any(item.iter_markers("slow")):
+            item.add_marker("fast")
 
 
 @pytest.fixture(scope="session")

@@ -4,11 +4,16 @@
 the readers of `test_fuzz` take some ten minutes.
 """
 
+import sys
+
 import numpy as np
 import pytest
+from commands import Ended
 from hypothesis import settings
 
-from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin import cli
+from lhpost6_pin.data.sensors import SensorSet, load_sensors
+from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.show.bodies import load_bodies
@@ -33,10 +38,38 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("fast")
 
 
+@pytest.fixture
+def lhpost6(capsys, monkeypatch, tmp_path):
+    """Run a command as the entry point does, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> Ended:
+        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        code = end.value.code
+        return Ended(code if isinstance(code, int) else 0 if code is None else 1, *capsys.readouterr())
+
+    return run
+
+
 @pytest.fixture(scope="session")
-def plant():
+def machine() -> Machine:
+    """The LHPOST6."""
+    return load_machine()
+
+
+@pytest.fixture(scope="session")
+def sensors() -> SensorSet:
+    """Its sensors."""
+    return load_sensors()
+
+
+@pytest.fixture(scope="session")
+def plant(machine):
     """The nominal LHPOST6, made ready; its arrays are read only by agreement."""
-    return make_plant(load_machine())
+    return make_plant(machine)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,11 @@ from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.pose import PlatenMotion
 
 DATA = Path(__file__).parent / "data"
+REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
+PRACTICE = DATA / "records" / "practice_a_TX.nc"
+PENDULUM = DATA / "pendulum.urdf"
+STEWART = DATA / "stewart.toml"
+SCRIPTS = Path(__file__).parent.parent / "scripts"
 FREE_MACHINES = ("lhpost6", "stewart")
 MACHINES = (*FREE_MACHINES, "uniaxial")
 

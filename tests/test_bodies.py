@@ -2,7 +2,6 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.machine.machine import load_machine
@@ -11,11 +10,6 @@ from lhpost6_pin.mechanics.pose import leg_displacements, rotation
 from lhpost6_pin.mechanics.rigid_body import lumped_inertia
 from lhpost6_pin.show.bodies import joint_positions, load_bodies
 from lhpost6_pin.show.urdf import drawing_sizes, legs, urdf_text
-
-
-@pytest.fixture(scope="module")
-def machine(plant):
-    return plant.machine
 
 
 def link_poses(bodies, machine, poses) -> dict[str, list[pin.SE3]]:

@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import refused
 
-from lhpost6_pin.cli import app
-from lhpost6_pin.core.errors import LhpostError, ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.data.campaign import Campaign, load_campaign
 from lhpost6_pin.identification.calibration import Calibration, Subset, calibration_numbers, machine_parameters
 from lhpost6_pin.identification.calibration.calibration_summary import (
@@ -249,7 +247,7 @@ def test_the_table_shows_what_changed(found, capsys) -> None:
 
 @pytest.mark.parametrize(("converged", "code"), [(True, 0), (False, 1)])
 def test_the_command_leaves_override_and_report_and_says_if_it_converged(
-    found, tmp_path, monkeypatch, converged, code
+    lhpost6, found, tmp_path, monkeypatch, converged, code
 ) -> None:
     asked = {}
 
@@ -259,39 +257,33 @@ def test_the_command_leaves_override_and_report_and_says_if_it_converged(
 
     monkeypatch.setattr("lhpost6_pin.data.campaign.load_campaign", lambda folder, machine: Campaign("march", ()))
     monkeypatch.setattr("lhpost6_pin.identification.calibration.calibrate", pretend)
-    ended = CliRunner().invoke(app, ["calibrate", "march", "--out", str(tmp_path), "--seed", "3", "--jobs", "1"])
-    assert ended.exit_code == code, ended.output
+    ended = lhpost6("calibrate", "march", "--out", tmp_path, "--seed", "3", "--jobs", "1")
+    assert ended.code == code, ended
     assert sorted(p.name for p in tmp_path.iterdir()) == ["override.toml", "report.html"]
     assert (asked["seed"], asked["jobs"], asked["campaign"]) == (3, 1, "march")
     mass = load_machine("lhpost6", tmp_path / "override.toml").parameters["platen.mass"]
     assert mass.evidence == "calibrated" and "march" in mass.source
     np.testing.assert_allclose(mass.value[0], 168100.0 * (1.0 + found.estimate[0]))
-    assert "not converged" in ended.output or converged
+    assert "not converged" in ended.words or converged
 
 
-def test_a_campaign_that_is_not_there_is_named(tmp_path) -> None:
+def test_a_campaign_that_is_not_there_is_named(lhpost6, tmp_path) -> None:
     for folder, words in ((tmp_path / "gone", "is no folder"), (tmp_path, "holds no record")):
-        ended = CliRunner().invoke(app, ["calibrate", str(folder)])
-        assert isinstance(ended.exception, RecordError)
-        assert words in str(ended.exception) and str(folder) in str(ended.exception)
-    ended = CliRunner().invoke(app, ["calibrate", str(tmp_path), "--sensors", "nobody"])
-    assert isinstance(ended.exception, UnknownNameError)
+        assert refused(lhpost6("calibrate", folder), str(folder), words)
+    assert refused(lhpost6("calibrate", tmp_path, "--sensors", "nobody"), "nobody")
 
 
 # ---------------------------------------------------------------------------------------- campaigns
-def test_a_simulated_campaign_can_be_loaded_and_is_not_added_to(tmp_path) -> None:
-    asked = ["campaign", "--machine", "uniaxial", "--scale", "0.3", "--out", str(tmp_path), "--seed", "2"]
-    ended = CliRunner().invoke(app, [*asked, "--tests", "TX"])
-    assert ended.exit_code == 0, ended.output
+def test_a_simulated_campaign_can_be_loaded_and_is_not_added_to(lhpost6, tmp_path) -> None:
+    asked = ("campaign", "--machine", "uniaxial", "--scale", "0.3", "--out", tmp_path, "--seed", "2")
+    assert lhpost6(*asked, "--tests", "TX").code == 0
     (record,) = load_campaign(tmp_path, load_machine("uniaxial")).records
     assert record.attrs["test"] == "TX" and "noise" in record.attrs
     swing = float(np.ptp(record["platen_displacement"].values[:, 0]))
     assert swing == pytest.approx(2 * 0.3 * 0.2, rel=0.1)  # a triangle of 0.2 m scaled; it is tracked to some per cent
-    again = CliRunner().invoke(app, asked)
-    assert isinstance(again.exception, ParameterError) and "holds records already" in str(again.exception)
+    assert refused(lhpost6(*asked), "holds records already")
 
 
 @pytest.mark.parametrize(("tests", "words"), [("TX,TX", "twice"), ("TX,QQ", "QQ")])
-def test_tests_that_a_campaign_has_not_are_named(tmp_path, tests, words) -> None:
-    ended = CliRunner().invoke(app, ["campaign", "--machine", "uniaxial", "--tests", tests, "--out", str(tmp_path)])
-    assert isinstance(ended.exception, LhpostError) and words in str(ended.exception)
+def test_tests_that_a_campaign_has_not_are_named(lhpost6, tmp_path, tests, words) -> None:
+    assert refused(lhpost6("campaign", "--machine", "uniaxial", "--tests", tests, "--out", tmp_path), words)

@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import refused
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
 from lhpost6_pin.data.records import sample_interval
-from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
+from lhpost6_pin.data.sensors import SensorSet, add_noise
 from lhpost6_pin.data.signals import align
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.identification.calibration import (
@@ -55,18 +54,6 @@ TURNED = {
     "hold_down.polytropic_index": -0.04,
 }
 """Coordinates of the parameters that the simulated machine has turned; one and a half to two stated deviations."""
-
-
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """The LHPOST6."""
-    return load_machine()
-
-
-@pytest.fixture(scope="module")
-def sensors() -> SensorSet:
-    """Its sensors."""
-    return load_sensors()
 
 
 @pytest.fixture(scope="module")
@@ -486,11 +473,9 @@ def test_no_test_at_all_is_refused(machine, sensors):
         calibrate(machine, [], sensors)
 
 
-@pytest.mark.parametrize("command", ["calibrate", "validate"])
-def test_no_jobs_at_all_are_refused(command, tmp_path):
-    done = CliRunner().invoke(app, [command, str(tmp_path), "--jobs", "0"])
-    assert done.exit_code == 1
-    assert "--jobs 0" in str(done.exception)
+@pytest.mark.parametrize("command", ["calibrate", "validate", "discover"])
+def test_no_jobs_at_all_are_refused(lhpost6, command, tmp_path):
+    assert refused(lhpost6(command, tmp_path, "--jobs", "0"), "--jobs 0")
 
 
 @pytest.fixture(scope="module")

@@ -12,12 +12,12 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import xarray as xr
-from machine_cases import DATA
+from commands import COARSE, SHORT, Ended, refused
+from machine_cases import PENDULUM, PRACTICE, REFERENCE, STEWART
 
 import lhpost6_pin
 import lhpost6_pin.motions.library as library
@@ -35,58 +35,13 @@ from lhpost6_pin.motions import find_motion, list_motions, make_target
 from lhpost6_pin.simulation import rehearse
 from lhpost6_pin.tuning.drives import circumstances, save_drive
 
-REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
-PRACTICE = DATA / "records" / "practice_a_TX.nc"
-PENDULUM = DATA / "pendulum.urdf"
-STEWART = DATA / "stewart.toml"
 ENTRY = Path(sys.executable).parent / "lhpost6"
-
-SHORT = ("sine", "--set", "amplitude=0.02", "--set", "cycles=0.5", "--set", "ramp_cycles=0.5", "--engine", "fused")
-COARSE = (*SHORT, "--rate", "2048", "--record-rate", "512")
-
-
-class Ended(NamedTuple):
-    """What a command left behind on the terminal."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def words(self) -> str:
-        """All text with line breaks and table rules taken out, for phrases that may be wrapped."""
-        return " ".join(re.sub(r"[\u2500-\u257f]", " ", self.out + self.err).split())
-
-
-@pytest.fixture
-def lhpost6(capsys, monkeypatch, tmp_path):
-    """Run a command as the entry point does, in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        code = end.value.code
-        return Ended(code if isinstance(code, int) else 0 if code is None else 1, *capsys.readouterr())
-
-    return run
 
 
 def process(*arguments: object, **options) -> subprocess.CompletedProcess:
     """Run the installed entry point."""
     command = [str(ENTRY), *map(str, arguments)]
     return subprocess.run(command, check=False, timeout=300, **{"capture_output": True, "text": True, **options})
-
-
-def refused(ended: Ended, *phrases: str) -> bool:
-    """Whether a command ended with one clear message on stderr that holds all phrases."""
-    assert ended.code == 2, ended
-    assert "Traceback" not in ended.err
-    for phrase in phrases:
-        assert phrase in ended.words, (phrase, ended.words)
-    return True
 
 
 def sound(folder: Path) -> xr.Dataset:
@@ -497,7 +452,7 @@ def test_brackets_in_names_are_shown_as_they_are(lhpost6, tmp_path, name):
     assert ended.code == 0 and f"wrote {folder / 'o' / 'record.nc'}" in ended.out
     assert stem in ended.err  # beside the progress bar
     assert f"{stem}" in lhpost6("check", folder / "o" / "record.nc").words
-    machine = (DATA / "stewart.toml").read_text().replace('"A Stewart platform for tests"', f'"{name}"')
+    machine = (STEWART).read_text().replace('"A Stewart platform for tests"', f'"{name}"')
     (tmp_path / "machine.toml").write_text(machine)
     assert name in lhpost6("info", "--machine", "machine.toml").words
     assert refused(lhpost6("run", "sine", "--set", name), f"--set {name}")
@@ -543,7 +498,7 @@ def test_a_place_that_is_none_is_refused(lhpost6, place):
 
 
 def test_check_holds_forces_against_pressures(lhpost6, tmp_path):
-    record = load_record(DATA / "records" / "practice_a_TX.nc")
+    record = load_record(PRACTICE)
     record["actuator_force"] = record["actuator_force"] * 1.2
     save_record(record, tmp_path / "wrong.nc")
     assert "actuator_force" in lhpost6("check", tmp_path / "wrong.nc").out

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from inverse_cases import RATE, shaken
-from machine_cases import DATA, machine_named
+from machine_cases import DATA, PENDULUM, machine_named
 from sensor_cases import measured
-from typer.testing import CliRunner
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.core.errors import RecordError, SimulationError
 from lhpost6_pin.data.records import load_record, open_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
@@ -190,11 +188,10 @@ def test_the_ledger_is_written_with_names_and_units(practice: tuple[Decomposed, 
     assert [p.name for p in tmp_path.iterdir()] == ["ledger.nc"]
 
 
-def test_the_command_leaves_ledger_and_report_and_says_what_is_left(tmp_path) -> None:
-    arguments = ["decompose", str(PRACTICE["TX"]), "--out", str(tmp_path), "--cutoff", "20", "--no-align"]
-    ended = CliRunner().invoke(app, arguments)
-    assert ended.exit_code == 0, ended.output
-    assert "up to 20 Hz" in ended.output and "sd/noise" in ended.output
+def test_the_command_leaves_ledger_and_report_and_says_what_is_left(lhpost6, tmp_path) -> None:
+    ended = lhpost6("decompose", PRACTICE["TX"], "--out", tmp_path, "--cutoff", "20", "--no-align")
+    assert ended.code == 0, ended
+    assert "up to 20 Hz" in ended.words and "sd/noise" in ended.words
     page = (tmp_path / "report.html").read_text()
     assert "at the noise&#x27;s level" in page and "Dissipative force" in page
     assert open_record(tmp_path / "ledger.nc").attrs["cutoff_hz"] == 20.0
@@ -241,4 +238,4 @@ def test_records_of_other_machines_specimens_and_too_short_ones_are_refused(tria
     with pytest.raises(RecordError, match="cutoff of 0 Hz"):
         decompose_record(MACHINE, triangle, cutoff=0.0)
     with pytest.raises(SimulationError, match="--locked"):
-        decompose_record(MACHINE.with_specimen(DATA / "pendulum.urdf"), triangle)
+        decompose_record(MACHINE.with_specimen(PENDULUM), triangle)

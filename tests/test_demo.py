@@ -2,22 +2,15 @@
 
 import json
 import re
-import sys
 
-import pytest
-
-from lhpost6_pin import cli
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.discovery.demonstration import hidden_effect
 from lhpost6_pin.machine.machine import load_machine
 
 
-def test_the_demonstration_finds_what_it_hides(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["lhpost6", "demo", "--no-open", "--out", str(tmp_path)])
-    with pytest.raises(SystemExit) as end:
-        cli.main()
-    assert not end.value.code
-    said = capsys.readouterr().out
+def test_the_demonstration_finds_what_it_hides(lhpost6, tmp_path):
+    ended = lhpost6("demo", "--no-open", "--out", tmp_path)
+    assert ended.code == 0, ended
     family, component, numbers = hidden_effect()
     verdict = json.loads((tmp_path / "verdict.json").read_text())
     (effect,) = verdict["effects"]
@@ -27,7 +20,7 @@ def test_the_demonstration_finds_what_it_hides(tmp_path, monkeypatch, capsys):
         # one draw of noise in ten is outside of a 90 % interval: then not by far
         abs(number["value"] - numbers["leakage"]) < 2 * (number["ci90"][1] - number["ci90"][0])
     )
-    before, after = map(float, re.search(r"ends ([\d.]+) mm .*?\s([\d.]+) mm with", said, re.DOTALL).groups())
+    before, after = map(float, re.search(r"ends ([\d.]+) mm .*?\s([\d.]+) mm with", ended.out, re.DOTALL).groups())
     assert after < 0.1 * before
     machine = load_machine()
     assert len(load_campaign(tmp_path / "measured", machine).records) == 3

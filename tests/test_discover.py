@@ -9,14 +9,12 @@ import joblib
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
-from typer.testing import CliRunner
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, save_campaign
-from lhpost6_pin.data.sensors import SensorSet, load_sensors
+from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, Reweighting, refusal, squares_by_column
 from lhpost6_pin.discovery.add_effects import _fit_jointly
@@ -48,18 +46,6 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 TESTS = ("TX", "TZ", "WN")
-
-
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """The LHPOST6."""
-    return load_machine()
-
-
-@pytest.fixture(scope="module")
-def sensors() -> SensorSet:
-    """Its sensors."""
-    return load_sensors()
 
 
 def measured(machine: Machine, sensors: SensorSet, seed: int, tests: tuple[str, ...] = TESTS) -> Campaign:
@@ -500,14 +486,15 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
     np.testing.assert_array_equal(clean["chamber_pressure_a"], record["chamber_pressure_a"])
 
 
-def test_the_command_goes_on_from_what_a_search_had_kept_to_the_same_verdict(rubbing, bookmarked, tmp_path, caplog):
+def test_the_command_goes_on_from_what_a_search_had_kept_to_the_same_verdict(
+    lhpost6, rubbing, bookmarked, tmp_path, caplog
+):
     found, folder = bookmarked
     (kept,) = folder.iterdir()
     assert [a.candidate.family.name for a in joblib.load(kept).search.added] == ["stribeck_friction"]
     save_campaign(rubbing, tmp_path)
-    asked = ["discover", str(tmp_path), "--hold-out", *ASKED["hold_out"], "--out", str(folder)]
-    result = CliRunner().invoke(app, asked)
-    assert result.exit_code == 0, result.output
+    ended = lhpost6("discover", tmp_path, "--hold-out", *ASKED["hold_out"], "--out", folder)
+    assert ended.code == 0, ended
     assert "goes on where the search was interrupted, with 1 effects found" in caplog.text
     assert {p.name for p in folder.iterdir()} == {"verdict.json", "model.toml", "report.html"}
     entries, same = json.loads((folder / "verdict.json").read_text()), verdict_entries(found)
@@ -586,9 +573,3 @@ def test_nothing_is_found_where_nothing_is_hidden(machine, sensors):
     entries = verdict_entries(discover(machine, measured(machine, sensors, 2, ("TX", "TY", "WN")), sensors))
     assert entries["verdict"] in ("none", "parameters_only")
     assert (entries["effects"], entries["closure"], entries["held_out"]) == ([], {}, [])
-
-
-def test_no_jobs_at_all_are_refused(tmp_path):
-    result = CliRunner().invoke(app, ["discover", str(tmp_path), "--jobs", "0"])
-    assert result.exit_code == 1  # `main` makes it 2 and prints it
-    assert "--jobs 0" in str(result.exception)

@@ -8,7 +8,7 @@ from lhpost6_pin.effects import evaluate as stage
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.effects.table import effect_table
-from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.machine.port_names import PLATEN_PORTS
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import Plant, make_plant
@@ -17,12 +17,6 @@ from lhpost6_pin.simulation.ledger import force_ledger
 from lhpost6_pin.simulation.simulate import OpenLoop, Run, simulate
 
 DRAG = Effect("drag", "viscous", PLATEN_PORTS, tuple((1e3 * (k + 1),) for k in range(6)), "test")
-
-
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """The LHPOST6."""
-    return load_machine()
 
 
 def stirred(machine: Machine, samples: int = 400) -> Run:

@@ -7,7 +7,7 @@ from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import parameters_of
-from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium, rest_pressures
 from lhpost6_pin.mechanics.plant import Plant, make_plant
@@ -17,18 +17,6 @@ from lhpost6_pin.mechanics.workspace import make_workspace
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
 
 MPA = 1e6
-
-
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """The LHPOST6."""
-    return load_machine()
-
-
-@pytest.fixture(scope="module")
-def plant(machine: Machine) -> Plant:
-    """Its plant."""
-    return make_plant(machine)
 
 
 def loaded(machine: Machine, **pull: float) -> Machine:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_scripts import PRACTICE, SCRIPTS, script
+from machine_cases import PRACTICE, SCRIPTS
+from test_scripts import script
 
 from lhpost6_pin.data.check import check_record
 from lhpost6_pin.data.records import load_record

@@ -4,16 +4,14 @@ import numpy as np
 import pytest
 import scipy.io
 import xarray as xr
+from commands import refused
 from data_files import LABELS, binary_469d, header, sines, typical_channels
-from machine_cases import DATA
+from machine_cases import PRACTICE
 
-from lhpost6_pin import cli
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.importing import export_record, guess_map, is_export, load_raw, make_imported_record
 from lhpost6_pin.data.records import load_record, make_record
-
-PRACTICE = DATA / "records" / "practice_a_TX.nc"
 
 
 @pytest.fixture(scope="module")
@@ -81,32 +79,17 @@ def test_parquet_without_pyarrow_says_which_extra_brings_it(tmp_path, record, mo
 
 
 # --------------------------------------------------------------------------------------------- commands
-@pytest.fixture
-def lhpost6(capsys, monkeypatch, tmp_path):
-    """Run a command as the entry point does, in a folder of its own; returns exit code and words."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> tuple[int, str]:
-        monkeypatch.setattr("sys.argv", ["lhpost6", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        text = "".join(capsys.readouterr())
-        return int(end.value.code or 0), " ".join(text.replace("│", " ").split())
-
-    return run
-
-
 def test_guess_then_import_shows_source_unit_and_range_of_every_channel(lhpost6, tmp_path):
     typical = typical_channels()
     values = sines(512, len(typical))
     columns = [(t.description, t.unit, values[:, k]) for k, t in enumerate(typical)]
     (tmp_path / "EQ1.bin").write_bytes(binary_469d(header(columns, 1 / 256), values))
-    code, words = lhpost6("import", "EQ1.bin", "--guess")
-    assert code == 0 and "lhpost6 import EQ1.bin --map EQ1_map.toml" in words
-    assert lhpost6("import", "EQ1.bin", "--guess")[0] == 2  # the map may have been edited
-    code, words = lhpost6("import", "EQ1.bin", "--map", "EQ1_map.toml", "--out", "EQ1.nc")
-    assert code == 0
-    assert "platen_displacement[x] EQ1.bin: Long Displ fbk [in] m" in words
+    ended = lhpost6("import", "EQ1.bin", "--guess")
+    assert ended.code == 0 and "lhpost6 import EQ1.bin --map EQ1_map.toml" in ended.words
+    assert lhpost6("import", "EQ1.bin", "--guess").code == 2  # the map may have been edited
+    ended = lhpost6("import", "EQ1.bin", "--map", "EQ1_map.toml", "--out", "EQ1.nc")
+    assert ended.code == 0
+    assert "platen_displacement[x] EQ1.bin: Long Displ fbk [in] m" in ended.words
     assert load_record(tmp_path / "EQ1.nc", LABELS).attrs["sample_rate_hz"] == 256
 
 
@@ -120,16 +103,16 @@ def test_a_wrong_unit_is_seen_after_the_import(lhpost6, tmp_path):
     (tmp_path / "map.toml").write_text(
         f'[channel]\n"platen_displacement[x]" = {{ column = "x", unit = "m" }}\n{zero}\n'
     )
-    code, words = lhpost6("import", "run.csv", "--map", "map.toml")
-    assert code == 0 and "wrote out/run.nc" in words
-    assert "reaches 20: mm or in for m?" in words
+    ended = lhpost6("import", "run.csv", "--map", "map.toml")
+    assert ended.code == 0 and "wrote out/run.nc" in ended.words
+    assert "reaches 20: mm or in for m?" in ended.words
 
 
 def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
     record.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
-    assert lhpost6("export", "a.nc", "--to", "csv") == (0, "wrote a.csv")
-    code, words = lhpost6("import", "a.csv", "--out", "b.nc")
-    assert code == 0 and "0 errors" in words
+    assert lhpost6("export", "a.nc", "--to", "csv")[:2] == (0, "wrote a.csv\n")
+    ended = lhpost6("import", "a.csv", "--out", "b.nc")
+    assert ended.code == 0 and "0 errors" in ended.words
     np.testing.assert_array_equal(load_record(tmp_path / "b.nc")["actuator_force"], record["actuator_force"])
 
 
@@ -146,13 +129,11 @@ def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
 )
 def test_a_command_that_cannot_go_on_says_why(lhpost6, tmp_path, arguments, phrase):
     (tmp_path / "run.csv").write_text("time [s],x\n0,1\n1,2\n")
-    code, words = lhpost6(*arguments)
-    assert code == 2 and phrase in words
+    assert refused(lhpost6(*arguments), phrase)
 
 
 def test_a_record_is_not_written_over_the_file_it_comes_from(lhpost6, tmp_path, record):
     export_record(record, tmp_path / "a.csv", "csv")
     before = (tmp_path / "a.csv").read_bytes()
-    code, words = lhpost6("import", "a.csv", "--out", "a.csv")
-    assert code == 2 and "is one of the files to import" in words
+    assert refused(lhpost6("import", "a.csv", "--out", "a.csv"), "is one of the files to import")
     assert (tmp_path / "a.csv").read_bytes() == before

@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from machine_cases import machine_named
-from typer.testing import CliRunner
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.core.errors import ParameterError, SimulationError
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
 from lhpost6_pin.effects.effect import Effect
@@ -448,13 +446,12 @@ def test_without_pythonfmu_the_exporter_says_what_to_install(tmp_path, monkeypat
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_line_exports_a_machine_with_its_changes(tmp_path):
+def test_the_command_line_exports_a_machine_with_its_changes(lhpost6, tmp_path):
     changes = tmp_path / "change.toml"
     changes.write_text("[platen]\nmass = { value = [150e3, 150e3, 160e3], unit = 'kg' }\n")
     out = tmp_path / "new" / "table.fmu"
-    ended = CliRunner().invoke(app, ["export-fmu", "--override", str(changes), "--valves", "2", "--out", str(out)])
-    assert ended.exit_code == 0, ended.output
-    assert str(out) in ended.stdout.replace("\n", "")
+    ended = lhpost6("export-fmu", "--override", changes, "--valves", "2", "--out", out)
+    assert ended.code == 0 and str(out) in ended.out.replace("\n", "")
     machine, _ = load_machine_file(Path(fmpy.extract(str(out), str(tmp_path / "a"))) / "resources")
     assert machine.platen.mass == (150e3, 150e3, 160e3)
     assert {a.valves for a in machine.actuators if a.area_b is not None} == {2}

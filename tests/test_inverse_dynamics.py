@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from inverse_cases import RATE, forces_of, friction_columns, motion_of, shaken
-from machine_cases import DATA, machine_named
+from machine_cases import PENDULUM, machine_named
 
 from lhpost6_pin.core.errors import RecordError, SimulationError
 from lhpost6_pin.identification.inverse_dynamics import Decomposition, inverse_dynamics, leg_wrenches, march_states
@@ -116,7 +116,7 @@ def test_a_leg_out_of_its_stroke_is_named_with_the_sample(run: Run) -> None:
 
 def test_a_specimen_with_joints_is_refused_and_locked_it_comes_apart() -> None:
     machine = machine_named("lhpost6")
-    loose, locked = (machine.with_specimen(DATA / "pendulum.urdf", locked=x) for x in (False, True))
+    loose, locked = (machine.with_specimen(PENDULUM, locked=x) for x in (False, True))
     still = PlatenMotion(*np.zeros((3, 8, 6)))
     with pytest.raises(SimulationError, match="--locked"):
         inverse_dynamics(make_plant(loose), np.arange(8) / 512, still, np.zeros((8, 10)))

@@ -3,25 +3,20 @@
 import inspect
 import json
 import re
-import sys
 from collections import namedtuple
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import SHORT
 from hypothesis import given
 from hypothesis import strategies as st
-from machine_cases import DATA
+from machine_cases import PRACTICE, REFERENCE
 
 from lhpost6_pin import cli
 from lhpost6_pin.core.jsonable import as_json, jsonable
 from lhpost6_pin.machine.machine import load_machine
-
-PRACTICE = DATA / "records" / "practice_a_TX.nc"
-REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
-SINE = ("sine", "--set", "amplitude=0.02", "--set", "cycles=0.5", "--set", "ramp_cycles=0.5", "--engine", "fused")
-
 
 PAGE = Path(__file__).parents[1] / "scripts" / "docs" / "pages" / "reference" / "json.md"
 
@@ -41,19 +36,15 @@ def not_a_constant(word: str) -> None:
 
 
 @pytest.fixture
-def said(capsys, monkeypatch, tmp_path):
-    """Run a command with --json in a folder of its own; what it says, and its exit code."""
-    monkeypatch.chdir(tmp_path)
+def said(lhpost6):
+    """Run a command with --json; what it says, and its exit code."""
 
     def run(*arguments: object) -> tuple[dict, int]:
-        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments), "--json"])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        entries = json.loads(capsys.readouterr().out, parse_constant=not_a_constant)
+        code, out, _ = lhpost6(*arguments, "--json")
+        entries = json.loads(out, parse_constant=not_a_constant)
         assert all(Path(path).is_file() for path in entries.get("files", []))
         assert set(entries) <= documented(str(arguments[0])) | {"error"}
-        return entries, int(end.value.code or 0)
+        return entries, code
 
     return run
 
@@ -97,7 +88,7 @@ def test_a_check_states_findings_by_file_and_fails_with_them(said, tmp_path):
 
 
 def test_a_run_states_what_its_report_says_first(said):
-    entries, code = said("run", *SINE)
+    entries, code = said("run", *SHORT)
     assert code == 0 and entries["trouble"] is None and entries["verdict"]
     x = next(row for row in entries["tracking"] if row["axis"] == "x" and row["quantity"] == "displacement")
     assert x["peak_target"] == pytest.approx(0.02, rel=1e-3) and 0.0 < x["rrmse_aligned"] < 0.2

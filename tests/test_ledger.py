@@ -29,12 +29,6 @@ CONSERVING = {
 }
 
 
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """The LHPOST6."""
-    return load_machine()
-
-
 def waves(plant_spools: int, t: np.ndarray) -> np.ndarray:
     """Smooth spool motions about zero, all actuators, 2 to 7 Hz."""
     k = np.arange(plant_spools)

@@ -27,7 +27,7 @@ from lhpost6_pin.identification.residuals import Residuals, evaluate_residuals
 from lhpost6_pin.laws import bulk, chamber, leaks, lines, orifice, play, spool
 from lhpost6_pin.machine.library import families
 from lhpost6_pin.machine.library.oil_families import BUILD
-from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
@@ -373,12 +373,6 @@ STRONG: dict[str, dict[str, float]] = {
 """Families that chambers feel, strong enough to show in a third of a second."""
 
 COMMAND = ("spool_lag", "transport_delay")
-
-
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """The LHPOST6."""
-    return load_machine()
 
 
 def stirred(machine: Machine, engine: str = "fused", samples: int = 600, steps: int = 16, **more: str) -> Run:

@@ -6,8 +6,8 @@ import threading
 from pathlib import Path
 
 import pytest
+from commands import refused
 
-from lhpost6_pin import cli
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.interfaces.link import LinkMode, ServedPlant, open_socket, serve
 
@@ -20,21 +20,6 @@ SHORT = (
 )
 SCRIPT = Path(__file__).parent.parent / "scripts" / "link_round_trip.py"
 GUARD = 120  # [s] no wait is meant to last so long
-
-
-@pytest.fixture
-def lhpost6(capsys, monkeypatch, tmp_path):
-    """Run a command as the entry point does, in a folder of its own; returns exit code and text."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        told = capsys.readouterr()
-        return int(end.value.code or 0), " ".join((told.out + told.err).split())
-
-    return run
 
 
 @pytest.fixture
@@ -52,10 +37,10 @@ def port(plant, rest):
 
 @pytest.mark.parametrize("mode", [m.label for m in LinkMode])
 def test_a_server_says_where_it_listens_and_what_it_met(lhpost6, mode):
-    code, told = lhpost6("serve", "--mode", mode, "--port", 0, "--seconds", 0.05)
-    assert code == 0
-    assert "listens at 127.0.0.1:" in told and f", {mode}; Ctrl-C ends" in told
-    assert "missed deadlines" in told and "malformed" in told
+    ended = lhpost6("serve", "--mode", mode, "--port", 0, "--seconds", 0.05)
+    assert ended.code == 0
+    assert "listens at 127.0.0.1:" in ended.words and f", {mode}; Ctrl-C ends" in ended.words
+    assert "missed deadlines" in ended.words and "malformed" in ended.words
 
 
 def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6):
@@ -64,14 +49,14 @@ def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6)
         try:
             where = server.stdout.readline()
             port = where.split("127.0.0.1:")[1].split(",")[0]
-            code, told = lhpost6("link", *SHORT, "--port", port, "--out", tmp_path / "out")
+            ended = lhpost6("link", *SHORT, "--port", port, "--out", tmp_path / "out")
         finally:
             server.kill()
-    assert code == 0, told
+    assert ended.code == 0, ended
     record = load_record(tmp_path / "out" / "record.nc")
     assert record.attrs["title"] == "sine at scale 0.2 over the link"
     assert record.attrs["link_mode"] == "lock-step" and record.attrs["lost"] == 0
-    assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in told.replace(" ", "")
+    assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in ended.words.replace(" ", "")
 
 
 def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6, port):
@@ -80,8 +65,8 @@ def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6
         "    def init(self, plant, rest):\n        return rest.spool\n"
         "    def step(self, memory, wanted, sensors):\n        return memory\n"
     )
-    code, told = lhpost6("link", *SHORT, "--port", port, "--controller", "mine.py:Mine")
-    assert code == 0, told
+    ended = lhpost6("link", *SHORT, "--port", port, "--controller", "mine.py:Mine")
+    assert ended.code == 0, ended
     assert abs(load_record(tmp_path / "out" / "sine_link" / "record.nc")["actuator_displacement"]).max() < 1e-6
 
 
@@ -91,17 +76,14 @@ def test_a_plant_that_trips_ends_the_command_with_one(tmp_path, lhpost6, port):
         "    def init(self, plant, rest):\n        pass\n"
         "    def step(self, memory, wanted, sensors):\n        return [0.0] * 4 + [1.0] * 6\n"
     )
-    code, told = lhpost6("link", *SHORT, "--port", port, "--controller", "wild.py:Wild")
-    assert code == 1 and "the plant tripped" in told
+    ended = lhpost6("link", *SHORT, "--port", port, "--controller", "wild.py:Wild")
+    assert ended.code == 1 and "the plant tripped" in ended.words
 
 
 def test_what_cannot_be_done_is_said_and_ends_with_two(lhpost6, port):
-    code, told = lhpost6("serve", "--port", port)
-    assert code == 2 and f"cannot listen on 127.0.0.1:{port}" in told
-    code, told = lhpost6("serve", "--mode", "fast")
-    assert code == 2 and "free, lock-step, real-time" in told
-    code, told = lhpost6("link", *SHORT, "--port", port, "--valves", 2)
-    assert code == 2 and "choose --valves alike" in told
+    assert refused(lhpost6("serve", "--port", port), f"cannot listen on 127.0.0.1:{port}")
+    assert refused(lhpost6("serve", "--mode", "fast"), "free, lock-step, real-time")
+    assert refused(lhpost6("link", *SHORT, "--port", port, "--valves", 2), "choose --valves alike")
 
 
 def test_the_round_trip_script_measures_and_keeps_its_figures(tmp_path):
@@ -114,5 +96,7 @@ def test_the_round_trip_script_measures_and_keeps_its_figures(tmp_path):
 def test_a_controller_that_fails_during_a_link_is_named(tmp_path, lhpost6, port):
     text = "class Mine:\n    def init(self, plant, rest): pass\n    def step(self, *seen): return 1 / 0\n"
     (tmp_path / "mine.py").write_text(text)
-    code, told = lhpost6("link", *SHORT, "--port", port, "--controller", "mine.py:Mine")
-    assert code == 2 and "Mine.step failed at sample 0: ZeroDivisionError" in told
+    assert refused(
+        lhpost6("link", *SHORT, "--port", port, "--controller", "mine.py:Mine"),
+        "Mine.step failed at sample 0: ZeroDivisionError",
+    )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machine_cases import DATA, MACHINES, machine_named, plant_named
+from machine_cases import MACHINES, PENDULUM, machine_named, plant_named
 
 from lhpost6_pin.core.errors import ParameterError, SimulationError, UnknownNameError
 from lhpost6_pin.core.names import ENGINES, SCHEMES
@@ -216,7 +216,7 @@ def test_any_machine_moves_where_its_spools_drive_it_in_both_engines(name, schem
 
 
 def test_pendulum_on_a_driven_table_obeys_its_closed_form_at_every_sample():
-    plant = make_plant(machine_named("uniaxial").with_specimen(DATA / "pendulum.urdf"))
+    plant = make_plant(machine_named("uniaxial").with_specimen(PENDULUM))
     rest = find_equilibrium(plant)
     spool = np.tile(rest.spool, (200, 1))
     spool[20:120] += 0.3
@@ -233,7 +233,7 @@ def test_pendulum_on_a_driven_table_obeys_its_closed_form_at_every_sample():
 
 
 def test_lhpost6_carries_a_free_pendulum_and_still_rests():
-    plant = make_plant(LHPOST6.with_specimen(DATA / "pendulum.urdf", (2.0, 1.0, 0.0)))
+    plant = make_plant(LHPOST6.with_specimen(PENDULUM, (2.0, 1.0, 0.0)))
     rest = find_equilibrium(plant)
     held = (LHPOST6.platen.mass[2] + 700.0) * G + sum(s.area * s.pressure for s in LHPOST6.struts)
     assert rest.force[4:].sum() == pytest.approx(held, rel=1e-12)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machine_cases import DATA, machine_named
+from machine_cases import PENDULUM, STEWART, machine_named
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.names import SAMPLE_RATE
@@ -214,7 +214,7 @@ def test_a_guided_platen_moves_along_its_axis_only():
 
 def test_a_machine_without_second_chambers_has_a_valid_record(tmp_path):
     """Every actuator single-acting, as in no shipped machine: no chamber B, no number of valves on horizontals."""
-    lines = (DATA / "stewart.toml").read_text().replace('"4-way"', '"3-way"').splitlines()
+    lines = (STEWART).read_text().replace('"4-way"', '"3-way"').splitlines()
     path = tmp_path / "single.toml"
     path.write_text("\n".join(line for line in lines if not line.startswith(("area_b", "chamber_b"))))
     record = record_of_run(short_run(load_machine(path)), {})
@@ -223,7 +223,7 @@ def test_a_machine_without_second_chambers_has_a_valid_record(tmp_path):
 
 
 def test_joints_of_an_articulated_specimen_are_recorded():
-    machine = load_machine().with_specimen(DATA / "pendulum.urdf")
+    machine = load_machine().with_specimen(PENDULUM)
     along_x = np.r_[-0.1, -0.1, 0.1, 0.1, np.zeros(6)]
     run = short_run(machine, samples=512, spool=along_x)
     record = record_of_run(run, {})
@@ -237,6 +237,6 @@ def test_joints_of_an_articulated_specimen_are_recorded():
 
 
 def test_a_locked_specimen_has_no_joints_to_record():
-    record = record_of_run(short_run(load_machine().with_specimen(DATA / "pendulum.urdf", locked=True)), {})
+    record = record_of_run(short_run(load_machine().with_specimen(PENDULUM, locked=True)), {})
     assert record.attrs["specimen"] == "pendulum"
     assert "specimen_joint_position" not in record

@@ -8,7 +8,7 @@ import pint
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from machine_cases import DATA
+from machine_cases import STEWART
 
 from lhpost6_pin.core.errors import LhpostError, ParameterError, UnknownNameError
 from lhpost6_pin.core.files import models_folder
@@ -16,7 +16,7 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import EVIDENCE, Quantity, load_parameters, override_parameters, to_unit
 
 SHIPPED = [p.stem for p in sorted(models_folder().glob("*.toml"))]
-FILES = [*SHIPPED, str(DATA / "stewart.toml")]
+FILES = [*SHIPPED, str(STEWART)]
 TEXT = (models_folder() / "lhpost6.toml").read_text(encoding="utf-8")
 UNITS = pint.UnitRegistry()
 

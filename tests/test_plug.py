@@ -4,14 +4,12 @@ import math
 import sys
 from dataclasses import dataclass
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from machine_cases import SCRIPTS
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.control import Controller, load_controller, make_controller
 from lhpost6_pin.control.plug import checked_command, is_plugged, load_plugged
 from lhpost6_pin.core.errors import ControllerError, SimulationError
@@ -25,8 +23,6 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
-
-SCRIPTS = Path(__file__).parent.parent / "scripts"
 
 HOLD = """
 from __future__ import annotations
@@ -260,11 +256,10 @@ def test_what_is_wanted_must_fit_the_samples_and_be_finite(plant, rest):
         simulate(plant, PluggedLoop(Hold(), *motion, rest), samples=8)
 
 
-def test_a_controller_runs_from_the_command_line_by_a_relative_path(file, monkeypatch):
+def test_a_controller_runs_from_the_command_line_by_a_relative_path(lhpost6, file, monkeypatch):
     monkeypatch.chdir(file.parent)
-    command = ["run", "sine", "--set", "amplitude=0.01", "--set", "cycles=1", "--controller", "mine.py:Hold"]
-    ended = CliRunner().invoke(app, [*command, "--out", "held"])
-    assert ended.exit_code == 0, ended.output
+    command = ("run", "sine", "--set", "amplitude=0.01", "--set", "cycles=1", "--controller", "mine.py:Hold")
+    assert lhpost6(*command, "--out", "held").code == 0
     record = load_record(file.parent / "held" / "record.nc")
     assert np.abs(record["reference_displacement"].values).max() == pytest.approx(0.01, rel=1e-3)
     assert np.abs(record["platen_displacement"].values).max() < 1e-9  # held, whatever was wanted

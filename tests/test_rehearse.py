@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machine_cases import DATA, machine_named
+from machine_cases import DATA, PENDULUM, machine_named
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ControllerError, OutOfRangeError, ParameterError, RecordError, SimulationError
@@ -54,7 +54,7 @@ def test_a_zero_target_keeps_the_platen_at_rest_for_ten_seconds(name):
 
 
 def test_an_eccentric_specimen_is_held_at_rest():
-    machine = load_machine().with_specimen(DATA / "pendulum.urdf", position=(2.0, 1.0, 0.0), locked=True)
+    machine = load_machine().with_specimen(PENDULUM, position=(2.0, 1.0, 0.0), locked=True)
     test = rehearse(machine, sine_target(scale=0.0), load_controller("lhpost6"), attrs={}, engine="fused")
     assert np.abs(test.record["platen_displacement"].values).max() < 1e-9
 

@@ -4,9 +4,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from machine_cases import (
-    DATA,
     FREE_MACHINES,
     MACHINES,
+    PENDULUM,
     frame_array,
     machine_named,
     plant_named,
@@ -31,7 +31,6 @@ from lhpost6_pin.mechanics.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forc
 from lhpost6_pin.mechanics.workspace import make_workspace
 from lhpost6_pin.simulation.engine_fused import refuse_joints
 
-PENDULUM = DATA / "pendulum.urdf"
 BOB, ARM, BOB_INERTIA, POST = 500.0, 2.0, 25.0, 200.0  # of pendulum.urdf: kg, m, kg m2 about Y, kg
 G = 9.80665
 ABOVE = (0.5, -0.3, 0.0)  # where the tests bolt it

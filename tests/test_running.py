@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machine_cases import DATA, plant_named
+from machine_cases import PENDULUM, plant_named
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError
@@ -84,7 +84,7 @@ def test_other_machines_run_sample_by_sample_too(name):
 
 
 def test_a_pendulum_on_the_table_runs_sample_by_sample_too():
-    plant = make_plant(load_machine().with_specimen(DATA / "pendulum.urdf"))
+    plant = make_plant(load_machine().with_specimen(PENDULUM))
     rest = find_equilibrium(plant)
     table = RunningPlant(plant, rest)
     for _ in range(100):

@@ -5,20 +5,16 @@ import re
 import runpy
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from machine_cases import DATA, machine_named
+from machine_cases import SCRIPTS, machine_named
 
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
-
-SCRIPTS = Path(__file__).parent.parent / "scripts"
-PRACTICE = DATA / "records" / "practice_a_TX.nc"
 
 
 def script(name: str, *arguments: object) -> subprocess.CompletedProcess:

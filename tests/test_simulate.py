@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machine_cases import DATA
+from machine_cases import PENDULUM, REFERENCE
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError, UnknownNameError
@@ -25,9 +25,6 @@ from lhpost6_pin.simulation.batch import simulate_many
 from lhpost6_pin.simulation.engine_pinocchio import make_stepper
 from lhpost6_pin.simulation.rehearse import replay
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate
-
-REFERENCE = DATA / "records" / "open_loop_ridgecrest.nc"
-PENDULUM = DATA / "pendulum.urdf"
 
 
 @pytest.fixture(scope="module")

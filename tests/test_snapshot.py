@@ -1,12 +1,11 @@
 """What is seen of a running plant is what its record says, and looking changes nothing."""
 
-import sys
 import time
 
 import numpy as np
 import pytest
+from commands import SHORT
 
-from lhpost6_pin import cli
 from lhpost6_pin.cli import live_view as live
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
@@ -68,12 +67,8 @@ def test_a_live_view_is_no_faster_than_the_table(plant):
         assert time.monotonic() - begin >= 0.3
 
 
-def test_a_run_can_be_watched_from_the_command_line(monkeypatch, tmp_path, capsys):
+def test_a_run_can_be_watched_from_the_command_line(lhpost6, monkeypatch, tmp_path):
     monkeypatch.setattr(live, "PATIENCE", 0.0)
-    words = "run sine --set amplitude=0.02 --set cycles=0.5 --set ramp_cycles=0.5 --engine fused --live --no-open"
-    monkeypatch.setattr(sys, "argv", ["lhpost6", *words.split(), "--out", str(tmp_path)])
-    with pytest.raises(SystemExit) as end:
-        cli.main()
-    told = capsys.readouterr()
-    assert not end.value.code and "http://127.0.0.1:" in told.out and "nobody has looked" in told.err
+    ended = lhpost6("run", *SHORT, "--live", "--no-open", "--out", tmp_path)
+    assert ended.code == 0 and "http://127.0.0.1:" in ended.out and "nobody has looked" in ended.err
     assert (tmp_path / "record.nc").is_file()

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.specimen_joints import joints_beyond, specimen_doubts, specimen_joints, specimen_positions
@@ -83,11 +81,10 @@ def test_joints_have_their_names_units_and_unwrapped_positions(tower):
     assert joints_beyond(loaded, np.arange(8.0), q[:8]) == []
 
 
-def test_a_run_warns_before_and_reports_what_the_joints_did(tower, tmp_path, caplog):
+def test_a_run_warns_before_and_reports_what_the_joints_did(lhpost6, tower, tmp_path, caplog):
     tower(friction=3.0)
-    asked = ["run", "sine", "--set", "amplitude=0.005", "--set", "cycles=1", "--rate", "2048"]
-    ended = CliRunner().invoke(app, [*asked, "--specimen", str(tmp_path / "tower.urdf"), "--out", str(tmp_path)])
-    assert ended.exit_code == 0, ended.output
+    asked = ("run", "sine", "--set", "amplitude=0.005", "--set", "cycles=1", "--rate", "2048")
+    assert lhpost6(*asked, "--specimen", "tower.urdf", "--out", tmp_path).code == 0
     assert "friction of hinge is in its URDF and not simulated" in caplog.text
     page = (tmp_path / "report.html").read_text()
     assert "Specimen joints over time" in page and "friction of hinge" in page and "specimen joint lift" in page

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from machine_cases import DATA
+from machine_cases import PENDULUM
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError
@@ -164,7 +164,7 @@ def test_a_changed_table_is_tuned_without_hand_work(change):
 
 @pytest.mark.slow
 def test_a_rigid_specimen_is_tuned_without_hand_work():
-    machine = load_machine().with_specimen(DATA / "pendulum.urdf", locked=True)
+    machine = load_machine().with_specimen(PENDULUM, locked=True)
     found = tune(machine, load_controller("lhpost6"))
     assert found.doubled and all(axis.margin_after.gain > 2.0 for axis in found.axes)
 

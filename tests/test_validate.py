@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from machine_cases import DATA
-from typer.testing import CliRunner
+from commands import refused
+from machine_cases import PRACTICE
 
-from lhpost6_pin.cli import app
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
@@ -22,7 +21,6 @@ from lhpost6_pin.identification.validation.metrics import validation_numbers
 from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
 from lhpost6_pin.identification.validation.resonance import find_peak
 from lhpost6_pin.identification.validation.valve_agreement import find_valves
-from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report.validate_report import write_validate_report
@@ -39,11 +37,6 @@ def triangle(axis="x"):
 
 def every_fourth(record):
     return record.isel(time=slice(None, None, 4)).assign_attrs(sample_rate_hz=512.0)
-
-
-@pytest.fixture(scope="module")
-def machine():
-    return load_machine()
 
 
 @pytest.fixture(scope="module")
@@ -354,7 +347,7 @@ def test_a_specimen_that_is_not_mounted_is_named(machine, campaign):
 
 
 def test_a_measured_record_goes_through(machine):
-    record = load_record(DATA / "records" / "practice_a_TX.nc")
+    record = load_record(PRACTICE)
     found = validate(machine, Campaign("measured", (record,)), phases=[1, 2])
     rows = {(p.number, a.quantity, a.column): a for p in found.phases for a in p.agreement}
     assert rows[1, "wrench", "x"].rrmse_aligned < 0.03  # 0.5 % of gain, friction of noisy motion
@@ -389,10 +382,10 @@ def test_the_report_has_the_figures_of_every_phase(found_noisy, tmp_path):
     assert len(page) < 6e6
 
 
-def test_the_command_leaves_report_and_metrics(coarse, tmp_path):
+def test_the_command_leaves_report_and_metrics(lhpost6, coarse, tmp_path):
     save_campaign(coarse._replace(records=coarse.records[:1]), tmp_path / "in")
-    done = CliRunner().invoke(app, ["validate", str(tmp_path / "in"), "--out", str(tmp_path / "out"), "--jobs", "1"])
-    assert done.exit_code == 0, done.output
+    ended = lhpost6("validate", "in", "--out", "out", "--jobs", "1")
+    assert ended.code == 0, ended
     found = json.loads((tmp_path / "out" / "metrics.json").read_text(), parse_constant=pytest.fail)  # no NaN, Infinity
     x = found["tests"]["TX"]["closed loop"]["agreement"]["velocity"]["x"]
     assert x["rrmse"] < 1e-5  # low-passed on either side at another rate
@@ -407,10 +400,8 @@ def test_the_command_leaves_report_and_metrics(coarse, tmp_path):
 
 
 @pytest.mark.parametrize("phases", ["", "4", "1;2"])
-def test_phases_that_do_not_exist_are_refused(phases, tmp_path):
-    done = CliRunner().invoke(app, ["validate", str(tmp_path), "--phases", phases])
-    assert done.exit_code == 1
-    assert "1,2,3" in str(done.exception)
+def test_phases_that_do_not_exist_are_refused(lhpost6, phases, tmp_path):
+    assert refused(lhpost6("validate", tmp_path, "--phases", phases), "1,2,3")
 
 
 def test_an_empty_folder_and_tests_of_different_states_are_refused(machine, campaign, tmp_path):

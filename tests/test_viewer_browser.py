@@ -24,11 +24,6 @@ DRAWN = "new Promise((drawn) => requestAnimationFrame(() => requestAnimationFram
 
 
 @pytest.fixture(scope="module")
-def machine(plant):
-    return plant.machine
-
-
-@pytest.fixture(scope="module")
 def record():
     return load_record(RECORD).isel(time=slice(0, 512 * 12))
 

@@ -103,10 +103,7 @@ KERNELS = {
             chamber.advance_double,
             (_OPEN, _PRESSURE, _PRESSURE, _LENGTH, _LENGTH, _STROKE, _DT, _AREA, _AREA, *(_K,) * 4, *_REST),
         ),
-        Kernel(
-            chamber.advance_single,
-            (_OPEN, _PRESSURE, _LENGTH, _STROKE, _DT, _AREA, _K, _K, *_REST),
-        ),
+        Kernel(chamber.advance_single, (_OPEN, _PRESSURE, _LENGTH, _STROKE, _DT, _AREA, _K, _K, *_REST)),
         Kernel(strut.gas_pressure, (_GAS[0], _GAS[1], _GAS[3], _GAS[4])),
         Kernel(strut.strut_force, _GAS),
         Kernel(strut.strut_energy, _GAS),

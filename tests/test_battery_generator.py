@@ -170,7 +170,7 @@ def written(tmp_path_factory):
 def test_a_written_case_is_a_campaign_of_valid_records_that_do_not_tell(written):
     case, folder = written
     assert sorted(path.name for path in folder.iterdir()) == [
-        *("EQ.nc", "TX.nc", "TY.nc", "TZ.nc", "WN.nc", "campaign.toml"),
+        *("EQ.nc", "TX.nc", "TY.nc", "TZ.nc", "WN.nc", "campaign.toml")
     ]
     for test in case.tests:
         record = load_record(folder / f"{test.name}.nc")

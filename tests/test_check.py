@@ -131,9 +131,7 @@ def test_a_measured_channel_that_never_changes_is_found(tests_by_name: dict[str,
     assert faults(check_dataset(broken)) == [("warning", "strut_pressure[S2]", 0)]
 
 
-def test_a_saturated_spool_is_found_at_the_first_sample_at_its_end(
-    tests_by_name: dict[str, xr.Dataset],
-) -> None:
+def test_a_saturated_spool_is_found_at_the_first_sample_at_its_end(tests_by_name: dict[str, xr.Dataset]) -> None:
     record = tests_by_name["EQ"]
     command = np.clip(4 * record["spool_command"].values, -1, 1)
     first = int(np.argmax(np.abs(command[:, 0]) == 1))

@@ -172,8 +172,7 @@ def test_oil_column_would_ring_without_force_feedback(plant, rest):
         test = rehearse(plant.machine, target, changed, attrs={"test": "x"}, engine="fused")
         late = delay(target.acceleration[:, 0], test.record["platen_acceleration"].values[:, 0], 1 / SAMPLE_RATE)
         return rrmse(
-            target.acceleration[:, 0],
-            align(test.record["platen_acceleration"].values[:, 0], late, 1 / SAMPLE_RATE),
+            target.acceleration[:, 0], align(test.record["platen_acceleration"].values[:, 0], late, 1 / SAMPLE_RATE)
         )
 
     assert roughness(settings.force_damping) < 0.5 * roughness((0.0,) * 6)

@@ -119,19 +119,11 @@ def cells(claimed: int) -> bytes:
 KNOWN = {
     "effect is a number": ("machine", lambda: b"effect = 1\n", "effect must be sections"),
     "too many digits": ("machine", lambda: b"a = " + b"9" * 5000, "not a TOML file"),
-    "too many digits for a message": (
-        "uniaxial",
-        lambda: b"[machine]\na = 0x" + b"f" * 5000,
-        "machine.a is a whole",
-    ),
+    "too many digits for a message": ("uniaxial", lambda: b"[machine]\na = 0x" + b"f" * 5000, "machine.a is a whole"),
     "dots without end": ("machine", lambda: b"a" + b".a" * 5000 + b" = 1", "nested too deeply"),
     "override of nothing": ("override", lambda: b"[platen]\nmasss = 1.0\n", "no parameter named 'platen.masss'"),
     "override without value": ("override", lambda: b"[platen]\nmass = { unit = 't' }\n", "value is missing"),
-    "unknown family": (
-        "override",
-        lambda: b"[effect.rub]\nfamily = 'rubber'\n",
-        "named 'rubber'",
-    ),
+    "unknown family": ("override", lambda: b"[effect.rub]\nfamily = 'rubber'\n", "named 'rubber'"),
     "a number to overflow": ("override", lambda: b"[platen]\ngravity = { value = 1e300 }\n", "beyond 1e[+]30"),
     "no sampling": ("sensors", lambda: b"", "sampling.rate is missing"),
     "half a bit": (
@@ -140,23 +132,11 @@ KNOWN = {
         "should be a whole",
     ),
     "gain without end": ("map", lambda: seed("map", b"1.002", b"1" + b"0" * 400), "gain is a whole number of more"),
-    "index without titles": (
-        "motions",
-        lambda: seed("motions", b"\ntitle = ", b"\ntitel = "),
-        "index.toml: is dam",
-    ),
+    "index without titles": ("motions", lambda: seed("motions", b"\ntitle = ", b"\ntitel = "), "index.toml: is dam"),
     "index of nothing": ("motions", lambda: b"records = 1", "index.toml: is dam"),
     "test without kind": ("tests", lambda: seed("tests", b"\nkind = ", b"\nkid = "), "tests.toml: is dam"),
-    "unknown type in MATLAB v5": (
-        "mat5",
-        lambda: seed("mat5", b"\x09\0\0\0\x60", b"\x08\0\0\0\x60"),
-        "no",
-    ),
-    "no numbers in MATLAB v5": (
-        "mat5",
-        lambda: seed("mat5", b"\x09\0\0\0\x60", b"\x0e\0\0\0\x60"),
-        "no",
-    ),
+    "unknown type in MATLAB v5": ("mat5", lambda: seed("mat5", b"\x09\0\0\0\x60", b"\x08\0\0\0\x60"), "no"),
+    "no numbers in MATLAB v5": ("mat5", lambda: seed("mat5", b"\x09\0\0\0\x60", b"\x0e\0\0\0\x60"), "no"),
     "two billion cells": ("mat5", lambda: cells(2**31 - 1), "fewer cells than it says"),
     "a rate without end": ("map", lambda: seed("map", b"128.0", b"1e300"), "rate = 1e[+]300 must be"),
     "8 TB in HDF5": ("hdf5", lambda: claiming(False), "claims 8e[+]03 GB"),

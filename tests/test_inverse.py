@@ -28,10 +28,7 @@ def oscillator(frequency: float, damping: float, gain: float = 1.0) -> tuple[np.
     return signal.bilinear([gain * w**2], [1, 2 * damping * w, w**2], RATE)
 
 
-PLANT = [
-    [oscillator(25, 0.4), oscillator(12, 0.3, 0.2)],
-    [oscillator(15, 0.3, -0.2), oscillator(40, 0.5)],
-]
+PLANT = [[oscillator(25, 0.4), oscillator(12, 0.3, 0.2)], [oscillator(15, 0.3, -0.2), oscillator(40, 0.5)]]
 """Two axes that resonate, roll off and couple; row output, column drive."""
 
 

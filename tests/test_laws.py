@@ -230,11 +230,7 @@ def test_one_dimension_is_two_with_nothing_across(dx: float, z: float, shape: fl
 
 
 @settings(deadline=None, max_examples=100)
-@given(
-    corners=st.lists(st.tuples(slips, slips), min_size=2, max_size=5),
-    shape=shapes,
-    two=st.booleans(),
-)
+@given(corners=st.lists(st.tuples(slips, slips), min_size=2, max_size=5), shape=shapes, two=st.booleans())
 def test_from_rest_friction_never_gives_energy_back(corners: list, shape: float, two: bool) -> None:
     """Z.v = d/dt(Y |Z|^2 / 2) + H |Z|^2, H >= 0 for shapes up to 1/2: work on the law is at least Y |Z|^2 / 2."""
     z, at, work = np.zeros(2), np.zeros(2), 0.0

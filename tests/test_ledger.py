@@ -5,28 +5,22 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
+from inverse_cases import shaken as every_step
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import UnknownNameError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.machine.machine import Machine, load_machine
-from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.ports import evaluate_ports, platen_pose
-from lhpost6_pin.mechanics.schemes import A, V
 from lhpost6_pin.mechanics.workspace import make_workspace
 from lhpost6_pin.simulation.energy import CREATED, Audit, energy_audit
-from lhpost6_pin.simulation.engine_pinocchio import make_stepper
 from lhpost6_pin.simulation.ledger import Ledger, force_ledger
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, Run, simulate
 
-CONSERVING = {
-    "machine.thrust": "normal",
-    "platen.mass": [168100.0, 168100.0, 168100.0],
-    "vertical.pad_friction": 0.0,
-}
+CONSERVING = {"machine.thrust": "normal", "platen.mass": [168100.0, 168100.0, 168100.0], "vertical.pad_friction": 0.0}
 
 
 def waves(plant_spools: int, t: np.ndarray) -> np.ndarray:
@@ -45,24 +39,6 @@ def open_loop(machine: Machine, duration: float = 1.0, rate: int = 8192, scheme:
     run = simulate(plant, OpenLoop(spool, rest.state), samples=n, scheme=scheme, steps_per_second=rate, engine="fused")
     assert run.trouble is None
     return run
-
-
-def every_step(machine: Machine, rate: int, duration: float = 0.5, scheme: str = "semi_implicit") -> Run:
-    """The same with every model step recorded: what is left in the audit is the scheme's and the quadrature's."""
-    plant = make_plant(machine)
-    rest = find_equilibrium(plant)
-    n = int(duration * rate)
-    spool = rest.spool + waves(plant.spools, (np.arange(n) + 0.5) / rate)
-    ws = make_workspace(plant, rest.state)
-    evaluate_derivatives(plant, ws, spool[0])
-    advance = make_stepper(plant, scheme, 1.0 / rate)
-    q, v, a, z = [], [], [], []
-    for held in spool:
-        for log, value in zip((q, v, a, z), (ws.q, ws.motion[V], ws.motion[A], ws.z), strict=True):
-            log.append(value.copy())
-        assert advance(ws, held[None]) == 0
-    arrays = [np.array(x) for x in (q, v, a, z)]
-    return Run(plant, np.arange(n) / rate, *arrays, spool, None, float(rate), scheme, rate, "pinocchio", 0, None)
 
 
 def reference(amplitude: list[float], frequency: list[float], duration: float) -> np.ndarray:
@@ -119,7 +95,7 @@ def test_all_forces_sum_to_the_inertia(machine: Machine) -> None:
 
 def test_with_the_staggered_scheme_the_sum_closes_with_second_order(machine: Machine) -> None:
     """Its accelerations belong to velocities that a half step extrapolates."""
-    left = [np.abs(force_ledger(every_step(machine, rate, 0.2)).residual).max(axis=0) for rate in (4096, 8192, 16384)]
+    left = [np.abs(force_ledger(every_step(machine, 0.2, rate)).residual).max(axis=0) for rate in (4096, 8192, 16384)]
     for coarse, fine in pairwise(left):
         np.testing.assert_allclose(coarse / fine, 4.0, rtol=0.02)  # third-order terms
     assert (left[-1] < 1.0).all()  # N, N m, of a meganewton
@@ -234,7 +210,7 @@ def test_the_energy_balance_closes_with_the_integrators_second_order(machine: Ma
     """
     left, through = [], 0.0
     for rate in (2048, 32768):
-        audit = energy_audit(every_step(machine.with_params(changes), rate))
+        audit = energy_audit(every_step(machine.with_params(changes), rate=rate))
         left.append(np.abs(audit.residual).max())
         through = turnover(audit)
     assert np.log2(left[0] / left[1]) / 4 == pytest.approx(2.0, abs=0.25)
@@ -244,7 +220,7 @@ def test_the_energy_balance_closes_with_the_integrators_second_order(machine: Ma
 def test_every_effect_accounts_for_its_own_energy(machine: Machine) -> None:
     left = []
     for rate in (4096, 8192):
-        audit = energy_audit(every_step(machine, rate))
+        audit = energy_audit(every_step(machine, rate=rate))
         delivered = [e for e in audit.entries if e.startswith("delivered.")]
         names = [e.removeprefix("delivered.") for e in delivered]
         left.append([np.abs(audit.effect_residual(name)).max() for name in names])

@@ -31,9 +31,20 @@ def sine_target(**options):
     return make_target(find_motion("sine", **numbers), scale=scale, axes=axes)
 
 
+def rehearsal(target=None, machine=None, **options):
+    """A rehearsal with the shipped settings, on the LHPOST6 unless given another."""
+    controller, options = load_controller("lhpost6"), {"attrs": {}, "engine": "fused", **options}
+    return rehearse(machine or load_machine(), target or sine_target(), controller, **options)
+
+
+def replayed(record, **options):
+    """Its spools in open loop on the LHPOST6."""
+    return replay(load_machine(), record, **{"attrs": {}, "engine": "fused", **options})
+
+
 @pytest.fixture(scope="module")
 def rehearsed():
-    return rehearse(load_machine(), sine_target(), load_controller("lhpost6"), attrs={}, engine="fused")
+    return rehearsal()
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +66,7 @@ def test_a_zero_target_keeps_the_platen_at_rest_for_ten_seconds(name):
 
 def test_an_eccentric_specimen_is_held_at_rest():
     machine = load_machine().with_specimen(PENDULUM, position=(2.0, 1.0, 0.0), locked=True)
-    test = rehearse(machine, sine_target(scale=0.0), load_controller("lhpost6"), attrs={}, engine="fused")
+    test = rehearsal(sine_target(scale=0.0), machine)
     assert np.abs(test.record["platen_displacement"].values).max() < 1e-9
 
 
@@ -91,18 +102,9 @@ def test_two_valves_carry_what_one_cannot():
 def test_rehearsing_beyond_limits_is_refused_before_anything_runs_unless_asked_for():
     called = []
     with pytest.raises(OutOfRangeError):
-        rehearse(
-            load_machine(), sine_target(amplitude=5.0), load_controller("lhpost6"), attrs={}, progress=called.append
-        )
+        rehearsal(sine_target(amplitude=5.0), progress=called.append)
     assert not called
-    test = rehearse(
-        load_machine(),
-        sine_target(amplitude=5.0),
-        load_controller("lhpost6"),
-        attrs={},
-        engine="fused",
-        beyond_limits=True,
-    )
+    test = rehearsal(sine_target(amplitude=5.0), beyond_limits=True)
     assert test.run.trouble is not None or test.run.clipped > 0
 
 
@@ -117,9 +119,7 @@ def test_the_platen_follows_its_target(rehearsed):
 
 
 def test_the_record_is_thinned_without_touching_the_simulation(rehearsed):
-    thin = rehearse(
-        load_machine(), sine_target(), load_controller("lhpost6"), attrs={}, engine="fused", record_every=16
-    )
+    thin = rehearsal(record_every=16)
     assert thin.record.attrs["sample_rate_hz"] == 128
     for name in ("platen_displacement", "chamber_pressure_a", "spool_command", "reference_acceleration"):
         assert np.array_equal(thin.record[name].values, rehearsed.record[name].values[::16])
@@ -128,15 +128,7 @@ def test_the_record_is_thinned_without_touching_the_simulation(rehearsed):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_progress_rises_to_one(engine):
     shares = []
-    rehearse(
-        load_machine(),
-        sine_target(),
-        load_controller("lhpost6"),
-        attrs={},
-        engine=engine,
-        steps_per_second=SAMPLE_RATE,
-        progress=shares.append,
-    )
+    rehearsal(engine=engine, steps_per_second=SAMPLE_RATE, progress=shares.append)
     assert len(shares) > 5 and shares == sorted(shares) and shares[-1] == 1.0
 
 
@@ -148,15 +140,7 @@ def test_a_controller_of_another_rate_is_refused():
 
 def test_a_run_that_diverges_keeps_what_was_finite_in_a_valid_record():
     """The report's Euler at 2048 Hz: its last state may hold numbers that are none."""
-    test = rehearse(
-        load_machine(),
-        sine_target(),
-        load_controller("lhpost6"),
-        attrs={},
-        scheme="euler",
-        steps_per_second=SAMPLE_RATE,
-        engine="fused",
-    )
+    test = rehearsal(scheme="euler", steps_per_second=SAMPLE_RATE)
     assert test.run.trouble and test.record.attrs["trouble"] == test.run.trouble
     assert 1000 < test.record.sizes["time"] < len(sine_target().time)
     for name, variable in test.record.data_vars.items():
@@ -169,15 +153,8 @@ def test_a_run_that_diverges_keeps_what_was_finite_in_a_valid_record():
 
 def test_replay_of_a_rehearsal_at_the_controllers_rate_is_the_rehearsal():
     """One step a sample: the recorded positions are all that the ports saw, and pressures start the same."""
-    test = rehearse(
-        load_machine(),
-        sine_target(),
-        load_controller("lhpost6"),
-        attrs={},
-        engine="fused",
-        steps_per_second=SAMPLE_RATE,
-    )
-    again = replay(load_machine(), test.record, attrs={}, engine="fused", steps_per_second=SAMPLE_RATE)
+    test = rehearsal(steps_per_second=SAMPLE_RATE)
+    again = replayed(test.record, steps_per_second=SAMPLE_RATE)
     assert again.record.attrs["spool_interpolation"] == "held"
     assert np.array_equal(again.run.q, test.run.q) and np.array_equal(again.run.z, test.run.z)
 
@@ -190,7 +167,7 @@ def test_replay_of_a_rehearsal_at_a_finer_step_differs_by_what_moves_within_a_sa
     a sample). With the positions at every step the replay is the rehearsal, bit for bit.
     """
     run, record = rehearsed
-    again = replay(load_machine(), record, attrs={}, engine="fused")
+    again = replayed(record)
     difference = np.abs(again.record["platen_displacement"].values - record["platen_displacement"].values)
     assert difference.max() < 5e-7  # ten times what it is
     steps = run.steps_per_second // SAMPLE_RATE
@@ -213,7 +190,7 @@ def test_simulated_records_at_the_controllers_rate_are_held_and_all_others_inter
         (slower, "band-limited"),
         (practice.isel(time=slice(0, 64)), "band-limited"),
     ):
-        test = replay(load_machine(), record, attrs={}, engine="fused", steps_per_second=SAMPLE_RATE)
+        test = replayed(record, steps_per_second=SAMPLE_RATE)
         assert test.record.attrs["spool_interpolation"] == how
         if how == "held":
             assert np.array_equal(test.run.spool, record["spool_position"].values)
@@ -230,7 +207,7 @@ def test_interpolated_spools_are_the_signal_in_the_middle_of_each_step(practice,
     record = practice.isel(time=slice(0, 512)).assign(
         spool_position=(("time", "actuator"), spool(t), practice["spool_position"].attrs)
     )
-    test = replay(load_machine(), record, attrs={}, engine="fused", steps_per_second=steps * SAMPLE_RATE)
+    test = replayed(record, steps_per_second=steps * SAMPLE_RATE)
     middles = [(j + 0.5) / (steps * SAMPLE_RATE) for j in range(steps)]
     expected = np.mean([spool(test.run.time + middle) for middle in middles], axis=0)  # a record has the mean
     inside = slice(100, -100)  # 24 samples of the old rate at each end are continued by reflection
@@ -240,7 +217,7 @@ def test_interpolated_spools_are_the_signal_in_the_middle_of_each_step(practice,
 
 def test_replay_of_a_practice_record_follows_it_as_well_as_its_own_effects_allow(practice):
     """Another simulator's test with sensor noise: another step and a filter, 0.7 mm of 200 mm after 11 s."""
-    runs = [replay(load_machine(), practice, attrs={}, engine=engine) for engine in ENGINES]
+    runs = [replayed(practice, engine=engine) for engine in ENGINES]
     for run, record in runs:
         assert run.trouble is None
         t = practice["time"].values
@@ -252,13 +229,13 @@ def test_replay_of_a_practice_record_follows_it_as_well_as_its_own_effects_allow
 def test_channels_are_taken_by_name_whatever_their_order(rehearsed):
     record = rehearsed.record.isel(time=slice(8192, 8192 + 256))
     turned = record.isel(actuator=slice(None, None, -1), horizontal=slice(None, None, -1)).transpose()
-    a, b = (replay(load_machine(), r, attrs={}, engine="fused") for r in (record, turned))
+    a, b = (replayed(r) for r in (record, turned))
     assert np.array_equal(a.run.q, b.run.q) and np.array_equal(a.run.z, b.run.z)
 
 
 def test_replay_opens_as_many_valves_as_the_record_says(practice):
     record = practice.isel(time=slice(0, 128)).assign_attrs(valves_per_horizontal_actuator=2)
-    test = replay(load_machine(), record, attrs={}, engine="fused")
+    test = replayed(record)
     assert {a.valves for a in test.run.plant.machine.actuators if a.area_b is not None} == {2}
     assert test.record.attrs["valves_per_horizontal_actuator"] == 2
 
@@ -274,7 +251,7 @@ def test_a_run_that_is_over_at_once_says_why_rather_than_that_its_record_is_shor
     record["chamber_pressure_a"][0] = 1e12
     for engine in ENGINES:
         with pytest.raises(SimulationError, match=r"stopped at 0\.\d+ s: V1 left its stroke"):
-            replay(load_machine(), record, attrs={}, engine=engine)
+            replayed(record, engine=engine)
 
 
 def test_a_record_of_two_samples_can_be_replayed():

@@ -54,13 +54,7 @@ def make_record(duration: float = 8.0, rate: float = 512.0) -> xr.Dataset:
         variables[name] = (("time", "actuator"), mean + scale * by_actuator)
     variables["chamber_pressure_b"] = (("time", "horizontal"), 8e6 - 2e6 * by_actuator[:, :4])
     variables["strut_pressure"] = (("time", "strut"), 15e6 + 1e5 * by_actuator[:, :3])
-    coords = {
-        "time": t,
-        "axis": AXES,
-        "actuator": ACTUATORS,
-        "horizontal": ACTUATORS[:4],
-        "strut": ["S1", "S2", "S3"],
-    }
+    coords = {"time": t, "axis": AXES, "actuator": ACTUATORS, "horizontal": ACTUATORS[:4], "strut": ["S1", "S2", "S3"]}
     attrs = {"title": "Sine burst", "test": "burst", "kind": "simulated", "specimen": "none"}
     return xr.Dataset(variables, coords, attrs)
 
@@ -126,11 +120,7 @@ def curve(trace: dict) -> tuple[np.ndarray, np.ndarray]:
 
 
 # ------------------------------------------------------------------------------------------ decimation
-@given(
-    st.integers(1, 3000),
-    st.integers(1, 400),
-    st.integers(0, 2**32 - 1),
-)
+@given(st.integers(1, 3000), st.integers(1, 400), st.integers(0, 2**32 - 1))
 @settings(deadline=None)
 def test_the_envelope_keeps_both_extremes_and_both_ends_of_any_channel(n, buckets, seed):
     values = np.random.default_rng(seed).normal(size=n)
@@ -169,12 +159,7 @@ def test_samples_that_are_not_numbers_do_not_hide_the_peak_beside_them():
 def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
     given_notes = ["spool V6 was clipped 3 times"]
     summary, page = report(
-        tmp_path,
-        make_record(),
-        limits=LIMITS,
-        notes=given_notes,
-        command="lhpost6 run burst",
-        machine_table=MACHINE,
+        tmp_path, make_record(), limits=LIMITS, notes=given_notes, command="lhpost6 run burst", machine_table=MACHINE
     )
     reader = Reader(page)
     words = " ".join(reader.words)
@@ -191,14 +176,7 @@ def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
         "Versions and how to repeat",
     ):
         assert title in words
-    for said in (
-        *given_notes,
-        "lhpost6 run burst",
-        "dead volume not published",
-        "Table 6.1",
-        "numpy",
-        "0.2, 0.1",
-    ):
+    for said in (*given_notes, "lhpost6 run burst", "dead volume not published", "Table 6.1", "numpy", "0.2, 0.1"):
         assert said in words
     assert len(summary.headlines) == 3 and all(h.value in words and h.label in words for h in summary.headlines)
     assert summary.verdict in words
@@ -371,7 +349,7 @@ def test_the_nearest_limit_is_said_first_and_every_quantity_has_its_row(tmp_path
     rows = page.partition("<caption><span>Limits used</span>")[2].partition("</table>")[0]
     named = re.findall('<th scope="row">(.*?)</th>', rows)
     assert named[0] == "Leg velocity" and set(named[1:]) == {
-        *("Displacement", "Velocity", "Acceleration", "Leg stroke", "Spool"),
+        *("Displacement", "Velocity", "Acceleration", "Leg stroke", "Spool")
     }
 
 
@@ -662,13 +640,7 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
     _, page = report(tmp_path, make_record(), limits=LIMITS, machine_table=MACHINE)
     probed = tmp_path / "probed.html"
     probed.write_text(page.replace("</body>", f"{PROBE}</body>"), encoding="utf-8")
-    options = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--window-size=1400,1000",
-        "--enable-logging=stderr",
-    ]
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1400,1000", "--enable-logging=stderr"]
     options += ["--virtual-time-budget=900000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom"]
     run = subprocess.run([str(BROWSER), *options, probed.as_uri()], capture_output=True, text=True, timeout=120)
     console = [line for line in run.stderr.splitlines() if "CONSOLE" in line]

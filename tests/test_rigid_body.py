@@ -436,10 +436,7 @@ def test_platen_and_pendulum_falling_free_keep_their_momentum_balance():
         assert np.allclose(rate.angular, 0.0, rtol=0.0, atol=1e-5)
 
 
-@pytest.mark.parametrize(
-    "robot, joints",
-    [("double_pendulum", 2), ("ur5", 6), ("solo12", 12)],
-)
+@pytest.mark.parametrize("robot, joints", [("double_pendulum", 2), ("ur5", 6), ("solo12", 12)])
 def test_models_of_example_robot_data_mount_as_specimens(robot, joints):
     import example_robot_data  # here: it takes a second to import
 

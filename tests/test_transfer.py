@@ -29,10 +29,7 @@ def oscillator(frequency: float, damping: float, gain: float = 1.0) -> tuple[np.
     return signal.bilinear([gain * w**2], [1, 2 * damping * w, w**2], RATE)
 
 
-PLANT = [
-    [oscillator(20, 0.5), oscillator(12, 0.3, 0.3)],
-    [oscillator(9, 0.2, -0.2), oscillator(15, 0.4)],
-]
+PLANT = [[oscillator(20, 0.5), oscillator(12, 0.3, 0.3)], [oscillator(9, 0.2, -0.2), oscillator(15, 0.4)]]
 """Two axes that resonate and couple; row output, column input."""
 
 

@@ -379,6 +379,22 @@ def use_specimen(table: Machine) -> None:
     assert np.isfinite(find_equilibrium(plant).spool).all()
 
 
+CONTENT: dict[Callable[[Any], object], Callable[[Any], object]] = {
+    use_motion: lambda motion: np.ptp(motion.samples) > 0,
+    use_record: lambda record: record.attrs["test"] == "sines" and np.ptp(record["platen_displacement"].values) > 0,
+    use_drive: lambda drive: drive.attrs["controller"] == "lhpost6" and len(drive.values) == 32,
+    use_inverse: lambda inverse: inverse.axes == ("x", "z") and inverse.taps.shape == (9, 2, 2),
+    use_machine: lambda table: table.actuators and table.platen.mass[0] > 0,
+    use_controller: lambda settings: settings == load_controller("lhpost6"),
+    use_map: lambda channels: channels.test.name == "EQ1" and len(channels.channels) == 4,
+    use_sensors: lambda sensors: list(sensors.noise) == list(load_sensors().noise),
+    use_procedure: lambda numbers: list(tests_of(numbers)) == ["TX"],
+    use_motions: lambda found: [entry.name for entry, _ in found] == [entry.name for entry in list_motions()],
+    use_raws: lambda raws: raws and all(np.ptp(raw.values, axis=0).all() for raw in raws),
+    use_specimen: lambda table: table.specimen.urdf.name == "broken.urdf",
+}
+"""What a valid file of each kind holds, by how it is used."""
+
 READERS = (
     Reader("csv", "broken.csv", CSV.encode, load_motion, use_motion, text),
     Reader("at2", "broken.AT2", lambda: at2_text(WAVE).encode(), load_motion, use_motion, text),

@@ -312,10 +312,15 @@ def test_two_instances_in_one_process_share_nothing(instance, folder, plant, res
     assert_same(instance, tables[0])
 
 
-def test_many_instances_come_and_go(folder):
+def test_many_instances_come_and_go_alike(folder, plant, rest):
+    table = RunningPlant(plant, rest)
+    table.advance(rest.spool)
     for k in range(20):
         one = Instance(folder, f"table {k}")
+        one.command(rest.spool)
         one.step(0.0)
+        assert one.status == 0
+        assert_same(one, table)
         one.fmu.freeInstance()
 
 

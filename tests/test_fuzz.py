@@ -25,7 +25,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from fuzz_readers import READERS, Reader
+from fuzz_readers import CONTENT, READERS, Reader
 from fuzzing import no_leak
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -77,7 +77,9 @@ def test_a_valid_file_is_read_and_can_be_used(reader, tmp_path):
     path = tmp_path / reader.file
     path.write_bytes(reader.seed())
     with no_leak():
-        reader.use(reader.load(path))
+        found = reader.load(path)
+        assert CONTENT[reader.use](found)
+        reader.use(found)
 
 
 @pytest.mark.parametrize("reader", READERS, ids=lambda r: r.name)

@@ -9,6 +9,8 @@ from battery import cases, generate, hidden, motions, rates, reach, scoring, sen
 
 from lhpost6_pin.data.records import load_record
 
+pytestmark = pytest.mark.long
+
 
 def nominal() -> tuple[np.ndarray, np.ndarray]:
     return table.make_table(table.nominal_values(cases.model()), 0.8)

@@ -45,6 +45,8 @@ from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
+pytestmark = pytest.mark.long
+
 TURNED = {
     "horizontal.seal_friction": 0.3,
     "horizontal.viscous": -0.3,

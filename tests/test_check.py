@@ -10,6 +10,8 @@ from lhpost6_pin.data.check import check_dataset, check_record
 from lhpost6_pin.data.layout_faults import RecordFinding
 from lhpost6_pin.data.records import load_record, make_record
 
+pytestmark = pytest.mark.long
+
 RECORDS = Path(__file__).parent / "data" / "records"
 PRACTICE = sorted(RECORDS.glob("practice_*.nc"))
 AREAS = {f"H{k}": (0.2027, 0.1297) for k in range(1, 5)} | {f"V{k}": (0.515, 0.0) for k in range(1, 7)}

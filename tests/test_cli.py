@@ -35,6 +35,8 @@ from lhpost6_pin.motions import find_motion, list_motions, make_target
 from lhpost6_pin.simulation import rehearse
 from lhpost6_pin.tuning.drives import circumstances, save_drive
 
+pytestmark = pytest.mark.long
+
 ENTRY = Path(sys.executable).parent / "lhpost6"
 
 

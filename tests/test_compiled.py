@@ -14,6 +14,8 @@ import lhpost6_pin
 from lhpost6_pin.core import compiled as module
 from lhpost6_pin.core.compiled import cache_folder, compiled
 
+pytestmark = pytest.mark.long
+
 PACKAGE = Path(lhpost6_pin.__file__).parent
 POSIX = pytest.mark.skipif(not hasattr(os, "getuid"), reason="ownership and permission bits are POSIX")
 

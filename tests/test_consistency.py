@@ -12,6 +12,8 @@ from lhpost6_pin.data.records import make_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align
 
+pytestmark = pytest.mark.long
+
 SENSORS = load_sensors()
 
 

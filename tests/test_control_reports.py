@@ -23,6 +23,8 @@ from lhpost6_pin.tuning.margins import LoopModel, Margin
 from lhpost6_pin.tuning.sine import sine_test
 from lhpost6_pin.tuning.tune import AxisTuning, Tuning, TuningStep
 
+pytestmark = pytest.mark.long
+
 DELAY = 0.006
 NO_NUMBER = re.compile(r"\b(nan|inf|none)\b", re.IGNORECASE)
 LINE = {"color": "#000000"}

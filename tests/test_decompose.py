@@ -25,6 +25,8 @@ from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.show.report import write_decompose_report
 from lhpost6_pin.simulation.outputs import record_of_run
 
+pytestmark = pytest.mark.long
+
 PRACTICE = {name: DATA / "records" / f"practice_a_{name}.nc" for name in ("TX", "EQ_ridgecrest2019_ccc")}
 MACHINE = machine_named("lhpost6")
 SENSORS = load_sensors()

@@ -3,9 +3,13 @@
 import json
 import re
 
+import pytest
+
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.discovery.demonstration import hidden_effect
 from lhpost6_pin.machine.machine import load_machine
+
+pytestmark = pytest.mark.long
 
 
 def test_the_demonstration_finds_what_it_hides(lhpost6, tmp_path):

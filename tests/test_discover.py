@@ -45,6 +45,8 @@ from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
+pytestmark = pytest.mark.long
+
 TESTS = ("TX", "TZ", "WN")
 
 

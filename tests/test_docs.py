@@ -17,6 +17,8 @@ from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.machine.library import families
 from lhpost6_pin.machine.machine import load_machine
 
+pytestmark = pytest.mark.long
+
 BY_HAND = sorted(PAGES.rglob("*.md"))
 RUN = ("bash", "python")
 SHOWN = ("text", "console")

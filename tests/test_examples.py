@@ -16,6 +16,8 @@ from lhpost6_pin.machine.library import find_family
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.tuning.drives import load_drive
 
+pytestmark = pytest.mark.long
+
 EXAMPLES = sorted(SCRIPTS.glob("example_*.py"))
 
 

@@ -23,9 +23,11 @@ from lhpost6_pin.simulation.running import RunningPlant
 
 builder = pytest.importorskip("pythonfmu.builder", reason="pythonfmu makes the FMU: pip install pythonfmu")
 fmpy = pytest.importorskip("fmpy", reason="FMPy runs the FMU: pip install fmpy")
-pytestmark = pytest.mark.skipif(
-    not builder.FmuBuilder.has_binary(), reason="pythonfmu brings no library for this platform"
-)
+HAS_BINARY = builder.FmuBuilder.has_binary()
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(not HAS_BINARY, reason="pythonfmu brings no library for this platform"),
+]
 
 STEP = 1.0 / SAMPLE_RATE
 DISCARD = 2  # fmi2Status

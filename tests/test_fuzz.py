@@ -41,6 +41,8 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import load_motion, make_target
 
+pytestmark = pytest.mark.long
+
 BY_NAME = {reader.name: reader for reader in READERS}
 CHECKS = [HealthCheck.too_slow, HealthCheck.filter_too_much, HealthCheck.data_too_large, HealthCheck.large_base_example]
 

@@ -15,6 +15,8 @@ from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.data.signals import align, rrmse
 from lhpost6_pin.data.transfer import Transfer, estimate_transfer
 
+pytestmark = pytest.mark.long
+
 RATE = 256.0
 LOW, HIGH = 0.5, 30.0
 DELAY = 5  # samples, 20 ms

@@ -15,6 +15,8 @@ from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
 from lhpost6_pin.simulation.ledger import force_ledger
 from lhpost6_pin.simulation.simulate import Run
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def run() -> Run:

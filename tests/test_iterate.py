@@ -15,6 +15,8 @@ from lhpost6_pin.tuning import iterate as module
 from lhpost6_pin.tuning.identify import tuning_numbers
 from lhpost6_pin.tuning.iterate import Iteration, identify_inverse, iterate
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def table():

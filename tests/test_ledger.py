@@ -20,6 +20,8 @@ from lhpost6_pin.simulation.energy import CREATED, Audit, energy_audit
 from lhpost6_pin.simulation.ledger import Ledger, force_ledger
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, Run, simulate
 
+pytestmark = pytest.mark.long
+
 CONSERVING = {"machine.thrust": "normal", "platen.mass": [168100.0, 168100.0, 168100.0], "vertical.pad_friction": 0.0}
 
 

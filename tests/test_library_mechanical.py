@@ -36,6 +36,8 @@ from lhpost6_pin.simulation.energy import row_power
 from lhpost6_pin.simulation.ledger import force_ledger
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
+pytestmark = pytest.mark.long
+
 # ------------------------------------------------------------------------------------------------- laws
 GAS = (15e6, 0.15, 2.0, 1.7)
 

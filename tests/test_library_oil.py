@@ -36,6 +36,8 @@ from lhpost6_pin.simulation.energy import row_power
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, Run, simulate
 
+pytestmark = pytest.mark.long
+
 _P, _X, _PART = (-1e5, 22e6), (-1.0, 1.0), (0.0, 1.0)
 KERNELS = (
     Kernel(leaks.turbulent_leak, ((-2e7, 2e7), (0.0, 1e-6), (1.0, 2e3))),

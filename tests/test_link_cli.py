@@ -11,6 +11,8 @@ from commands import refused
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.interfaces.link import LinkMode, ServedPlant, open_socket, serve
 
+pytestmark = pytest.mark.long
+
 SERVE = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {!r}; main()"
 SHORT = (
     "sine",

@@ -32,6 +32,8 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
+pytestmark = pytest.mark.long
+
 MODES = list(LinkMode)
 MOVING = [LinkMode.REAL_TIME, LinkMode.FREE]
 GUARD = 60.0  # [s] no wait is meant to last so long

@@ -24,6 +24,8 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
+pytestmark = pytest.mark.long
+
 HOLD = """
 from __future__ import annotations
 from dataclasses import dataclass

@@ -20,6 +20,8 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.rehearse import rehearse, replay, target_within_limits
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
+pytestmark = pytest.mark.long
+
 RECORDS = DATA / "records"
 
 

@@ -12,6 +12,8 @@ from lhpost6_pin.core.errors import MotionError
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.motions import find_motion, list_motions, load_motion
 
+pytestmark = pytest.mark.long
+
 READY = ("ac156", "tx5", "ty4", "tz4", "sxh1")
 PACKAGE = ("tcu065", "rrs")
 OWN = ("tabas", "takatori", "nepal", "el-centro", "sfu")

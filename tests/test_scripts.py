@@ -16,6 +16,8 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
+pytestmark = pytest.mark.long
+
 
 def script(name: str, *arguments: object) -> subprocess.CompletedProcess:
     """Run a script in a process of its own."""

@@ -26,6 +26,8 @@ from lhpost6_pin.simulation.engine_pinocchio import make_stepper
 from lhpost6_pin.simulation.rehearse import replay
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def reference():

@@ -15,6 +15,8 @@ from lhpost6_pin.tuning import sine as module
 from lhpost6_pin.tuning.identify import tuning_numbers
 from lhpost6_pin.tuning.sine import sine_target, sine_test, with_cancellers
 
+pytestmark = pytest.mark.long
+
 QUICK = {"sine.time_constant": 1.5, "sine.harmonics": 15.0, "sine.settling": 6.0}
 
 

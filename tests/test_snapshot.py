@@ -17,6 +17,8 @@ from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
 from lhpost6_pin.simulation.snapshot import EVERY, Snapshot
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def loop(plant, rest):

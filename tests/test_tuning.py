@@ -20,6 +20,8 @@ from lhpost6_pin.tuning import tune as tuning
 from lhpost6_pin.tuning.identify import noise_target, tuning_numbers
 from lhpost6_pin.tuning.tune import stays_stable, tune
 
+pytestmark = pytest.mark.long
+
 SHORT = {"noise.duration": 32.0, "noise.slow_duration": 80.0, "feedforward_targets.rounds": 2.0}
 
 

@@ -28,6 +28,8 @@ from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulated_campaign import SensorErrors, as_sensed
 from lhpost6_pin.tuning.identify import noise_target
 
+pytestmark = pytest.mark.long
+
 
 def triangle(axis="x"):
     """Slow triangle along one axis."""

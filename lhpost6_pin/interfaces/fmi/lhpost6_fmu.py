@@ -18,15 +18,15 @@ import numpy as np
 from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Integer, Real, String
 from pythonfmu.enums import Fmi2Initial, Fmi2Status, Fmi2Variability
 
-from ... import __version__
-from ...core.errors import SimulationError
-from ...core.names import AXES, SAMPLE_RATE, SCHEMES
-from ...machine.machine import Machine
-from ...mechanics.equilibrium import find_equilibrium
-from ...mechanics.plant import make_plant
-from ...mechanics.pose import platen_motion
-from ...simulation.running import RunningPlant
-from .machine_file import load_machine_file
+from lhpost6_pin import __version__
+from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file
+from lhpost6_pin.machine.machine import Machine
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.simulation.running import RunningPlant
 
 __all__ = ["ShakeTable"]
 

@@ -223,8 +223,8 @@ def _port(family: Family, machine: Machine) -> str:
     except ParameterError:
         return "none: a property of a channel or of the controller"
     law = _law_link(effect.law)
-    if alters := LAWS[effect.law].alters:
-        return f"{law} modifies the {alters} of {cell(' '.join(effect.ports))}"
+    if modified := LAWS[effect.law].modifies:
+        return f"{law} modifies the {modified} of {cell(' '.join(effect.ports))}"
     ports = [port.removesuffix(" -").replace(" ", " + ") for port in effect.ports]
     some = ports if len(ports) <= 4 else [*ports[:2], "...", ports[-1]]
     return f"{law} on {cell(', '.join(some))}"

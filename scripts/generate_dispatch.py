@@ -56,7 +56,7 @@ def write() -> str:
     lines += [
         '__all__ = ["CODES", "HYDRAULIC", "INLINED", "LAWS", "MOST_NUMBERS", "advance_called", "advance_inlined"]'
     ]
-    lines += ['__all__ += ["force_called", "force_inlined", "power", "rates", "view_hydraulic"]', ""]
+    lines += ['__all__ += ["apply_forces", "power", "rates", "view_hydraulic"]', ""]
     lines += ["CODES: Mapping[str, int] = {" + ", ".join(f'"{name}": {i}' for i, name in enumerate(acting)) + "}"]
     lines += ['"""Codes of the laws that have rows."""', ""]
     lines += [f"INLINED = {sum(single[name].LAW.inlined for name in acting)}"]
@@ -75,9 +75,11 @@ def write() -> str:
         lines += view(name, single[name])
     inlined = [name for name in acting if single[name].LAW.inlined]
     called = [name for name in acting if name not in inlined]
-    for of, arguments in (("force", "row, s, sd, z"), ("advance", "row, s, ds, dt, z")):
-        lines += function(f"{of}_inlined", arguments, of, inlined, single, acting, inline=True)
-        lines += function(f"{of}_called", arguments, of, called, single, acting)
+    lines += function("force_called", "row, s, sd, z", "force", called, single, acting)
+    lines += loop(inlined, single)
+    arguments = "row, s, ds, dt, z"
+    lines += function("advance_inlined", arguments, "advance", inlined, single, acting, inline=True)
+    lines += function("advance_called", arguments, "advance", called, single, acting)
     lines += function("rates", "row, s, sd, z, zd", "rates", acting, single, acting)
     lines += function("power", "row, s, z, work", "power", acting, single, acting)
     text = "\n".join(lines) + "\n"
@@ -161,6 +163,25 @@ def function(
     if of == "force" and any(single[n].LAW.feels_load for n in names):
         lines = LOAD + lines
     lines += {"force": ["    return 0.0, 0.0, 0.0"], "power": ["    return -work, 0.0"]}.get(of, [])
+    return [*lines, ""]
+
+
+def loop(names: list[str], single: dict[str, Any]) -> list[str]:
+    """The loop over a table that fills the ledger; a function a row in place of its branches would be slower."""
+    lines = ["", "@compiled_inline", "def apply_forces(rows, s, sd, z, force, port_force):"]
+    lines += ['    """Fill the ledger force (n_rows, 3) and its sum per port."""', "    port_force[:] = 0.0"]
+    lines += ["    for i in range(rows.size):", "        row = rows[i]", "        second = third = 0.0"]
+    for code, name in enumerate(names):
+        law, takes = single[name].LAW, list(inspect.signature(single[name].force.py_func).parameters)
+        call = ", ".join(argument(a, law).replace("p.", f"p_{code}.") if a != "p" else f"p_{code}" for a in takes)
+        lines += [f"        {'elif' if code else 'if'} row.law == {code}:  # {name}"]
+        lines += [f"            p_{code} = view_{name}(row.numbers)"]
+        lines += [f"            {', '.join(['first', 'second', 'third'][: law.ports[1]])} = {name}.force({call})"]
+    lines += ["        else:", "            first, second, third = force_called(row, s, sd, z)"]
+    lines += [f"        force[i, {k}] = {value}" for k, value in enumerate(("first", "second", "third"))]
+    lines += ["        port_force[row.port] += first"]
+    for port, value in (("port_2", "second"), ("port_3", "third")):
+        lines += [f"        if row.{port} >= 0:", f"            port_force[row.{port}] += {value}"]
     return [*lines, ""]
 
 

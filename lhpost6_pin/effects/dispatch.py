@@ -45,7 +45,7 @@ from ..laws import (
 from ..laws.contract import Law
 
 __all__ = ["CODES", "HYDRAULIC", "INLINED", "LAWS", "MOST_NUMBERS", "advance_called", "advance_inlined"]
-__all__ += ["force_called", "force_inlined", "power", "rates", "view_hydraulic"]
+__all__ += ["apply_forces", "power", "rates", "view_hydraulic"]
 
 CODES: Mapping[str, int] = {
     "bouc_wen_1d": 0,
@@ -302,32 +302,6 @@ def view_warm_up(numbers):
     return warm_up.WarmUp(numbers[0], numbers[1], numbers[2], numbers[3])
 
 
-@compiled_inline
-def force_inlined(row, s, sd, z):
-    """Forces of a row on its first, second and third port [N or N m]."""
-    if row.law == 0:  # bouc_wen_1d
-        p = view_bouc_wen_1d(row.numbers)
-        first = bouc_wen_1d.force(p, z[row.state])
-        return first, 0.0, 0.0
-    if row.law == 1:  # bouc_wen_2d
-        p = view_bouc_wen_2d(row.numbers)
-        first, second = bouc_wen_2d.force(p, z[row.state], z[row.state + 1])
-        return first, second, 0.0
-    if row.law == 2:  # hydraulic
-        p = view_hydraulic(row.numbers)
-        first = hydraulic.force(p, z[row.state], (z[row.state + 1] if p.area_b > 0.0 else 0.0))
-        return first, 0.0, 0.0
-    if row.law == 3:  # nitrogen_strut
-        p = view_nitrogen_strut(row.numbers)
-        first = nitrogen_strut.force(p, s[row.port])
-        return first, 0.0, 0.0
-    if row.law == 4:  # viscous
-        p = view_viscous(row.numbers)
-        first = viscous.force(p, sd[row.port])
-        return first, 0.0, 0.0
-    return 0.0, 0.0, 0.0
-
-
 @compiled
 def _load(row, p, z):
     """Force of the actuator on the same leg [N]; p has its areas."""
@@ -415,6 +389,40 @@ def force_called(row, s, sd, z):
         first = warm_up.force(p, z[row.state], z[row.state + 1])
         return first, 0.0, 0.0
     return 0.0, 0.0, 0.0
+
+
+@compiled_inline
+def apply_forces(rows, s, sd, z, force, port_force):
+    """Fill the ledger force (n_rows, 3) and its sum per port."""
+    port_force[:] = 0.0
+    for i in range(rows.size):
+        row = rows[i]
+        second = third = 0.0
+        if row.law == 0:  # bouc_wen_1d
+            p_0 = view_bouc_wen_1d(row.numbers)
+            first = bouc_wen_1d.force(p_0, z[row.state])
+        elif row.law == 1:  # bouc_wen_2d
+            p_1 = view_bouc_wen_2d(row.numbers)
+            first, second = bouc_wen_2d.force(p_1, z[row.state], z[row.state + 1])
+        elif row.law == 2:  # hydraulic
+            p_2 = view_hydraulic(row.numbers)
+            first = hydraulic.force(p_2, z[row.state], (z[row.state + 1] if p_2.area_b > 0.0 else 0.0))
+        elif row.law == 3:  # nitrogen_strut
+            p_3 = view_nitrogen_strut(row.numbers)
+            first = nitrogen_strut.force(p_3, s[row.port])
+        elif row.law == 4:  # viscous
+            p_4 = view_viscous(row.numbers)
+            first = viscous.force(p_4, sd[row.port])
+        else:
+            first, second, third = force_called(row, s, sd, z)
+        force[i, 0] = first
+        force[i, 1] = second
+        force[i, 2] = third
+        port_force[row.port] += first
+        if row.port_2 >= 0:
+            port_force[row.port_2] += second
+        if row.port_3 >= 0:
+            port_force[row.port_3] += third
 
 
 @compiled_inline

@@ -11,7 +11,7 @@ and third port [N or N m], port_force (n_ports,) their sum per port.
 from ..core.compiled import compiled, compiled_inline
 from ..laws.supply import varies
 from .actuator import advance_actuator, advance_modified, fill_rates
-from .dispatch import HYDRAULIC, INLINED, advance_called, advance_inlined, force_called, force_inlined, rates
+from .dispatch import HYDRAULIC, INLINED, advance_called, advance_inlined, apply_forces, rates
 from .supply import close_supply, open_supply, supply_pressures, supply_rates
 
 __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
@@ -55,26 +55,6 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
             advance_modified(row, s, ds, dt, spool, high, low, z)
     if varies(supply):
         close_supply(rows, spool, supply, dt, before, z)
-
-
-@compiled_inline
-def apply_forces(rows, s, sd, z, force, port_force):
-    """Fill the ledger force (n_rows, 3) and its sum per port."""
-    port_force[:] = 0.0
-    for i in range(rows.size):
-        row = rows[i]
-        if row.law < INLINED:
-            first, second, third = force_inlined(row, s, sd, z)
-        else:
-            first, second, third = force_called(row, s, sd, z)
-        force[i, 0] = first
-        force[i, 1] = second
-        force[i, 2] = third
-        port_force[row.port] += first
-        if row.port_2 >= 0:
-            port_force[row.port_2] += second
-        if row.port_3 >= 0:
-            port_force[row.port_3] += third
 
 
 @compiled_inline

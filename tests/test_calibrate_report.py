@@ -168,13 +168,13 @@ def test_pairs_of_sensors_that_are_alike_are_not_held_against_parameters(found) 
 # ---------------------------------------------------------------------------------------- page
 def test_the_page_says_first_what_was_found(found, tmp_path) -> None:
     page = page_of(found, tmp_path)
-    summary = page[: page.index("Parameters beside their priors")]
+    summary = page[: page.index("Parameters and priors")]
     assert "converged after 3 rounds" in summary
-    assert "told something of 4 of 5 parameters" in summary
+    assert "4 of 5 parameters are identifiable" in summary
     assert "2 differ from nominal: platen.mass[x] (+3.0" in summary
     assert "hold_down.base_height (−0.0200 m)" in summary
-    assert "from 16,900 to 1.07: sensor noise is all that is left" in summary
-    assert "Sensor errors found 1 of 2" in summary
+    assert "from 16,900 to 1.07, the level of sensor noise" in summary
+    assert "Significant sensor errors 1 of 2" in summary
     assert "lhpost6 calibrate march" in page
 
 
@@ -199,14 +199,14 @@ def test_the_page_draws_parameters_and_groups_beside_the_priors(found, tmp_path)
     assert forest
     for kind in ("differs from nominal", "does not differ", "not informed"):
         assert kind in forest.group(1)
-    assert "contradicts all together" in text
+    assert "contradicts the joint estimate" in text
 
 
 def test_a_misfit_above_noise_a_bound_and_a_failed_search_are_not_passed_over(found, tmp_path) -> None:
     left = replace(found, misfit_after=2.0 * found.misfit_after)
     assert "an effect is missing" in page_of(left, tmp_path) and "1.94 !" in page_of(left, tmp_path)
     far = replace(found, estimate=np.where(np.arange(7) == 1, 4.0 * found.prior, found.estimate))
-    assert "something else is wrong: horizontal.leakage" in page_of(far, tmp_path)
+    assert "indicates another cause: horizontal.leakage" in page_of(far, tmp_path)
     assert "did not converge in 3 rounds" in page_of(replace(found, converged=False), tmp_path)
 
 
@@ -221,7 +221,7 @@ def test_a_failed_search_gives_no_intervals(found, tmp_path, capsys) -> None:
     page = page_of(failed, tmp_path)
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "%{text}" in text and r"\u00b1 %{customdata" not in text  # nothing beside the dots either
-    assert "no intervals" in page and f"to {float(f'{high:.5g}'):,.10g}" not in page
+    assert "without intervals" in page and f"to {float(f'{high:.5g}'):,.10g}" not in page
     entries = calibration_entries(failed)
     assert np.isnan(entries["parameters"]["platen.mass[x]"]["ci90"]).all()
     assert entries["sensors"]["delay spool_position"]["sd"] is None
@@ -232,8 +232,8 @@ def test_a_campaign_that_tells_nothing_has_a_page_too(found, tmp_path) -> None:
         found, estimate=np.zeros(7), covariance=np.diag(found.prior**2), subsets=(), alone=np.vstack(2 * [found.prior])
     )
     page = page_of(blank, tmp_path)
-    assert "told something of 0 of 5 parameters" in page and "None differs from nominal" in page
-    assert "No two unknowns are correlated" in page and "No group tells of a parameter by itself" in page
+    assert "0 of 5 parameters are identifiable" in page and "No parameter differs from nominal" in page
+    assert "No two unknowns are correlated" in page and "No group identifies a parameter by itself" in page
 
 
 # ---------------------------------------------------------------------------------------- terminal

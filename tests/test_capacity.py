@@ -6,7 +6,7 @@ import pytest
 from lhpost6_pin.core.errors import OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.capacity import capacity_table, leg_speeds, make_leg_check
+from lhpost6_pin.mechanics.capacity import actuator_speeds, capacity_table, make_leg_check
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
 from lhpost6_pin.mechanics.plant import make_plant
@@ -109,7 +109,7 @@ def test_leg_check_finds_what_the_valves_cannot_feed(plant):
     """SXH1 asks 2.80 m/s of a table that gives 2.74 and keeps a reserve: refused, with the scale that fits."""
     both = make_plant(load_machine().with_params({"horizontal.valves": 2}))
     target = make_target(find_motion("sxh1"), rate=float(SAMPLE_RATE))
-    with pytest.raises(OutOfRangeError, match=r"scale that fits is 0.83;.* leg velocity"):
+    with pytest.raises(OutOfRangeError, match=r"scale that fits is 0.83;.* actuator velocity"):
         target_within_limits(both, target)
     with pytest.raises(OutOfRangeError, match=r"scale that fits is 0.41"):
         target_within_limits(plant, target)  # one valve
@@ -120,7 +120,7 @@ def test_leg_check_shares_are_rates_over_speeds(plant):
     velocity = np.zeros((2, 6))
     velocity[0, 2], velocity[1, 2] = 0.1, -0.1
     share, names, stroke = check(np.zeros((2, 6)), velocity)
-    speeds = (1.0 - plant.machine.limits.valve_reserve) * leg_speeds(plant)
+    speeds = (1.0 - plant.machine.limits.valve_reserve) * actuator_speeds(plant)
     assert names == plant.machine.actuator_names
     assert share[0, 4] == pytest.approx(0.1 / speeds[4, 0])
     assert share[1, 4] == pytest.approx(0.1 / speeds[4, 1])

@@ -128,9 +128,9 @@ def test_info_shows_what_an_override_changes(lhpost6, tmp_path):
     assert "123400" not in lhpost6("info").words
     assert "123400" in lhpost6("info", "--override", "mine.toml").words
     (tmp_path / "leak.toml").write_text('[effect.worn]\nfamily = "piston_leakage"\ncomponents = ["H2"]\n')
-    assert "Effects that alter oil" not in lhpost6("info").words
+    assert "Modifiers of oil" not in lhpost6("info").words
     altered = lhpost6("info", "--override", "leak.toml").words
-    assert "Effects that alter oil" in altered and "worn" in altered
+    assert "Modifiers of oil" in altered and "worn" in altered
 
 
 def test_capacity_compares_with_table_2_2_and_gives_the_oil_column_modes(lhpost6):
@@ -185,7 +185,7 @@ def test_check_names_channel_and_sample_of_a_broken_record_and_exits_1(lhpost6, 
 
 
 def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6, tmp_path):
-    assert "206 numbers, 0 suspicious" in lhpost6("check", PRACTICE).words
+    assert "206 comparisons, 0 suspicious" in lhpost6("check", PRACTICE).words
     record = load_record(PRACTICE)
     record["actuator_displacement"][:, 0] *= 1.05  # ten times the calibration range
     save_record(record, tmp_path / "campaign" / "long.nc")
@@ -210,7 +210,7 @@ def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lh
     record = sound(tmp_path / "here")
     assert everything(tmp_path) == ["here/record.nc", "here/report.html"]
     assert record.attrs["steps_per_second"] == 8192 and record.attrs["scheme"] == "semi_implicit"
-    words = ("RRMSE", "delay [ms]", "x displacement [m] 0.02", "limits used")
+    words = ("RRMSE", "delay [ms]", "x displacement [m] 0.02", "demand over capacity")
     for phrase in ("wrote here/record.nc", "wrote here/report.html", *words):
         assert phrase in ended.words
     page = (tmp_path / "here" / "report.html").read_text()
@@ -292,7 +292,7 @@ def test_a_folder_with_the_name_of_a_motion_does_not_hide_it(lhpost6, tmp_path):
 def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_insisted(lhpost6, tmp_path):
     large = ("sine", "--set", "amplitude=0.8", "--set", "cycles=0.5", "--set", "ramp_cycles=0.5", "--engine", "fused")
     ended = lhpost6("run", *large, "--out", "a")
-    assert refused(ended, "more than the table can give", "x velocity", "The largest scale that fits is")
+    assert refused(ended, "exceeds the capacity of the table", "x velocity", "The largest scale that fits is")
     assert everything(tmp_path) == []
     fits = re.search(r"scale that fits is ([\d.]+)", ended.words)[1]
     assert lhpost6("run", *large, "--record-rate", "512", "--scale", fits, "--out", "b").code == 0

@@ -195,7 +195,7 @@ def test_the_command_leaves_ledger_and_report_and_says_what_is_left(lhpost6, tmp
     assert ended.code == 0, ended
     assert "up to 20 Hz" in ended.words and "sd/noise" in ended.words
     page = (tmp_path / "report.html").read_text()
-    assert "at the noise&#x27;s level" in page and "Dissipative force" in page
+    assert "at noise level" in page and "Dissipative force" in page
     assert open_record(tmp_path / "ledger.nc").attrs["cutoff_hz"] == 20.0
 
 

@@ -61,7 +61,7 @@ def test_2_a_motion_of_ones_own_moves_a_specimen(tmp_path):
     assert bare.attrs["specimen"] == "none" and loaded.attrs["specimen"] == "pendulum"
     force = float(abs(loaded["actuator_force"]).max()) / 1e3
     assert "loaded: acceleration RRMSE" in said and f"largest force {force:.0f} kN" in said
-    assert "leg velocity:" in said and (tmp_path / "view.html").is_file()
+    assert "actuator velocity:" in said and (tmp_path / "view.html").is_file()
 
 
 def test_2_a_motion_that_does_not_fit_is_refused_with_the_scale_that_would(tmp_path):

@@ -95,8 +95,8 @@ def test_a_run_states_what_its_report_says_first(said):
     assert [Path(path).name for path in entries["files"]] == ["record.nc", "report.html"]
     assert set(entries) == documented("run") - {"against_record"}
     assert {use["quantity"] for use in entries["limits"]} >= {
-        "leg velocity",
-        "leg stroke",
+        "actuator velocity",
+        "actuator stroke",
         "push",
         "spool",
         "displacement",
@@ -125,7 +125,7 @@ def test_doctor_decompose_and_export_state_theirs(said):
     [
         (("info", "--machine", "nothing"), "UnknownNameError", "no machine named 'nothing'"),
         (("decompose", "not_there.nc"), "RecordError", "not_there.nc"),
-        (("run", "sine", "--set", "amplitude=5"), "OutOfRangeError", "more than the table can give"),
+        (("run", "sine", "--set", "amplitude=5"), "OutOfRangeError", "exceeds the capacity of the table"),
         (("export", PRACTICE, "--to", "csv", "--out", "/proc/none/a.csv"), "OSError", "/proc/none"),
     ],
 )

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from lhpost6_pin.core.errors import MotionError, OutOfRangeError
 from lhpost6_pin.motions import (
     AXES,
+    ActuatorUtilisation,
     GroundMotion,
-    LegUtilisation,
     MotionLimits,
     check_limits,
     find_motion,
@@ -196,7 +196,7 @@ def test_an_over_range_target_names_axis_value_limit_time_and_the_scale_that_fit
     for part in (
         "x displacement 1 m against 0.3 m at t = ",
         "x velocity 3.142 m/s against 1 m/s at t = ",
-        "The largest scale that fits is 0.6; beyond",
+        "The largest scale that fits is 0.6; exceeded",
     ):
         assert part in message
     places = re.findall(r"t = ([\d.]+) s \(sample (\d+)\)", message)
@@ -221,20 +221,20 @@ def test_a_target_at_exactly_its_limit_passes():
 def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
     target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
 
-    def legs(displacement: np.ndarray, velocity: np.ndarray) -> LegUtilisation:
+    def legs(displacement: np.ndarray, velocity: np.ndarray) -> ActuatorUtilisation:
         length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0  # a leg across the motion, 3 m long
-        return LegUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 0.02)
+        return ActuatorUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 0.02)
 
     with pytest.raises(
-        OutOfRangeError, match=r"H1 leg stroke \d+(\.\d)? % of its stroke at t = .* s \(sample"
+        OutOfRangeError, match=r"H1 actuator stroke \d+(\.\d)? % of its stroke at t = .* s \(sample"
     ) as caught:
         check_limits(target, WIDE, legs)
     # closed form: sqrt(9.25) - 3 over 0.02 is 206.9 %
-    assert "H1 leg stroke 206.9 %" in str(caught.value)
+    assert "H1 actuator stroke 206.9 %" in str(caught.value)
     # closed form: (0.5 s)^2 = 3.02^2 - 9, so s = 0.6940, rounded down
     assert "fits is 0.694" in str(caught.value) or "fits is 0.693" in str(caught.value)
     fits = largest_scale(target, WIDE, legs)
-    assert check_limits(with_scale(target, fits), WIDE, legs).utilisation["leg stroke"]["H1"] <= 1
+    assert check_limits(with_scale(target, fits), WIDE, legs).utilisation["actuator stroke"]["H1"] <= 1
 
 
 def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_legs_by_quantity():
@@ -242,15 +242,15 @@ def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_
     limits = MotionLimits(np.full(6, 1e-3), np.full(6, 1e-3), np.full(6, 1e-3))  # all 18 exceeded
     names = tuple(f"H{i}" for i in range(1, 5))
 
-    def legs(displacement: np.ndarray, velocity: np.ndarray) -> LegUtilisation:
+    def legs(displacement: np.ndarray, velocity: np.ndarray) -> ActuatorUtilisation:
         share = np.abs(velocity[:, :1]) * np.array([50.0, 90.0, 70.0, 1e-3])
-        return LegUtilisation(share, names, 100 * np.abs(displacement[:, :1]) * np.array([[1.0, 2.0, 0.0, 0.0]]))
+        return ActuatorUtilisation(share, names, 100 * np.abs(displacement[:, :1]) * np.array([[1.0, 2.0, 0.0, 0.0]]))
 
     target = make_target(motion)
     with pytest.raises(OutOfRangeError) as caught:
         check_limits(target, limits, legs)
-    first, _, rest = str(caught.value).partition("; beyond the limits: ")
-    assert re.fullmatch(r"sfu-like at scale 1 is more than .*\. The largest scale that fits is [\d.e-]+", first)
+    first, _, rest = str(caught.value).partition("; exceeded: ")
+    assert re.fullmatch(r"sfu-like at scale 1 exceeds .*\. The largest scale that fits is [\d.e-]+", first)
     clauses = rest.split("; ")
     assert len(clauses) == 5
     assert {clause.split(" ")[1] for clause in clauses[:3]} == {"displacement", "velocity", "acceleration"}
@@ -261,11 +261,13 @@ def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_
     stroke, velocity = clauses[3:]
     peak = np.abs(target.displacement[:, 0])
     assert stroke.startswith(
-        f"H2 leg stroke {2e4 * peak.max():.4g} % of its stroke at t = {peak.argmax() / RATE:.3f} s"
+        f"H2 actuator stroke {2e4 * peak.max():.4g} % of its stroke at t = {peak.argmax() / RATE:.3f} s"
     )
     assert stroke.endswith(", also H1")
     speed = np.abs(target.velocity[:, 0])
-    assert velocity.startswith(f"H2 leg velocity {9000 * speed.max():.4g} % of what its valves can give at t = ")
+    assert velocity.startswith(
+        f"H2 actuator velocity {9000 * speed.max():.4g} % of the unloaded velocity of its valves at t = "
+    )
     assert velocity.endswith(f"(sample {speed.argmax()}), also H3, H1")  # H4 is within its own
 
 
@@ -274,16 +276,16 @@ def test_the_scale_that_fits_does_not_depend_on_the_scale_that_was_asked(scale):
     motion = find_motion("sine", amplitude=0.5, period=2.0)
     limits = limited(displacement=("x", 0.3))
 
-    def legs(displacement: np.ndarray, velocity: np.ndarray) -> LegUtilisation:
+    def legs(displacement: np.ndarray, velocity: np.ndarray) -> ActuatorUtilisation:
         length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0
-        return LegUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 2.0)
+        return ActuatorUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 2.0)
 
     target = make_target(motion, scale=scale)
     if scale > 1:
         with pytest.raises(OutOfRangeError) as caught:
             check_limits(target, limits, legs)
         assert len(str(caught.value)) < 600 and "scale that fits is 0.6;" in str(caught.value)
-        assert "H1 leg stroke" in str(caught.value)
+        assert "H1 actuator stroke" in str(caught.value)
     else:
         check_limits(target, limits, legs)
     # below 1e-307 the samples themselves have lost their digits: no scale is too large that can be told

@@ -96,7 +96,7 @@ def test_the_scale_that_a_refusal_names_fits_and_the_next_does_not(name):
 
 def test_two_valves_carry_what_one_cannot():
     target = sine_target(amplitude=0.7, period=2.0)  # 2.2 m/s
-    with pytest.raises(OutOfRangeError, match="H1 leg velocity"):
+    with pytest.raises(OutOfRangeError, match="H1 actuator velocity"):
         target_within_limits(make_plant(load_machine()), target)
     target_within_limits(make_plant(load_machine().with_valves(2)), target)
 

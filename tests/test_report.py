@@ -173,7 +173,7 @@ def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
         "Drift",
         "Table of metrics",
         "Assumptions and sources",
-        "Versions and how to repeat",
+        "Versions and command",
     ):
         assert title in words
     for said in (*given_notes, "lhpost6 run burst", "dead volume not published", "Table 6.1", "numpy", "0.2, 0.1"):
@@ -182,7 +182,7 @@ def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
     assert summary.verdict in words
     assert set(reader.figures) >= {f"axis-{axis}" for axis in AXES}
     assert {"spectrum-x", "spectrum-y", "spectrum-z", "close-x"} <= set(reader.figures)
-    assert "spectrum-yaw" not in reader.figures  # it was not asked to move
+    assert "spectrum-yaw" not in reader.figures  # it was not commanded
     drawn = {trace["name"] for name in reader.figures for trace in reader.figures[name]["traces"]}
     assert drawn >= {"target", "achieved", "achieved, delay removed", "as recorded", "supply", "S3", *ACTUATORS}
     assert drawn >= {"command", "position"}
@@ -299,10 +299,10 @@ def test_what_was_exceeded_is_named_in_the_verdict(tmp_path):
     tight = {"displacement": [0.05, 1, 1, 1, 1, 1], "actuator_stroke": [0.001] + [1.0] * 9}
     summary, page = report(tmp_path, record, limits=tight)
     assert summary.level == "bad"
-    for name in ("x displacement", "H1 leg stroke", "spool V6"):
+    for name in ("x displacement", "H1 actuator stroke", "spool V6"):
         assert name in summary.verdict
     assert "y displacement" not in summary.verdict
-    assert "within all given limits" not in summary.verdict
+    assert "within the given limits" not in summary.verdict
     assert 'class="bar over"' in page
 
 
@@ -315,11 +315,11 @@ def test_the_verdict_leads_with_clipped_spools(tmp_path):
     assert summary.verdict.startswith(
         f"4 spool commands were clipped: spool V6 {share:.3g}\N{NO-BREAK SPACE}% of the time."
     )
-    assert "within all given limits" in summary.verdict and summary.level == "bad"
+    assert "within the given limits" in summary.verdict and summary.level == "bad"
     record.attrs["spool_values_clipped"] = 0
-    assert report(tmp_path, record)[0].verdict.startswith("Spools were at the limit of their stroke: spool V6 ")
+    assert report(tmp_path, record)[0].verdict.startswith("Spools reached their full stroke: spool V6 ")
     clean, _ = report(tmp_path, make_record(), limits=LIMITS)
-    assert "within all given limits" in clean.verdict and "clipped" not in clean.verdict
+    assert "within the given limits" in clean.verdict and "clipped" not in clean.verdict
     assert clean.level == "good"
 
 
@@ -327,11 +327,11 @@ def test_the_verdict_on_a_run_that_stopped_begins_with_that_and_judges_nothing_e
     record = make_record()
     record.attrs["trouble"] = "stopped at 0.1606 s: V1 left its stroke of +-0.4 m; scale the motion down"
     summary, _ = report(tmp_path, record, limits=LIMITS)
-    assert summary.verdict.startswith("The run stopped at 0.1606 s: V1 left its stroke of +-0.4 m: how closely")
+    assert summary.verdict.startswith("The run stopped at 0.1606 s: V1 left its stroke of +-0.4 m: tracking is")
     assert "RRMSE" not in summary.verdict and "limits" not in summary.verdict and summary.level == "bad"
 
 
-def test_the_nearest_limit_is_said_first_and_every_quantity_has_its_row(tmp_path):
+def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path):
     record = make_record()
     t, amplitude, w = record["time"].values, 0.06, 2 * np.pi * 1.5
     sine = amplitude * np.sin(w * t)
@@ -339,17 +339,19 @@ def test_the_nearest_limit_is_said_first_and_every_quantity_has_its_row(tmp_path
     speeds = {"actuator_extending": [4.0] * 10, "actuator_retracting": [0.6] * 10}
     summary, page = report(tmp_path, record, limits={**LIMITS, **speeds})
     uses = {(use.quantity, use.name): use for use in summary.limits}
-    leg = uses["leg velocity", "H4"]  # retracting: the lesser limit; central differences lose (w dt)^2 / 6 of it
+    leg = uses["actuator velocity", "H4"]  # retracting: the lesser limit; central differences lose (w dt)^2 / 6 of it
     assert leg.peak == pytest.approx(amplitude * w, rel=1e-4) and leg.share == pytest.approx(leg.peak / 0.6)
-    assert uses["leg stroke", "H4"].share == pytest.approx(amplitude / 0.75, rel=1e-4)  # the peak falls between samples
+    assert uses["actuator stroke", "H4"].share == pytest.approx(
+        amplitude / 0.75, rel=1e-4
+    )  # the peak falls between samples
     moved = np.abs(record["platen_displacement"].values[:, 1]).max()
     assert uses["displacement", "y"].share == pytest.approx(moved / 0.38)
-    assert "leg velocity" in summary.headlines[2].note and "H4" in summary.headlines[2].note
-    assert summary.headlines[2].level == "attention" and "within all given limits" in summary.verdict
-    rows = page.partition("<caption><span>Limits used</span>")[2].partition("</table>")[0]
+    assert "actuator velocity" in summary.headlines[2].note and "H4" in summary.headlines[2].note
+    assert summary.headlines[2].level == "attention" and "within the given limits" in summary.verdict
+    rows = page.partition("<caption><span>Demand over capacity</span>")[2].partition("</table>")[0]
     named = re.findall('<th scope="row">(.*?)</th>', rows)
-    assert named[0] == "Leg velocity" and set(named[1:]) == {
-        *("Displacement", "Velocity", "Acceleration", "Leg stroke", "Spool")
+    assert named[0] == "Actuator velocity" and set(named[1:]) == {
+        *("Displacement", "Velocity", "Acceleration", "Actuator stroke", "Spool")
     }
 
 
@@ -358,8 +360,8 @@ def test_a_peak_counts_as_beyond_its_limit_from_a_thousandth_on(tmp_path, share,
     record = make_record()
     peak = float(np.abs(record["platen_displacement"].values[:, 0]).max())
     summary, page = report(tmp_path, record, limits={"displacement": [peak / share] + [1.0] * 5})
-    found = re.search("Beyond a limit: x displacement \\((.*) of its limit\\)", summary.verdict)
-    assert bool(found) == beyond == ("within all given limits" not in summary.verdict)
+    found = re.search("Limits exceeded: x displacement \\((.*) of its limit\\)", summary.verdict)
+    assert bool(found) == beyond == ("within the given limits" not in summary.verdict)
     assert beyond == (summary.level == "bad") == (summary.headlines[2].level == "bad") == ("bar over" in page)
     if found:
         assert found[1] == "100.2\N{NO-BREAK SPACE}%"  # not the 100 % that it would be in three digits
@@ -384,19 +386,19 @@ def forced(pushed: float, pulled: float, actuator: int) -> xr.Dataset:
         (0, 4.0e6, 3.0e6, "H1 pull (116.7\N{NO-BREAK SPACE}% of its limit)"),
         (9, 2.9e6, -1e4, ""),
         (9, 2.9e6, 2e3, ""),  # a pull within a thousandth of its push is rounding
-        (9, 2.9e6, 1e5, "V6 pull (it can give none)"),
+        (9, 2.9e6, 1e5, "V6 pull (no capacity)"),
         (9, 3.1e6, 0.0, "V6 push (103.3\N{NO-BREAK SPACE}% of its limit)"),
     ],
 )
 def test_push_and_pull_have_limits_of_their_own(tmp_path, actuator, pushed, pulled, said):
     summary, page = report(tmp_path, forced(pushed, pulled, actuator), limits=PULL)
-    assert summary.verdict.partition("Beyond a limit: ")[2].removesuffix(".") == said
+    assert summary.verdict.partition("Limits exceeded: ")[2].removesuffix(".") == said
     row = re.search(
         f'<th scope="row">{ACTUATORS[actuator]}</th>(<td>.*?)</tr>', page[page.index("Forces and strokes") :]
     )
     cells = re.findall("<td>(.*?)</td>", row[1])
     assert cells[0] == number(max(pushed, 1e5) / 1e6) and cells[2] == number(max(pulled, 0.0) / 1e6)
-    assert ("impossible" in cells[3]) == ("none" in said)
+    assert ("no capacity" in cells[3]) == ("no capacity" in said)
     assert ("over" in cells[1] or "over" in cells[3]) == bool(said)
 
 
@@ -416,7 +418,7 @@ def test_without_a_limit_of_pulling_the_magnitude_counts_and_without_a_number_no
     both, _ = report(tmp_path, record, limits={"actuator_force": [4.12e6] * 10})
     assert "H1 force (101.9" in both.verdict
     none, page = report(tmp_path, record, limits={**PULL, "actuator_pull": [np.nan] * 10})
-    assert "Beyond" not in none.verdict and "nan" not in " ".join(Reader(page).words).lower()
+    assert "exceeded" not in none.verdict and "nan" not in " ".join(Reader(page).words).lower()
     short, _ = report(tmp_path, record, limits={"actuator_pull": [2.57e6]})
     assert "H1 pull (163.4" in short.verdict
 
@@ -426,7 +428,7 @@ def test_poor_tracking_is_not_called_good(tmp_path):
     record["platen_acceleration"] = 2.0 * record["platen_acceleration"]  # RRMSE 1
     summary, _ = report(tmp_path, record)
     assert summary.level == "attention"
-    assert "did not follow" in summary.verdict
+    assert "did not track" in summary.verdict
 
 
 def test_a_target_too_small_to_square_is_not_judged(tmp_path):
@@ -474,7 +476,7 @@ def test_samples_that_are_not_numbers_are_named_with_their_time(tmp_path, name):
     record = make_record()
     record[name][512:] = np.nan
     summary, page = report(tmp_path, record, limits=LIMITS)
-    assert f"{name} holds samples that are not numbers, the first at 1.0000 s" in page
+    assert f"{name} has non-finite samples, the first at 1.0000 s" in page
     assert summary.level != "good"
     assert "nan" not in " ".join(Reader(page).words).lower()
 
@@ -598,7 +600,7 @@ def test_a_bar_never_runs_over_its_box_and_says_its_per_cent():
     assert "width:100.0%" in bar(1.7) and "170 %" in bar(1.7) and "over" in bar(1.7)
     assert "width:50.0%" in bar(0.5) and "within" in bar(0.5)
     assert bar(float("nan")) == "–"
-    assert "impossible" in bar(float("inf")) and "width:100.0%" in bar(float("inf"))
+    assert "no capacity" in bar(float("inf")) and "width:100.0%" in bar(float("inf"))
     assert "bar over" in bar(1.0) and "bar near" in bar(1.0, 1e-3) and "bar over" in bar(1.002, 1e-3)
 
 

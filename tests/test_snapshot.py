@@ -72,5 +72,5 @@ def test_a_live_view_is_no_faster_than_the_table(plant):
 def test_a_run_can_be_watched_from_the_command_line(lhpost6, monkeypatch, tmp_path):
     monkeypatch.setattr(live, "PATIENCE", 0.0)
     ended = lhpost6("run", *SHORT, "--live", "--no-open", "--out", tmp_path)
-    assert ended.code == 0 and "http://127.0.0.1:" in ended.out and "nobody has looked" in ended.err
+    assert ended.code == 0 and "http://127.0.0.1:" in ended.out and "no viewer connected" in ended.err
     assert (tmp_path / "record.nc").is_file()

@@ -53,7 +53,7 @@ def watched(
     with LiveView(table, title, look) as view:
         show_address(view.url, what, open_it, err)
         if not view.wait(PATIENCE):
-            typer.echo(f"nobody has looked for {PATIENCE:g} s: it goes on", err=True)
+            typer.echo(f"no viewer connected for {PATIENCE:g} s; continuing", err=True)
         yield view.show
 
 

@@ -16,10 +16,10 @@ from .plant import Plant, make_plant
 from .pose import leg_displacements
 from .rigid_body import platen_inertia
 
-__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "leg_speeds", "make_leg_check"]
+__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "actuator_speeds", "make_leg_check"]
 
 Array = NDArray[np.float64]
-LegCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
+ActuatorCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
 
 
 class Capacity(NamedTuple):
@@ -42,7 +42,7 @@ def has_printed_capacity(machine: Machine) -> bool:
     return "table_2_2.force_actuators" in machine.parameters
 
 
-def leg_speeds(plant: Plant) -> Array:
+def actuator_speeds(plant: Plant) -> Array:
     """Steady unloaded piston speeds at full spool, extending and retracting, (n_actuators, 2) [m/s]."""
     rest = find_equilibrium(plant)
     speeds = np.empty((plant.spools, 2))
@@ -53,14 +53,14 @@ def leg_speeds(plant: Plant) -> Array:
     return speeds
 
 
-def make_leg_check(plant: Plant) -> LegCheck:
+def make_leg_check(plant: Plant) -> ActuatorCheck:
     """Return a check of strokes and valve flow: (displacement, velocity) (n, 6) to shares used, (n, n_actuators).
 
     The returned function gives (speed over what the valves can feed, actuator names, elongation over stroke). Valves
     can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
     """
     reserve = plant.machine.limits.valve_reserve
-    speeds, strokes = (1.0 - reserve) * leg_speeds(plant), plant.legs["stroke"][: plant.spools]
+    speeds, strokes = (1.0 - reserve) * actuator_speeds(plant), plant.legs["stroke"][: plant.spools]
 
     def check(displacement: Array, velocity: Array) -> tuple[Array, tuple[str, ...], Array]:
         moved, rate = leg_displacements(plant, displacement, velocity)
@@ -141,7 +141,7 @@ def _forces(plant: Plant) -> list[Capacity]:
 def _speeds(machine: Machine) -> list[Capacity]:
     both = machine.with_params({f"{a.kind}.valves": 2 for a in machine.actuators if a.area_b is not None})
     plant = make_plant(both)
-    jacobian, speeds = _zero_jacobian(plant), leg_speeds(plant)
+    jacobian, speeds = _zero_jacobian(plant), actuator_speeds(plant)
     lines = []
     for k, axis in enumerate(AXES):
         for sign, word in ((1.0, "up"), (-1.0, "down")) if axis == "z" else ((1.0, ""),):

@@ -4,7 +4,7 @@ from .ac156 import required_spectrum
 from .at2 import load_at2
 from .csv import load_csv
 from .library import MotionEntry, find_motion, list_motions, motion_entry, motion_options
-from .limits import LegUtilisation, LimitsSummary, MotionLimits, check_limits, largest_scale
+from .limits import ActuatorUtilisation, LimitsSummary, MotionLimits, check_limits, largest_scale
 from .motion import AXES, GroundMotion, make_motion
 from .motion_options import MotionOption
 from .process import Reference, Target, make_target, smooth_step, with_scale
@@ -15,7 +15,7 @@ from .v1 import load_v1
 __all__ = [
     "AXES",
     "GroundMotion",
-    "LegUtilisation",
+    "ActuatorUtilisation",
     "LimitsSummary",
     "MotionEntry",
     "MotionLimits",

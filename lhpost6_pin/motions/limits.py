@@ -1,4 +1,4 @@
-"""Whether a target lies within what the table can do, and the scale at which it would."""
+"""Demand of a target over the capacity of the table, and the largest scale within it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from ..core.errors import OutOfRangeError
 from .motion import AXES
 from .process import Target
 
-__all__ = ["LegCheck", "LegUtilisation", "LimitsSummary", "MotionLimits", "check_limits", "largest_scale"]
+__all__ = ["ActuatorCheck", "ActuatorUtilisation", "LimitsSummary", "MotionLimits", "check_limits", "largest_scale"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
-_FULL = 1 + 1e-6  # a motion at exactly the limit passes whatever its rounding
+_FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class MotionLimits:
     acceleration: np.ndarray  # (6,) [m/s^2, rad/s^2]
 
     def __post_init__(self) -> None:
-        """Store arrays and refuse limits that are no limits."""
+        """Convert to read-only arrays; raises ValueError unless all are positive."""
         for quantity in _QUANTITIES:
             values = np.array(getattr(self, quantity), dtype=float)
             if values.shape != (len(AXES),) or not (values > 0).all():
@@ -35,27 +35,27 @@ class MotionLimits:
             object.__setattr__(self, quantity, values)
 
 
-class LegUtilisation(NamedTuple):
-    """How much of each actuator a motion needs, as parts of what it has; above 1 is too much."""
+class ActuatorUtilisation(NamedTuple):
+    """Demand of a motion over capacity, by actuator; above 1 it exceeds the capacity."""
 
-    velocity: np.ndarray  # (n, n_legs) leg velocity over the velocity its valves can feed
-    names: Sequence[str]  # (n_legs,)
-    stroke: np.ndarray  # (n, n_legs) elongation over half stroke
+    velocity: np.ndarray  # (n, n_actuators) velocity over that of the unloaded piston at full spool
+    names: Sequence[str]  # (n_actuators,)
+    stroke: np.ndarray  # (n, n_actuators) elongation over half stroke
 
 
-LegCheck = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Sequence[str], np.ndarray]]
-"""From displacement and velocity (n, 6) to a `LegUtilisation` (or a plain tuple in its order)."""
+ActuatorCheck = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Sequence[str], np.ndarray]]
+"""From displacement and velocity (n, 6) to an `ActuatorUtilisation` (or a tuple in its order)."""
 
 
 @dataclass(frozen=True)
 class LimitsSummary:
-    """Largest part used of each limit, by quantity (or "leg velocity", "leg stroke"), then axis or leg."""
+    """Demand over capacity by quantity ("actuator velocity" and "actuator stroke" included), then axis or actuator."""
 
     utilisation: dict[str, dict[str, float]]
 
     @property
     def highest(self) -> tuple[str, str, float]:
-        """Quantity, axis or leg, and value of the highest utilisation."""
+        """Quantity, axis or actuator, and value of the governing utilisation."""
         return max(
             ((quantity, name, value) for quantity, row in self.utilisation.items() for name, value in row.items()),
             key=lambda item: item[2],
@@ -70,20 +70,20 @@ class _Peak(NamedTuple):
     text: str  # value against limit
 
 
-def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | None = None) -> LimitsSummary:
+def check_limits(target: Target, limits: MotionLimits, actuator_check: ActuatorCheck | None = None) -> LimitsSummary:
     """Utilisation of the table by a target.
 
-    `leg_check` adds the actuators' strokes and the flow of their valves. Raises OutOfRangeError with the largest
-    scale that would fit, then a clause for each quantity exceeded, axes before legs: the worst axis or leg with
-    its value against the limit, time and sample, and the names of the others beyond theirs.
+    `actuator_check` adds the actuators' strokes and the flow of their valves. Raises OutOfRangeError with the largest
+    scale within the limits, then a clause per exceeded quantity, axes before actuators: the governing one with its
+    value, limit, time and sample, and the names of the others.
     """
-    peaks = _axis_peaks(target, limits) + (_leg_peaks(target, leg_check, 1.0) if leg_check else [])
+    peaks = _axis_peaks(target, limits) + (_actuator_peaks(target, actuator_check, 1.0) if actuator_check else [])
     over = [peak for peak in peaks if peak.utilisation > _FULL]
     if over:
-        fits = largest_scale(target, limits, leg_check)
+        fits = largest_scale(target, limits, actuator_check)
         raise OutOfRangeError(
-            f"{target.reference.motion} at scale {target.reference.scale:g} is more than the table can give. "
-            f"The largest scale that fits is {fits:g}; beyond the limits: {'; '.join(_clauses(over, target.time))}",
+            f"{target.reference.motion} at scale {target.reference.scale:g} exceeds the capacity of the table. "
+            f"The largest scale that fits is {fits:g}; exceeded: {'; '.join(_clauses(over, target.time))}",
             fits,
         )
     utilisation: dict[str, dict[str, float]] = {}
@@ -92,32 +92,32 @@ def check_limits(target: Target, limits: MotionLimits, leg_check: LegCheck | Non
     return LimitsSummary(utilisation)
 
 
-def largest_scale(target: Target, limits: MotionLimits, leg_check: LegCheck | None = None) -> float:
+def largest_scale(target: Target, limits: MotionLimits, actuator_check: ActuatorCheck | None = None) -> float:
     """Largest scale of the target's motion within all limits, rounded down to three digits.
 
-    Infinity for a target that does not move, or less than a floating-point number can resolve. Leg lengths are
-    not linear in the pose, so with `leg_check` the scale is found by bisection below the one the axes allow.
+    Infinity for a target at rest (or below floating-point resolution). Actuator lengths are not linear in the pose:
+    with `actuator_check` the scale is found by bisection below that of the axes.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
     factor = 1 / highest
-    if leg_check is not None:
+    if actuator_check is not None:
 
-        def too_much(trial: float) -> bool:
-            return max(peak.utilisation for peak in _leg_peaks(target, leg_check, trial)) > _FULL
+        def exceeds(trial: float) -> bool:
+            return max(peak.utilisation for peak in _actuator_peaks(target, actuator_check, trial)) > _FULL
 
-        if too_much(factor):
+        if exceeds(factor):
             low, high = 0.0, factor
             while high - low > 1e-4 * high:
                 middle = (low + high) / 2
-                low, high = (low, middle) if too_much(middle) else (middle, high)
+                low, high = (low, middle) if exceeds(middle) else (middle, high)
             factor = low
     return _round_down(factor * abs(target.reference.scale))
 
 
 def _clauses(over: Sequence[_Peak], time: np.ndarray) -> list[str]:
-    """One clause for each quantity: its worst axis or leg in full, the others by name; axes before legs."""
+    """One clause per quantity: its governing axis or actuator in full, the others by name; axes first."""
     ranked = sorted(over, key=lambda peak: (peak.quantity not in _QUANTITIES, -peak.utilisation))
     groups: dict[str, list[_Peak]] = {}
     for peak in ranked:
@@ -143,19 +143,19 @@ def _axis_peaks(target: Target, limits: MotionLimits) -> list[_Peak]:
     return peaks
 
 
-def _leg_peaks(target: Target, leg_check: LegCheck, factor: float) -> list[_Peak]:
-    with np.errstate(all="ignore"):  # a pose too far away to have a leg length is beyond every stroke: infinite
-        velocity, names, stroke = leg_check(factor * target.displacement, factor * target.velocity)
+def _actuator_peaks(target: Target, actuator_check: ActuatorCheck, factor: float) -> list[_Peak]:
+    with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
+        velocity, names, stroke = actuator_check(factor * target.displacement, factor * target.velocity)
     peaks = []
     for quantity, shares, of in (
-        ("leg velocity", velocity, "of what its valves can give"),
-        ("leg stroke", stroke, "of its stroke"),
+        ("actuator velocity", velocity, "of the unloaded velocity of its valves"),
+        ("actuator stroke", stroke, "of its stroke"),
     ):
         values = np.nan_to_num(np.abs(shares), nan=np.inf, posinf=np.inf)
         for i, name in enumerate(names):
             sample = int(np.argmax(values[:, i]))
             value = float(values[sample, i])
-            share = f"{100 * value:.4g} %" if np.isfinite(value) else "a countless multiple"
+            share = f"{100 * value:.4g} %" if np.isfinite(value) else "infinitely many times"
             peaks.append(_Peak(quantity, name, value, sample, f"{share} {of}"))
     return peaks
 

@@ -1,4 +1,4 @@
-"""What a terminal shows of a calibration."""
+"""Calibration results as tables for a terminal."""
 
 import numpy as np
 from rich.markup import escape
@@ -19,7 +19,7 @@ __all__ = ["print_calibration"]
 
 
 def print_calibration(calibration: Calibration) -> None:
-    """Print parameters, sensor errors that stand out, misfits, and whether the fit converged."""
+    """Print parameters, significant sensor errors, misfits and convergence."""
     console = make_console()
     console.print(_parameters(calibration))
     console.print(_sensors(calibration))
@@ -31,7 +31,7 @@ def print_calibration(calibration: Calibration) -> None:
     console.print(
         f"converged after {rounds}"
         if calibration.converged
-        else f"[bold red]not converged[/] in {rounds}: these tests tell too little; give more, or stronger ones"
+        else f"[bold red]not converged[/] in {rounds}: the tests carry too little information; add tests or excite more"
     )
 
 
@@ -51,7 +51,7 @@ def _sensors(calibration: Calibration) -> Table:
     order = sorted(range(first, len(distance)), key=lambda i: -abs(distance[i]))
     outside, allowed = beyond(calibration), stated_range(calibration)
     found = [i for i in order if outside[i]]
-    title = f"Errors of the sensors: {len(found)} of {len(order)} found, {range_summary(calibration)}"
+    title = f"Errors of the sensors: {len(found)} of {len(order)} significant, {range_summary(calibration)}"
     table = _table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
     for i in found:
         unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / allowed[i]

@@ -1,4 +1,4 @@
-"""Tables that the commands of the virtual 469D print."""
+"""Results of tuning, iteration and sine tests as tables for a terminal."""
 
 import math
 
@@ -16,7 +16,7 @@ __all__ = ["print_iterations", "print_sine", "print_tuning"]
 
 
 def print_tuning(tuning: Tuning) -> None:
-    """Bands and margins before and after, and the gains found."""
+    """Print bands and margins before and after, and the tuned gains."""
     console = Console()
     title = f"Reference to feedback within {tuning.tolerance:g} dB and with a coherence of {tuning.coherence:g}"
     table = _table(title, "axis", "before [Hz]", "after [Hz]", "delay [ms]", "gain margin", "phase margin")
@@ -31,7 +31,7 @@ def print_tuning(tuning: Tuning) -> None:
             f"{math.degrees(margin.phase):.0f} deg at {margin.phase_frequency:.3g} Hz",
         )
     console.print(table)
-    gains = _table("Gains found", "axis", "Kx [1/s]", "KF [1]", "Kvf [1]", "Kaf [s]", "Kjf [s2]")
+    gains = _table("Tuned gains", "axis", "Kx [1/s]", "KF [1]", "Kvf [1]", "Kaf [s]", "Kjf [s2]")
     ahead = (f"{name}_feedforward" for name in ("velocity", "acceleration", "jerk"))
     columns = [getattr(tuning.after, name) for name in ("displacement_gain", "force_damping", *ahead)]
     for axis in tuning.axes:
@@ -40,11 +40,11 @@ def print_tuning(tuning: Tuning) -> None:
     for axis in tuning.axes:
         console.print(f"{axis.axis}: {axis.limited_by}", highlight=False, soft_wrap=True)
     stable = "stable" if tuning.doubled else "[bold red]unstable[/]"
-    console.print(f"All master gains doubled at once, without dry friction: {stable}")
+    console.print(f"With all master gains doubled, without dry friction: {stable}")
 
 
 def print_iterations(result: Iterated) -> None:
-    """Errors of every iteration, and why it stopped."""
+    """Print the errors of every iteration, and the stopping criterion."""
     console = Console()
     moved = [k for k in range(6) if not math.isnan(result.history[0].acceleration[k])]
     title = "RRMSE [%] of the acceleration, 0 to 33 Hz, delay removed"
@@ -64,7 +64,7 @@ def print_iterations(result: Iterated) -> None:
 
 
 def print_sine(test: SineTest) -> None:
-    """Amplitude, phase and distortion before and after."""
+    """Print amplitude, phase and distortion without and with cancellers."""
     console = Console()
     unit = "m" if test.axis in "xyz" else "rad"
     title = f"{test.amplitude:g} {unit} at {test.frequency:g} Hz in {test.axis}; distortion over all harmonics to 33 Hz"

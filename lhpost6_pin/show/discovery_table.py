@@ -1,4 +1,4 @@
-"""What a terminal shows of a search for missing effects."""
+"""Discovery results as tables for a terminal."""
 
 import math
 
@@ -13,7 +13,7 @@ __all__ = ["print_discovery"]
 
 
 def print_discovery(found: Discovery) -> None:
-    """Print the verdict, the effects with their numbers, and the gap on held-out tests."""
+    """Print the verdict, the effects with their parameters, and the errors on held-out tests."""
     console = make_console()
     verdict = found.verdict
     console.print(f"[bold]{verdict.word}[/]: {escape(said(found))}")
@@ -36,7 +36,7 @@ def print_discovery(found: Discovery) -> None:
         size = f"{off.estimate.value:.4g} {off.estimate.unit}, stated {off.stated:.3g}"
         console.print(f"sensor: {escape(off.name)} {size}")
     if found.proof:
-        title = "Gap on tests not searched, in deviations of noise (1: noise alone)"
+        title = "Normalised RMS error on held-out tests (1: sensor noise)"
         table = Table("phase", "test", "delivered", "refitted", "after", "closure", title=title, title_justify="left")
         for gap in found.proof.gaps:
             share = "" if math.isnan(gap.closure) else f"{gap.closure:.2f}"

@@ -1,4 +1,4 @@
-"""Results of commands as plain entries, for `--json`: SI units, angles in radians, shares of 1."""
+"""Results of commands as entries for `--json`: SI units, angles in radians, fractions."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -55,7 +55,7 @@ def machine_entries(machine: Machine) -> Entries:
 
 
 def capacity_entries(machine: Machine) -> Entries:
-    """Capacity beside Table 2.2, where the machine has that table, and the oil-column modes."""
+    """Capacity against Table 2.2 (if the machine has that table), and the oil-column modes."""
     from ..mechanics.capacity import capacity_table, has_printed_capacity
     from ..mechanics.linearize import oil_column_modes
 
@@ -68,7 +68,7 @@ def capacity_entries(machine: Machine) -> Entries:
 
 
 def motion_entries(name: str | None) -> Entries:
-    """All motions known by name; or the options of one. Raises UnknownNameError."""
+    """All motions by name, or the options of one. Raises UnknownNameError."""
     from ..motions import list_motions, motion_entry, motion_options
 
     if name is None:
@@ -79,7 +79,7 @@ def motion_entries(name: str | None) -> Entries:
 
 
 def finding_entries(found: Mapping[str, Sequence[RecordFinding]]) -> Entries:
-    """What is in records and wrong with them, by file."""
+    """Findings on records, by file."""
     every = [f for findings in found.values() for f in findings]
     return {
         "records": found,
@@ -89,7 +89,7 @@ def finding_entries(found: Mapping[str, Sequence[RecordFinding]]) -> Entries:
 
 
 def run_entries(run: Run, summary: "RunSummary | None") -> Entries:
-    """How a run went and, with a summary, how it followed its target and what it used."""
+    """Outcome of a run and, with a summary, its tracking and demand over capacity."""
     entries: Entries = {
         "seconds": run.time[-1] + 1 / run.rate,
         "scheme": run.scheme,
@@ -133,7 +133,7 @@ def tuning_entries(found: Tuning) -> Entries:
 
 
 def iteration_entries(found: Iterated) -> Entries:
-    """Errors of every iteration by axis, the best, and why it stopped."""
+    """Errors of every iteration by axis, the best iteration, and the stopping criterion."""
 
     def by_axis(values: Any) -> Entries:
         return {a: v for a, v in zip(AXES, values, strict=True) if not math.isnan(v)}
@@ -162,7 +162,7 @@ def sine_entries(found: SineTest) -> Entries:
 
 
 def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
-    """Modelled against measured forces, and the residual with what is to be expected of it, by axis."""
+    """Modelled against measured forces, and the residual with its expected levels, by axis."""
     matches = {name: getattr(agreement, name) for name in ("actuators", "struts", "dissipative")}
 
     def axis(k: int) -> Entries:

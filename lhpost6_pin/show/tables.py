@@ -1,4 +1,4 @@
-"""What the command line prints: machine, capacity, motions, findings, results; and their rows for reports."""
+"""Tables for a terminal: machine, capacity, motions, findings, runs; and their rows for reports."""
 
 import math
 from collections.abc import Sequence
@@ -50,12 +50,12 @@ def machine_rows(machine: Machine) -> list[tuple[str, str, str, str, bool]]:
 
 
 def report_limits(plant: "Plant") -> dict[str, Any]:
-    """Limits that a run report draws: Table 2.2, strokes, speeds and forces of the actuators, supply, strut areas."""
-    from ..mechanics.capacity import leg_speeds
+    """Limits for a run report: Table 2.2, strokes, velocities and forces of actuators, supply, strut areas."""
+    from ..mechanics.capacity import actuator_speeds
 
     machine = plant.machine
     area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
-    speeds = leg_speeds(plant)
+    speeds = actuator_speeds(plant)
     return {
         "displacement": machine.limits.displacement,
         "velocity": machine.limits.velocity,
@@ -86,10 +86,10 @@ def print_machine(machine: Machine) -> None:
         sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)
         table.add_row(escape(path), _text(q.value), escape(q.unit), sd, evidence, escape(q.source))
     console.print(table)
-    console.print("* assumed: nobody has published this number; change it with --override")
+    console.print("* assumed: not published; replace it with --override")
     console.print(_effects_table("Force effects, in ledger order", machine.effects))
     if machine.modifiers:
-        console.print(_effects_table("Effects that alter oil, valves, supply or inertia", machine.modifiers))
+        console.print(_effects_table("Modifiers of oil, valves, supply or inertia", machine.modifiers))
     if "estimates.platen_alone.mass" in machine.parameters:
         console.print(_inertia_table(machine))
 
@@ -121,7 +121,7 @@ def _inertia_table(machine: Machine) -> Table:
 
 
 def print_capacity(machine: Machine) -> None:
-    """Print what the model can give beside Table 2.2, with each deviation."""
+    """Print the capacity of the model and Table 2.2, with deviations."""
     from ..mechanics.capacity import capacity_table
 
     table = Table("capacity", "model", "Table 2.2", "unit", "deviation", "how", title="Capacity, all servovalves open")
@@ -136,7 +136,7 @@ def print_modes(machine: Machine) -> None:
     from ..mechanics.linearize import oil_column_modes
 
     table = Table(
-        "axis", "undamped [Hz]", "with friction stuck and leaks [Hz]", "damping [%]", title="Oil-column modes"
+        "axis", "undamped [Hz]", "with sticking friction and leakage [Hz]", "damping [%]", title="Oil-column modes"
     )
     full = {m.axis: m for m in oil_column_modes(machine, undamped=False)}
     for mode in oil_column_modes(machine):
@@ -147,18 +147,18 @@ def print_modes(machine: Machine) -> None:
 
 
 def print_motions(name: str | None = None) -> None:
-    """Print the motions known by name and what each needs; with a name, what can be chosen about that one."""
+    """Print all motions by name with what they require; with a name, the options of that one."""
     from ..motions import list_motions, motion_entry, motion_options
 
     console = make_console()
     if name is None:
-        table = Table(Column("name", no_wrap=True), "kind", "what it is", Column("needs", no_wrap=True))
+        table = Table(Column("name", no_wrap=True), "kind", "description", Column("requires", no_wrap=True))
         for m in list_motions():
             needs = [escape(m.remedy) or "[green]ready[/]"]
             needs += [f"or your file: {m.wanted.record}"] if m.wanted and m.kind != "file" else []
             table.add_row(" ".join((m.name, *m.aliases)), m.kind, m.title, "\n".join(needs))
         console.print(table)
-        console.print("lhpost6 motions NAME says what can be chosen about one of them")
+        console.print("lhpost6 motions NAME prints the options of one")
         return
     found = motion_entry(name)
     console.print(f"[bold]{found.name}[/]: {found.title}")
@@ -172,8 +172,8 @@ def print_motions(name: str | None = None) -> None:
 
 
 def print_findings(file: str, findings: "Sequence[RecordFinding]") -> None:
-    """Print what is in a record and what is wrong with it."""
-    table = Table("", "channel", "sample", "finding", "what to do", title=escape(file))
+    """Print the findings on a record."""
+    table = Table("", "channel", "sample", "finding", "remedy", title=escape(file))
     colour = {"error": "[bold red]error[/]", "warning": "[yellow]warning[/]", "info": "info"}
     for f in findings:
         sample = "" if f.sample is None else str(f.sample)
@@ -185,7 +185,7 @@ def print_findings(file: str, findings: "Sequence[RecordFinding]") -> None:
 
 
 def print_sensor_findings(findings: "Sequence[ConsistencyFinding]") -> None:
-    """Print comparisons between sensors that stand out, and how many there were."""
+    """Print the suspicious comparisons of redundant sensors, and the counts."""
     suspicious = [f for f in findings if f.verdict == "suspicious"]
     untested = sum(f.verdict == "untested" for f in findings)
     console = make_console()
@@ -196,30 +196,28 @@ def print_sensor_findings(findings: "Sequence[ConsistencyFinding]") -> None:
             numbers = f"{f.estimate:.5g}", f"{f.expected:.5g}", f"{f.tolerance:.2g}", f"{f.significance:+.1f}"
             table.add_row(f.check, escape(f.channel), f.named, f.unit, *numbers)
         console.print(table)
-        console.print("A sensor is off, or the law or geometry that it is held against lacks something.")
-    console.print(
-        f"sensors against each other: {len(findings)} numbers, {len(suspicious)} suspicious, {untested} untested"
-    )
+        console.print("A sensor is wrong, or the law or geometry of the comparison is incomplete.")
+    console.print(f"redundant sensors: {len(findings)} comparisons, {len(suspicious)} suspicious, {untested} untested")
 
 
 _COMPARED = ("platen_displacement", "chamber_pressure_a", "chamber_pressure_b", "actuator_force")
 _SILENT = 1e-6
-"""A channel whose peak is below this share of the largest of its kind did not move: its relative error says nothing."""
+"""Fraction of the largest peak of its kind below which a channel is at rest and has no relative error."""
 
 
 class Compared(NamedTuple):
-    """One channel of a replayed test against the recorded one, in `unit`."""
+    """Difference of a replayed channel from the recorded one, in `unit`."""
 
     channel: str
     unit: str
     peak_recorded: float
     largest_difference: float
-    rrmse: float  # not a number where the channel did not move
+    rrmse: float  # not-a-number for a channel at rest
     drift: float  # of the difference [unit/s]
 
 
 def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
-    """How far a replayed test is from the recorded one, per channel, on common samples; empty if these are too few."""
+    """Differences of a replayed test from the recorded one by channel, on common samples; empty below two."""
     from ..data.channels import LAYOUT, channel_unit
     from ..data.signals import drift_rate, rrmse
 
@@ -244,7 +242,7 @@ def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
 
 
 def print_comparison(compared: Sequence[Compared]) -> None:
-    """Print how far a replayed test is from the recorded one."""
+    """Print the differences of a replayed test from the recorded one."""
     table = Table("channel", "peak recorded", "largest difference", "RRMSE", "drift", title="Model against record")
     for c in compared:
         rrmse = "" if math.isnan(c.rrmse) else f"{c.rrmse:.3g}"
@@ -254,19 +252,19 @@ def print_comparison(compared: Sequence[Compared]) -> None:
 
 
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
-    """Print what a run's report says first, and how long and how it ran."""
+    """Print the summary of a run, its duration, scheme and rate."""
     console = make_console()
     if summary is not None:
         console.print(f"[bold]{escape(summary.verdict)}[/]")
         delay = escape("delay [ms]")
-        table = Table("axis", "what", "peak asked", "peak achieved", "RRMSE", delay, "RRMSE, delay removed")
+        table = Table("axis", "quantity", "peak target", "peak achieved", "RRMSE", delay, "RRMSE, delay removed")
         for row in summary.tracking:
             if row.peak_target:
                 table.add_row(*map(escape, tracking_cells(row)))
         console.print(table)
-        nearest = [f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in summary.nearest]
-        if nearest:
-            console.print(f"limits used, the nearest first: {', '.join(nearest)}")
+        uses = [f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in summary.governing]
+        if uses:
+            console.print(f"demand over capacity, governing limit first: {', '.join(uses)}")
     console.print(
         f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second"
     )

@@ -1,4 +1,4 @@
-"""Figures of a calibration: estimates beside their priors, groups of residuals beside all, which test tells of what."""
+"""Figures of a calibration: estimates and priors, subset and joint estimates, information per test."""
 
 import html
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 PROBABILITY = 0.9  # of every interval that is drawn or printed
 INTERVAL = f"{100 * PROBABILITY:g}\N{NO-BREAK SPACE}% interval"
 ROW, SUBSET_ROW = 19, 38  # [CSS px] height of a parameter's row
-TOGETHER = "all together"
+TOGETHER = "joint estimate"
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "x", "star", "hexagon")
 _SHADES = (4, 3, 2, 0)
-"""From much to little told."""
+"""From much to little information."""
 
 
 class Dots(NamedTuple):
@@ -51,10 +51,10 @@ def _reach(calibration: Calibration) -> float:
 
 
 def _drawn(calibration: Calibration) -> str:
-    """What estimates are drawn with."""
+    """How estimates are drawn."""
     if calibration.converged:
         return f"with {INTERVAL}s"
-    return "where the fit stopped without converging, so without intervals"
+    return "of the last round (not converged), without intervals"
 
 
 def forest_block(calibration: Calibration) -> Markup:
@@ -77,57 +77,59 @@ def forest_block(calibration: Calibration) -> Markup:
         f"Estimates {_drawn(calibration)}, in standard deviations of their priors from nominal; the band is "
         f"the {INTERVAL} of the prior, before the campaign."
     )
-    return figure(_forest("forest", "Parameters beside their priors", words, names, dots, ROW))
+    return figure(_forest("forest", "Parameters and priors", words, names, dots, ROW))
 
 
 def subset_block(calibration: Calibration) -> Markup:
-    """Return what each group of residuals says of each parameter by itself, beside all together."""
+    """Return the estimate of each group of residuals for each parameter alone, and the joint estimate."""
     count, prior, limit = len(calibration.parameters), calibration.prior, calibration.numbers.number("report.informed")
     own = calibration.numbers.number("simulation.deviations")
     groups = [s for s in calibration.subsets if np.any(s.sd[:count] < limit * prior[:count])]
     if not groups:
-        return paragraph("No group tells of a parameter by itself.")
-    tells = {s.name: [i for i in range(count) if s.sd[i] < limit * prior[i]] for s in groups}
-    told = sorted({i for chosen in tells.values() for i in chosen})
-    speakers = {i: [TOGETHER, *(name for name, chosen in tells.items() if i in chosen)] for i in told}
+        return paragraph("No group identifies a parameter by itself.")
+    identifies = {s.name: [i for i in range(count) if s.sd[i] < limit * prior[i]] for s in groups}
+    identified = sorted({i for chosen in identifies.values() for i in chosen})
+    estimators = {i: [TOGETHER, *(name for name, chosen in identifies.items() if i in chosen)] for i in identified}
     names = calibration.names
 
     def place(name: str, i: int) -> float:
         """Place of a group's estimate up the figure: those of one parameter stand close together."""
-        spoken = speakers[i]
-        return told.index(i) + 0.8 * ((spoken.index(name) + 0.5) / len(spoken) - 0.5)
+        own_names = estimators[i]
+        return identified.index(i) + 0.8 * ((own_names.index(name) + 0.5) / len(own_names) - 0.5)
 
     def dots_of(name: str, chosen: Sequence[int], estimate: Array, sd: Array, color: str, symbol: str) -> Dots:
         places, labels = [place(name, i) for i in chosen], [names[i] for i in chosen]
         where, half = ([float(x[i] / prior[i]) for i in chosen] for x in (estimate, _reach(calibration) * sd))
         return Dots(name, places, where, half, labels, color, symbol)
 
-    series = [dots_of(TOGETHER, told, calibration.estimate, calibration.sd, BLACK, "line-ns-open")]
-    for k, s in enumerate(groups):  # the last colour is black: all together
+    series = [dots_of(TOGETHER, identified, calibration.estimate, calibration.sd, BLACK, "line-ns-open")]
+    for k, s in enumerate(groups):  # the last colour is black: the joint estimate
         color, symbol = CYCLE[k % (len(CYCLE) - 1)], SYMBOLS[k % len(SYMBOLS)]
-        series.append(dots_of(s.name, tells[s.name], s.estimate, s.sd, color, symbol))
+        series.append(dots_of(s.name, identifies[s.name], s.estimate, s.sd, color, symbol))
     alone = {s.name: s.estimate for s in groups}
-    marked = [(name, i) for name, i, _ in contradictions(calibration) if i in tells.get(name, ())]
+    marked = [(name, i) for name, i, _ in contradictions(calibration) if i in identifies.get(name, ())]
     if marked:
         places, where = [place(*one) for one in marked], [float(alone[name][i] / prior[i]) for name, i in marked]
         labels, half = [f"{names[i]}, {name}" for name, i in marked], [0.0] * len(marked)
-        series.append(Dots("contradicts all together", places, where, half, labels, VERMILLION, "circle-open", 17))
+        series.append(
+            Dots("contradicts the joint estimate", places, where, half, labels, VERMILLION, "circle-open", 17)
+        )
     words = (
         f"Estimates {_drawn(calibration)}: of each group of residuals alone, and of open-loop simulation from the "
-        "recorded spools, with the same priors; a group is left out where its predicted deviation is "
-        f"above {limit:g} of the prior's. Ringed: {calibration.limit:g} deviations or more from all together, "
+        "recorded spools, with the same priors; a group is omitted where its predicted deviation is "
+        f"above {limit:g} of the prior's. Ringed: {calibration.limit:g} deviations or more from the joint estimate, "
         f"simulation {own:g}. "
         "Drag to zoom; a double click shows all."
     )
-    shown = [names[i] for i in told]
-    return figure(_forest("subsets", "Gas law, flows and wrenches by themselves", words, shown, series, SUBSET_ROW))
+    shown = [names[i] for i in identified]
+    return figure(_forest("subsets", "Estimates by group of residuals", words, shown, series, SUBSET_ROW))
 
 
 def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> list[Markup]:
     """Return, for some unknowns, the predicted deviation from each test alone over the prior, as a shaded table."""
     informed = calibration.numbers.number("report.informed")
     edges = (0.2 * informed, 0.5 * informed, informed)
-    said = [f"up to {edge:g}" for edge in edges] + [f"above {informed:g}: next to nothing"]
+    said = [f"up to {edge:g}" for edge in edges] + [f"above {informed:g}: almost no information"]
     key = " ".join(map(shaded, said, _SHADES))
     ratios = np.vstack([calibration.sd, calibration.alone])[:, unknowns] / calibration.prior[unknowns]
     rows = [

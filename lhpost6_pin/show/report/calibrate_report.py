@@ -1,4 +1,4 @@
-"""The report of a calibration: what a campaign says of a machine's numbers and of its sensors."""
+"""The report of a calibration: estimates of machine parameters and sensor errors from a campaign."""
 
 from pathlib import Path
 
@@ -8,16 +8,16 @@ from ...identification.calibration import Calibration
 from ...identification.calibration.calibration_summary import chance, range_summary
 from ...identification.calibration.verdicts import beyond, changed_parameters, contradictions, out_of_range, verdict_on
 from .calibrate_sections import (
-    alike_blocks,
     change_of,
+    correlation_blocks,
     group_blocks,
     misfit_blocks,
     parameter_blocks,
     sensor_blocks,
     test_blocks,
 )
-from .control_blocks import load_of
-from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page, table, versions
+from .control_blocks import load_of, numbers_used
+from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page
 
 __all__ = ["write_calibrate_report"]
 
@@ -41,14 +41,13 @@ def write_calibrate_report(calibration: Calibration, path: Path | str, command: 
         sections=[
             Section("parameters", "Parameters", parameter_blocks(calibration)),
             Section("sensors", "Errors of the sensors", sensor_blocks(calibration)),
-            Section("misfit", "What is left", misfit_blocks(calibration)),
-            Section("information", "Which tests tell of what", test_blocks(calibration)),
-            Section("subsets", "What each group of residuals says", group_blocks(calibration)),
-            Section("alike", "What cannot be told apart", alike_blocks(calibration)),
+            Section("misfit", "Residuals", misfit_blocks(calibration)),
+            Section("information", "Information per test", test_blocks(calibration)),
+            Section("subsets", "Estimates by group of residuals", group_blocks(calibration)),
+            Section("alike", "Parameter correlation", correlation_blocks(calibration)),
             Section("assumptions", "Assumptions and numbers used", _assumptions(calibration)),
         ],
-        command=command or None,
-        versions=versions(),
+        command=command,
     )
     return save_page(page, path)
 
@@ -60,35 +59,33 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
     said = [
         f"The fit converged after {rounds}."
         if calibration.converged
-        else f"The fit did not converge in {rounds}: estimates are where it stopped, and have no intervals.",
-        f"The campaign has told something of {informed} of {count} parameters.",
+        else f"The fit did not converge in {rounds}: estimates are those of the last round, without intervals.",
+        f"{informed} of {count} parameters are identifiable.",
     ]
     if changed:
         most = ", ".join(f"{calibration.names[i]} ({change_of(calibration, i)})" for i in changed[:NAMED])
-        more = f"{'most clearly ' * (len(changed) > NAMED)}{most}"
+        more = f"{'most significantly ' * (len(changed) > NAMED)}{most}"
         differ = "differs" if len(changed) == 1 else "differ"
         said.append(f"{len(changed)} {differ} from nominal: {more}.")
     else:
-        said.append("None differs from nominal.")
+        said.append("No parameter differs from nominal.")
     before, after = (float(np.nanmax(m)) for m in (calibration.misfit_before, calibration.misfit_after))
     level: Level = "good"
     bounded, wrong = _bounded(calibration), out_of_range(calibration)
     if after > calibration.noise_alone:
         level = "attention"
         said.append(
-            f"The worst misfit went from {number(before)} to {number(after)}: more than sensor noise is left, so an "
-            "effect is missing, a sensor is wrong, or noise is more than stated."
+            f"The largest misfit changed from {number(before)} to {number(after)}, above sensor noise: an effect is "
+            "missing, a sensor is wrong, or the stated noise is too small."
         )
     else:
-        said.append(
-            f"The worst misfit went from {number(before)} to {number(after)}: sensor noise is all that is left."
-        )
+        said.append(f"The largest misfit changed from {number(before)} to {number(after)}, the level of sensor noise.")
     if wrong:
         level = "attention"
         said.append(f"Sensor errors {range_summary(calibration)}.")
     if bounded:
         level = "attention"
-        said.append(f"As far off as the fit lets it go, so that something else is wrong: {', '.join(bounded)}.")
+        said.append(f"At the bound of the fit, which indicates another cause: {', '.join(bounded)}.")
     return " ".join(said), level if calibration.converged else "bad"
 
 
@@ -109,11 +106,13 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     trust: Level = "attention" if wrong else "good"
     return [
         Headline("yes" if calibration.converged else "no", "Converged", f"rounds: {calibration.rounds}", good),
-        Headline(f"{np.sum(informed[:count])} of {count}", "Parameters informed", note),
-        Headline(f"{np.sum(outside[:count])} of {count}", "Parameters that differ from nominal", differ),
-        Headline(f"{np.sum(outside[count:])} of {p - count}", "Sensor errors found", ranges, trust),
-        Headline(number(after), "Worst misfit", f"1: noise alone; {number(before)} before", fits),
-        Headline(str(apart), "Contradictions", f"groups against all together; by chance about {by_chance}"),
+        Headline(f"{np.sum(informed[:count])} of {count}", "Identifiable parameters", note),
+        Headline(f"{np.sum(outside[:count])} of {count}", "Parameters different from nominal", differ),
+        Headline(f"{np.sum(outside[count:])} of {p - count}", "Significant sensor errors", ranges, trust),
+        Headline(number(after), "Largest misfit", f"1: noise alone; {number(before)} before", fits),
+        Headline(
+            str(apart), "Contradictions", f"subset estimates against the joint one; expected by chance: {by_chance}"
+        ),
     ]
 
 
@@ -122,18 +121,13 @@ def _bounded(calibration: Calibration) -> list[str]:
 
 
 def _assumptions(calibration: Calibration) -> list[Markup]:
-    said = [
-        "Priors are the standard deviations that the machine file states (models/lhpost6.toml for the shipped table); "
-        "most are assumed, and an estimate that is not informed is no better than they are.",
-        "Sensor noise, and how far gains, offsets and delays may be off, come from the sensors' file "
-        "(models/sensors/lhpost6.toml unless --sensors names another); nobody has measured them. Misfit, predicted "
+    lines = [
+        "Priors are the standard deviations stated in the machine file (models/lhpost6.toml for the shipped table); "
+        "most are assumed, and an estimate that is not informative is no better than its prior.",
+        "Sensor noise and the ranges of gains, offsets and delays are from the sensors' file "
+        "(models/sensors/lhpost6.toml unless --sensors names another); they are not measured. Misfit, predicted "
         "deviations and intervals are all relative to that noise.",
-        "Predicted deviations and intervals hold if the equations do: what they leave out is not in them.",
-        "The drawn and printed intervals take the unknowns as normally distributed about the estimates, to first "
-        "order.",
+        "Predicted deviations and intervals assume that the equations are complete; model errors are not included.",
+        "Intervals take the unknowns as normally distributed about the estimates, to first order.",
     ]
-    rows = [
-        (path, f"{float(np.max(q.value)):g}{f' {q.unit}' if q.unit != '1' else ''}", q.evidence, q.source)
-        for path, q in calibration.numbers.items()
-    ]
-    return [bullet_list(said), table("Numbers used", ("Number", "Value", "Evidence", "Source"), rows)]
+    return [bullet_list(lines), numbers_used(calibration.numbers)]

@@ -1,4 +1,4 @@
-"""Sections of a calibration report: parameters, sensors, what is left, what tells of what, what is alike."""
+"""Sections of a calibration report: parameters, sensors, residuals, information per test, correlation."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ from .page import Markup, details, number, paragraph, table
 from .run_motion import percent
 
 __all__ = [
-    "alike_blocks",
+    "correlation_blocks",
     "change_of",
     "group_blocks",
     "parameter_blocks",
@@ -33,7 +33,7 @@ KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force":
 
 # ---------------------------------------------------------------------------------------- parameters and sensors
 def parameter_blocks(calibration: Calibration) -> list[Markup]:
-    """Return every parameter beside its prior, drawn and in numbers."""
+    """Return estimates and priors of all parameters as figure and table."""
     outside = far(calibration)
     informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
     rows = []
@@ -53,33 +53,31 @@ def parameter_blocks(calibration: Calibration) -> list[Markup]:
             )
         )
     how = (
-        "At its bound: as far from nominal as the fit lets it go, by its prior or since no machine could be built. "
-        f"Changed: farther from nominal than {calibration.limit:g} predicted deviations, and than {material:g} of the "
-        "prior's. Unchanged: nearer, and the campaign "
-        f"has told something of it, which is a predicted deviation below {informed:g} of the prior's. Not informed: "
-        "what stands here is mostly the prior. A height is the mean over its kind's components, which move "
-        "together."
+        "At its bound: the limit of the fit, from its prior or from an unbuildable machine. "
+        f"Changed: more than {calibration.limit:g} predicted deviations and {material:g} prior deviations from "
+        f"nominal. Unchanged: less, and identifiable (predicted deviation below {informed:g} of the prior's). Not "
+        "informed: mostly the prior. A height is the mean over the components of its kind, which move together."
     )
-    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "In deviations")
+    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "Deviations")
     heads = (*header, "Predicted over prior", INTERVAL)
     cut = map(paragraph, cut_strokes(calibration))
     return [forest_block(calibration), paragraph(how), table("All parameters", heads, rows), *cut]
 
 
 def sensor_blocks(calibration: Calibration) -> list[Markup]:
-    """Return the errors of the sensors, those that stand out first."""
+    """Return the errors of the sensors, the most significant first."""
     first, outside = len(calibration.parameters), beyond(calibration)
     order = sorted(range(first, len(calibration.prior)), key=lambda i: -abs(far(calibration)[i]))
     rows = [_sensor_row(calibration, i) for i in order]
     differ = sum(bool(outside[i]) for i in order)
     how = paragraph(
         "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
-        "parameters are free of these errors; the override file does not hold them. Every sensor is off by a little: "
-        f"{differ} of {len(order)} errors are large enough to be found, beyond {calibration.limit:g} predicted "
-        f"deviations from zero, {range_summary(calibration)}."
+        "parameters are corrected for these errors, which the override file does not contain. "
+        f"{differ} of {len(order)} errors are significant (beyond {calibration.limit:g} predicted deviations), "
+        f"{range_summary(calibration)}."
     )
-    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "In deviations", "Predicted over prior")
-    caption = "Errors found, the clearest first"
+    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "Deviations", "Predicted over prior")
+    caption = "Significant errors"
     blocks = [how]
     if differ:
         blocks.append(table(caption, header, rows[:differ]))
@@ -112,21 +110,21 @@ def misfit_blocks(calibration: Calibration) -> list[Markup]:
         for t, test in enumerate(calibration.tests)
     ]
     how = (
-        "Mean square of the residuals over what sensor noise alone would leave, with the machine and the sensors as "
-        "given and as calibrated: 1 is noise. Wrench: inertia, weight and friction against what actuators and struts "
-        "deliver. Oil flow: continuity in every chamber. Gas law: strut pressures against their lengths. Force: load "
-        f"cells against chamber pressures. ! marks what is above {calibration.noise_alone:g}."
+        "Mean square of the residuals relative to sensor noise (1), with machine and sensors as given and as "
+        "calibrated. Wrench: inertia, weight and friction against forces of actuators and struts. Oil flow: continuity "
+        "of every chamber. Gas law: strut pressures against lengths. Force: load cells against chamber pressures. "
+        f"! marks values above {calibration.noise_alone:g}."
     )
     header = ("Test", *(KINDS[RESIDUALS[k]] for k in kinds))
     return [paragraph(how), table("Misfit before → after", header, rows)]
 
 
 def test_blocks(calibration: Calibration) -> list[Markup]:
-    """Return what each test alone would tell."""
+    """Return the information of each test alone."""
     count, p = len(calibration.parameters), len(calibration.prior)
     how = paragraph(
-        "What would be known if a test were the only one: predicted deviation over the prior's, so 1 is nothing and "
-        "0.1 ten times better than before. Sensor errors are unknown at the same time."
+        "Predicted deviation from a single test over that of the prior: 1 is no information, 0.1 a tenfold reduction. "
+        "Sensor errors are estimated simultaneously."
     )
     blocks = [how, *information_blocks(calibration, range(count))]
     if p > count:
@@ -135,7 +133,7 @@ def test_blocks(calibration: Calibration) -> list[Markup]:
 
 
 def group_blocks(calibration: Calibration) -> list[Markup]:
-    """Return what groups of residuals say by themselves, contradictions first."""
+    """Return the estimates by groups of residuals, contradictions first."""
     found = contradictions(calibration)
     rows = []
     for one in found:
@@ -145,35 +143,34 @@ def group_blocks(calibration: Calibration) -> list[Markup]:
         alone, together = (_plain(_value(calibration, i, float(x[i]))) for x in (subset.estimate, calibration.estimate))
         rows.append((calibration.names[i], one.subset, alone, together, unit, number(one.deviations, 2)))
     how = paragraph(
-        f"{contradiction_summary(calibration)} Many more than by chance indicate an incomplete equation. Noise that "
-        "residuals share is taken off in the order wrench, flow, gas law, force: a later group holds a little of the "
-        "earlier ones. "
-        "Simulation drives the plant by the recorded spools, in open loop, and compares platen velocity and chamber "
-        "pressures, with the errors of the sensors held at what all together say of them; noise of the recorded spools "
-        "biases it by more than its predicted deviations say, so it is let go farther."
+        f"{contradiction_summary(calibration)} Many more than expected by chance indicate an incomplete equation. "
+        "Noise shared by residuals is removed in the order wrench, flow, gas law, force: later groups contain a "
+        "little of the earlier ones. Simulation drives the plant open loop by the recorded spools and compares platen "
+        "velocity and chamber pressures, with sensor errors fixed at the joint estimate; noise of the recorded spools "
+        "biases it beyond its predicted deviations, so its limit is wider."
     )
-    header = ("Unknown", "Group", "Group alone", "All together", "Unit", "In deviations")
+    header = ("Unknown", "Group", "Group alone", "Joint", "Unit", "Deviations")
     blocks = [how]
     if rows:
-        blocks += _folded("Groups that contradict all together", header, rows)
+        blocks += _folded("Groups that contradict the joint estimate", header, rows)
     return [*blocks, subset_block(calibration)]
 
 
-def alike_blocks(calibration: Calibration) -> list[Markup]:
-    """Return the pairs of unknowns that cannot be told apart."""
+def correlation_blocks(calibration: Calibration) -> list[Markup]:
+    """Return the strongly correlated pairs of unknowns."""
     pairs = calibration.alike()
     limit = calibration.numbers.number("report.alike")
     if not pairs:
         return [paragraph(f"No two unknowns are correlated by {limit:g} or more.")]
     own = {parameter.name for parameter in calibration.parameters}
     how = paragraph(
-        f"{correlation_summary(calibration)} These are pairs correlated by {limit:g} or more: their sum "
-        "(correlation negative) or difference (positive), in prior deviations, is identified much better than either."
+        f"{correlation_summary(calibration)} Pairs correlated by {limit:g} or more: their sum (negative correlation) "
+        "or difference (positive), in prior deviations, is determined much better than either alone."
     )
     groups = (
-        ("Parameters with each other", [p for p in pairs if p[0] in own and p[1] in own], LISTED),
-        ("A parameter with a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)], LISTED),
-        ("Sensors with each other", [p for p in pairs if p[0] not in own and p[1] not in own], 0),  # all folded away
+        ("Between parameters", [p for p in pairs if p[0] in own and p[1] in own], LISTED),
+        ("Between a parameter and a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)], LISTED),
+        ("Between sensors", [p for p in pairs if p[0] not in own and p[1] not in own], 0),  # all collapsed
     )
     blocks = [how]
     for caption, found, listed in groups:
@@ -185,7 +182,7 @@ def alike_blocks(calibration: Calibration) -> list[Markup]:
 def _folded(
     caption: str, header: Sequence[str], rows: Sequence[Sequence[object]], listed: int = LISTED
 ) -> list[Markup]:
-    """A table, its rows after those listed folded away."""
+    """A table; rows after the first `listed` are collapsed."""
     blocks = [table(caption, header, rows[:listed])] if listed else []
     if len(rows) > listed:
         more = f"{len(rows) - listed} more" if listed else f"{caption}: {len(rows)} pairs"
@@ -219,7 +216,7 @@ def _unit(calibration: Calibration, i: int) -> str:
 
 
 def change_of(calibration: Calibration, i: int) -> str:
-    """How far parameter i is from nominal, signed: relative, or in its unit."""
+    """Change of parameter i from nominal, signed: relative, or in its unit."""
     parameter, coordinate = calibration.parameters[i], float(calibration.estimate[i])
     if parameter.form == "factor":
         return f"{'+' * (coordinate > 0)}{percent(coordinate)}"

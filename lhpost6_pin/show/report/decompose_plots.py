@@ -1,4 +1,4 @@
-"""Figures of a decomposed record: Section 6.1's rows of forces, forces per effect, components, work."""
+"""Figures of a force decomposition: the rows of forces of Section 6.1, forces by effect, components, work."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from ...identification.decompose import Decomposed, Work, WrenchAgreement
 from ...identification.decompose.work import delivered_by
 from .charts import Curve, Plot, grid_figure
 from .page import Figure, Markup, details, figure
-from .plots import BLUE, GREY, SCALES, VERMILLION, Row, Scale, Trace, envelope, palette, time_figure
+from .plots import ACHIEVED, SCALES, TARGET, VERMILLION, Row, Scale, Trace, envelope, palette, time_figure
 from .run_motion import axis_scale
 
 __all__ = ["component_blocks", "effect_blocks", "force_scale", "moved_axes", "six_row_blocks", "work_blocks"]
@@ -20,12 +20,10 @@ Array = NDArray[np.float64]
 
 FORCE, MOMENT = Scale(1e-3, "kN"), Scale(1e-3, "kN m")
 ENERGY, POWER = Scale(1e-3, "kJ"), Scale(1e-3, "kW")
-MEASURED: dict[str, Any] = {"color": GREY, "width": 3.2}
-MODELLED: dict[str, Any] = {"color": BLUE, "width": 1.2}
-LEFT: dict[str, Any] = {"color": VERMILLION, "width": 1.0}
+RESIDUAL: dict[str, Any] = {"color": VERMILLION, "width": 1.0}
 POINTS = 2500  # of a loop that is drawn: 60 a second of a record of 40 s
 BUCKETS = 500  # stretches of a channel over time, each drawn by its least and greatest sample
-STILL = 0.01  # share of an axis's travel below which it counts as not moved
+STILL = 0.01  # fraction of an axis's travel below which it counts as at rest
 CELL = 190  # [CSS px] height of a plot
 ROWS = (
     ("Total actuator force", "time"),
@@ -39,7 +37,7 @@ DRY = ("seal_friction", "pad_friction", "viscous")
 
 
 def force_scale(axis: str) -> Scale:
-    """How forces, or moments, of an axis are shown."""
+    """Scale of forces, or moments, of an axis."""
     return FORCE if axis in "xyz" else MOMENT
 
 
@@ -51,7 +49,7 @@ def moved_axes(found: Decomposed) -> list[str]:
 
 
 def six_row_blocks(found: Decomposed) -> list[Markup]:
-    """Return the six rows of Section 6.1 for the translations, and for the rotations if one of them moved."""
+    """Return the six rows of Section 6.1 for the translations, and for the rotations that moved."""
     moved = moved_axes(found)
     free = [AXES[k] for k in found.plant.axes]
     groups = (("translations", [a for a in free if a in "xyz"]), ("rotations", [a for a in moved if a not in "xyz"]))
@@ -62,7 +60,7 @@ def six_row_blocks(found: Decomposed) -> list[Markup]:
         still = [axis for axis in axes if axis not in moved]
         words = "Measured in grey, modelled by inverse dynamics in blue; displacement and velocity as measured."
         if still:
-            words += f" Hardly moved: {', '.join(still)}."
+            words += f" Almost at rest: {', '.join(still)}."
         blocks.append(figure(_six_rows(f"six-rows-{name}", f"Forces of the {name}", words, found, axes)))
     return blocks
 
@@ -80,7 +78,7 @@ def _six_rows(name: str, title: str, words: str, found: Decomposed, axes: Sequen
         k, scale = AXES.index(axis), force_scale(axis)
         over, word = _over(found, against, k), what if axis in "xyz" else what.replace("force", "moment")
         curves = []
-        for label, values, line in zip(("measured", "modelled"), pairs[what], (MEASURED, MODELLED), strict=True):
+        for label, values, line in zip(("measured", "modelled"), pairs[what], (TARGET, ACHIEVED), strict=True):
             if values is not None:
                 kept = _kept(values[:, k], against)
                 curves.append(Curve(label, over[kept], values[kept, k] * scale.factor, line))
@@ -91,7 +89,7 @@ def _six_rows(name: str, title: str, words: str, found: Decomposed, axes: Sequen
 
 
 def _kept(values: Array, against: str) -> NDArray[np.int64]:
-    """Samples to draw: every peak over time, evenly spaced ones along a loop."""
+    """Samples to draw: envelope over time, evenly spaced along a loop."""
     if against == "time":
         return envelope(values, 2 * BUCKETS)
     return np.arange(0, len(values), max(1, -(-len(values) // POINTS)))
@@ -108,7 +106,7 @@ def _against(axis: str, against: str) -> str:
 
 
 def effect_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]:
-    """Return the wrench of every effect over time; axes that hardly moved are folded away."""
+    """Return the wrench of every effect over time; axes almost at rest are collapsed."""
     effects, wrench = delivered_by(found)
     actuators = {e.name for e in found.plant.machine.effects if e.spools}
     lines = dict(zip(effects[:-1], palette(len(effects) - 1), strict=True))
@@ -117,22 +115,22 @@ def effect_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]
     folded: list[Markup] = []
     for k in found.plant.axes:
         axis = AXES[k]
-        traces = {n: Trace(_said(n, n in actuators), wrench[:, i, k], lines[n]) for i, n in enumerate(effects[:-1])}
-        large = [Trace("inertia", found.forces.ledger.inertia[:, k], MEASURED)]
+        traces = {n: Trace(_label(n, n in actuators), wrench[:, i, k], lines[n]) for i, n in enumerate(effects[:-1])}
+        large = [Trace("inertia", found.forces.ledger.inertia[:, k], TARGET)]
         large += [trace for name, trace in traces.items() if name not in DRY]
         scale = force_scale(axis)
         mean, most = float(agreement.residual.offset[k]), 2.0 * float(agreement.noise[k])
-        band = {"its mean, more or less twice the noise": mean + most, "": mean - most} if most else {}
+        band = {"mean ± 2 sigma (noise)": mean + most, "": mean - most} if most else {}
         rows = [
             Row("Actuators, struts, weight, inertia", large, scale),
             Row("Friction and viscous", [traces[n] for n in DRY if n in traces], scale),
-            Row("Unexplained", [Trace("unexplained", wrench[:, -1, k], LEFT)], scale, band),
+            Row("Residual", [Trace("residual", wrench[:, -1, k], RESIDUAL)], scale, band),
         ]
         word = "Forces" if axis in "xyz" else "Moments"
         drawn = time_figure(
             f"effects-{axis}",
             f"{word} by effect, {axis}",
-            "On the platen at C in {c}; all effects and the unexplained rest add up to the inertia.",
+            "On the platen at the centre of its top (C), platen axes; effects and residual sum to the inertia.",
             [row for row in rows if row.traces],
             start=float(found.time[0]),
             step=found.dt,
@@ -141,11 +139,11 @@ def effect_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]
         (shown if axis in moved else folded).append(figure(drawn))
     if folded:
         names = ", ".join(AXES[k] for k in found.plant.axes if AXES[k] not in moved)
-        shown.append(details(f"Axes that hardly moved: {names}", *folded))
+        shown.append(details(f"Axes almost at rest: {names}", *folded))
     return shown
 
 
-def _said(effect: str, measured: bool) -> str:
+def _label(effect: str, measured: bool) -> str:
     return effect.replace("_", " ") + (", measured" if measured else "")
 
 
@@ -162,7 +160,7 @@ def component_blocks(found: Decomposed) -> list[Markup]:
             for i, line in zip(members, lines, strict=True)
         ]
         rows.append(Row(kind.replace("_", " ").capitalize(), traces, SCALES["force"]))
-    words = "Along each component, positive where it pushes its ends apart; in the band compared."
+    words = "Along each component, positive in compression (pushing its ends apart), in the compared band."
     drawn = time_figure(
         "components",
         "Forces along actuators and struts",
@@ -177,18 +175,16 @@ def component_blocks(found: Decomposed) -> list[Markup]:
 
 def work_blocks(work: Work, dt: float) -> list[Markup]:
     """Return energy and power of every effect over time."""
-    lines = [*palette(len(work.effects) - 1), LEFT]
+    lines = [*palette(len(work.effects) - 1), RESIDUAL]
     names = [effect.replace("_", " ") for effect in work.effects]
     energy = [Trace(n, x, line) for n, x, line in zip(names, work.energy.T, lines, strict=True)]
     power = [Trace(n, x, line) for n, x, line in zip(names, work.power.T, lines, strict=True)]
     kinetic = [
-        Trace("change of kinetic energy", work.kinetic, MEASURED),
-        Trace("work of all effects", work.inertia, MODELLED),
+        Trace("change of kinetic energy", work.kinetic, TARGET),
+        Trace("work of all effects", work.inertia, ACHIEVED),
     ]
     rows = [Row("Energy", energy, ENERGY), Row("Kinetic energy", kinetic, ENERGY), Row("Power", power, POWER)]
-    words = (
-        "Work on the platen since the first sample, and power; positive goes into the platen. Actuators as measured."
-    )
+    words = "Work on the platen since the first sample, and power; positive into the platen. Actuators as measured."
     start = float(work.time[0])
     return [
         figure(time_figure("work", "Energy and power by effect", words, rows, start=start, step=dt, buckets=BUCKETS))

@@ -1,4 +1,4 @@
-"""Figures of a search for missing effects: where the gap is, what explains it, how it shrinks, what has no name."""
+"""Figures of a discovery: misfit map, candidates, errors on held-out tests, residual function."""
 
 import html
 from collections.abc import Sequence
@@ -41,8 +41,8 @@ def map_blocks(found: Discovery) -> list[Markup]:
     before, after = (gap_map(problem, rest) for rest in (found.search.refit.normal.residual, found.search.residual))
     blocks = [
         paragraph(
-            "Mean square of the whitened residuals, known parameters and sensor errors refitted: one is sensor noise "
-            "alone. Each cell: without any effect → with the effects found."
+            "Mean square of the whitened residuals, known parameters and sensor errors refitted: 1 is sensor noise "
+            "alone. Each cell: without effects → with the identified effects."
         )
     ]
     for kind, words in _KINDS.items():
@@ -58,7 +58,7 @@ def map_blocks(found: Discovery) -> list[Markup]:
 
 
 def _cell(before: float, after: float) -> Markup:
-    """Before and after, on a ground that says how much was there before."""
+    """Misfit before and after; the shade shows that before."""
     if not np.isfinite(before):
         return text("–")
     shade = next(k for k, top in _SHADES.items() if before <= top)
@@ -70,35 +70,23 @@ def _short(value: float) -> str:
 
 
 def gain_figure(one: Round, number: int, least: float, confusable: float) -> Figure:
-    """Return the best candidate of each family in one round: what it gains, and what is refused."""
+    """Return the gain of the best candidate of each family in one round, and whether it is rejected."""
     best = list(one.best.values())
     shown = [s for s in best if s.gain > 1.0][:SHOWN] or best[:3]
     names = [f"{s.candidate.family.named}, {where(s.candidate.components)}" for s in shown]
     traces = []
-    for words, color, keep in (("may be added", BLUE, True), ("refused", "#6e7781", False)):
+    for words, color, keep in (("accepted", BLUE, True), ("rejected", "#6e7781", False)):
         some = [i for i, s in enumerate(shown) if (not s.refused) == keep]
         if some:
             said = [shown[i].refused or "passes" for i in some]
-            traces.append(
-                {
-                    "type": "bar",
-                    "orientation": "h",
-                    "name": words,
-                    "x": [max(shown[i].gain, 1.0) for i in some],
-                    "y": [i + _BELOW for i in some],
-                    "text": [html.escape(s) for s in said],
-                    "textposition": "none",
-                    "hovertemplate": "%{x:.4g}: %{text}",
-                    "marker": {"color": color},
-                }
-            )
+            bar = _bar(words, color, [max(shown[i].gain, 1.0) for i in some], some, "%{x:.4g}: %{text}")
+            traces.append(bar | {"text": [html.escape(s) for s in said], "textposition": "none"})
     layout = _bars(names, "Gain of log-likelihood", 38, least, max(s.gain for s in shown))
     words = (
-        "The best candidate of each family, everything known refitted beside it. "
-        f"The dashed line is the least gain, {least:g}; families that another form of the report's laws may pass for "
-        f"need {confusable:g}."
+        "The best candidate of each family, with all known unknowns refitted. Dashed: the least gain, "
+        f"{least:g}; families confusable with another form of the baseline laws need {confusable:g}."
     )
-    return Figure(f"gains-{number}", f"Round {number}: what could explain it", words, traces, layout, layout["height"])
+    return Figure(f"gains-{number}", f"Round {number}: candidate effects", words, traces, layout, layout["height"])
 
 
 def gap_figure(found: Discovery) -> Figure:
@@ -113,28 +101,19 @@ def gap_figure(found: Discovery) -> Figure:
         ("with the effects", "after", BLUE),
     )
     for words, key, color in series:
-        traces.append(
-            {
-                "type": "bar",
-                "orientation": "h",
-                "name": words,
-                "x": [getattr(gap, key) for gap in gaps],
-                "y": [i + _BELOW for i in range(len(gaps))],
-                "hovertemplate": "%{x:.3g} × noise",
-                "marker": {"color": color},
-            }
-        )
+        sizes = [getattr(gap, key) for gap in gaps]
+        traces.append(_bar(words, color, sizes, range(len(gaps)), "%{x:.3g} × noise"))
     most = max(max(gap.delivered, gap.refitted, gap.after) for gap in gaps)
-    layout = _bars(names, "Gap over sensor noise", 74, FLOOR, most) | {"barmode": "group"}
-    words = "Root mean square error over everything that moves, in deviations of noise; the dashed line is noise alone."
-    return Figure("gap", "The gap on tests that were not searched", words, traces, layout, layout["height"])
+    layout = _bars(names, "Normalised RMS error (1: sensor noise)", 74, FLOOR, most) | {"barmode": "group"}
+    words = "Root mean square error of all moving channels over sensor noise; the dashed line is noise alone."
+    return Figure("gap", "Normalised RMS error on held-out tests", words, traces, layout, layout["height"])
 
 
-def residual_function_figure(left: ResidualFunction) -> Figure:
-    """Return a free function of a leg's state with two deviations on either side."""
-    title = "Rate of elongation [m/s]" if left.state == "velocity" else f"Elongation: {left.words} [m]"
-    layout = stacked_layout([f"Force along {where(left.components)} [kN]"], title, row_height=240)
-    nodes, value, sd = left.nodes.tolist(), left.value / 1e3, left.sd / 1e3
+def residual_function_figure(function: ResidualFunction) -> Figure:
+    """Return a residual function of an actuator's or strut's state with its band of ± 2 sigma."""
+    title = "Rate of elongation [m/s]" if function.state == "velocity" else f"Elongation: {function.words} [m]"
+    layout = stacked_layout([f"Force along {where(function.components)} [kN]"], title, row_height=240)
+    nodes, value, sd = function.nodes.tolist(), function.value / 1e3, function.sd / 1e3
     band = [*(value + 2 * sd).tolist(), *(value - 2 * sd)[::-1].tolist()]
     traces = [
         {
@@ -145,7 +124,7 @@ def residual_function_figure(left: ResidualFunction) -> Figure:
             "fill": "toself",
             "line": {"width": 0},
             "fillcolor": "rgba(0,114,178,0.2)",
-            "name": "two deviations",
+            "name": "± 2 sigma",
             "hoverinfo": "skip",
         },
         {
@@ -157,12 +136,19 @@ def residual_function_figure(left: ResidualFunction) -> Figure:
             "name": "force",
         },
     ]
-    words = f"A force along {where(left.components)} as a free function of {left.words}, fitted to what is left."
-    return Figure("left", "What has no name", words, traces, layout, layout["height"])
+    place = where(function.components)
+    words = f"Force along {place} as a nonparametric function of {function.words}, fitted to the residual."
+    return Figure("left", "Residual function", words, traces, layout, layout["height"])
 
 
 _BELOW = 0.2
-"""How far a bar stands below the middle of its row, whose name is above it; in rows."""
+"""Offset of a bar below the middle of its row, in rows; the name is above it."""
+
+
+def _bar(name: str, color: str, sizes: Sequence[float], rows: Sequence[int], hover: str) -> dict[str, Any]:
+    """Horizontal bars of one series."""
+    shared = {"type": "bar", "orientation": "h", "name": name, "marker": {"color": color}, "hovertemplate": hover}
+    return shared | {"x": list(sizes), "y": [row + _BELOW for row in rows]}
 
 
 def _bars(names: Sequence[str], x_title: str, height: int, mark: float, most: float) -> dict[str, Any]:

@@ -1,16 +1,14 @@
-"""The report of a search for missing effects: where the gap is, its name, what else was considered, how it shrinks."""
+"""The report of a discovery: identified effects, held-out errors, misfit map, candidates considered."""
 
 import math
 from pathlib import Path
-
-import numpy as np
 
 from ...discovery import Discovery, save_verdict
 from ...discovery.verdict_file import advice
 from ...discovery.verdict_summary import said, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
-from .control_blocks import load_of
+from .control_blocks import load_of, numbers_used
 from .discover_plots import gain_figure, gap_figure, map_blocks, residual_function_figure
 from .page import (
     Headline,
@@ -25,7 +23,6 @@ from .page import (
     paragraph,
     save_page,
     table,
-    versions,
 )
 
 __all__ = ["save_discovery", "write_discover_report"]
@@ -34,7 +31,7 @@ _LEVELS: dict[str, Level] = {"none": "good", "parameters_only": "good", "named":
 
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
-    """Leave verdict.json, model.toml (with `title` on top) and report.html in a folder, and say where."""
+    """Write verdict.json, model.toml (headed by `title`) and report.html to a directory; returns the paths."""
     return [
         save_verdict(found, folder / "verdict.json"),
         save_machine_toml(found.fitted, folder / "model.toml", title),
@@ -49,26 +46,25 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
     held = f"; {', '.join(found.held_out)} held out" if found.held_out else ""
     page = Page(
         kind="Discovery",
-        title=f"What {found.machine.name} lacks to explain {found.campaign}",
-        asked=f"Find effects that the model of {load_of(found.machine)} lacks, from {tests}{held}.",
+        title=f"Effects missing from {found.machine.name}, by {found.campaign}",
+        asked=f"Identify effects missing from the model of {load_of(found.machine)}, from {tests}{held}.",
         verdict=f"{verdict.word}: {said(found)}",
         level=_LEVELS.get(verdict.word, "attention"),
         headlines=_headlines(found),
         sections=[
-            Section("effects", "What was found", _effect_blocks(found)),
-            Section("proof", "The gap, before and after", _proof_blocks(found)),
-            Section("where", "Where the gap is", map_blocks(found)),
-            Section("considered", "What was considered, and why not", _considered(found)),
+            Section("effects", "Identified effects", _effect_blocks(found)),
+            Section("proof", "Errors on held-out tests", _proof_blocks(found)),
+            Section("where", "Misfit by channel and band", map_blocks(found)),
+            Section("considered", "Candidates considered", _considered(found)),
             Section("parameters", "Parameters and sensors", _parameter_blocks(found)),
             Section("assumptions", "Assumptions and numbers used", _assumptions(found)),
         ],
-        command=command or None,
-        versions=versions(),
+        command=command,
     )
     return save_page(page, path)
 
 
-def _chance(p: float) -> str:
+def _p_value(p: float) -> str:
     return "less than 1e-300" if p < 1e-300 else f"{p:.1g}"
 
 
@@ -81,8 +77,8 @@ def _headlines(found: Discovery) -> list[Headline]:
         shown.append(
             Headline(
                 f"{number(widest.refitted)} → {number(widest.after)}",
-                f"Widest gap: {widest.phase}, {widest.test}",
-                "over sensor noise; 1 is noise alone",
+                f"Largest normalised RMS error: {widest.phase}, {widest.test}",
+                "refitted → with the effects; 1 is sensor noise",
             )
         )
     return shown
@@ -104,45 +100,51 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         confused = ", ".join(map(title_of, family.confused_with))
         blocks.append(
             paragraph(
-                f"{family.equation}. Gain of log-likelihood {number(one.gain)}; chance of as much by noise alone, of "
-                f"all candidates, {_chance(one.p_value)}. Often confused with: {confused}."
+                f"{family.equation}. Gain of log-likelihood {number(one.gain)}; p-value, corrected for the number of "
+                f"candidates: {_p_value(one.p_value)}. Often confused with: {confused}."
             )
         )
     if lines := advice(found):
-        blocks += [paragraph("The campaign cannot tell these apart. What would:"), bullet_list(lines)]
+        blocks += [
+            paragraph("The campaign does not distinguish the candidates. Tests that would:"),
+            bullet_list(lines),
+        ]
     if found.next_tests:
         blocks.append(_next_tests(found))
     if verdict.residual_function is not None:
         blocks.append(figure(residual_function_figure(verdict.residual_function)))
     elif verdict.word == "unexplained":
-        blocks.append(paragraph("More than noise is left, and no leg's position or speed, now or lately, explains it."))
+        words = "The residual exceeds noise and is not a function of an actuator's or strut's position or velocity."
+        blocks.append(paragraph(words))
     if verdict.where:
-        blocks.append(paragraph(f"Most of what is left is in: {'; '.join(s.words for s in verdict.where)}."))
+        blocks.append(paragraph(f"The largest residuals are in: {'; '.join(s.words for s in verdict.where)}."))
     if verdict.nearest:
         near = " and ".join(map(title_of, verdict.nearest))
         blocks.append(
-            paragraph(f"Of the library, {near} comes nearest, but leaves too much to be its name; model.toml has it.")
+            paragraph(
+                f"The closest library family is {near}, which leaves a significant residual; model.toml contains it."
+            )
         )
     return blocks
 
 
 def _next_tests(found: Discovery) -> Markup:
-    """Tests simulated with the one effect and explained by the other."""
+    """Tests simulated with one effect and fitted with the other."""
     rows = [
         (one.test, " or ".join(map(title_of, one.families)), _margin(one.margin), "yes" if one.informative else "no")
         for one in found.next_tests
     ]
-    header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood between them", "Tells them apart")
+    header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood difference", "Distinguishes")
     return table("Next tests, simulated", header, rows)
 
 
 def _margin(value: float) -> str:
-    return "cannot be run" if math.isnan(value) else number(value)
+    return "not feasible" if math.isnan(value) else number(value)
 
 
 def _proof_blocks(found: Discovery) -> list[Markup]:
     if found.proof is None:
-        return [paragraph("No test was held out; give one with --hold-out.")]
+        return [paragraph("No test was held out; name one with --hold-out.")]
     rows = [
         (
             f"{gap.phase}, {gap.test}",
@@ -157,9 +159,9 @@ def _proof_blocks(found: Discovery) -> list[Markup]:
     header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
     return [
         figure(gap_figure(found)),
-        table("Gap over sensor noise", header, rows),
+        table("Normalised RMS error (1: sensor noise)", header, rows),
         paragraph(
-            "Closure is (refitted − with the effects) over (refitted − floor); – where next to nothing was open."
+            "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
         ),
     ]
 
@@ -180,11 +182,11 @@ def _considered(found: Discovery) -> list[Markup]:
             )
             for s in one.best.values()
         ]
-        header = ("Family", "On", "Gain", "On tests not fitted", "Of the gap", "Added?")
+        header = ("Family", "On", "Gain", "Cross-validated gain", "Closure", "Accepted")
         blocks.append(details(f"Round {k}: all families", table("Best candidate of each family", header, rows)))
         for contest in (a.contest for a in found.search.added if a.round == k - 1):
             tried = [(c.candidate.family.name, where(c.candidate.components), number(c.behind)) for c in contest]
-            blocks.append(table("Fitted in full, by log-likelihood behind the best", ("Family", "On", "Behind"), tried))
+            blocks.append(table("Full fits: log-likelihood below the best", ("Family", "On", "Difference"), tried))
     return blocks
 
 
@@ -195,28 +197,25 @@ def _parameter_blocks(found: Discovery) -> list[Markup]:
         for name, value in verdict.changed.items()
     ]
     header = ("Parameter", "Value", "90 % interval", "Unit")
-    blocks = [table("Parameters that differ, within calibration", header, rows) if rows else paragraph("None differs.")]
+    blocks = [table("Recalibrated parameters", header, rows) if rows else paragraph("No parameter differs.")]
     if verdict.sensors:
         sensors = [
             (s.name, f"{s.estimate.value:.4g} {s.estimate.unit}", f"{s.stated:.3g}", s.family) for s in verdict.sensors
         ]
-        blocks.append(table("Sensors beyond what is stated", ("Error", "Value", "Stated", "Family"), sensors))
+        blocks.append(table("Sensors outside their stated range", ("Error", "Value", "Stated", "Family"), sensors))
     else:
-        blocks.append(paragraph("No sensor is off beyond what its file states."))
+        blocks.append(paragraph("All sensors are within their stated ranges."))
     return blocks
 
 
 def _assumptions(found: Discovery) -> list[Markup]:
     lines = [
-        "Priors of parameters and ranges of sensor errors are those of the machine's and the sensors' files; most are "
-        "assumed. Noise is simulated from the sensors' file, not estimated from what is left.",
-        "A parameter beyond three stated deviations counts as an effect of its family; within them, as calibration.",
-        "Candidates are ranked to first order; the best are fitted in full with everything else.",
-    ]
-    rows = [
-        (path, ", ".join(f"{x:g}" for x in np.atleast_1d(q.value)), q.evidence, q.source)
-        for path, q in found.numbers.items()
+        "Priors of parameters and ranges of sensor errors are from the machine's and the sensors' files; most are "
+        "assumed. Noise is simulated from the sensors' file, not estimated from the residual.",
+        "A fitted parameter within 3 sigma of its prior counts as calibration; beyond that it is reported as an "
+        "effect of its family.",
+        "Candidates are ranked to first order; the best are fitted in full together with all known unknowns.",
     ]
     if hidden := found.verdict.untestable:
-        lines.append(f"This campaign is no test of {', '.join(hidden)}: their typical sizes do not stand clear of it.")
-    return [bullet_list(lines), table("Numbers used", ("Number", "Value", "Evidence", "Source"), rows)]
+        lines.append(f"Not testable with this campaign: {', '.join(hidden)}; typical sizes are within the noise.")
+    return [bullet_list(lines), numbers_used(found.numbers)]

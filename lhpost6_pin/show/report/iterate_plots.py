@@ -1,4 +1,4 @@
-"""Sections of an iteration report: motion, error spectra, drive, and the table as white noise showed it."""
+"""Sections of an iteration report: motion, error spectra, drive, and the identified transfer function of the table."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 class AxisIteration(NamedTuple):
-    """One axis's acceleration, (n,) SI; `target`, `first` and `best` end with the band, delays are removed."""
+    """Acceleration of an axis, (n,) SI; `target`, `first` and `best` low-passed, delays removed."""
 
     axis: str
     target: Array
@@ -66,9 +66,8 @@ def motion_blocks(found: Sequence[AxisIteration]) -> list[Markup]:
     """Return target and achieved acceleration of the first and the best run, with a close-up of every axis."""
     high = tuning_numbers().number("iteration.high")
     how = (
-        f"Up to {high:g} Hz, as judged, and after removing each run's own delay. The grey band is the target; the "
-        "shaded stretch is drawn at the full rate below, where the dotted line is the best run with all that lies "
-        f"above {high:g} Hz."
+        f"Low-passed at {high:g} Hz, the judged band, with the delay of each run removed. Grey: target. The shaded "
+        "interval is drawn below at the full rate, where the dotted line is the best run without the low-pass."
     )
     blocks = [paragraph(how)]
     for one in found:
@@ -103,7 +102,8 @@ def spectrum_blocks(found: Sequence[AxisIteration]) -> list[Markup]:
             figure(chart_figure(name, axis_title(one.axis), words, [panel], over, row_height=230, marks=[end]))
         )
     how = (
-        "Errors are achieved minus target acceleration after removing the delay. The dotted line ends the judged band."
+        "Errors are achieved minus target acceleration, delay removed. The dotted line marks the end of the judged "
+        "band."
     )
     return [paragraph(how), grid(*drawings, pairs=True)]
 
@@ -111,7 +111,7 @@ def spectrum_blocks(found: Sequence[AxisIteration]) -> list[Markup]:
 def drive_blocks(result: Iterated, found: Sequence[AxisIteration]) -> list[Markup]:
     """Return the best drive over the reference, in the quantity of the controller's mode."""
     mode = result.settings.mode
-    how = f"The drive is {mode}, the mode of the reference generator; the reference is what iteration 0 drove with."
+    how = f"The drive is a {mode}, the mode of the reference generator; the reference is the drive of iteration 0."
     drawings = []
     for one in found:
         k = AXES.index(one.axis)
@@ -141,7 +141,7 @@ def table_blocks(table: TableInverse) -> list[Markup]:
     response = np.abs(transfer.response[inside]) * size[:, None] / size
     decibels = 20.0 * np.log10(np.maximum(response, np.finfo(float).tiny))
     words = (
-        f"Magnitude [dB], rows achieved, columns wanted, all on one scale; rotations are multiplied by {radius:g} m. "
+        f"Magnitude [dB], rows achieved, columns reference, one scale; rotations are multiplied by {radius:g} m. "
         f"Delay {shown_as(table.delay, SCALES['time'])}, the mean of the axes."
     )
     matrix = matrix_figure(
@@ -160,8 +160,8 @@ def table_blocks(table: TableInverse) -> list[Markup]:
     over = XAxis("Frequency [Hz]", log=True, span=MATRIX, ticks=(0.5, 1, 2, 5, 10, 20, 40))
     panel = Panel("Multiple coherence", coherent, span=(0.0, 1.05))
     said = (
-        "Share of each axis's motion that all six references together explain; where it falls from 0.8 to 0.4 the "
-        "inverse fades to doing nothing."
+        "Fraction of each axis's motion explained linearly by all six references; the inverse is faded out where it "
+        "falls from 0.8 to 0.4."
     )
     high = tuning_numbers().number("iteration.high")
     coherence = chart_figure("coherence", "Coherence of every axis", said, [panel], over, row_height=210, marks=[high])
@@ -205,7 +205,7 @@ def _close_up(one: AxisIteration) -> Figure:
     return time_figure(
         f"close-{one.axis}",
         f"{axis_title(one.axis)}, close-up",
-        "The strongest second, every sample.",
+        "The second around the peak, every sample.",
         [Row("Acceleration", traces, axis_scale(one.axis, "acceleration"))],
         start=first * STEP,
         step=STEP,

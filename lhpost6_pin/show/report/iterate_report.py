@@ -1,4 +1,4 @@
-"""The report of an iteration on a motion: the error of every drive, and what the best one achieves."""
+"""The report of a drive iteration: the error of every iteration, and the best drive."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +25,6 @@ from .page import (
     paragraph,
     save_page,
     table,
-    versions,
 )
 from .plots import SCALES
 from .run_motion import percent, shown_as
@@ -34,7 +33,7 @@ __all__ = ["write_iterate_report"]
 
 # Judgement, not physics: largest acceleration RRMSE of an axis, and its share of the error before iterating.
 REACHED = 0.05
-LEFT = 0.5
+REMAINING = 0.5
 # Numbers of `tuning.toml` that identify the table and iterate on it.
 NUMBERS = ("noise.rms", "noise.rotation_radius", "noise.low", "noise.high", "noise.segment", "iteration")
 
@@ -56,8 +55,7 @@ def write_iterate_report(result: Iterated, path: Path | str, command: str = "") 
         level=level,
         headlines=_headlines(result),
         sections=_sections(result, compare(result, high)),
-        command=command or None,
-        versions=versions(),
+        command=command,
     )
     return save_page(page, path)
 
@@ -72,7 +70,7 @@ def _judge(result: Iterated) -> tuple[str, Level]:
     level: Level = "good"
     words = []
     if result.best == 0:
-        words.append("No drive was better than the reference itself.")
+        words.append("No iteration improved on the reference as drive.")
         level = "attention"
     errors = dict(zip(AXES, best.acceleration, strict=True))
     large = [axis for axis in _moved(result) if not errors[axis] <= REACHED]
@@ -83,12 +81,12 @@ def _judge(result: Iterated) -> tuple[str, Level]:
     else:
         words.append(f"Acceleration RRMSE of every axis is at most {100 * REACHED:g} % after iterating: {said}.")
     before = dict(zip(AXES, first.acceleration, strict=True))
-    little = [axis for axis in _moved(result) if not errors[axis] <= LEFT * before[axis]]
+    little = [axis for axis in _moved(result) if not errors[axis] <= REMAINING * before[axis]]
     if little:
-        words.append(f"More than half of the error without iterating is left in {', '.join(little)}.")
+        words.append(f"More than half of the initial error remains in {', '.join(little)}.")
         level = "attention"
     else:
-        words.append("At most half of the error without iterating is left on every axis.")
+        words.append("At most half of the initial error remains in every axis.")
     if best.clipped:
         words.append(f"{best.clipped} spool commands of the best drive were clipped at their limit.")
         level = "bad"
@@ -104,8 +102,8 @@ def _headlines(result: Iterated) -> list[Headline]:
         Headline(
             percent(errors[0]),
             "Worst acceleration RRMSE after iterating",
-            f"axis {worst}; without iterating {percent(errors[1])}",
-            "good" if errors[0] <= min(REACHED, LEFT * errors[1]) else "attention",
+            f"axis {worst}; initially {percent(errors[1])}",
+            "good" if errors[0] <= min(REACHED, REMAINING * errors[1]) else "attention",
         ),
         Headline(
             f"{result.best} of {result.history[-1].number}",
@@ -142,11 +140,11 @@ def _errors(result: Iterated) -> Figure:
             Curve(axis, numbers, 100.0 * _of(result.history, quantity, axis), AXIS_LINES[axis], "lines+markers")
             for axis in _moved(result)
         ]
-        lines = {f"{100 * REACHED:g} % wanted": 100.0 * REACHED} if quantity == "acceleration" else {}
+        lines = {f"{100 * REACHED:g} % (criterion)": 100.0 * REACHED} if quantity == "acceleration" else {}
         panels.append(Panel(f"{quantity.capitalize()} RRMSE [%]", curves, log=True, lines=lines))
     words = (
-        "Iteration 0 drives with the reference itself, 1 with what the inverse makes of it, the others correct the "
-        f"drive by what is left. The dotted line marks the best, {result.best}."
+        "Iteration 0 uses the reference as drive, 1 the reference through the inverse; later ones correct the drive "
+        f"by the remaining error. The dotted line marks the best, {result.best}."
     )
     over = XAxis("Iteration", span=(-0.2, numbers[-1] + 0.2), ticks=numbers)
     return chart_figure(
@@ -186,6 +184,6 @@ def _shares(errors: NDArray[np.float64], axes: Sequence[str]) -> list[str]:
 def _why(result: Iterated) -> Markup:
     last = result.history[-1].number
     return paragraph(
-        f"Iterating stopped after iteration {last}: {result.reason}. What counts is the mean square of the "
-        f"acceleration errors of all axes, least in iteration {result.best}, whose drive is the result."
+        f"Stopped after iteration {last}: {result.reason}. The objective, the mean square of the acceleration errors "
+        f"of all axes, is least in iteration {result.best}, whose drive is the result."
     )

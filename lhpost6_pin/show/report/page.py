@@ -1,4 +1,4 @@
-"""The page that every report shares: summary first, then sections, versions and the command to repeat.
+"""The page of every report: summary, sections, versions and the command that repeats it.
 
 A report is one HTML file that loads nothing from elsewhere: style, script and the plotting library (packed,
 once) are inside it, and its content security policy forbids the rest. All text is escaped here; only a
@@ -48,12 +48,12 @@ SIGNS: dict[Level, str] = {"good": "✓", "attention": "!", "bad": "✗", "plain
 
 
 class Markup(str):
-    """HTML that needs no escaping any more."""
+    """HTML that is already escaped."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """An interactive figure: plotly traces and layout as plain data, and what it shows in words."""
+    """An interactive figure: plotly traces and layout as dicts, and a description in words."""
 
     name: str
     title: str
@@ -66,7 +66,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Headline:
-    """One figure that matters: its value large, what it is, and what it is compared with."""
+    """A key figure: its value, label and reference for comparison."""
 
     value: str
     label: str
@@ -76,7 +76,7 @@ class Headline:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page with its own entry in the navigation."""
+    """A section of the page, with its entry in the navigation."""
 
     name: str
     title: str
@@ -85,7 +85,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """All that a report says, in the order in which it is read."""
+    """Contents of a report, in reading order."""
 
     kind: str
     title: str
@@ -95,8 +95,8 @@ class Page:
     headlines: Sequence[Headline]
     sections: Sequence[Section]
     notes: Sequence[str] = ()
-    command: str | None = None
-    versions: Mapping[str, str] = field(default_factory=dict)
+    command: str | None = None  # that repeats it
+    versions: Mapping[str, str] = field(default_factory=lambda: versions())
 
 
 def text(value: object) -> Markup:
@@ -123,7 +123,7 @@ def paragraph(*parts: object) -> Markup:
 
 
 def missing(names: Sequence[str], consequence: str) -> Markup:
-    """Return a notice that names the channels a section lacks."""
+    """Return a notice of the channels that a section needs and the record lacks."""
     codes = ", ".join(f"<code>{text(name)}</code>" for name in names)
     return Markup(f'<p class="missing"><strong>Not in the record:</strong> {codes}. {text(consequence)}</p>')
 
@@ -134,30 +134,29 @@ def bullet_list(items: Iterable[object]) -> Markup:
 
 
 def details(summary: str, *blocks: Markup) -> Markup:
-    """Return blocks that are folded away on screen and open in print."""
+    """Return blocks that are collapsed on screen and open in print."""
     return Markup(f"<details><summary>{text(summary)}</summary>{''.join(blocks)}</details>")
 
 
 def grid(*blocks: Markup, pairs: bool = False) -> Markup:
-    """Return blocks side by side where the screen is wide enough, with `pairs` never more than two."""
+    """Return blocks side by side on wide screens; with `pairs`, at most two."""
     return Markup(f'<div class="{"grid pairs" if pairs else "grid"}">{"".join(blocks)}</div>')
 
 
-UNSEEN = 1e-6  # share of a limit that is shown as none
+UNSEEN = 1e-6  # fraction of a limit that is shown as zero
 
 
 def bar(fraction: float, tolerance: float = 0.0) -> Markup:
-    """Return a bar filled to `fraction` of a limit, with the per cent in words.
+    """Return a bar filled to `fraction` of a limit, with the percentage as text.
 
-    It is hatched from the limit on, or from `tolerance` (a share of the limit) beyond it. Infinity stands for
-    something of which there should be none.
+    Hatched from the limit on, or from `tolerance` (a fraction of the limit) beyond it. Infinity: the limit is zero.
     """
     if fraction != fraction:
         return text("–")
     level = "over" if fraction >= 1.0 + tolerance else "near" if fraction >= 0.8 else "within"
     width = min(100.0 * fraction, 100.0)
     shown = 100.0 * fraction if fraction > UNSEEN else 0.0
-    percent = f"{number(shown, 3 if fraction >= 1.0 else 2)} %" if fraction < float("inf") else "impossible"
+    percent = f"{number(shown, 3 if fraction >= 1.0 else 2)} %" if fraction < float("inf") else "no capacity"
     return Markup(
         f'<span class="bar {level}"><span class="fill" style="width:{width:.1f}%"></span></span>'
         f'<span class="percent">{percent}</span>'
@@ -165,7 +164,7 @@ def bar(fraction: float, tolerance: float = 0.0) -> Markup:
 
 
 def shaded(words: str, shade: int) -> Markup:
-    """Return words on one of five shades of a hue, 0 the lightest."""
+    """Return text on one of five shades of a hue, 0 the lightest."""
     return Markup(f'<span class="shade shade{shade}">{text(words)}</span>')
 
 
@@ -183,7 +182,7 @@ def table(caption: str, header: Sequence[str], rows: Iterable[Sequence[object]])
 
 
 def figure(drawing: Figure) -> Markup:
-    """Return a place for a figure with its data beside it; the page's script draws it when it scrolls in."""
+    """Return the element of a figure with its data; the page's script draws it when it scrolls into view."""
     data = json.dumps({"traces": drawing.traces, "layout": drawing.layout}, separators=(",", ":"))
     data = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     name = text(drawing.name)
@@ -203,7 +202,7 @@ def figure(drawing: Figure) -> Markup:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of this package, Python and the libraries that make its numbers."""
+    """Return the versions of this package, Python and the numerical libraries."""
     found = {"lhpost6-pin": __version__, "Python": platform.python_version()}
     for name in ("pin", "numpy", "scipy", "numba", "xarray", "plotly"):
         try:
@@ -228,7 +227,7 @@ def beside(name: str) -> str:
 
 def render_page(page: Page) -> str:
     """Return the whole report as HTML text."""
-    ending = [Section("repeat", "Versions and how to repeat", _repeat(page))]
+    ending = [Section("repeat", "Versions and command", _repeat(page))]
     sections = [*page.sections, *ending]
     links = "".join(f'<li><a href="#{text(s.name)}">{text(s.title)}</a></li>' for s in sections)
     body = "".join(

@@ -31,30 +31,30 @@ __all__ = [
 
 Limits = Mapping[str, NDArray[np.float64]]
 
-OFF_SCALE = 0.4  # share of a limit below which pressures and forces get a scale of their own, without its line
+OFF_SCALE = 0.4  # fraction of a limit below which its line is not drawn and the scale fits the data
 JOINTS = (("rad", "Angle", "rotation"), ("m", "Position", "displacement"), ("1", "Quaternion", "ratio"))
-TOLERANCE = 1e-3  # share of a limit by which a sampled peak may pass it before it counts as beyond
+TOLERANCE = 1e-3  # relative excess of a sampled peak over its limit that still counts as within
 
 
 class ForceUse(NamedTuple):
-    """Peak forces of the actuators in one direction, and the share of what they can give."""
+    """Peak forces of the actuators in one direction, and demand over capacity."""
 
     words: str  # "push", "pull", or "force" for both
     peak: NDArray[np.float64]  # (n_act,) magnitude [N]
-    share: NDArray[np.float64]  # (n_act,) not-a-number without a limit, infinity for a pull where none can be
+    share: NDArray[np.float64]  # (n_act,) not-a-number without a limit, infinity for a pull without capacity
 
 
 def force_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
     """Return forces over time and the table of forces and strokes used."""
     names = ("actuator_force", "actuator_displacement")
     absent = [name for name in names if name not in record]
-    blocks = [missing(absent, "Forces and strokes are shown as far as they were recorded.")] if absent else []
+    blocks = [missing(absent, "The recorded part of forces and strokes is shown.")] if absent else []
     if "actuator_force" in record:
-        words = "Chamber pressures times piston areas, P_A A₁ − P_B A₂; positive pushes the actuator longer."
+        words = "Chamber pressures times piston areas, P_A A₁ − P_B A₂; positive extends the actuator."
         rows = _group_rows(record, "Force", "actuator_force", "actuator", SCALES["force"])
         if "actuator_pull" in limits:
             rows = [_with_force_limits(row, record, limits) for row in rows]
-            words += " Dashed lines, where the forces come near them, are the largest push and pull."
+            words += " Dashed lines: push and pull capacity, where the forces approach them."
         blocks.append(draw_over_time(record, "force", "Actuator forces over time", words, rows))
     if len(absent) < len(names):
         blocks.append(_use_of_actuators(record, limits))
@@ -81,7 +81,7 @@ def pressure_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
         words = "Pressure in each chamber."
         if supply is not None:
             rows = [_with_supply(row, supply) for row in rows]
-            words += " The dashed line is the supply; where all stay far below it, the legend switches it on."
+            words += " Dashed: the supply; where pressures stay far below it, the legend switches it on."
         blocks.append(draw_over_time(record, "pressure", "Chamber pressures over time", words, rows))
     return blocks
 
@@ -103,7 +103,7 @@ def strut_blocks(record: xr.Dataset, limits: Limits) -> list[Markup]:
 
 
 def specimen_blocks(record: xr.Dataset) -> list[Markup]:
-    """Return the positions of the free joints of the record's specimen, which has some."""
+    """Return the positions of the free joints of the specimen; the record must have some."""
     joints = record["specimen_joint_position"]
     values = channel(record, "specimen_joint_position", "specimen_joint")
     names = [str(name) for name in joints["specimen_joint"].values]
@@ -136,7 +136,7 @@ def shares_of_limit(peak: NDArray[np.float64], limits: Limits, name: str) -> NDA
 
 
 def force_use(record: xr.Dataset, limits: Limits) -> list[ForceUse]:
-    """Return the use of the actuators' forces: push and pull apart where `actuator_pull` is given, else magnitude."""
+    """Return demand over capacity of actuator forces: push and pull where `actuator_pull` is given, else magnitude."""
     if "actuator_force" not in record:
         return []
     force = channel(record, "actuator_force", "actuator")
@@ -146,14 +146,14 @@ def force_use(record: xr.Dataset, limits: Limits) -> list[ForceUse]:
     push, pull = peaks(np.maximum(force, 0.0)), peaks(np.maximum(-force, 0.0))
     allowed = np.pad(limits["actuator_pull"], (0, len(pull)), constant_values=np.nan)[: len(pull)]
     known = np.nan_to_num(np.pad(limits.get("actuator_force", np.array([])), (0, len(pull)))[: len(pull)])
-    # what cannot pull at all is allowed the tolerance of its push
+    # without pull capacity, the tolerance of the push applies
     none = np.where(pull > TOLERANCE * known, np.inf, np.where(np.isnan(pull), np.nan, 0.0))
     share = np.where(allowed == 0.0, none, pull / np.where(allowed == 0.0, np.nan, allowed))
     return [ForceUse("push", push, shares_of_limit(push, limits, "actuator_force")), ForceUse("pull", pull, share)]
 
 
 def _with_force_limits(row: Row, record: xr.Dataset, limits: Limits) -> Row:
-    """Row with the largest push and pull, where its forces come near them and all its actuators have the same."""
+    """Row with lines of push and pull capacity, if forces approach them and all its actuators share them."""
     labels = [str(label) for label in record["actuator"].values]
     own = [labels.index(trace.name) for trace in row.traces]
     lines = {}
@@ -163,7 +163,7 @@ def _with_force_limits(row: Row, record: xr.Dataset, limits: Limits) -> Row:
         bounds = limits.get(name, np.array([]))
         level = set(bounds[own]) if max(own) < len(bounds) else set()
         if len(level) == 1 and np.nanmax(use.share[own], initial=0.0) >= OFF_SCALE:
-            lines[f"largest {use.words}"] = sign * float(level.pop())
+            lines[f"{use.words} capacity"] = sign * float(level.pop())
     return replace(row, lines=lines)
 
 
@@ -174,16 +174,16 @@ def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Markup:
         header.append(f"Peak {words} [{SCALES['force'].unit}]")
         columns.append([number(value * SCALES["force"].factor) for value in peak])
         if "actuator_force" in limits or "actuator_pull" in limits:
-            header.append("of its limit")
+            header.append("Demand / capacity")
             columns.append([bar(value, TOLERANCE) for value in share])
     if "actuator_displacement" in record:
         scale, largest = SCALES["displacement"], peaks(channel(record, "actuator_displacement", "actuator"))
         header.append(f"Peak displacement [{scale.unit}]")
         columns.append([number(peak * scale.factor) for peak in largest])
         if "actuator_stroke" in limits:
-            header.append("of its stroke")
+            header.append("of the stroke")
             columns.append([bar(share, TOLERANCE) for share in shares_of_limit(largest, limits, "actuator_stroke")])
-    return table("Forces and strokes used", header, zip(*columns, strict=True))
+    return table("Forces and strokes: demand over capacity", header, zip(*columns, strict=True))
 
 
 def _with_supply(row: Row, supply: NDArray[np.float64]) -> Row:

@@ -1,4 +1,4 @@
-"""How much of every limit a test used, and which limit it came nearest to."""
+"""Demand over capacity of every limit, and the governing one."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -13,34 +13,43 @@ from .run_components import TOLERANCE, Limits, force_use, share_of_limit, shares
 from .run_metrics import SpoolUse, Tracking, channel, peaks, sampling
 from .run_motion import axis_scale, shown_as
 
-__all__ = ["LimitUse", "limit_blocks", "limit_uses", "nearest_limits", "of_limit"]
+__all__ = ["LimitUse", "limit_blocks", "limit_uses", "governing_limits", "of_limit"]
 
-SHOWN = {"leg stroke": "displacement", "leg velocity": "velocity", "push": "force", "pull": "force", "force": "force"}
+SHOWN = {
+    "actuator stroke": "displacement",
+    "actuator velocity": "velocity",
+    "push": "force",
+    "pull": "force",
+    "force": "force",
+}
 
 
 class LimitUse(NamedTuple):
-    """The most that a test used of one limit of an axis or actuator."""
+    """Peak demand of a test on one limit of an axis or actuator."""
 
-    quantity: str  # "displacement", "leg stroke", "push", "spool", ...
+    quantity: str  # "displacement", "actuator stroke", "push", "spool", ...
     name: str  # of the axis or actuator
     peak: float  # SI
-    share: float  # of the limit; infinity of one that is nought
+    share: float  # demand over capacity; infinity for a capacity of zero
 
 
 def limit_uses(
     record: xr.Dataset, found: Sequence[Tracking], spools: Sequence[SpoolUse], limits: Limits
 ) -> list[LimitUse]:
-    """Return the use of every limit that is known: axes, then strokes, speeds and forces of the legs, then spools."""
+    """Return the demand on every known limit: axes; strokes, speeds and forces of actuators; spools."""
     uses = [
         LimitUse(r.quantity, r.axis, r.peak_achieved, share_of_limit(r.peak_achieved, limits, r.quantity, r.place))
         for r in found
     ]
-    uses += [*_legs(record, limits), *(LimitUse("spool", spool.actuator, spool.peak, spool.peak) for spool in spools)]
+    uses += [
+        *_actuators(record, limits),
+        *(LimitUse("spool", spool.actuator, spool.peak, spool.peak) for spool in spools),
+    ]
     return [use for use in uses if not np.isnan(use.share)]
 
 
-def nearest_limits(uses: Iterable[LimitUse]) -> list[LimitUse]:
-    """Return of each quantity the use nearest to its limit, the nearest of all first."""
+def governing_limits(uses: Iterable[LimitUse]) -> list[LimitUse]:
+    """Return the largest demand over capacity of each quantity, the governing limit first."""
     most: dict[str, LimitUse] = {}
     for use in uses:
         if use.quantity not in most or use.share > most[use.quantity].share:
@@ -49,25 +58,25 @@ def nearest_limits(uses: Iterable[LimitUse]) -> list[LimitUse]:
 
 
 def of_limit(share: float) -> str:
-    """Return the share of a limit with a digit more than elsewhere, to tell 100.2 % from 100 %."""
-    return f"{number(100 * share, 4)}\N{NO-BREAK SPACE}% of its limit" if np.isfinite(share) else "it can give none"
+    """Return demand over capacity with four digits, to distinguish 100.2 % from 100 %."""
+    return f"{number(100 * share, 4)}\N{NO-BREAK SPACE}% of its limit" if np.isfinite(share) else "no capacity"
 
 
 def limit_blocks(uses: Sequence[LimitUse]) -> list[Markup]:
-    """Return the table of the limits used, the nearest first."""
+    """Return the table of demand over capacity, the governing limit first."""
     if not uses:
-        return [paragraph("No limits of the machine were given to this report, and no spool was recorded.")]
+        return [paragraph("Neither limits of the machine nor spools are available.")]
     rows = [
-        (use.quantity.capitalize(), use.name, _shown(use), bar(use.share, TOLERANCE)) for use in nearest_limits(uses)
+        (use.quantity.capitalize(), use.name, _shown(use), bar(use.share, TOLERANCE)) for use in governing_limits(uses)
     ]
     words = (
-        "Of each quantity the axis or actuator that came nearest to its limit. A leg's velocity is held against that "
-        "of the unloaded piston at full spool. Every axis and actuator is in the tables of the other sections."
+        "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
+        "velocity is that of the unloaded piston at full spool. All axes and actuators are in the other sections."
     )
-    return [paragraph(words), table("Limits used", ("Limit", "Nearest", "Peak", "of its limit"), rows)]
+    return [paragraph(words), table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)]
 
 
-def _legs(record: xr.Dataset, limits: Limits) -> Iterator[LimitUse]:
+def _actuators(record: xr.Dataset, limits: Limits) -> Iterator[LimitUse]:
     if "actuator" not in record.coords:
         return
     names = [str(name) for name in record["actuator"].values]
@@ -78,13 +87,13 @@ def _legs(record: xr.Dataset, limits: Limits) -> Iterator[LimitUse]:
     if "actuator_displacement" in record:
         moved = channel(record, "actuator_displacement", "actuator")
         stroke = peaks(moved)
-        yield from each("leg stroke", stroke, shares_of_limit(stroke, limits, "actuator_stroke"))
+        yield from each("actuator stroke", stroke, shares_of_limit(stroke, limits, "actuator_stroke"))
         velocity = np.gradient(moved, sampling(record)[1], axis=0)
         out, back = peaks(np.maximum(velocity, 0.0)), peaks(np.maximum(-velocity, 0.0))
         extending = shares_of_limit(out, limits, "actuator_extending")
         retracting = shares_of_limit(back, limits, "actuator_retracting")
         peak = np.where(extending >= retracting, out, back)
-        yield from each("leg velocity", peak, np.maximum(extending, retracting))
+        yield from each("actuator velocity", peak, np.maximum(extending, retracting))
     for words, peak, share in force_use(record, limits):
         yield from each(words, peak, share)
 

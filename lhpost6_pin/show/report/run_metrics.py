@@ -1,7 +1,7 @@
-"""The numbers a test is judged by: tracking per axis, use of the valves, drift of the platen.
+"""Metrics of a test: tracking per axis, use of the valves, drift of the platen.
 
-Everything is computed from a record alone (dimensions `time`, `axis`, `actuator`, ...); what a record lacks
-comes out as not-a-number and is named by the report. Axis order x y z roll pitch yaw; SI.
+Everything is computed from a record alone (dimensions `time`, `axis`, `actuator`, ...); missing channels
+give not-a-number. Axis order x y z roll pitch yaw; SI.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ __all__ = [
     "Drift",
     "SpoolUse",
     "Tracking",
-    "asked_axes",
+    "commanded_axes",
     "channel",
     "drift",
     "peak_window",
@@ -29,9 +29,9 @@ __all__ = [
 ]
 
 QUANTITIES = ("displacement", "velocity", "acceleration")
-SQUARED = float(np.sqrt(np.finfo(np.float64).tiny))  # what is smaller has no square to divide by
-ASKED = 1e-3  # an axis is asked to move if its target reaches this share of the largest one (1 rad as 1 m)
-DRIFT_BAND = 0.2  # [Hz] what the displacement error does below this is called drift
+SQUARED = float(np.sqrt(np.finfo(np.float64).tiny))  # smaller values have no representable square
+COMMANDED = 1e-3  # an axis is commanded if its peak target is at least this fraction of the largest (1 rad as 1 m)
+DRIFT_BAND = 0.2  # [Hz] the displacement error below this frequency is drift
 FEWEST = 64  # samples, below which no delay is sought and no tracking judged
 LONGEST_DELAY = 0.25  # [s] sought either way; ten times what such a table has
 END = 0.5  # [s] the residual offset is the mean error over this last part of the record
@@ -39,7 +39,7 @@ END = 0.5  # [s] the residual offset is the mean error over this last part of th
 
 @dataclass(frozen=True)
 class Tracking:
-    """How one quantity of one axis followed its target; not-a-number where there is no target."""
+    """Tracking of one quantity of one axis; not-a-number without a target."""
 
     axis: str
     place: int  # of the axis in the record's order
@@ -54,7 +54,7 @@ class Tracking:
 
 @dataclass(frozen=True)
 class SpoolUse:
-    """How much of its stroke a fourth-stage spool used."""
+    """Use of the stroke of a fourth-stage spool."""
 
     actuator: str
     peak: float  # largest |x|, 1 is the full stroke
@@ -92,30 +92,30 @@ def sampling(record: xr.Dataset) -> tuple[float, float]:
     return float(time[0]), float(step)
 
 
-def asked_axes(record: xr.Dataset) -> list[str]:
-    """Return the names of the axes that the test asked to move; without a target, all that moved."""
+def commanded_axes(record: xr.Dataset) -> list[str]:
+    """Return the names of the commanded axes; without a target, of those that moved."""
     name = "reference_displacement" if "reference_displacement" in record else "platen_displacement"
     if name not in record:
         return []
     motion = channel(record, name, "axis")
     size = np.nan_to_num(peaks(motion - motion[0]))
-    return [str(axis) for axis, peak in zip(record["axis"].values, size, strict=True) if peak > ASKED * size.max()]
+    return [str(axis) for axis, peak in zip(record["axis"].values, size, strict=True) if peak > COMMANDED * size.max()]
 
 
 def track(record: xr.Dataset, quantity: str) -> list[Tracking]:
-    """Return how `quantity` of every axis followed its target; empty if the record has no such motion."""
+    """Return the tracking of `quantity` on every axis; empty if the record has no such motion."""
     if f"platen_{quantity}" not in record:
         return []
     _, step = sampling(record)
     achieved = channel(record, f"platen_{quantity}", "axis")
     known = f"reference_{quantity}" in record
     target = channel(record, f"reference_{quantity}", "axis") if known else np.full_like(achieved, np.nan)
-    asked = asked_axes(record) if known and len(achieved) >= FEWEST else []
+    commanded = commanded_axes(record) if known and len(achieved) >= FEWEST else []
     longest = min(LONGEST_DELAY, len(achieved) * step / 8.0)
     found = []
     for k, axis in enumerate(map(str, record["axis"].values)):
         whole, late, without, shifted = np.nan, np.nan, np.nan, None
-        if axis in asked and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
+        if axis in commanded and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
             whole = float(rrmse(target[:, k], achieved[:, k]))
             late = float(delay(target[:, k], achieved[:, k], step, longest))
             shifted = align(achieved[:, k], late, step) if np.isfinite(late) else achieved[:, k]

@@ -10,7 +10,7 @@ from ...motions.response_spectra import response_spectrum
 from .page import Figure, Markup, details, figure, grid, missing, number, paragraph, table
 from .plots import ACHIEVED, RECORDED, SCALES, TARGET, Row, Scale, Trace, palette, spectrum_figure, time_figure
 from .run_components import draw_over_time
-from .run_metrics import QUANTITIES, Tracking, asked_axes, channel, drift, peak_window, sampling
+from .run_metrics import QUANTITIES, Tracking, channel, commanded_axes, drift, peak_window, sampling
 
 __all__ = ["axis_scale", "drift_blocks", "percent", "shown_as", "spectrum_blocks", "tracking_blocks"]
 
@@ -40,43 +40,42 @@ def shown_as(value: float, scale: Scale) -> str:
 
 
 def tracking_blocks(record: xr.Dataset, found: Sequence[Tracking]) -> list[Markup]:
-    """Return target and achieved motion of every axis, those that were not asked to move folded away."""
+    """Return target and achieved motion of every axis; uncommanded axes collapsed."""
     names = [f"{who}_{quantity}" for who in ("platen", "reference") for quantity in QUANTITIES]
     absent = [name for name in names if name not in record]
-    blocks = [missing(absent, "What the record has of target and motion is drawn.")] if absent else []
+    blocks = [missing(absent, "The recorded part of target and motion is drawn.")] if absent else []
     if len(absent) == len(names):
         return blocks
     how = (
-        "RRMSE = √(Σ error² ∕ Σ target²). The achieved motion is drawn, and judged in the title of each plot, after "
-        "removing its delay, the shift that brings achieved and target together; the legend switches on what was "
-        "recorded. Dragging over a plot zooms the time axes of all plots; a double click "
-        "shows all again. The shaded stretch is drawn at the full rate below its plot."
+        "RRMSE = √(Σ error² ∕ Σ target²). The achieved motion, and the RRMSE in the title of each plot, are shown "
+        "with the delay removed; the legend switches on the motion as recorded. Dragging zooms the time axes of all "
+        "plots, a double click resets them. The shaded interval is drawn below its plot at the full rate."
     )
     blocks.append(paragraph(how))
-    asked = asked_axes(record)
-    for axis in asked:
+    commanded = commanded_axes(record)
+    for axis in commanded:
         window = _peak_window(record, axis)
-        blocks.append(figure(_axis_figure(record, found, axis, window, "no target to compare with")))
+        blocks.append(figure(_axis_figure(record, found, axis, window, "no target")))
         if window:
             blocks.append(figure(_close_up(record, found, axis, window)))
-    quiet = [axis for axis in map(str, record["axis"].values) if axis not in asked]
-    if quiet:
-        drawings = [figure(_axis_figure(record, found, axis, None, "not asked to move")) for axis in quiet]
-        blocks.append(details(f"Axes that were not asked to move: {', '.join(quiet)}", *drawings))
+    uncommanded = [axis for axis in map(str, record["axis"].values) if axis not in commanded]
+    if uncommanded:
+        drawings = [figure(_axis_figure(record, found, axis, None, "uncommanded")) for axis in uncommanded]
+        blocks.append(details(f"Uncommanded axes (cross-coupling): {', '.join(uncommanded)}", *drawings))
     return blocks
 
 
 def spectrum_blocks(record: xr.Dataset) -> list[Markup]:
-    """Return the response spectra of target and achieved acceleration of the axes asked to move."""
+    """Return the response spectra of target and achieved acceleration of the commanded axes."""
     names = ("reference_acceleration", "platen_acceleration")
     absent = [name for name in names if name not in record]
-    blocks = [missing(absent, "No response spectrum can be drawn of what is absent.")] if absent else []
+    blocks = [missing(absent, "Their response spectra are not drawn.")] if absent else []
     if len(absent) == len(names):
         return blocks
     _, step = sampling(record)
     periods = PERIODS[PERIODS >= 10.0 * step]  # peaks are taken at samples
     drawings = []
-    for axis in asked_axes(record):
+    for axis in commanded_axes(record):
         curves = {}
         for name, label, line in zip(names, ("target", "achieved"), (TARGET, ACHIEVED), strict=True):
             motion = _of_axis(record, name, axis) if name in record else np.array([np.nan])
@@ -91,13 +90,13 @@ def spectrum_blocks(record: xr.Dataset) -> list[Markup]:
 
 
 def drift_blocks(record: xr.Dataset) -> list[Markup]:
-    """Return the slow part of the displacement error and what of it is left at the end."""
+    """Return the slow part of the displacement error, and the residual offset at the end."""
     absent = [name for name in ("platen_displacement", "reference_displacement") if name not in record]
     if absent:
-        return [missing(absent, "Drift is the slow part of achieved minus target and needs both.")]
+        return [missing(absent, "Drift, the slow part of achieved minus target, is not drawn.")]
     slow = drift(record)
     if slow is None:
-        return [paragraph("Drift is not shown: the displacement holds samples that are not numbers.")]
+        return [paragraph("Drift is not shown: the displacement has non-finite samples.")]
     axes = [str(axis) for axis in record["axis"].values]
     scales = [axis_scale(axis, "displacement") for axis in axes]
     rows = []
@@ -135,7 +134,7 @@ def _axis_figure(
 
 
 def _close_up(record: xr.Dataset, found: Sequence[Tracking], axis: str, window: tuple[int, int]) -> Figure:
-    """Return the highest derivative there is around its peak, every sample, also as recorded."""
+    """Return the highest recorded derivative around its peak, every sample, also as recorded."""
     start, step = sampling(record)
     quantity = next(q for q in reversed(QUANTITIES) if {f"platen_{q}", f"reference_{q}"} & set(record.variables))
     row = _tracked(found, axis, quantity)
@@ -185,7 +184,7 @@ def _of_axis(record: xr.Dataset, name: str, axis: str) -> NDArray[np.float64]:
 
 
 def _tracked(found: Sequence[Tracking], axis: str, quantity: str) -> Tracking | None:
-    """Return how the quantity followed its target, if it had one."""
+    """Return the tracking of a quantity, if it had a target."""
     rows = (row for row in found if row.axis == axis and row.quantity == quantity)
     return next((row for row in rows if np.isfinite(row.rrmse)), None)
 

@@ -10,10 +10,10 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...core.errors import UnknownNameError
-from .page import Headline, Level, Page, number, save_page, versions
+from .page import Headline, Level, Page, number, save_page
 from .run_components import Limits
-from .run_limits import LimitUse, limit_uses, nearest_limits
-from .run_metrics import QUANTITIES, SpoolUse, Tracking, asked_axes, sampling, spool_use, track
+from .run_limits import LimitUse, governing_limits, limit_uses
+from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
 from .run_motion import axis_scale, shown_as
 from .run_sections import run_sections
 from .run_verdict import headlines, judge
@@ -36,7 +36,7 @@ LIMIT_NAMES = (
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What a run report says first, for a terminal or another report."""
+    """Summary of a run report, for a terminal or another report."""
 
     path: Path
     verdict: str
@@ -48,9 +48,9 @@ class RunSummary:
     missing: tuple[str, ...]  # variables of the record layout that the record lacks
 
     @property
-    def nearest(self) -> list[LimitUse]:
-        """Of each quantity the limit that the test came nearest to, the nearest of all first."""
-        return nearest_limits(self.limits)
+    def governing(self) -> list[LimitUse]:
+        """Largest demand over capacity of each quantity, the governing limit first."""
+        return governing_limits(self.limits)
 
 
 EXPECTED = (
@@ -77,10 +77,10 @@ def write_run_report(
 ) -> RunSummary:
     """Write the self-contained HTML report of a test to `path` and return its summary.
 
-    `limits` maps names of `LIMIT_NAMES` to what the machine can give (SI; not-a-number means no limit, as does 0
+    `limits` maps names of `LIMIT_NAMES` to capacities (SI; not-a-number means no limit, as does 0
     except for `actuator_pull`),
     `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name, value, unit,
-    source, assumed). What the record lacks is named where it would have been shown.
+    source, assumed). Missing channels are named in their sections.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
     limit.
     """
@@ -101,7 +101,6 @@ def write_run_report(
         sections=run_sections(record, found, spools, bounds, uses, list(machine_table or ())),
         notes=notes,
         command=command,
-        versions=versions(),
     )
     absent = tuple(name for name in EXPECTED if name not in record)
     said = (verdict, level, tuple(page.headlines))
@@ -119,7 +118,7 @@ def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
 
 
 def _gaps(record: xr.Dataset) -> list[str]:
-    """Name the channels that hold samples that are not numbers, and since when."""
+    """Channels with non-finite samples, and the time of the first."""
     found = []
     for name, variable in record.data_vars.items():
         if "time" not in variable.dims or variable.dtype.kind != "f":
@@ -127,19 +126,19 @@ def _gaps(record: xr.Dataset) -> list[str]:
         gaps = ~np.isfinite(variable.transpose("time", ...).values).reshape(record.sizes["time"], -1)
         if gaps.any():
             first = float(record["time"].values[gaps.any(axis=1).argmax()])
-            found.append(f"{name} holds samples that are not numbers, the first at {first:.4f} s.")
+            found.append(f"{name} has non-finite samples, the first at {first:.4f} s.")
     return found
 
 
 def _asked(record: xr.Dataset, found: Sequence[Tracking]) -> str:
     _, step = sampling(record)
     length = f"{number(record.sizes['time'] * step)} s at {1.0 / step:.6g} samples a second"
-    asked = asked_axes(record)
-    peaks = [row for row in found if row.quantity == "displacement" and row.axis in asked]
+    commanded = commanded_axes(record)
+    peaks = [row for row in found if row.quantity == "displacement" and row.axis in commanded]
     if "reference_displacement" not in record:
-        return f"{length}; the record does not say what was asked."
+        return f"{length}; the record has no target."
     words = ", ".join(f"{row.axis} {shown_as(row.peak_target, axis_scale(row.axis, 'displacement'))}" for row in peaks)
     specimen = str(record.attrs.get("specimen", "none"))
     load = "bare table" if specimen == "none" else f"specimen {specimen}"
-    count = f"{len(asked)} of {record.sizes['axis']} axes"
-    return f"Follow a motion on {count} (peak displacement {words}), {length}, {load}."
+    count = f"{len(commanded)} of {record.sizes['axis']} axes"
+    return f"Track a motion on {count} (peak target displacement {words}), {length}, {load}."

@@ -33,7 +33,7 @@ def run_sections(
     uses: Sequence[LimitUse],
     machine_table: Sequence[Sequence[Any]],
 ) -> list[Section]:
-    """Return the sections of the report; each shows its channels or names those that the record lacks."""
+    """Return the sections of the report; each names channels missing from the record."""
     moves = "specimen_joint_position" in record
     specimen = [Section("specimen", "Specimen", specimen_blocks(record))] if moves else []
     return [
@@ -45,7 +45,7 @@ def run_sections(
         Section("struts", "Hold-down struts", strut_blocks(record, limits)),
         *specimen,
         Section("drift", "Drift", drift_blocks(record)),
-        Section("limits", "Limits used", limit_blocks(uses)),
+        Section("limits", "Demand over capacity", limit_blocks(uses)),
         Section("metrics", "Table of metrics", [_metrics(found, limits)]),
         Section("assumptions", "Assumptions and sources", _assumptions(machine_table)),
         Section("record", "The record", _contents(record)),
@@ -54,7 +54,7 @@ def run_sections(
 
 def _metrics(found: Sequence[Tracking], limits: Limits) -> Markup:
     if not found:
-        return missing([f"platen_{quantity}" for quantity in QUANTITIES], "There is nothing to tabulate.")
+        return missing([f"platen_{quantity}" for quantity in QUANTITIES], "Peaks and tracking are not tabulated.")
     rows = []
     for row in found:
         scale = axis_scale(row.axis, row.quantity)
@@ -76,7 +76,7 @@ def _metrics(found: Sequence[Tracking], limits: Limits) -> Markup:
         "Unit",
         "Peak target",
         "Peak achieved",
-        "of its limit",
+        "Demand / capacity",
         "RRMSE",
         "Delay",
         "RRMSE, delay removed",
@@ -86,7 +86,7 @@ def _metrics(found: Sequence[Tracking], limits: Limits) -> Markup:
 
 def _assumptions(rows: Sequence[Sequence[Any]]) -> list[Markup]:
     if not rows:
-        return [paragraph("No table of the machine's numbers was given to this report.")]
+        return [paragraph("The numbers of the machine are not available.")]
     header = ("Quantity", "Value", "Unit", "Source")
     assumed = [(name, _shown(value), unit, source) for name, value, unit, source, guess in rows if guess]
     known = [(name, _shown(value), unit, source) for name, value, unit, source, guess in rows if not guess]
@@ -94,7 +94,7 @@ def _assumptions(rows: Sequence[Sequence[Any]]) -> list[Markup]:
     if assumed:
         blocks.append(table("Assumed", header, assumed))
     if known:
-        blocks.append(details(f"Numbers with a source ({len(known)})", table("With a source", header, known)))
+        blocks.append(details(f"Published or estimated ({len(known)})", table("Published or estimated", header, known)))
     return blocks
 
 

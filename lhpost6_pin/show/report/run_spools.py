@@ -19,7 +19,7 @@ Spool = Mapping[str, NDArray[np.float64]]  # of LINES, (n, n_act) [1]
 
 LINES = {"command": TARGET, "position": ACHIEVED}
 LIMITS = {"+1": 1.0, "−1": -1.0}
-SPAN = (-1.2, 1.2)  # of every panel, so that actuators can be compared and the limits are in sight
+SPAN = (-1.2, 1.2)  # of every panel, to compare actuators and include the limits
 BUCKETS = 750  # stretches a channel is divided into; half as many as of a plot over the whole width
 MARKS = 300  # stretches of the record that are shaded or not for a command at its limit
 CLOSE_UP = 1.0  # [s] drawn at full rate around the largest command
@@ -31,14 +31,14 @@ def spool_blocks(record: xr.Dataset, spools: Sequence[SpoolUse]) -> list[Markup]
     names = [f"spool_{who}" for who in LINES]
     absent = [name for name in names if name not in record]
     if len(absent) == len(names):
-        return [missing(names, "Servovalves are not drawn.")]
+        return [missing(names, "Spools are not drawn.")]
     used = [[s.actuator, bar(s.peak), percent(s.rms), percent(s.saturated)] for s in spools]
     blocks = [missing(absent, "Only the other is drawn.")] if absent else []
     blocks.append(table("Valve utilisation", ("Actuator", "Largest opening", "RMS opening", "Time at the limit"), used))
     how = (
-        "Fourth-stage spools as a share of their stroke, on one scale for all actuators, with the limits ±1. The grey "
-        "band is the command, the blue line the position, which follows after the delay of the valve. Where a command "
-        "is at its limit the plot is shaded. Below, the largest command of each kind of actuator at the full rate."
+        "Fourth-stage spools as a fraction of their stroke, on one scale for all actuators, with the limits ±1. Grey: "
+        "command; blue: position, behind the command by the delay of the valve. Shaded: a command is at its limit. "
+        "Below, the largest command of each kind of actuator at the full rate."
     )
     blocks.append(paragraph(how))
     labels = [str(label) for label in record["actuator"].values]
@@ -60,7 +60,7 @@ def _panel(record: xr.Dataset, spool: Spool, label: str, k: int) -> Figure:
         f"plot-spool-{k + 1}",
         f"Spool {label}",
         words,
-        [Row("Share of the stroke", _traces(spool, k, slice(None)), SCALES["ratio"], LIMITS, SPAN)],
+        [Row("Fraction of the stroke", _traces(spool, k, slice(None)), SCALES["ratio"], LIMITS, SPAN)],
         start=start,
         step=step,
         buckets=BUCKETS,
@@ -86,7 +86,7 @@ def _close_up(record: xr.Dataset, spool: Spool, labels: Sequence[str], own: Sequ
         f"close-spool-{k + 1}",
         f"Spool {labels[k]}, close-up",
         words,
-        [Row("Share of the stroke", traces, SCALES["ratio"])],
+        [Row("Fraction of the stroke", traces, SCALES["ratio"])],
         start=start + window[0] * step,
         step=step,
         buckets=window[1] - window[0],

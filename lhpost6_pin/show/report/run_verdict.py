@@ -1,4 +1,4 @@
-"""The summary of a run report: the verdict and the three figures that matter."""
+"""The summary of a run report: the verdict and three key figures."""
 
 from collections.abc import Sequence
 
@@ -8,15 +8,15 @@ import xarray as xr
 from .page import Headline, Level
 from .plots import SCALES
 from .run_components import TOLERANCE
-from .run_limits import LimitUse, nearest_limits, of_limit
+from .run_limits import LimitUse, governing_limits, of_limit
 from .run_metrics import SpoolUse, Tracking, channel
 from .run_motion import axis_scale, percent, shown_as
 
 __all__ = ["FOLLOWED", "NEAR", "headlines", "judge"]
 
-# Judgement, not physics: the largest RRMSE, delay removed, with which a target counts as followed.
+# Judgement, not physics: largest RRMSE, delay removed, with which a target counts as tracked.
 FOLLOWED = {"displacement": 0.10, "acceleration": 0.40}
-NEAR = 0.8  # share of a limit from which attention is drawn to it
+NEAR = 0.8  # demand over capacity that calls for attention
 
 
 def judge(
@@ -26,20 +26,22 @@ def judge(
     uses: Sequence[LimitUse],
     notes: Sequence[str],
 ) -> tuple[str, Level]:
-    """Return the verdict in words and how grave it is: spools clipped, target followed, limits kept, notes to read."""
+    """Return the verdict and its level: clipped spools, tracking, limits, notes."""
     stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
-    if stopped != "none":  # how a piece was followed, and what it left of the limits, says nothing of the test
+    if stopped != "none":  # the part before the stop does not represent the test
         clipped = _clipped(record, spools)
-        said = [f"The run {stopped}: how closely the table followed is not judged.", clipped, "See the notes."]
+        said = [f"The run {stopped}: tracking is not judged.", clipped, "See the notes."]
         return " ".join(filter(None, said)), "bad"
     sentences, level = _followed(record, found)
     clipped, beyond = _clipped(record, spools), _beyond(uses)
     if clipped:
         sentences.insert(0, clipped)
     if beyond:
-        sentences.append(f"Beyond a limit: {', '.join(beyond)}.")
+        sentences.append(f"Limits exceeded: {', '.join(beyond)}.")
     elif any(use.quantity != "spool" for use in uses):
-        sentences.append("The rest is within all given limits." if clipped else "The test is within all given limits.")
+        sentences.append(
+            "All other demands are within the given limits." if clipped else "All demands are within the given limits."
+        )
     elif spools and not clipped:
         sentences.append("No spool reached its limit.")
     if clipped or beyond:
@@ -51,8 +53,8 @@ def judge(
 
 
 def headlines(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headline]:
-    """Return worst RRMSE, peak displacement and the limit that the test came nearest to."""
-    return [_worst_rrmse(found), _peak_displacement(found), _nearest_limit(uses)]
+    """Return worst RRMSE, peak displacement and the governing limit."""
+    return [_worst_rrmse(found), _peak_displacement(found), _governing_limit(uses)]
 
 
 def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str], Level]:
@@ -61,12 +63,12 @@ def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str],
         worst = _worst(found, quantity)
         if worst:
             good &= worst.rrmse_aligned <= allowed
-            words.append(f"{quantity} {percent(worst.rrmse_aligned)} ({worst.axis}, allowed {100 * allowed:.0f} %)")
+            words.append(f"{quantity} {percent(worst.rrmse_aligned)} ({worst.axis}, criterion {100 * allowed:.0f} %)")
     if not words:
         lacking = [n for n in ("platen_displacement", "reference_displacement") if n not in record]
-        why = f"the record has no {' and no '.join(lacking)}" if lacking else "no motion was asked for"
+        why = f"the record has no {' and no '.join(lacking)}" if lacking else "the target is at rest"
         return [f"Tracking cannot be judged: {why}."], "plain"
-    start = "The table followed its target" if good else "The table did not follow its target closely enough"
+    start = "The table tracked its target" if good else "The table did not track its target closely enough"
     return [f"{start}: worst RRMSE, delay removed, {' and '.join(words)}."], "good" if good else "attention"
 
 
@@ -76,18 +78,18 @@ def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
     count = int(count) if isinstance(count, int | np.integer) else 0
     shares = {spool.actuator: spool.saturated for spool in spools}
     if "spool_command" in record:
-        asked = np.mean(np.abs(channel(record, "spool_command", "actuator")) >= 1.0, axis=0)
-        for actuator, share in zip(map(str, record["actuator"].values), asked, strict=True):
+        command = np.mean(np.abs(channel(record, "spool_command", "actuator")) >= 1.0, axis=0)
+        for actuator, share in zip(map(str, record["actuator"].values), command, strict=True):
             shares[actuator] = max(shares.get(actuator, 0.0), float(share))
     full = [f"spool {actuator} {percent(share)} of the time" for actuator, share in shares.items() if share]
     if not (count or full):
         return ""
-    start = f"{count} spool commands were clipped" if count else "Spools were at the limit of their stroke"
+    start = f"{count} spool commands were clipped" if count else "Spools reached their full stroke"
     return f"{start}: {', '.join(full)}." if full else f"{start}."
 
 
 def _beyond(uses: Sequence[LimitUse]) -> list[str]:
-    """Name what passed its limit by more than the tolerance; spools at full stroke are said apart."""
+    """Names of limits exceeded by more than the tolerance, without spools."""
     beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
     return [f"{use.name} {use.quantity} ({of_limit(use.share)})" for use in beyond]
 
@@ -115,15 +117,17 @@ def _peak_displacement(found: Sequence[Tracking]) -> Headline:
     )
 
 
-def _nearest_limit(uses: Sequence[LimitUse]) -> Headline:
+def _governing_limit(uses: Sequence[LimitUse]) -> Headline:
     if not uses:
-        return Headline("–", "Nearest limit", "neither limits of the machine nor spools are known")
-    use = nearest_limits(uses)[0]
+        return Headline(
+            "–", "Governing limit: demand / capacity", "neither limits of the machine nor spools are available"
+        )
+    use = governing_limits(uses)[0]
     level: Level = "bad" if use.share > 1.0 + TOLERANCE else "attention" if use.share >= NEAR else "good"
     if use.quantity == "spool" and use.share >= 1.0:
         level = "bad"
-    said = percent(use.share) if np.isfinite(use.share) else "impossible"
-    return Headline(said, "Nearest limit", f"{use.name}, {use.quantity}", level)
+    said = percent(use.share) if np.isfinite(use.share) else "no capacity"
+    return Headline(said, "Governing limit: demand / capacity", f"{use.name}, {use.quantity}", level)
 
 
 def _worst(found: Sequence[Tracking], quantity: str) -> Tracking | None:

@@ -36,10 +36,10 @@ Array = NDArray[np.float64]
 
 
 def harmonic_blocks(test: SineTest) -> list[Markup]:
-    """Return bars of all multiples relative to the fundamental, and their table folded away."""
+    """Return bars of all harmonics relative to the fundamental, and their table, collapsed."""
     count = len(test.before.acceleration.amplitude)
     if count < 2:
-        return [paragraph("No multiple of this frequency lies in the table's band.")]
+        return [paragraph("No harmonic of this frequency is within the band of the table.")]
     panels, columns = [], []
     for quantity in ("acceleration", "displacement"):
         curves = []
@@ -50,9 +50,9 @@ def harmonic_blocks(test: SineTest) -> list[Markup]:
         top = max(float(column[1:].max()) for column in columns[-2:])
         title = f"{quantity.capitalize()} [% of the fundamental]"
         panels.append(Panel(title, curves, log=True, span=(FLOOR, max(2.0 * top, 1.0))))
-    words = f"Amplitudes of the multiples of {number(test.frequency)} Hz over that of the fundamental."
+    words = f"Amplitudes of the harmonics of {number(test.frequency)} Hz relative to the fundamental."
     drawing = chart_figure(
-        "harmonics", "Harmonics relative to the fundamental", words, panels, XAxis("Multiple"), row_height=200
+        "harmonics", "Harmonics relative to the fundamental", words, panels, XAxis("Harmonic"), row_height=200
     )
     rows = [
         (
@@ -63,7 +63,7 @@ def harmonic_blocks(test: SineTest) -> list[Markup]:
         for n in range(1, count)
     ]
     header = (
-        "Multiple",
+        "Harmonic",
         "Frequency",
         *(f"{q}, {n}" for q in ("Acceleration", "Displacement") for n in (ALONE, CANCELLED)),
     )
@@ -95,7 +95,7 @@ def history_block(test: SineTest) -> Markup:
 
 
 def convergence_block(test: SineTest) -> Markup:
-    """Return the RMS error of every cycle over the whole test, relative to the sine asked for."""
+    """Return the RMS error of every cycle of the test, relative to the target sine."""
     k = AXES.index(test.axis)
     panels = []
     for quantity, fundamental in (("displacement", 1.0), ("acceleration", (2.0 * np.pi * test.frequency) ** 2)):
@@ -109,8 +109,8 @@ def convergence_block(test: SineTest) -> Markup:
             curves.append(Curve(name, time[drawn], share[drawn], line, "lines+markers"))
         panels.append(Panel(f"Error of the {quantity} [%]", curves, log=True))
     words = (
-        "RMS of achieved minus wanted over each cycle, no delay removed, as a share of the RMS of the full sine. The "
-        "dotted lines are where measuring begins and ends; the sine then fades out."
+        "RMS of achieved minus wanted over each cycle, no delay removed, relative to the RMS of the full sine. The "
+        "dotted lines mark the measured interval; the sine then fades out."
     )
     measured = test.target.time[test.measured] - test.target.time[0]
     ends = float(measured[0]), float(measured[-1])
@@ -124,7 +124,7 @@ def spool_blocks(test: SineTest) -> list[Markup]:
     runs = {ALONE: (test.before.run.command, BEFORE), CANCELLED: (test.after.run.command, AFTER)}
     known = {name: (command, line) for name, (command, line) in runs.items() if command is not None}
     if not known:
-        return [paragraph("Not in the runs: spool commands. They are not drawn.")]
+        return [paragraph("The runs have no spool commands.")]
     part, first = _last_cycles(test)
     rows: list[list[str]] = []
     working: list[Markup] = []
@@ -140,13 +140,12 @@ def spool_blocks(test: SineTest) -> list[Markup]:
         (working if used else quiet).append(figure(_spool(label, i, commands, first)))
     header = ["Actuator", *(f"{what}, {name}" for name in known for what in ("Largest", "At the limit"))]
     how = (
-        "Commands to the fourth-stage spools as a share of their stroke over the last cycles, on one scale, with the "
-        "limits ±1: beyond them the valve gives no more flow. Where a command of the run with cancellers is at its "
-        "limit the plot is shaded."
+        "Commands to the fourth-stage spools as a fraction of their stroke over the last cycles, on one scale, with "
+        "the limits ±1, where the valve saturates. Shaded: a command of the run with cancellers is at its limit."
     )
     blocks = [table("Commands over the measured cycles", header, rows), paragraph(how), grid(*working, pairs=True)]
     if quiet:
-        words = f"Actuators that use less than {100 * QUIET:g} % of the stroke ({len(quiet)})"
+        words = f"Actuators below {100 * QUIET:g} % of the spool stroke ({len(quiet)})"
         blocks.append(details(words, grid(*quiet, pairs=True)))
     return blocks
 
@@ -162,7 +161,7 @@ def _spool(label: str, i: int, commands: dict[str, Array], first: float) -> Figu
         f"spool-{i + 1}",
         f"Spool {label}",
         words,
-        [Row("Share of the stroke", traces, SCALES["ratio"], LIMITS, SPAN)],
+        [Row("Fraction of the stroke", traces, SCALES["ratio"], LIMITS, SPAN)],
         start=first,
         step=STEP,
         buckets=len(full),
@@ -174,12 +173,12 @@ def _spool(label: str, i: int, commands: dict[str, Array], first: float) -> Figu
 
 
 def achieved_motion(found: SineResult) -> PlatenMotion:
-    """Return what the platen did."""
+    """Return the platen motion of a run."""
     return platen_motion(found.run.plant, found.run.q, found.run.v, found.run.a)
 
 
 def percent_of_fundamental(share: float) -> str:
-    """Return a share [%] of the fundamental's amplitude; what is too small to be drawn is not told apart."""
+    """Return an amplitude [% of the fundamental]; below the plotted floor as an inequality."""
     return f"< {FLOOR:.4f}\N{NO-BREAK SPACE}%" if share <= FLOOR else percent(share / 100.0)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...core.names import AXES
 from ...tuning.sine import SineResult, SineTest
 from .control_blocks import assumption_blocks, load_of
-from .page import Headline, Level, Markup, Page, Section, number, save_page, table, versions
+from .page import Headline, Level, Markup, Page, Section, number, save_page, table
 from .run_motion import axis_scale, percent, shown_as
 from .sine_plots import (
     achieved_motion,
@@ -40,7 +40,7 @@ def write_sine_report(test: SineTest, path: Path | str, command: str = "") -> Pa
         title=f"Sine of {amplitude} at {number(test.frequency)} Hz in {test.axis}",
         asked=(
             f"Reproduce a sine of {amplitude} at {number(test.frequency)} Hz in {test.axis} on {load_of(machine)}, "
-            f"under “{test.settings.name}”, alone and with amplitude-phase control and adaptive harmonic cancellation; "
+            f"with “{test.settings.name}”, alone and with amplitude-phase control and adaptive harmonic cancellation; "
             f"judged over {_measured(test)}."
         ),
         verdict=verdict,
@@ -58,8 +58,7 @@ def write_sine_report(test: SineTest, path: Path | str, command: str = "") -> Pa
                 assumption_blocks(machine, ("sine", "feedforward_targets.high")),
             ),
         ],
-        command=command or None,
-        versions=versions(),
+        command=command,
     )
     return save_page(page, path)
 
@@ -76,19 +75,19 @@ def _judge(test: SineTest) -> tuple[str, Level]:
     near = abs(after.amplitude_error) <= AMPLITUDE and abs(after.phase_error) <= PHASE
     halved = after.distortion <= DISTORTION_LEFT * before.distortion
     words = [
-        f"With the cancellers the amplitude is {_signed(after.amplitude_error)} and the phase "
-        f"{_angle(after.phase_error)} off, {'within' if near else 'not within'} {100 * AMPLITUDE:g} % and "
+        f"With the cancellers the amplitude error is {_signed(after.amplitude_error)} and the phase error "
+        f"{_angle(after.phase_error)}, {'within' if near else 'not within'} {100 * AMPLITUDE:g} % and "
         f"{np.degrees(PHASE):g}°.",
         f"The distortion of the acceleration falls from {percent(before.distortion)} to {percent(after.distortion)}"
         if after.distortion < before.distortion
         else f"The distortion of the acceleration does not fall: {percent(before.distortion)} without, "
         f"{percent(after.distortion)} with them",
     ]
-    words[1] += ", to half or less." if halved else ", more than half of it is left."
+    words[1] += ", by half or more." if halved else ", by less than half."
     if not (near and halved):
         level = "attention"
     if _growing(test):
-        words.append("The error with the cancellers still grows from cycle to cycle: they are not stable here.")
+        words.append("The error with the cancellers grows from cycle to cycle: the cancellers are unstable here.")
         level = "bad"
     clipped = {name: found.run.clipped for name, found in (("without", before), ("with", after)) if found.run.clipped}
     if clipped:

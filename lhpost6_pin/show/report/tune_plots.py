@@ -1,4 +1,4 @@
-"""Figures of a tuning report: one Bode plot an axis, and all axes together."""
+"""Figures of a tuning report: a Bode plot per axis, and the magnitudes of all axes."""
 
 from typing import Any
 
@@ -43,7 +43,7 @@ def bode_figure(tuning: Tuning, a: int) -> Markup:
         Panel("Phase as measured [deg]", raw),
         Panel("Coherence", coherent, span=(0.0, 1.05), lines={f"{tuning.coherence:g}": tuning.coherence}),
     ]
-    words = f"Follows to {axis.band_after[1]:.3g} Hz." if np.isfinite(axis.band_after[1]) else "Follows nowhere."
+    words = f"Band to {axis.band_after[1]:.3g} Hz." if np.isfinite(axis.band_after[1]) else "No band."
     return figure(
         chart_figure(
             f"bode-{axis.axis}", axis_title(axis.axis), words, panels, FREQUENCIES, row_height=ROW, marks=[_band_end()]
@@ -52,7 +52,7 @@ def bode_figure(tuning: Tuning, a: int) -> Markup:
 
 
 def overview_figure(tuning: Tuning) -> Markup:
-    """Return the magnitudes of all axes before and after, above each other."""
+    """Return the magnitudes of all axes before and after tuning."""
     panels = []
     for name in ("before", "after"):
         curves = []
@@ -71,10 +71,10 @@ def overview_figure(tuning: Tuning) -> Markup:
 def _response(
     name: str, line: dict[str, Any], f: NDArray[np.float64], response: Complex, delay: float
 ) -> tuple[Curve, Curve, Curve]:
-    """Magnitude, phase left without a delay [s], and phase of a response (m,)."""
+    """Magnitude, phase after removing a delay [s], and phase of a response (m,)."""
     turn = 360.0 * f * delay
     left = np.degrees(np.angle(response * np.exp(1j * np.radians(turn))))
-    left[1:][np.abs(np.diff(left)) > 180.0] = np.nan  # a turn begins anew: no line across
+    left[1:][np.abs(np.diff(left)) > 180.0] = np.nan  # no line across a phase wrap
     return Curve(name, f, _decibels(response), line), Curve(name, f, left, line), Curve(name, f, left - turn, line)
 
 

@@ -1,4 +1,4 @@
-"""The report of a tuning: bands, margins and Bode plots before and after, and the gains chosen."""
+"""The report of a tuning: bands, margins and Bode plots before and after, and the chosen gains."""
 
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from .page import (
     paragraph,
     save_page,
     table,
-    versions,
 )
 from .plots import SCALES
 from .run_motion import shown_as
@@ -46,8 +45,7 @@ def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Pa
         level=level,
         headlines=_headlines(tuning),
         sections=_sections(tuning),
-        command=command or None,
-        versions=versions(),
+        command=command,
     )
     return save_page(page, path)
 
@@ -66,7 +64,7 @@ def _judge(tuning: Tuning) -> tuple[str, Level]:
     short = [axis for axis in tuning.axes if not _follows(axis)]
     if short:
         found = ", ".join(f"{axis.axis} {_band(axis.band_after)}" for axis in short)
-        words.append(f"Not every axis is within {tuning.tolerance:g} dB and coherent {band}: {found}.")
+        words.append(f"Not all axes are within {tuning.tolerance:g} dB and coherent {band}: {found}.")
         level = "attention"
     else:
         words.append(f"Every axis is within {tuning.tolerance:g} dB of its reference and coherent {band}.")
@@ -78,9 +76,9 @@ def _judge(tuning: Tuning) -> tuple[str, Level]:
     else:
         words.append(f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.")
     if tuning.doubled:
-        words.append("With all master gains doubled at once the loop is stable.")
+        words.append("The loop is stable with all master gains doubled.")
     else:
-        words.append("With all master gains doubled at once the loop is unstable.")
+        words.append("The loop is unstable with all master gains doubled.")
         level = "attention"
     if any(np.isnan(axis.band_after[0]) for axis in tuning.axes):
         level = "bad"
@@ -107,7 +105,7 @@ def _headlines(tuning: Tuning) -> list[Headline]:
         ),
         Headline(
             shown_as(tuning.delay, SCALES["time"]),
-            "Delay that all axes were tuned to have",
+            "Common target delay",
             f"measured {number(1e3 * min(late))} to {shown_as(max(late), SCALES['time'])}",
         ),
     ]
@@ -117,10 +115,10 @@ def _sections(tuning: Tuning) -> list[Section]:
     names = [axis.axis for axis in tuning.axes]
     return [
         Section("bands", "Bands and margins", [_band_table(tuning), _margin_table(tuning), overview_figure(tuning)]),
-        Section("limits", "What limits 20 to 33 Hz", _limits(tuning)),
+        Section("limits", "Bandwidth limitation, 20 to 33 Hz", _limits(tuning)),
         Section("bode", "Bode plots before and after", _bode(tuning)),
-        Section("gains", "Numbers chosen", gain_table(tuning.before, tuning.after, names)),
-        Section("steps", "Steps in order", _steps(tuning)),
+        Section("gains", "Chosen settings", gain_table(tuning.before, tuning.after, names)),
+        Section("steps", "Tuning steps", _steps(tuning)),
         Section(
             "assumptions",
             "Assumptions and sources",
@@ -169,37 +167,37 @@ def _margin_table(tuning: Tuning) -> Markup:
 
 def _limits(tuning: Tuning) -> list[Markup]:
     said = paragraph(
-        "Up to the end of its band each axis is as flat as asked. What ends the band, from the response measured at "
-        "the next frequency:"
+        "Within its band each axis meets the tolerance. The band is limited, according to the response measured at "
+        "the next frequency, by:"
     )
     reasons = [
-        f"{axis.axis}, {_band(axis.band_after)}: {axis.limited_by or 'no reason was found'}" for axis in tuning.axes
+        f"{axis.axis}, {_band(axis.band_after)}: {axis.limited_by or 'no cause identified'}" for axis in tuning.axes
     ]
     return [said, bullet_list(reasons)]
 
 
 def _bode(tuning: Tuning) -> list[Markup]:
     how = (
-        "Response of the achieved to the wanted acceleration under white noise on that axis alone, drawn by another "
-        f"seed than the gains were fitted to. The shaded band is ±{tuning.tolerance:g} dB. Phase is shown after "
+        "Response from reference to achieved acceleration under white noise on that axis alone, with another seed "
+        f"than that of the fit. The shaded band is ±{tuning.tolerance:g} dB. Phase is shown after "
         f"removing the common delay of {shown_as(tuning.delay, SCALES['time'])}, and as measured. The dashed line is "
-        "what the linear model without dry friction expects of the settings found; the dotted line ends the "
-        "operational band."
+        "the response of the linear model without dry friction with these settings; the dotted line marks the end of "
+        "the operational band."
     )
     return [paragraph(how), grid(*(bode_figure(tuning, a) for a in range(len(tuning.axes))), pairs=True)]
 
 
 def _steps(tuning: Tuning) -> list[Markup]:
     if not tuning.steps:
-        return [paragraph("No step was recorded.")]
+        return [paragraph("No steps recorded.")]
     rows = [
         (f"{n}. {step.stage}", step.axis, number(step.before), number(step.after), step.reason)
         for n, step in enumerate(tuning.steps, 1)
     ]
     how = (
-        "Feedback first, displacement gain Kx and force feedback KF, on the linear model; then feed-forward of "
-        "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured. The error expected of a fit is "
-        "that of the response to a pure delay, relative, over the band that it is fitted in."
+        "Feedback first, displacement gain Kx and force feedback KF, on the linear model; then feedforward of "
+        "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured. The expected error of a fit is "
+        "the relative deviation of the response from a pure delay over the fitted band."
     )
     return [paragraph(how), table("Decisions, SI", ("Step", "Axis", "Before", "After", "Reason"), rows)]
 

@@ -1,4 +1,4 @@
-"""Sections of a validation report on the machine over all tests: drift, closed loop, oil columns, servovalves."""
+"""Sections of a validation report over all tests: drift, closed loop, oil columns, servovalves."""
 
 from collections.abc import Sequence
 
@@ -18,27 +18,27 @@ def drift_blocks(found: Validation) -> list[Markup]:
     """Return the drift rate of every test's open loop."""
     phases = [p for p in found.phases if p.number == 2 and not p.reason]
     if not phases:
-        return [paragraph(f"Not known: {why_not(found, 2)}.")]
+        return [paragraph(f"Not available: {why_not(found, 2)}.")]
     axes = [a.column for a in phases[0].of("displacement")]
     rows = [
         (p.test, *(number(1e6 * a.drift) for a in p.of("displacement")), f"{number(float(p.time[-1]))} s")
         for p in phases
     ]
     how = (
-        "How fast the model's platen wanders off the measured one: least-squares slope of the displacement's error, "
-        "model less measured. Nothing holds an open loop in place: errors of pressures, spools, flow and leakage add "
-        "up, and a closed loop has no such drift. Rate times duration is about where the model ends, off the test."
+        "Least-squares slope of the displacement error, model less measured. An open loop integrates errors of "
+        "pressures, spools, flow and leakage; a closed loop has no such drift. Rate times duration approximates the "
+        "final displacement error."
     )
     header = ("Test", *(f"{axis} [{'µrad/s' if axis in AXES[3:] else 'µm/s'}]" for axis in axes), "Over")
     worst = [
         _furthest(phases, [k for k, axis in enumerate(axes) if (axis in AXES[3:]) == turns]) for turns in (False, True)
     ]
-    said = paragraph(f"Furthest off: {'; '.join(words for words in worst if words)}.")
+    said = paragraph(f"Largest drift: {'; '.join(words for words in worst if words)}.")
     return [paragraph(how), table("Drift rate", header, rows), said]
 
 
 def _furthest(phases: Sequence[Phase], columns: Sequence[int]) -> str:
-    """Where drift leads in the test and column in which it leads furthest, in words."""
+    """The largest accumulated drift of some columns, as text."""
     ends = [(p, p.of("displacement")[k], float(p.time[-1])) for p in phases for k in columns]
     if not ends:
         return ""
@@ -47,23 +47,23 @@ def _furthest(phases: Sequence[Phase], columns: Sequence[int]) -> str:
     pair = phase.pair("displacement")
     assert pair is not None
     peak = float(np.abs(pair.measured[:, pair.columns.index(one.column)]).max())
-    moved = f"its peak was {shown_as(peak, scale)}" if one.moves else "it hardly moved"
+    moved = f"peak {shown_as(peak, scale)}" if one.moves else "almost at rest"
     off = shown_as(abs(one.drift) * seconds, scale)
-    return f"{one.column} in {phase.test}, where {moved}, by {off} after {number(seconds)} s"
+    return f"{one.column} in {phase.test}, {off} after {number(seconds)} s ({moved})"
 
 
 def lag_blocks(found: Validation) -> list[Markup]:
-    """Return how far test and simulated closed loop are behind what was asked for."""
+    """Return the delays of test and simulated closed loop behind the reference."""
     rows = [
         (p.test, lag.column, *(number(1e3 * value) for value in (lag.measured, lag.model, lag.model - lag.measured)))
         for p in found.phases
         for lag in p.lags
     ]
     if not rows:
-        return [paragraph(f"Not known: {why_not(found, 3)}.")]
+        return [paragraph(f"Not available: {why_not(found, 3)}.")]
     how = (
-        "Delay of the platen's velocity behind that of the reference, of axes that moved. The difference is what "
-        "“delay removed” takes out."
+        "Delay of the platen velocity behind the reference velocity, for axes that moved. “Delay removed” refers to "
+        "the difference of the two."
     )
     header = ("Test", "Axis", "Measured [ms]", "Model [ms]", "Model less measured [ms]")
     return [paragraph(how), table("Delay behind the reference", header, rows)]
@@ -73,7 +73,7 @@ def valve_blocks(found: Validation) -> list[Markup]:
     """Return spools against their commands: delays and transfer functions."""
     valves = found.valves
     if valves is None:
-        return [paragraph("Not known: no test has both spool_command and spool_position.")]
+        return [paragraph("Not available: no test has both spool_command and spool_position.")]
     how = (
         "Delay of each spool behind its command, from the slope of the transfer function's phase over all tests. The "
         "model has a pure delay; a command held over the controller's samples adds half of one (0.244 ms at 2048 Hz), "
@@ -90,7 +90,7 @@ def valve_blocks(found: Validation) -> list[Markup]:
 
 
 def resonance_blocks(found: Validation) -> list[Markup]:
-    """Return the oil columns as tests and model show them."""
+    """Return the oil-column resonances of tests and model."""
     rows = [
         (
             f"{p.test}, {PHASES[p.number]}",
@@ -104,13 +104,13 @@ def resonance_blocks(found: Validation) -> list[Markup]:
         if np.isfinite(r.measured.frequency) and np.isfinite(r.model.frequency)
     ]
     how = (
-        "Where the acceleration of an axis answers its spools most, near the oil column of the linear model (undamped, "
-        "friction sliding), if it is coherent with them and above the noise. Sharpness is half the relative width at "
-        "half the power: a damping ratio, if the length of the test does not limit it. Axes that hardly moved are left "
-        "out, and peaks that only one side shows."
+        "Peak of the response of an axis's acceleration to its spools near the oil column of the linear model "
+        "(undamped, sliding friction), if coherent and above noise. Sharpness: half the relative half-power width, a "
+        "damping ratio unless limited by the length of the test. Axes almost at rest, and peaks found in only one of "
+        "test and model, are omitted."
     )
     if not rows:
-        return [paragraph(how), paragraph("No test shows an oil column.")]
+        return [paragraph(how), paragraph("No oil-column resonance was found.")]
     header = ("Test", "Axis", "Linear model [Hz]", "Measured [Hz]", "Model [Hz]", "Sharpness, measured", "and model")
     return [paragraph(how), table("Oil columns", header, rows)]
 
@@ -119,7 +119,7 @@ def _delays_of(valves: Valves) -> str:
     """Least and greatest delay in words, of the spools whose delay is known nearly as well as the best known."""
     known = np.isfinite(valves.standard_error)
     if not known.any():
-        return "no spool moved enough to tell"
+        return "not determined, too little spool motion"
     sure = valves.delay[known & (valves.standard_error <= 10 * valves.standard_error[known].min())]
     low, high = number(1e3 * float(sure.min())), number(1e3 * float(sure.max()))
     return f"{low} ms" if low == high else f"{low} to {high} ms"

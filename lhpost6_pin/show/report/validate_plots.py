@@ -1,7 +1,6 @@
 """Figures of a validation, in the kind of the report's Figures 6.1 to 6.37: measured and model's, overlaid."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from .charts import Curve, Panel, Plot, XAxis, chart_figure, grid_figure
 from .control_blocks import axis_title
 from .decompose_plots import force_scale
 from .page import Figure, Markup, figure, grid, number
-from .plots import BLUE, GREY, SCALES, Row, Scale, Trace, envelope, palette, time_figure
+from .plots import ACHIEVED, SCALES, TARGET, Row, Scale, Trace, envelope, palette, time_figure
 from .run_components import kinds
 from .run_motion import axis_scale, percent
 
@@ -21,8 +20,6 @@ __all__ = ["actuator_blocks", "force_blocks", "motion_blocks", "scale_of", "spec
 
 Array = NDArray[np.float64]
 
-MEASURED: dict[str, Any] = {"color": GREY, "width": 3.2}
-MODEL: dict[str, Any] = {"color": BLUE, "width": 1.2}
 BUCKETS = 320  # stretches of a channel over time, each drawn by its least and greatest sample
 FEW = 160  # the same where many actuators share a figure
 LOOP = 1600  # points of a loop, evenly spaced: above 60 Hz in a test of half a minute
@@ -41,7 +38,7 @@ _FORCES = {"wrench": "Total actuator force", "struts": "Strut force", "dissipati
 
 
 def scale_of(quantity: str, column: str) -> Scale:
-    """How a compared quantity is shown."""
+    """Display scale of a compared quantity."""
     if quantity in MOTIONS:
         return axis_scale(column, quantity)
     if quantity in _FORCES:
@@ -56,7 +53,7 @@ def force_blocks(phase: Phase, motion: Phase | None, axes: Sequence[str]) -> lis
     """
     rows = [("wrench", "time"), ("wrench", "displacement"), ("wrench", "velocity")]
     rows += [("struts", "displacement"), ("dissipative", "displacement"), ("dissipative", "velocity")]
-    words = "At C in {c}: measured in grey, required by the measured motion in blue."
+    words = "At the centre of the platen's top (C), platen axes; grey: measured, blue: required."
     name = f"forces-{phase.test}"
     return [figure(_grid(name, "Forces by inverse dynamics", words, phase, motion, rows, axes))] if axes else []
 
@@ -75,14 +72,14 @@ def motion_blocks(phase: Phase, axes: Sequence[str]) -> list[Markup]:
             one = next(a for a in phase.of(quantity) if a.column == axis)
             if one.moves:
                 said.append(f"{word.lower()} {percent(one.rrmse_aligned)}")
-        words = f"RRMSE, delay removed: {', '.join(said)}." if said else "Hardly moved."
+        words = f"RRMSE, delay removed: {', '.join(said)}." if said else "Almost at rest."
         drawings.append(
             figure(_over_time(f"motion{phase.number}-{phase.test}-{axis}", axis_title(axis), words, phase, rows))
         )
     blocks = [grid(*drawings, pairs=True)]
     if phase.number == 2 and phase.pair("wrench") is not None:
         loops = [("wrench", "displacement")]
-        words = "At C in {c}, each side against its own displacement: measured in grey, model in blue."
+        words = "At the centre of the platen's top (C), each over its own displacement; grey: measured, blue: model."
         name = f"loops-{phase.test}"
         blocks.append(figure(_grid(name, "Forces against displacement", words, phase, phase, loops, axes)))
     return blocks
@@ -99,9 +96,7 @@ def actuator_blocks(phase: Phase, quantity: str) -> list[Markup]:
         ends = f"{pair.columns[own[0]]} to {pair.columns[own[-1]]}" if len(own) > 1 else pair.columns[own[0]]
         name = f"{quantity}{phase.number}-{phase.test}-{pair.columns[own[0]]}"
         title = f"{_WORDS[quantity]}, {ends}"
-        drawings.append(
-            figure(_over_time(name, title, "Measured in grey, model in blue.", phase, rows, FEW, SMALL_ROW))
-        )
+        drawings.append(figure(_over_time(name, title, "Grey: measured, blue: model.", phase, rows, FEW, SMALL_ROW)))
     return [grid(*drawings, pairs=True)]
 
 
@@ -117,7 +112,7 @@ def spectrum_block(phase: Phase, axes: Sequence[str], edges: Sequence[float]) ->
     for axis in axes:
         k = spectrum.columns.index(axis)
         scale = scale_of(spectrum.quantity, axis)
-        sides = (("measured", spectrum.measured, MEASURED), ("model", spectrum.model, MODEL))
+        sides = (("measured", spectrum.measured, TARGET), ("model", spectrum.model, ACHIEVED))
         curves = [Curve(n, f[inside], scale.factor * np.sqrt(power[inside, k]), line) for n, power, line in sides]
         curves = [
             Curve(c.name, np.asarray(c.x)[np.asarray(c.y) > 0], np.asarray(c.y)[np.asarray(c.y) > 0], c.style)
@@ -128,8 +123,8 @@ def spectrum_block(phase: Phase, axes: Sequence[str], edges: Sequence[float]) ->
             for low, high, ratio in zip(edges[:-1], edges[1:], spectrum.ratio[:, k], strict=True)
             if np.isfinite(ratio)
         )
-        words = f"Model over measured: {ratios}." if ratios else "No band rises out of the noise."
-        words += " The noise of recorded spools shakes the model's oil columns." * (phase.number == 2)
+        words = f"Model over measured: {ratios}." if ratios else "No band exceeds the noise."
+        words += " Noise of the recorded spools excites the oil columns of the model." * (phase.number == 2)
         panel = Panel(f"Spectral density [{scale.unit}/√Hz]", curves, log=True)
         over = XAxis("Frequency [Hz]", log=True, span=SHOWN, ticks=TICKS)
         marks = [expected[axis]] if axis in expected else []
@@ -168,7 +163,7 @@ def _over_time(
 
 
 def _traces(pair: ComparedQuantity, k: int) -> list[Trace]:
-    return [Trace("measured", pair.measured[:, k], MEASURED), Trace("model", pair.model[:, k], MODEL)]
+    return [Trace("measured", pair.measured[:, k], TARGET), Trace("model", pair.model[:, k], ACHIEVED)]
 
 
 # -------------------------------------------------------------------------------------- force against motion
@@ -190,7 +185,7 @@ def _grid(
         word = _FORCES[what] if axis not in AXES[3:] else _FORCES[what].replace("force", "moment")
         unit = "s" if over == "time" else scale_of(over, axis).unit
         curves = []
-        for side, line in (("measured", MEASURED), ("model", MODEL)):
+        for side, line in (("measured", TARGET), ("model", ACHIEVED)):
             x, y = _loop(phase, pairs[what], against.get(over), side, axis, over, own=motion is phase)
             curves.append(Curve(side, x, y, line))
         return Plot(f"{word}, {axis} [{scale_of(what, axis).unit}]", f"{over.capitalize()} [{unit}]", curves)

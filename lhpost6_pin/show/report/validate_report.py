@@ -1,19 +1,17 @@
-"""The report of a validation: how close the model is in three phases, test by test and axis by axis."""
+"""The report of a validation: agreement of model and measurement in three phases, by test and axis."""
 
 from pathlib import Path
 
-import numpy as np
-
 from ...identification.validation import PHASES, Validation
-from .control_blocks import load_of
-from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page, table, versions
+from .control_blocks import assumed_in, load_of, numbers_used
+from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page
 from .run_motion import percent
 from .validate_machine import drift_blocks, lag_blocks, resonance_blocks, valve_blocks
 from .validate_sections import ROMAN, named, summary_blocks, test_blocks, why_not, worst_of
 
 __all__ = ["write_validate_report"]
 
-FOLLOWED = 0.10  # judgement, not physics: RRMSE, delay removed, up to which the model counts as following a test
+FOLLOWED = 0.10  # judgement, not physics: RRMSE, delay removed, up to which the model counts as valid for a test
 
 
 def write_validate_report(found: Validation, path: Path | str, *, command: str = "") -> Path:
@@ -40,20 +38,19 @@ def write_validate_report(found: Validation, path: Path | str, *, command: str =
             Section("assumptions", "Assumptions and sources", _assumptions(found)),
         ],
         notes=_notes(found),
-        command=command or None,
-        versions=versions(),
+        command=command,
     )
     return save_page(page, path)
 
 
 def _machine_sections(found: Validation) -> list[Section]:
-    """Sections on all tests together, as far as their phases were asked for."""
+    """Sections on all tests together, for the requested phases."""
     done = _done(found)
     sections = []
     if 2 in done:
         sections.append(Section("drift", "Drift of the open loop", drift_blocks(found)))
     if 3 in done:
-        sections.append(Section("lag", "Closed loop behind its reference", lag_blocks(found)))
+        sections.append(Section("lag", "Delay of the closed loop", lag_blocks(found)))
     if 2 in done or 3 in done:
         sections.append(Section("resonance", "Oil columns", resonance_blocks(found)))
         sections.append(Section("valves", "Servovalves", valve_blocks(found)))
@@ -75,16 +72,16 @@ def _judge(found: Validation) -> tuple[str, Level]:
             continue
         phase, one = worst
         where = f"{phase.test}, {one.column}, {named(one.quantity)}"
-        words = f"{PHASES[n].capitalize()}: RRMSE at worst {percent(one.rrmse_aligned)} ({where})"
+        words = f"{PHASES[n].capitalize()}: largest RRMSE {percent(one.rrmse_aligned)} ({where})"
         spread = found.residual_over_noise if n == 1 else None
         residual = f"; residual {number(spread[0], 2)} to {number(spread[1], 2)} times the noise" if spread else ""
         sentences.append(f"{words}{residual}.")
         level = level if one.rrmse_aligned <= FOLLOWED else "attention"
     if any("settings may differ" in words for p in found.phases for words in p.notes):
-        sentences.append("The controller's settings are not known to be those of the tests.")
+        sentences.append("The controller settings of the tests are unknown.")
     stopped = [p.test for p in found.phases if any("stopped at" in words for words in (*p.notes, p.reason or ""))]
     if stopped:
-        sentences.append(f"A simulation stopped on the way in {', '.join(dict.fromkeys(stopped))}; see the notes.")
+        sentences.append(f"A simulation stopped early in {', '.join(dict.fromkeys(stopped))}; see the notes.")
         level = "bad"
     return " ".join(sentences), level
 
@@ -93,15 +90,15 @@ def _headline(found: Validation, n: int) -> Headline:
     label = f"Phase {ROMAN[n]}, {PHASES[n]}: worst RRMSE, delay removed"
     worst = worst_of(found, n)
     if worst is None:
-        return Headline("–", label, "nothing to judge")
+        return Headline("–", label, "not judged")
     phase, one = worst
-    note = f"{phase.test}, axis {one.column}, {named(one.quantity)}; {percent(one.rrmse)} with its delay; "
+    note = f"{phase.test}, axis {one.column}, {named(one.quantity)}; {percent(one.rrmse)} including delay; "
     note += f"{number(one.error_to_noise, 2)} × noise"
     return Headline(percent(one.rrmse_aligned), label, note, "good" if one.rrmse_aligned <= FOLLOWED else "attention")
 
 
 def _notes(found: Validation) -> list[str]:
-    """What a phase lacks, and what happened on the way; tests of which the same is said together."""
+    """Missing phases and events; tests with the same note share it."""
     said: dict[str, list[str]] = {}
     for phase in found.phases:
         if phase.reason:
@@ -116,25 +113,21 @@ def _notes(found: Validation) -> list[str]:
 
 
 def _assumptions(found: Validation) -> list[Markup]:
-    machine, sensors, band = found.machine, found.sensors, found.numbers.band
-    doubt = sum(q.assumed for q in machine.parameters.values())
+    sensors, band = found.sensors, found.numbers.band
     guessed = sum(q.assumed for q in sensors.parameters.values())
     made = [p.notes for p in found.phases if p.number == 1 and not p.reason]
-    items = [
+    lines = [
         *dict.fromkeys(words for notes in made for words in notes),
-        f"Everything compared went through one zero-phase low-pass, gain one half at {band.high:g} Hz, order "
-        f"{band.order}; {found.numbers.edge:g} s at each end are left out. Spectra are not low-passed any further.",
-        "An open loop starts in the control zero-position with the record's first pressures; friction starts at rest.",
-        f"Noise is what adding the noise of “{sensors.name}” to a record once more changes; {guessed} of its "
+        f"All compared signals are low-passed by one zero-phase filter (gain 1/2 at {band.high:g} Hz, order "
+        f"{band.order}); {found.numbers.edge:g} s at each end are omitted. Spectra are not filtered.",
+        "Open-loop runs start in the control zero-position with the first recorded pressures and with friction at "
+        "rest.",
+        f"Noise is the change caused by adding the noise of “{sensors.name}” to a record once more; {guessed} of its "
         f"{len(sensors.parameters)} numbers are assumed. Gains and offsets of sensors are not corrected.",
         *(
-            f"Skew taken out of {group}: {1e3 * d.delay:+.3f} ± {1e3 * d.standard_error:.3f} ms behind {d.reference}."
+            f"Skew removed from {group}: {1e3 * d.delay:+.3f} ± {1e3 * d.standard_error:.3f} ms behind {d.reference}."
             for group, d in found.skews.items()
         ),
-        f"{doubt} of the {len(machine.parameters)} numbers of {machine.name} are assumed; “lhpost6 info” lists them.",
+        assumed_in(found.machine),
     ]
-    rows = []
-    for path, q in found.numbers.stated.items():
-        values = ", ".join(f"{v:g}" for v in np.atleast_1d(q.value))
-        rows.append((path, f"{values}{f' {q.unit}' if q.unit != '1' else ''}", q.evidence, q.source))
-    return [bullet_list(items), table("Numbers used", ("Number", "Value", "Evidence", "Source"), rows)]
+    return [bullet_list(lines), numbers_used(found.numbers.stated)]

@@ -23,7 +23,7 @@ ROMAN = {1: "I", 2: "II", 3: "III"}
 SUMMED = {1: ("wrench",), 2: ("displacement", "acceleration", "wrench"), 3: ("displacement", "acceleration")}
 """Quantities of each phase that the summary shows."""
 
-NOISE = 2.0  # judgement: times the noise, up to which an error of an axis that hardly moves is unremarkable
+NOISE = 2.0  # judgement: times the noise, up to which an error of an axis almost at rest is insignificant
 SENSED = 3.0  # judgement: standard deviations of the sensors' calibration that a mean error may reach
 ACTUATORS = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
 _NAMES = {
@@ -40,22 +40,22 @@ _SHADES = (0.01, 0.03, 0.10, 0.30, np.inf)
 
 
 def named(quantity: str) -> str:
-    """A quantity in words."""
+    """Name of a quantity for display."""
     return _NAMES.get(quantity, quantity)
 
 
 def worst_of(found: Validation, phase: int) -> tuple[Phase, ColumnAgreement] | None:
-    """The worst of what the summary shows of a phase, among axes that moved; None if there is nothing."""
+    """The largest error in the summary of a phase, among axes that moved; None without any."""
     rows = ((p, a) for p in found.phases if p.number == phase for a in _judged(p))
     return max(rows, key=lambda row: row[1].rrmse_aligned, default=None)
 
 
 def why_not(found: Validation, phase: int) -> str:
-    """Why there is nothing of a phase to judge, in words."""
+    """Why a phase is not judged, as text."""
     reasons = {p.reason for p in found.phases if p.number == phase and p.reason}
     if len(reasons) == 1:
-        return f"not done, since {reasons.pop()}"
-    return "not done, see the notes" if reasons else "no axis moved enough to be judged"
+        return f"omitted: {reasons.pop()}"
+    return "omitted, see the notes" if reasons else "no axis moved enough"
 
 
 def _judged(phase: Phase) -> list[ColumnAgreement]:
@@ -68,10 +68,10 @@ def summary_blocks(found: Validation) -> list[Markup]:
     tops = [f"up to {100 * top:g} %" for top in _SHADES[:-1]] + [f"above {100 * _SHADES[-2]:g} %"]
     key = " ".join(shaded(words, k) for k, words in enumerate(tops))
     how = (
-        "RRMSE = √(Σ error² ∕ Σ measured²), delay removed; forces less their means, which are compared below. ▲ marks "
-        "the worst of each phase. An axis that hardly moves has no percentage: its error stands as a multiple of what "
-        f"the sensors' noise alone would leave, marked ! above {NOISE:g}, without gains and offsets of sensors. Errors "
-        "of a displacement come from gains and drift, not from noise: they stand by themselves."
+        "RRMSE = √(Σ error² ∕ Σ measured²), delay removed; forces with their means removed (compared below). ▲ marks "
+        "the largest of each phase. For an axis almost at rest the error is given as a multiple of that expected from "
+        f"sensor noise, marked ! above {NOISE:g}, without gains and offsets of sensors; for its displacement, where "
+        "gains and drift dominate, in absolute terms."
     )
     axes = [axis for axis in AXES if any(a.column == axis for p in found.phases for a in p.agreement)]
     rows = []
@@ -91,14 +91,12 @@ def summary_blocks(found: Validation) -> list[Markup]:
 
 
 def _spool_blocks(found: Validation) -> list[Markup]:
-    """Return how close the spool commands of the closed loop are, by their worst actuator."""
+    """Return the largest RRMSE of the spool commands of the closed loop."""
     rows = [(p.test, a) for p in found.phases for a in p.of("spool_command") if a.moves]
     if not rows:
         return []
     test, worst = max(rows, key=lambda row: row[1].rrmse_aligned)
-    words = (
-        f"Spool commands of the closed loop: RRMSE at worst {percent(worst.rrmse_aligned)} ({test}, {worst.column})."
-    )
+    words = f"Spool commands of the closed loop: largest RRMSE {percent(worst.rrmse_aligned)} ({test}, {worst.column})."
     return [paragraph(words)]
 
 
@@ -113,10 +111,10 @@ def _noise_blocks(found: Validation) -> list[Markup]:
         rows.append((p.test, *(f"{'! ' * (not 1 / NOISE < r < NOISE)}{number(r, 3)}" for r in ratios)))
     rows.append(("noise predicted", *(_span(same) for same in zip(*(p.of("wrench") for p in phases), strict=True))))
     how = (
-        "Residual of inverse dynamics, required less measured actuator force less its mean, delay removed, over what "
-        f"the sensors' noise is predicted to leave in it. One is noise and nothing else; ! marks more than {NOISE:g} "
-        f"(the model lacks something) and less than {1 / NOISE:g} (the record has less noise than is stated). The last "
-        "row is that noise itself, one standard deviation. Gains of sensors add to the residual in axes that move."
+        "Residual of inverse dynamics (required less measured actuator force, mean and delay removed) over its "
+        f"predicted sensor noise. 1 is noise alone; ! marks more than {NOISE:g} (incomplete model) and less than "
+        f"{1 / NOISE:g} (stated noise too large). The last row is that noise, one standard deviation. Gain errors of "
+        "sensors add to the residual of moving axes."
     )
     header = ("Test", *(a.column for a in phases[0].of("wrench")))
     return [paragraph(how), table("Residual of inverse dynamics over the noise predicted", header, rows)]
@@ -130,7 +128,7 @@ def _span(tests: Sequence[ColumnAgreement]) -> str:
 
 
 def _mean_blocks(found: Validation) -> list[Markup]:
-    """Return the mean error of the total actuator force by inverse dynamics, against what calibration may leave."""
+    """Return the mean error of the total actuator force by inverse dynamics, against calibration uncertainty."""
     phases = [p for p in found.phases if p.number == 1 and not p.reason]
     if not phases:
         return []
@@ -138,9 +136,9 @@ def _mean_blocks(found: Validation) -> list[Markup]:
     rows = [(p.test, *(_mean_cell(a) for a in p.of("wrench"))) for p in phases]
     due = ("calibration, one sd", *(number(a.offset_expected * scale_of("wrench", a.column).factor, 2) for a in first))
     how = (
-        "Mean of required less measured force by inverse dynamics. The last row is what gains and offsets of the "
-        f"force sensors leave in it, one standard deviation; ! marks more than {SENSED:g} of them: a weight, a "
-        "pressure or a sensor is off."
+        "Mean of required less measured force by inverse dynamics. The last row is its uncertainty from gains and "
+        f"offsets of the force sensors, one standard deviation; ! marks more than {SENSED:g} of them: a weight, a "
+        "pressure or a sensor is wrong."
     )
     header = ("Test", *(f"{a.column} [{scale_of('wrench', a.column).unit}]" for a in first))
     return [paragraph(how), table("Mean error of the total actuator force", header, [*rows, due])]
@@ -158,20 +156,20 @@ def _cell(one: ColumnAgreement, worst: bool) -> Markup:
     if one.quantity == "displacement":
         return text(f"{number(1e6 * one.error, 2)}\N{NO-BREAK SPACE}{'µrad' if one.column in AXES[3:] else 'µm'}")
     if not np.isfinite(one.error_to_noise):
-        return text("hardly moves")
+        return text("almost at rest")
     return text(f"{'! ' * (one.error_to_noise > NOISE)}{number(one.error_to_noise, 2)} × noise")
 
 
 # ---------------------------------------------------------------------------------------------- test by test
 def test_blocks(found: Validation, test: str) -> list[Markup]:
-    """Return every phase of a test, folded away: numbers, figures, spectra."""
+    """Return every phase of a test, collapsed: numbers, figures, spectra."""
     blocks = []
     phases = [p for p in found.phases if p.test == test]
     motion = next((p for p in phases if p.pair("displacement")), None)
     for phase in phases:
         title = f"Phase {ROMAN[phase.number]}: {PHASES[phase.number]}"
         if phase.reason:
-            blocks.append(paragraph(Markup(f"<strong>{title}</strong>"), f" was not done: {phase.reason}."))
+            blocks.append(paragraph(Markup(f"<strong>{title}</strong>"), f" omitted: {phase.reason}."))
             continue
         axes = _shown_axes(motion or phase)
         figures = force_blocks(phase, motion, axes) if phase.number == 1 else motion_blocks(phase, axes)
@@ -193,7 +191,7 @@ def _shown_axes(phase: Phase) -> list[str]:
 def _short(phase: Phase) -> str:
     worst = max(_judged(phase), key=lambda a: a.rrmse_aligned, default=None)
     if worst is None:
-        return ", hardly moved"
+        return ", almost at rest"
     return f", worst RRMSE {percent(worst.rrmse_aligned)} ({worst.column}, {named(worst.quantity)})"
 
 
@@ -210,8 +208,8 @@ def _metrics(phase: Phase) -> Markup:
         rows.append((f"{named(a.quantity)}, {a.column}", *ratios, *errors))
     heads = (*header, "÷ noise", "Mean error")
     how = (
-        "Delay: of the model behind the measurement. Correlation and RMS error: delay removed. A dash: hardly moves. "
-        "With and without the delay: metrics.json."
+        "Delay: of the model behind the measurement. Correlation and RMS error: delay removed. A dash: almost at rest. "
+        "Values with and without delay: metrics.json."
     )
     numbers = table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows)
     return details("All numbers", paragraph(how), numbers)

@@ -116,7 +116,7 @@ def record_frames(
     if "reference_displacement" in record:
         ghosts.append(Ghost("reference", "reference", time, record["reference_displacement"].values))
     if len(others) > len(OTHERS):
-        raise ParameterError(f"{len(others)} records over another cannot be told apart; give at most {len(OTHERS)}")
+        raise ParameterError(f"{len(others)} records over another are not distinguishable; give at most {len(OTHERS)}")
     for name, other in zip(OTHERS, others, strict=False):
         label = f"{record_title(other)}, {other.attrs.get('kind', 'record')}"
         ghosts.append(Ghost(name, label, other["time"].values, _motion(machine, other)))

@@ -6,7 +6,7 @@ import pytest
 from lhpost6_pin.core.errors import OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.capacity import actuator_speeds, capacity_table, make_leg_check
+from lhpost6_pin.mechanics.capacity import actuator_speeds, capacity_table, make_actuator_check
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
 from lhpost6_pin.mechanics.plant import make_plant
@@ -105,7 +105,7 @@ def test_linear_plant_predicts_the_first_milliseconds(plant):
     assert run.v[-1] == pytest.approx(x[6:12], abs=2e-3 * np.abs(x[6:12]).max())  # second order in the step
 
 
-def test_leg_check_finds_what_the_valves_cannot_feed(plant):
+def test_actuator_check_finds_what_the_valves_cannot_feed(plant):
     """SXH1 asks 2.80 m/s of a table that gives 2.74 and keeps a reserve: refused, with the scale that fits."""
     both = make_plant(load_machine().with_params({"horizontal.valves": 2}))
     target = make_target(find_motion("sxh1"), rate=float(SAMPLE_RATE))
@@ -115,8 +115,8 @@ def test_leg_check_finds_what_the_valves_cannot_feed(plant):
         target_within_limits(plant, target)  # one valve
 
 
-def test_leg_check_shares_are_rates_over_speeds(plant):
-    check = make_leg_check(plant)
+def test_actuator_check_shares_are_rates_over_speeds(plant):
+    check = make_actuator_check(plant)
     velocity = np.zeros((2, 6))
     velocity[0, 2], velocity[1, 2] = 0.1, -0.1
     share, names, stroke = check(np.zeros((2, 6)), velocity)

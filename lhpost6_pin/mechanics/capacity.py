@@ -16,7 +16,7 @@ from .plant import Plant, make_plant
 from .pose import leg_displacements
 from .rigid_body import platen_inertia
 
-__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "actuator_speeds", "make_leg_check"]
+__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "actuator_speeds", "make_actuator_check"]
 
 Array = NDArray[np.float64]
 ActuatorCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
@@ -53,7 +53,7 @@ def actuator_speeds(plant: Plant) -> Array:
     return speeds
 
 
-def make_leg_check(plant: Plant) -> ActuatorCheck:
+def make_actuator_check(plant: Plant) -> ActuatorCheck:
     """Return a check of strokes and valve flow: (displacement, velocity) (n, 6) to shares used, (n, n_actuators).
 
     The returned function gives (speed over what the valves can feed, actuator names, elongation over stroke). Valves

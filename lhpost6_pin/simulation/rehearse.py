@@ -17,7 +17,7 @@ from ..core.names import AXES, SAMPLE_RATE
 from ..data.records import require
 from ..data.signals import resample_band_limited
 from ..machine.machine import Machine
-from ..mechanics.capacity import make_leg_check
+from ..mechanics.capacity import make_actuator_check
 from ..mechanics.equilibrium import find_equilibrium
 from ..mechanics.plant import Plant, State, make_plant
 from ..mechanics.pose import PlatenMotion
@@ -55,7 +55,7 @@ def target_within_limits(plant: Plant, target: Target) -> LimitsSummary:
         return np.array([values[k] if k in axes else math.inf for k in range(6)])
 
     bounds = MotionLimits(six(limits.displacement), six(limits.velocity), six(limits.acceleration))
-    return check_limits(target, bounds, make_leg_check(plant))
+    return check_limits(target, bounds, make_actuator_check(plant))
 
 
 def rehearse(

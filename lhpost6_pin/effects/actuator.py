@@ -17,7 +17,7 @@ from ..laws.hydraulic import (
     valve_flows,
 )
 from ..laws.lines import line_step
-from .dispatch import view_hydraulic
+from .views import view_hydraulic
 
 __all__ = ["advance_actuator", "advance_line", "advance_modified", "fill_rates", "oil_power", "pressures_of"]
 __all__ += ["rod_travels", "start_line", "supplied", "valve_pressure"]
@@ -36,8 +36,9 @@ def valve_pressure(row, z, high):
 
 
 @compiled_inline
-def supplied(row, p, modified, spool, pressure_a, pressure_b, high, low, z):
+def supplied(row, modified, spool, pressure_a, pressure_b, high, low, z):
     """Flows from the valve into the chambers and their slopes (`hydraulic.valve_flows`), behind its lines if any."""
+    p = view_hydraulic(row.numbers)
     if modified and p.line_time > 0.0:
         return z[row.line_state], z[row.line_state + 2], 0.0, 0.0
     if modified:
@@ -46,14 +47,18 @@ def supplied(row, p, modified, spool, pressure_a, pressure_b, high, low, z):
 
 
 @compiled_inline
-def advance_actuator(row, modified, s, ds, dt, spool, high, low, z):
-    """Advance a row's pressures, and its lines by half a step before it and half a step behind it."""
+def advance_actuator(row, modified, s, ds, dt, spool, supply, z):
+    """Advance a row's pressures, and its lines by half a step before it and half a step behind it.
+
+    supply holds the supply and return pressure [Pa].
+    """
+    high, low = supply
     p, x = view_hydraulic(row.numbers), spool[row.spool]
     pressure_a, pressure_b = pressures_of(row, p, z)
     if modified:
         advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * dt, z)
-    valve = supplied(row, p, modified, x, pressure_a, pressure_b, high, low, z)
-    after_a, after_b = step_pressures(p, modified, valve, pressure_a, pressure_b, low, s[row.port], ds[row.port], dt)
+    valve = supplied(row, modified, x, pressure_a, pressure_b, high, low, z)
+    after_a, after_b = step_pressures(p, modified, valve, (pressure_a, pressure_b), low, s[row.port], ds[row.port], dt)
     z[row.state] = after_a
     if p.area_b > 0.0:
         z[row.state + 1] = after_b
@@ -62,9 +67,9 @@ def advance_actuator(row, modified, s, ds, dt, spool, high, low, z):
 
 
 @compiled
-def advance_modified(row, s, ds, dt, spool, high, low, z):
+def advance_modified(row, s, ds, dt, spool, supply, z):
     """`advance_actuator` with all that modifiers add."""
-    advance_actuator(row, True, s, ds, dt, spool, high, low, z)
+    advance_actuator(row, True, s, ds, dt, spool, supply, z)
 
 
 @compiled
@@ -72,7 +77,7 @@ def fill_rates(row, s, sd, spool, high, low, z, zd):
     """Fill the rates of a row's pressures and lines."""
     p, x = view_hydraulic(row.numbers), spool[row.spool]
     pressure_a, pressure_b = pressures_of(row, p, z)
-    valve = supplied(row, p, True, x, pressure_a, pressure_b, high, low, z)
+    valve = supplied(row, True, x, pressure_a, pressure_b, high, low, z)
     rate_a, rate_b = pressure_rates(p, True, valve, pressure_a, pressure_b, low, s[row.port], sd[row.port])
     zd[row.state] = rate_a
     if p.area_b > 0.0:
@@ -133,7 +138,7 @@ def oil_power(row, s, z, spool, high, low):
     """Inflow through the valve and power lost in leaks [W], and energy stored [J], of one row at coordinate s."""
     p = view_hydraulic(row.numbers)
     pressure_a, pressure_b = pressures_of(row, p, z)
-    flow_a, flow_b, _, _ = supplied(row, p, True, spool, pressure_a, pressure_b, high, low, z)
+    flow_a, flow_b, _, _ = supplied(row, True, spool, pressure_a, pressure_b, high, low, z)
     across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
     h_a, h_b = oil_enthalpy(p, pressure_a), oil_enthalpy(p, pressure_b)
     lost = (h_a - h_b) * across + h_a * out_a + h_b * out_b

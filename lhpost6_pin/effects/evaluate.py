@@ -11,7 +11,8 @@ and third port [N or N m], port_force (n_ports,) their sum per port.
 from ..core.compiled import compiled, compiled_inline
 from ..laws.supply import varies
 from .actuator import advance_actuator, advance_modified, fill_rates
-from .dispatch import HYDRAULIC, INLINED, advance_called, advance_inlined, apply_forces, rates
+from .dispatch import advance_called, advance_inlined, apply_forces, rates
+from .views import HYDRAULIC, INLINED
 from .supply import close_supply, open_supply, supply_pressures, supply_rates
 
 __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
@@ -40,7 +41,7 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
     before = (0.0, 0.0, 0.0, 0.0)
     if varies(supply):
         before = open_supply(rows, spool, supply, dt, z)
-    high, low = supply_pressures(supply, z)
+    pressures = supply_pressures(supply, z)
     for i in range(rows.size):
         row = rows[i]
         if row.state < 0:
@@ -50,9 +51,9 @@ def advance_states(rows, s, ds, dt, spool, supply, z):
         elif row.law != HYDRAULIC:
             advance_inlined(row, s, ds, dt, z)
         elif row.modified == 0:
-            advance_actuator(row, False, s, ds, dt, spool, high, low, z)
+            advance_actuator(row, False, s, ds, dt, spool, pressures, z)
         else:
-            advance_modified(row, s, ds, dt, spool, high, low, z)
+            advance_modified(row, s, ds, dt, spool, pressures, z)
     if varies(supply):
         close_supply(rows, spool, supply, dt, before, z)
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..laws import gas_heat, gas_leak
-from .dispatch import CODES
+from .views import CODES
 from .registry import parameters_of
 
 __all__ = ["log_ratio"]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..laws.contract import Law, parameter_sizes
-from .dispatch import CODES, HYDRAULIC, LAWS, MOST_NUMBERS
+from .views import CODES, HYDRAULIC, LAWS, MOST_NUMBERS
 
 __all__ = ["LAWS", "PORTS", "ROW", "actuator_rows", "columns_of", "law_of", "parameters_of"]
 __all__ += ["shapes_of", "states_of"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import UnknownNameError
 from ..laws.contract import Law
-from .dispatch import CODES
+from .views import CODES
 from .effect import Effect
 from .modifiers import modify_rows
 from .registry import LAWS, PORTS, ROW, parameters_of

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import compiled
 from ..effects.actuator import advance_line, start_line, supplied
-from ..effects.dispatch import view_hydraulic
+from ..effects.views import view_hydraulic
 from ..effects.supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
 from ..laws.hydraulic import leak_flows, oil_modulus, rod_travel, rod_velocity
 from ..laws.supply import varies
@@ -84,7 +84,7 @@ def _flow_misses(k, row, oil, supply, rod, z, flow):
         start_line(row, x, pressure_a, pressure_b, high, low, z)
     else:
         advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)
-    flow_a, flow_b, _, _ = supplied(row, p, True, x, pressure_a, pressure_b, high, low, z)
+    flow_a, flow_b, _, _ = supplied(row, True, x, pressure_a, pressure_b, high, low, z)
     across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
     at += rod_travel(p, True, pressure_a, pressure_b)
     speed += rod_velocity(p, True, pressure_a, pressure_b, rate_a, rate_b)

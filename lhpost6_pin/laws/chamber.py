@@ -28,6 +28,10 @@ __all__ = [
 ]
 
 
+Pair = tuple[float, float]
+"""Of chambers A and B."""
+
+
 class DeadVolume(NamedTuple):
     """Parameters of a volume that adds to the chambers'."""
 
@@ -70,31 +74,20 @@ def side_shares(side: float) -> tuple[float, float]:
 
 @compiled_inline
 def pressure_rises(
-    flow_a: float,
-    flow_b: float,
-    slope_a: float,
-    slope_b: float,
-    across: float,
-    stroke: float,
-    dt: float,
-    area_a: float,
-    area_b: float,
-    rise_per_oil_a: float,
-    rise_per_oil_b: float,
-) -> tuple[float, float]:
+    flow: Pair, slope: Pair, across: float, stroke: float, dt: float, area: Pair, rise_per_oil: Pair
+) -> Pair:
     """Rises of both pressures over one linearly implicit step [Pa].
 
-    Flows into the chambers [m3/s] at the step's start; slope_* [m3/s/Pa] theirs with their own pressure, but for the
-    leak across the piston, whose slope is `across`; rise_per_oil_* [Pa/m3] at mid-step, zero for a chamber not there.
+    flow into the chambers [m3/s] at the step's start; slope [m3/s/Pa] theirs with their own pressure, but for the leak
+    across the piston, whose slope is `across`; rise_per_oil [Pa/m3] at mid-step, zero for a chamber not there.
     """
-    rise_a = rise_per_oil_a * (dt * flow_a - area_a * stroke)
-    rise_b = rise_per_oil_b * (dt * flow_b + area_b * stroke)
-    half_a = 0.5 * dt * rise_per_oil_a
-    half_b = 0.5 * dt * rise_per_oil_b
+    rise_a = rise_per_oil[0] * (dt * flow[0] - area[0] * stroke)
+    rise_b = rise_per_oil[1] * (dt * flow[1] + area[1] * stroke)
+    half_a, half_b = 0.5 * dt * rise_per_oil[0], 0.5 * dt * rise_per_oil[1]
     # (I - dt/2 J) rise = dt rate, J = d(rates)/d(pressures)
-    m_aa = 1.0 - half_a * (slope_a - across)
+    m_aa = 1.0 - half_a * (slope[0] - across)
     m_ab = -half_a * across
     m_ba = -half_b * across
-    m_bb = 1.0 - half_b * (slope_b - across)
+    m_bb = 1.0 - half_b * (slope[1] - across)
     scale = 1.0 / (m_aa * m_bb - m_ab * m_ba)
     return scale * (m_bb * rise_a - m_ab * rise_b), scale * (m_aa * rise_b - m_ba * rise_a)

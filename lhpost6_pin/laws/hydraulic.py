@@ -213,8 +213,8 @@ def _shared(p, pressure_a, pressure_b, change_a, change_b, fall_a, fall_b):
 
 
 @compiled_inline
-def step_pressures(p, modified, valve, pressure_a, pressure_b, low, at, stroke, dt):
-    """Pressures of chambers A and B one step on [Pa], while the piston moves by `stroke` from `at` [m].
+def step_pressures(p, modified, valve, chambers, low, at, stroke, dt):
+    """Pressures of chambers A and B one step on from `chambers` [Pa], while the piston moves by `stroke` from `at` [m].
 
     valve holds the flows from the valve into A and B at the step's start and their slopes. Linearly implicit midpoint
     (one-stage Rosenbrock, order 2, A-stable for a linear orifice) on Eq. 4-5, with chamber lengths at mid-step; on the
@@ -224,9 +224,10 @@ def step_pressures(p, modified, valve, pressure_a, pressure_b, low, at, stroke, 
     their rise.
     """
     flow_a, flow_b, slope_a, slope_b = valve
+    pressure_a, pressure_b = chambers
     across, cross, out_a, out_b, steep_a, steep_b = leak_flows(p, modified, pressure_a, pressure_b, low)
     flow_a, flow_b = flow_a - across - out_a, flow_b + across - out_b
-    slope_a, slope_b = slope_a - steep_a, slope_b - steep_b
+    slopes, areas = (slope_a - steep_a, slope_b - steep_b), (p.area_a, p.area_b)
     middle = at + 0.5 * stroke
     passes = 2 if modified and (p.air != 0.0 or p.voids != 0.0 or p.play != 0.0) else 1
     rise_a = rise_b = 0.0
@@ -235,15 +236,13 @@ def step_pressures(p, modified, valve, pressure_a, pressure_b, low, at, stroke, 
         bulk_a, left_a = oil_modulus(p, modified, half_a)
         bulk_b, left_b = oil_modulus(p, modified, half_b)
         rod = middle + rod_travel(p, modified, half_a, half_b)
-        per_oil_a = left_a * bulk_a / (p.area_a * (p.chamber_a + rod))
-        per_oil_b = left_b * bulk_b / (p.area_b * (p.chamber_b - rod)) if p.area_b > 0.0 else 0.0
-        rise_a, rise_b = pressure_rises(
-            flow_a, flow_b, slope_a, slope_b, cross, stroke, dt, p.area_a, p.area_b, per_oil_a, per_oil_b
+        per_oil = (
+            left_a * bulk_a / (p.area_a * (p.chamber_a + rod)),
+            left_b * bulk_b / (p.area_b * (p.chamber_b - rod)) if p.area_b > 0.0 else 0.0,
         )
+        rise_a, rise_b = pressure_rises((flow_a, flow_b), slopes, cross, stroke, dt, areas, per_oil)
         if modified and p.play != 0.0:
-            fall_a, fall_b = pressure_rises(
-                0.0, 0.0, slope_a, slope_b, cross, -1.0, dt, p.area_a, p.area_b, per_oil_a, per_oil_b
-            )
+            fall_a, fall_b = pressure_rises((0.0, 0.0), slopes, cross, -1.0, dt, areas, per_oil)
             ahead = _shared(p, half_a, half_b, rise_a, rise_b, fall_a, fall_b)
             rise_a, rise_b = rise_a - ahead * fall_a, rise_b - ahead * fall_b
     return pressure_a + rise_a, pressure_b + rise_b

@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 
 from ..core.compiled import compiled
 from ..effects.actuator import oil_power
-from ..effects.dispatch import HYDRAULIC, LAWS, power
+from ..effects.dispatch import power
+from ..effects.views import HYDRAULIC, LAWS
 from ..effects.supply import supply_pressures
 from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
 from .ledger import history_of, number_of
@@ -110,7 +111,7 @@ def energy_audit(run: Run) -> Audit:
     created = np.zeros((n, len(CREATED)))
     spool = np.ascontiguousarray(run.spool)  # over the interval after each sample; before it, that of the last one
     before = np.concatenate([spool[:1], spool[:-1]])
-    _powers(*history_of(run), spool, before, flows, created)
+    _powers(*history_of(run), (before, spool), flows, created)
     inflow, inflow_before, dissipated, delivered, stored = np.moveaxis(flows, 2, 0)
     dt = 1.0 / run.rate
     entries, powers, energies = [], [], []
@@ -160,12 +161,13 @@ def row_power(row, s, z, work, spool, supply):
 
 
 @compiled
-def _powers(q, v, z, tables, ws, spool, spool_before, flows, created):
+def _powers(q, v, z, tables, ws, spools, flows, created):
     """Fill flows (n, n_effects, 5) and created (n, 3), in the order of CREATED [W].
 
-    Flows: inflow just after and just before the sample, dissipated, delivered [W], stored [J].
+    spools holds those just before and just after each sample. Flows: inflow after and before it, dissipated, delivered [W], stored [J].
     """
     port, force, rows, JB = ws.port, ws.force, tables.rows, ws.JB
+    spool_before, spool = spools
     s, sd = port[S], port[SD]
     for k in range(q.shape[0]):
         ws.motion[V_SEEN] = v[k]

@@ -20,7 +20,7 @@ from lhpost6_pin.laws.contract import Law, parameter_sizes
 FOLDER = Path(__file__).parents[1] / "lhpost6_pin" / "effects"
 PORTS = ("port", "port_2", "port_3")
 
-VIEWS = '''"""Laws by name and code, and a row's numbers as the parameters of its law: by `scripts/generate_dispatch.py`.
+VIEWS = '''"""Laws by name and code, a row's numbers as the parameters of its law; by `scripts/generate_dispatch.py`.
 
 A row's code says its law, its numbers are the law's parameters in order.
 """

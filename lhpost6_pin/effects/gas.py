@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..laws import gas_heat, gas_leak
-from .views import CODES
 from .registry import parameters_of
+from .views import CODES
 
 __all__ = ["log_ratio"]
 

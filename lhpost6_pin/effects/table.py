@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..core.errors import UnknownNameError
 from ..laws.contract import Law
-from .views import CODES
 from .effect import Effect
 from .modifiers import modify_rows
 from .registry import LAWS, PORTS, ROW, parameters_of
+from .views import CODES
 
 __all__ = ["effect_table", "state_names"]
 

@@ -1,4 +1,4 @@
-"""Laws by name and code, and a row's numbers as the parameters of its law: by `scripts/generate_dispatch.py`.
+"""Laws by name and code, a row's numbers as the parameters of its law; by `scripts/generate_dispatch.py`.
 
 A row's code says its law, its numbers are the law's parameters in order.
 """

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..core.compiled import compiled
 from ..effects.actuator import advance_line, start_line, supplied
-from ..effects.views import view_hydraulic
 from ..effects.supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
+from ..effects.views import view_hydraulic
 from ..laws.hydraulic import leak_flows, oil_modulus, rod_travel, rod_velocity
 from ..laws.supply import varies
 

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 from ..core.compiled import compiled
 from ..effects.actuator import oil_power
 from ..effects.dispatch import power
-from ..effects.views import HYDRAULIC, LAWS
 from ..effects.supply import supply_pressures
+from ..effects.views import HYDRAULIC, LAWS
 from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
 from .ledger import history_of, number_of
 from .simulate import Run
@@ -164,7 +164,8 @@ def row_power(row, s, z, work, spool, supply):
 def _powers(q, v, z, tables, ws, spools, flows, created):
     """Fill flows (n, n_effects, 5) and created (n, 3), in the order of CREATED [W].
 
-    spools holds those just before and just after each sample. Flows: inflow after and before it, dissipated, delivered [W], stored [J].
+    spools holds those just before and just after each sample. Flows: inflow after and before it, dissipated,
+    delivered [W], stored [J].
     """
     port, force, rows, JB = ws.port, ws.force, tables.rows, ws.JB
     spool_before, spool = spools

@@ -70,6 +70,7 @@ def test_delays_are_averaged_by_their_errors_and_widened_by_their_scatter() -> N
     assert combine_delays([1.0, 1.0, 99.0], [1.0, 1.0, 11.0]) == pytest.approx((1.0, np.sqrt(0.5)))
 
 
+@pytest.mark.long
 def test_skews_of_a_noisy_campaign_are_found_within_a_tenth_of_a_millisecond(plant) -> None:
     delays = group_delays(plant, [skewed(plant, seed) for seed in (0, 1)])
     assert set(delays) == set(SKEWS)

@@ -274,6 +274,7 @@ def test_a_campaign_that_is_not_there_is_named(lhpost6, tmp_path) -> None:
 
 
 # ---------------------------------------------------------------------------------------- campaigns
+@pytest.mark.long
 def test_a_simulated_campaign_can_be_loaded_and_is_not_added_to(lhpost6, tmp_path) -> None:
     asked = ("campaign", "--machine", "uniaxial", "--scale", "0.3", "--out", tmp_path, "--seed", "2")
     assert lhpost6(*asked, "--tests", "TX").code == 0

@@ -385,6 +385,7 @@ def test_a_canceller_learns_a_pure_tone_with_its_time_constant():
 # Whole runs ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_both_engines_agree_with_every_feature_on(plant, rest):
     """Notches, velocity and acceleration feedback, balance, cancellers: three seconds of motion on every axis."""
     settings = replace(

@@ -43,6 +43,7 @@ def test_a_triangle_wave_has_odd_harmonics_that_fall_with_the_square_of_their_or
     assert total_harmonic_distortion(found) == pytest.approx(np.sqrt(np.sum(odd[1:] ** 2)), abs=1e-6)
 
 
+@pytest.mark.long
 def test_a_square_wave_has_odd_harmonics_that_fall_with_their_order() -> None:
     x = np.where(np.sin(2 * np.pi * 0.5 * (T + 0.5 / RATE)) >= 0, 1.0, -1.0)  # half a sample off its edges
     found = harmonics(x, RATE, 0.5, 200)

@@ -15,6 +15,8 @@ from lhpost6_pin.mechanics.kinematics import pose_jacobian
 from lhpost6_pin.mechanics.port_path import ports_along
 from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
 
+pytestmark = pytest.mark.long
+
 SENSORS = load_sensors()
 DT = 1 / RATE
 INSIDE = slice(256, -256)

@@ -18,6 +18,8 @@ from lhpost6_pin import cli
 from lhpost6_pin.core.jsonable import as_json, jsonable
 from lhpost6_pin.machine.machine import load_machine
 
+pytestmark = pytest.mark.long
+
 PAGE = Path(__file__).parents[1] / "scripts" / "docs" / "pages" / "reference" / "json.md"
 
 

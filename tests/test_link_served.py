@@ -13,6 +13,8 @@ from lhpost6_pin.interfaces.link.statistics import Counts, Histogram
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.running import RunningPlant
 
+pytestmark = pytest.mark.long
+
 SECOND = 10**9
 MODES = list(LinkMode)
 MOVING = [LinkMode.REAL_TIME, LinkMode.FREE]

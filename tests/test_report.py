@@ -637,6 +637,7 @@ probe();
 </script>"""
 
 
+@pytest.mark.long
 @pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
 def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_together(tmp_path):
     _, page = report(tmp_path, make_record(), limits=LIMITS, machine_table=MACHINE)

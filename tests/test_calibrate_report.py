@@ -268,7 +268,7 @@ def test_the_command_leaves_override_and_report_and_says_if_it_converged(
 
 
 def test_a_campaign_that_is_not_there_is_named(lhpost6, tmp_path) -> None:
-    for folder, words in ((tmp_path / "gone", "is no folder"), (tmp_path, "holds no record")):
+    for folder, words in ((tmp_path / "gone", "not a directory"), (tmp_path, "holds no record")):
         assert refused(lhpost6("calibrate", folder), str(folder), words)
     assert refused(lhpost6("calibrate", tmp_path, "--sensors", "nobody"), "nobody")
 

@@ -602,7 +602,7 @@ def test_a_campaign_is_the_same_for_the_same_seed_and_survives_the_disk(machine,
 def test_a_folder_that_is_no_campaign_is_refused(machine, tmp_path):
     with pytest.raises(RecordError, match="no record"):
         load_campaign(tmp_path, machine)
-    with pytest.raises(RecordError, match="is no folder"):
+    with pytest.raises(RecordError, match="not a directory"):
         load_campaign(tmp_path / "absent", machine)
 
 

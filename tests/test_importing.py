@@ -678,7 +678,7 @@ def test_going_down_to_a_rate_keeps_what_it_can_hold_and_drops_what_would_fold(f
 def test_files_that_share_no_stretch_of_time_are_refused():
     files, _, _ = two_rates(20.0)
     later = raw(files[1].values, ["Pa"], files[1].time + 100, "slow")
-    with pytest.raises(RecordError, match=r"share no stretch of time: 0 to 3.99951 s, 100 to 103.998 s"):
+    with pytest.raises(RecordError, match=r"do not overlap in time: 0 to 3.99951 s, 100 to 103.998 s"):
         make_imported_record([files[0], later], struts("slow"), LABELS)
 
 

@@ -124,7 +124,7 @@ def test_a_command_of_another_shape_is_refused(plant, rest, shape):
 
 @pytest.mark.parametrize("rate", [0, 1000, 3000, -2048])
 def test_a_rate_that_does_not_divide_the_sample_is_refused(plant, rest, rate):
-    with pytest.raises(SimulationError, match=f"{rate} model steps a second are no multiple of 2048"):
+    with pytest.raises(SimulationError, match=rf"multiple of the controller rate, 2048 Hz \(got {rate}\)"):
         RunningPlant(plant, rest, steps_per_second=rate)
 
 

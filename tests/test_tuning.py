@@ -17,6 +17,8 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import override_parameters
 from lhpost6_pin.tuning import identify
 from lhpost6_pin.tuning import tune as tuning
+from lhpost6_pin.tuning.bandwidth import bandwidth_limitation
+from lhpost6_pin.tuning.feedforward_fit import FeedforwardFit
 from lhpost6_pin.tuning.identify import noise_target, tuning_numbers
 from lhpost6_pin.tuning.tune import stays_stable, tune
 
@@ -123,7 +125,7 @@ def test_a_panel_with_velocity_and_acceleration_feedback_is_fitted_exactly():
     gains = [2.0 + 0.4, 0.3 + 1.0, 0.01 + 0.002, 1e-5]  # on s^0 to s^3
     response = plant * sum(g * s**n for n, g in enumerate(gains))
     seen = Transfer(frequency, response[:, None, None], np.ones((200, 1)))
-    fit = tuning._Fit(seen, settings, 0, ((0.5, 5.0), (0.5, 33.0)), (1, 2))
+    fit = FeedforwardFit(seen, settings, 0, ((0.5, 5.0), (0.5, 33.0)), (1, 2))
     np.testing.assert_allclose(fit.plant, plant, rtol=1e-12)
 
 
@@ -199,7 +201,7 @@ def test_what_limits_a_band_is_said_even_where_there_is_none(plant):
     good = np.ones((len(f), 1))
 
     def words(response, coherence, band):
-        return tuning._limit(plant, Transfer(f, response, coherence, ("x",)), band, 3.0, 0.8, 33.0)
+        return bandwidth_limitation(plant, Transfer(f, response, coherence, ("x",)), band, 3.0, 0.8, 33.0)
 
     assert words(ones, good, (0.125, 40.0)) == "follows to 33 Hz and beyond"
     assert words(3 * ones, good, (np.nan, np.nan)).startswith("gain +9.5 dB at 1 Hz")

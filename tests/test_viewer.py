@@ -210,7 +210,7 @@ def test_two_records_are_drawn_over_the_time_that_both_have(machine, record):
     assert frames.time[0] == late["time"].values[0] and frames.time[-1] <= early["time"].values[-1]
     other = next(g for g in frames.ghosts if g.name == "first_other")
     np.testing.assert_allclose(other.displacement, frames.displacement, atol=1e-12)  # the same samples
-    with pytest.raises(RecordError, match="share no time"):
+    with pytest.raises(RecordError, match="do not overlap in time"):
         record_frames(machine, early, [record.isel(time=slice(8192, 9000))])
 
 

@@ -34,7 +34,7 @@ class ControllerError(LhpostError):
 
 
 class LinkError(LhpostError):
-    """A link cannot be opened, nobody answers, or a datagram is no frame; the message says where and what to do."""
+    """A link cannot be opened, does not respond, or a datagram is malformed; the message gives place and remedy."""
 
 
 class RecordError(LhpostError):

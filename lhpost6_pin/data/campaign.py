@@ -27,7 +27,7 @@ def load_campaign(folder: Path | str, machine: Machine) -> Campaign:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise RecordError(f"{folder}: is no folder; a campaign is a folder of records (.nc) of the same machine")
+        raise RecordError(f"{folder}: not a directory; a campaign is a directory of records (.nc) of the same machine")
     files = sorted(folder.glob("*.nc"))
     if not files:
         raise RecordError(f"{folder}: holds no record (.nc); import measured data with `lhpost6 import`")

@@ -5,14 +5,14 @@ one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or `
 `machine.py` gives the paths their meaning.
 """
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
-from ..core.errors import ParameterError, UnknownNameError, instead_of
+from ..core.errors import ParameterError, UnknownNameError
 from ..core.files import find_shipped, read_toml, reason_of
+from .quantity import EVIDENCE, LARGEST, Quantity, Value, read_number, read_quantity, to_unit, unusable, vector_length
 
 __all__ = [
     "EVIDENCE",
@@ -27,37 +27,8 @@ __all__ = [
     "unusable",
 ]
 
-Value: TypeAlias = float | tuple[float, ...]
-
-EVIDENCE = ("report", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
-"""How well a number is known, strongest claim first; `override` is what a user set by hand."""
-
-LARGEST = 1e30
-"""No quantity of a machine or a test in SI is larger, and the powers of this one can still be computed with."""
-
-_QUANTITY_KEYS = {"value", "unit", "evidence", "source", "printed", "rel_sd", "sd"}
 _GROUPS = ("kind", "component", "estimates")
 """Sections that hold named sub-sections; the sub-section's name is the path's first part."""
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """A number (or vector) with its unit and where it comes from.
-
-    `sd` is one standard deviation in `unit` (None where no uncertainty is stated).
-    """
-
-    value: Value
-    unit: str
-    evidence: str
-    source: str
-    sd: Value | None = None
-    printed: str | None = None
-
-    @property
-    def assumed(self) -> bool:
-        """True if nobody has published this number."""
-        return self.evidence == "assumed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,34 +160,6 @@ def _override_effect(effects: dict[str, EffectEntry], key: str, entry: Any, orig
     effects[name] = replace(known, values={**known.values, number: changed})
 
 
-def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
-    """Convert `value` from `unit` to `wanted`; raises ParameterError naming `key` if the dimensions differ."""
-    if unit == wanted:
-        return value
-    import pint  # slow to import and needed only where a unit is not the SI one
-
-    registry: Any = pint.UnitRegistry()
-    try:
-        factor = registry.Quantity(1.0, _pint_spelling(unit)).to(_pint_spelling(wanted)).magnitude
-    except Exception as error:  # pint raises a dozen types for a bad unit
-        raise ParameterError(f"{key}: unit {unit!r} cannot be converted to {wanted!r}; give it in {wanted}") from error
-    if isinstance(value, tuple):
-        return tuple(float(v) * factor for v in value)
-    return float(value) * factor
-
-
-def _pint_spelling(unit: str) -> str:
-    """Spell a unit such as ``m3/s/Pa`` or ``kg m2`` the way pint reads it."""
-    words = unit.replace("·", " ").replace("/", " / ").split()
-    spelled: list[str] = []
-    for word in words:
-        if spelled and word != "/" and spelled[-1] != "/":
-            spelled.append("*")
-        stem = word.rstrip("0123456789")
-        spelled.append(f"{stem}**{word[len(stem) :]}" if stem and stem != word else word)
-    return " ".join(spelled)
-
-
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
         return read_toml(path)
@@ -233,7 +176,7 @@ def _flatten(tree: Mapping[str, Any], file: str) -> Parameters:
     words: dict[str, str | int] = {}
     for path, entry in _entries(tree, file).items():
         if isinstance(entry, dict):
-            quantities[path] = _quantity(entry, f"{file}: {path}")
+            quantities[path] = read_quantity(entry, f"{file}: {path}")
         elif isinstance(entry, str | int) and not isinstance(entry, bool):
             words[path] = entry
         else:
@@ -260,7 +203,9 @@ def _effects(tree: Mapping[str, Any], file: str) -> dict[str, EffectEntry]:
         for k, v in entries.items():
             if not isinstance(v, dict):
                 raise ParameterError(f"{key}: {k} = {v!r} has no unit; write {k} = {{ value = ..., unit = ... }}")
-        values = {k: _quantity({"evidence": "override", "source": file, **v}, f"{key}.{k}") for k, v in entries.items()}
+        values = {
+            k: read_quantity({"evidence": "override", "source": file, **v}, f"{key}.{k}") for k, v in entries.items()
+        }
         found[name] = EffectEntry(table["family"], tuple(components), values)
     return found
 
@@ -296,63 +241,6 @@ def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping
             yield (f"{name}.{sub}" if name == "estimates" else sub), inner
 
 
-def unusable(number: float) -> str:
-    """What is wrong with a number that is not within `LARGEST`, in words."""
-    return f"beyond {LARGEST:g}" if math.isfinite(number) else "not finite"
-
-
-def _number(value: object, key: str) -> Value:
-    value = value.tolist() if hasattr(value, "tolist") else value  # an array, or a number of one
-    if isinstance(value, list | tuple):
-        if not value:
-            raise ParameterError(f"{key}: an empty list is no value")
-        return tuple(_scalar(v, key) for v in value)
-    return _scalar(value, key)
-
-
-def _scalar(value: object, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{key}: value {value!r} is not a number")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not abs(number) <= LARGEST:
-        raise ParameterError(f"{key}: value {str(value)[:40]} is {unusable(number)}")
-    return number
-
-
-def _quantity(entry: Mapping[str, Any], key: str) -> Quantity:
-    for needed in ("value", "unit", "evidence", "source"):
-        if needed not in entry:
-            raise ParameterError(f"{key}: {needed} is missing")
-    if unknown := sorted(set(entry) - _QUANTITY_KEYS):
-        raise ParameterError(f"{key}: unknown {unknown[0]}; {instead_of(unknown[0], sorted(_QUANTITY_KEYS))}")
-    if entry["evidence"] not in EVIDENCE:
-        raise ParameterError(f"{key}: evidence {entry['evidence']!r} is not one of {', '.join(EVIDENCE)}")
-    for text in ("unit", "source", "printed"):
-        if not isinstance(entry.get(text, ""), str):
-            raise ParameterError(f"{key}: {text} must be text")
-    value = _number(entry["value"], key)
-    sd = _sd(entry, value, key)
-    if sd is not None and _length(sd) not in (0, _length(value)):
-        raise ParameterError(f"{key}: sd {sd!r} has not the shape of {value!r}")
-    return Quantity(value, entry["unit"], entry["evidence"], entry["source"], sd, entry.get("printed"))
-
-
-def _sd(entry: Mapping[str, Any], value: Value, key: str) -> Value | None:
-    if "sd" in entry:
-        sd: Value = _number(entry["sd"], f"{key}.sd")
-    elif "rel_sd" in entry:
-        fraction = _scalar(entry["rel_sd"], f"{key}.rel_sd")
-        sd = tuple(abs(v) * fraction for v in value) if isinstance(value, tuple) else abs(value) * fraction
-    else:
-        return None
-    if min(sd if isinstance(sd, tuple) else (sd,)) < 0.0:
-        raise ParameterError(f"{key}: standard deviation {sd!r} is negative")
-    return sd
-
-
 def _of_kind(parameters: Parameters, key: str) -> str:
     """Path that component key ``H3.seal_friction`` inherits from: its kind's; empty for anything else."""
     component, _, name = key.partition(".")
@@ -364,16 +252,13 @@ def _changed(base: Quantity, entry: Any, key: str, origin: str) -> Quantity:
     if isinstance(entry, Quantity):
         new = entry
     elif isinstance(entry, Mapping):
-        new = _quantity({"unit": base.unit, "evidence": "override", "source": origin, **entry}, key)
+        new = read_quantity({"unit": base.unit, "evidence": "override", "source": origin, **entry}, key)
     else:
-        new = Quantity(_number(entry, key), base.unit, "override", f"{origin}; was {base.value!r} ({base.source})")
-    value = _number(to_unit(new.value, new.unit, base.unit, key), key)
+        new = Quantity(read_number(entry, key), base.unit, "override", f"{origin}; was {base.value!r} ({base.source})")
+    value = read_number(to_unit(new.value, new.unit, base.unit, key), key)
     sd = base.sd if new.sd is None else to_unit(new.sd, new.unit, base.unit, key)
-    if _length(value) != _length(base.value) or (sd is not None and _length(sd) not in (0, _length(value))):
-        raise ParameterError(f"{key}: {new.value!r} has not the shape of {base.value!r}")
+    if vector_length(value) != vector_length(base.value) or (
+        sd is not None and vector_length(sd) not in (0, vector_length(value))
+    ):
+        raise ParameterError(f"{key}: {new.value!r} does not have the shape of {base.value!r}")
     return replace(new, value=value, unit=base.unit, sd=sd)
-
-
-def _length(value: Value) -> int:
-    """Length of a vector, 0 for a scalar."""
-    return len(value) if isinstance(value, tuple) else 0

@@ -38,8 +38,8 @@ def steps_a_sample(scheme: str, steps_per_second: int) -> int:
     if steps_per_second < SAMPLE_RATE or steps_per_second % SAMPLE_RATE:
         nearest = max(1, round(steps_per_second / SAMPLE_RATE)) * SAMPLE_RATE
         raise SimulationError(
-            f"{steps_per_second} model steps a second are no multiple of {SAMPLE_RATE}, the controller's samples; "
-            f"the nearest is {nearest}"
+            f"steps per second must be a multiple of the controller rate, {SAMPLE_RATE} Hz (got {steps_per_second}); "
+            f"nearest: {nearest}"
         )
     return steps_per_second // SAMPLE_RATE
 

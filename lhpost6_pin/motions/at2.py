@@ -98,5 +98,5 @@ def _parse_at2(text: str, where: str) -> tuple[float, np.ndarray]:
     except MotionError as error:
         raise MotionError(f"{where}, line {number}: {error}") from None
     if quantity != "acceleration":
-        raise MotionError(f"{where}, line {number}: unit {unit[1]} is no acceleration; use the .AT2 file in g")
+        raise MotionError(f"{where}, line {number}: unit {unit[1]} is not an acceleration; use the .AT2 file in g")
     return step, values

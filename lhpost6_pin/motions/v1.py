@@ -184,7 +184,7 @@ def _si(values: np.ndarray, data: "re.Match[str]", where: str, line: int) -> np.
     except MotionError as error:
         raise MotionError(f"{where}, line {line}: {error}; raw counts need a V1 file in g or cm/s^2") from None
     if quantity != "acceleration":
-        raise MotionError(f"{where}, line {line}: unit {unit[1]!r} is no acceleration")
+        raise MotionError(f"{where}, line {line}: unit {unit[1]!r} is not an acceleration")
     return values
 
 

@@ -1,4 +1,4 @@
-"""Tuning of the three-variable controller, off line and without hand work.
+"""Tuning of the three-variable controller, off line and automatic.
 
 In the order of the real table's tuning notes, per degree of freedom: displacement gain Kx, force feedback KF, velocity
 feed-forward Kvf, jerk feed-forward Kjf, again, acceleration feed-forward Kaf. Feedback is raised on the linear model
@@ -7,9 +7,9 @@ under white noise (`identify`): with the loop closed as it is,
 
     T = G (Kxf + Kvf s + Kaf s^2 + Kjf s^3 + Kx + Kv s + Ka s^2),
 
-(the reset integrator is far below) so a measured T gives G, and the gains that bring T nearest to a pure delay follow
-by least squares over all frequencies, weighted by coherence. The delay is one for all axes, so that they stay in step;
-it is the one with which the fit is best.
+(the reset integrator is far below) so a measured T gives G, and the gains that bring T closest to a pure delay follow
+by least squares over all frequencies, weighted by coherence. All axes share one delay, and so stay synchronous; it is
+the delay with the least total error.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,10 +26,11 @@ from ..data.transfer import Transfer, band_within, delay_of, estimate_transfer
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.equilibrium import find_equilibrium
-from ..mechanics.linearize import oil_column_modes
 from ..mechanics.plant import Plant, make_plant
 from ..motions import Target
 from ..simulation.simulate import ClosedLoop, fastest_engine, simulate
+from .bandwidth import bandwidth_limitation
+from .feedforward_fit import FEEDFORWARD, FeedforwardFit, best_delay
 from .identify import noise_target, run_noise, tuning_numbers
 from .margins import LoopModel, Margin, expected_response, loop_gain, make_loop_model, margins
 
@@ -38,12 +39,9 @@ __all__ = ["AxisTuning", "Tuning", "TuningStep", "stays_stable", "tune"]
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
-_FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "jerk_feedforward")
-"""Gains on s, s^2 and s^3."""
-
 
 class TuningStep(NamedTuple):
-    """One decision on the way."""
+    """One step of a tuning."""
 
     stage: str  # "Kx", "KF", "Kvf", "Kjf", "Kaf", "delay"
     axis: str  # or "all"
@@ -133,7 +131,7 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
                 delay_after=delay_of(after[a], 0, 0, low, high),
                 margin_before=old[a],
                 margin_after=new[a],
-                limited_by=_limit(plant, after[a], now, tolerance, coherence, high),
+                limited_by=bandwidth_limitation(plant, after[a], now, tolerance, coherence, high),
             )
         )
     doubled = replace(tuned, master_gain=tuple(2.0 * g for g in tuned.master_gain))
@@ -308,8 +306,8 @@ def _tune_feedforward(
     targets = [noise_target((name,)) for name in job.names]
     segment = numbers.number("noise.segment")
     tuned = settings
-    for k in job.plant.axes:  # a start that the fit can see through, whatever was there before
-        for name, value in zip(_FEEDFORWARD, (1.0, 0.0, 0.0), strict=True):
+    for k in job.plant.axes:  # a well-conditioned start, independent of the settings given
+        for name, value in zip(FEEDFORWARD, (1.0, 0.0, 0.0), strict=True):
             tuned = _with(tuned, name, int(k), value)
     low, high = numbers.number("feedforward_targets.low"), numbers.number("feedforward_targets.high")
     bands = (low, slowest * numbers.number("feedforward_targets.integrator_band")), (low, high)
@@ -318,101 +316,17 @@ def _tune_feedforward(
     delay = 0.0
     for n, (stage, terms) in enumerate(stages):
         found = job.measure(tuned, targets, segment)
-        fits = [_Fit(t, tuned, int(k), bands, terms) for t, k in zip(found, job.plant.axes, strict=True)]
+        fits = [FeedforwardFit(t, tuned, int(k), bands, terms) for t, k in zip(found, job.plant.axes, strict=True)]
         if stage == "Kaf":
-            delay = _best_delay(fits, numbers.number("feedforward_targets.largest_delay"))
+            delay = best_delay(fits, numbers.number("feedforward_targets.largest_delay"))
         for fit, name in zip(fits, job.names, strict=True):
             gains, error = fit.gains(delay)
             k = AXES.index(name)
             for term in (0, *terms):
-                symbol, old = ("Kvf", "Kaf", "Kjf")[term], getattr(tuned, _FEEDFORWARD[term])[k]
-                tuned = _with(tuned, _FEEDFORWARD[term], k, gains[term])
+                symbol, old = ("Kvf", "Kaf", "Kjf")[term], getattr(tuned, FEEDFORWARD[term])[k]
+                tuned = _with(tuned, FEEDFORWARD[term], k, gains[term])
                 if n == len(stages) - 1 or symbol == stage != "Kaf":
                     steps.append(TuningStep(symbol, name, old, gains[term], f"expected error {error:.3f}"))
         job.done(3 + n)
-    steps.append(TuningStep("delay", "all", 0.0, delay, "one for all axes, least error in sum"))
+    steps.append(TuningStep("delay", "all", 0.0, delay, "common to all axes, least total error"))
     return tuned, delay
-
-
-class _Fit:
-    """Least squares of the feed-forward of one axis to its measured response.
-
-    Kvf where the table answers a velocity like an integrator, the other terms (1 Kaf, 2 Kjf) given that over the whole
-    band: an oil column inside the band must not spoil what lies below it.
-    """
-
-    def __init__(
-        self,
-        transfer: Transfer,
-        settings: ControllerSettings,
-        k: int,
-        bands: tuple[tuple[float, float], tuple[float, float]],
-        terms: tuple[int, ...],
-    ) -> None:
-        f = transfer.frequency
-        self.bands, self.terms = [(f >= low) & (f <= high) for low, high in bands], terms
-        self.s = 2j * np.pi * f
-        self.weight = np.sqrt(transfer.coherence[:, 0])
-        fed_back = (settings.displacement_gain, settings.velocity_gain, settings.acceleration_gain)
-        self.fixed = settings.displacement_feedforward[k] + sum(g[k] * self.s**n for n, g in enumerate(fed_back))
-        self.before = [float(getattr(settings, name)[k]) for name in _FEEDFORWARD]
-        self.plant = transfer.response[:, 0, 0] / (self.fixed + self._ahead(self.before))
-
-    def gains(self, delay: float) -> tuple[list[float], float]:
-        """Gains on s, s^2, s^3 nearest to a pure delay [s], and the relative error that they leave."""
-        found = self._solve(self.before, (0,), self.bands[0], delay)
-        found = self._solve(found, self.terms, self.bands[1], delay)
-        inside = self.bands[1 if self.terms else 0]
-        error = (self.plant * (self.fixed + self._ahead(found)) - np.exp(-self.s * delay)) * self.weight
-        return found, float(np.linalg.norm(error[inside]) / np.linalg.norm(self.weight[inside]))
-
-    def _ahead(self, gains: Sequence[float]) -> NDArray[np.complex128]:
-        return np.asarray(sum(g * self.s ** (n + 1) for n, g in enumerate(gains)))
-
-    def _solve(
-        self, gains: Sequence[float], terms: tuple[int, ...], inside: NDArray[np.bool_], delay: float
-    ) -> list[float]:
-        """Gains with those of `terms` fitted."""
-        out = [0.0 if n in terms else g for n, g in enumerate(gains)]
-        if not terms:
-            return out
-        missing = (np.exp(-self.s * delay) - self.plant * (self.fixed + self._ahead(out)))[inside]
-        columns = np.column_stack([self.plant * self.s ** (n + 1) for n in terms])[inside]
-        size = np.abs(columns).max(axis=0)  # s^3 is a million times s
-        left, right = columns / size * self.weight[inside, None], missing * self.weight[inside]
-        found, *_ = np.linalg.lstsq(
-            np.vstack([left.real, left.imag]), np.concatenate([right.real, right.imag]), rcond=None
-        )
-        for n, gain in zip(terms, (found / size).tolist(), strict=True):
-            out[n] = gain
-        return out
-
-
-def _best_delay(fits: Sequence[_Fit], largest: float) -> float:
-    """Delay [s] with the least sum of squared errors over all axes, to a tenth of a millisecond."""
-    delays = np.arange(0.0, largest + 1e-9, 1e-4)
-    errors = [sum(fit.gains(delay)[1] ** 2 for fit in fits) for delay in delays]
-    return float(delays[int(np.argmin(errors))])
-
-
-def _limit(
-    plant: Plant, transfer: Transfer, band: tuple[float, float], tolerance: float, coherence: float, high: float
-) -> str:
-    """What keeps an axis from following further than its band, in words, from the response just above it."""
-    end = band[1]
-    if end >= high:
-        return f"follows to {high:g} Hz and beyond"
-    f = transfer.frequency
-    at = int(np.searchsorted(f, end, side="right")) if np.isfinite(end) else int(np.argmin(np.abs(f - 1.0)))
-    gain, coherent = 20.0 * np.log10(np.abs(transfer.response[at, 0, 0])), transfer.coherence[at, 0]
-    words = []
-    if coherent < coherence:
-        words.append(f"coherence {coherent:.2f} at {f[at]:.3g} Hz: too little of the motion answers the reference")
-    if abs(gain) > tolerance:
-        words.append(f"gain {gain:+.1f} dB at {f[at]:.3g} Hz: beyond what three feed-forward gains can correct")
-    modes = oil_column_modes(plant.machine)
-    near = min(modes, key=lambda mode: abs(np.log(mode.frequency / f[at])))
-    if abs(np.log2(near.frequency / f[at])) < 0.5:
-        words.append(f"beside the oil column at {near.frequency:.3g} Hz ({near.axis})")
-    words.append(f"with {360.0 * f[at] * float(plant.delays.max()):.0f} deg of valve delay")
-    return ", ".join(words)

@@ -129,7 +129,7 @@ def common_time(samplings: Sequence[Sampling], rate: float | None, where: str) -
         raise RecordError(f"{where}: {count:.3g} samples at {1 / step:g} Hz are too many; ask for a lower rate")
     if count < 2:
         spans = ", ".join(f"{s.time[0]:g} to {s.time[-1]:g} s" for s in samplings)
-        raise RecordError(f"{where}: the files share no stretch of time: {spans}; give files of one test")
+        raise RecordError(f"{where}: the files do not overlap in time: {spans}; give files of one test")
     grid = start + step * np.arange(count, dtype=np.float64)
     for sampling in samplings:  # a clock that fits is kept to the last bit
         k = int(np.argmin(np.abs(sampling.time - start)))

@@ -17,7 +17,7 @@ _MEANING = {
     "lost": "commands that never came",
     "superseded": "commands that a newer one replaced in time",
     "short": "datagrams that end too early",
-    "malformed": "datagrams that are no frame",
+    "malformed": "malformed datagrams",
     "foreign": "frames of another client or session",
     "missed_frames": "samples without a new command",
     "holds": "times in safe hold",

@@ -175,7 +175,7 @@ def encode(frame: Datagram) -> bytes:
 def decode(datagram: bytes) -> Datagram:
     """Frame of a datagram; raises ShortDatagramError if it ends too early, LinkError for all else that can be wrong."""
     if len(datagram) < _HEADER.size:
-        raise ShortDatagramError(f"{len(datagram)} bytes are no frame; its header alone takes {_HEADER.size}")
+        raise ShortDatagramError(f"{len(datagram)} bytes are too few for a frame; its header takes {_HEADER.size}")
     magic, version, kind, mode, state, actuators, valves, flags, session, *rest = _HEADER.unpack_from(datagram)
     sequence, acknowledged, stamp, echo, crc, _ = rest
     if magic != MAGIC:

@@ -133,7 +133,7 @@ def _moments(times: Sequence[Array], rate: float) -> Array:
     first, last = max(t[0] for t in times), min(t[-1] for t in times)
     if last <= first:
         spans = " and ".join(f"{t[0]:g} to {t[-1]:g} s" for t in (times[0], times[-1]))
-        raise RecordError(f"the records share no time: {spans}; let both begin with the same test")
+        raise RecordError(f"the records do not overlap in time: {spans}; both must begin with the same test")
     frames = int((last - first) * rate * (1.0 + 1e-12)) + 1
     if frames > MOST_FRAMES:
         raise ParameterError(

@@ -16,23 +16,24 @@ from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, save_campaign
 from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
-from lhpost6_pin.discovery.acceptance import Lowered, Reweighting, refusal, squares_by_column
+from lhpost6_pin.discovery.acceptance import Lowered, refusal
 from lhpost6_pin.discovery.add_effects import _fit_jointly
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.linearisation import Linearisation, linearise
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.pairs import score_pairs
 from lhpost6_pin.discovery.releases import block_of, list_releases
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _hats
 from lhpost6_pin.discovery.scores import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discovery.screening import _by_rank, linearise
+from lhpost6_pin.discovery.screening import _by_rank
 from lhpost6_pin.discovery.search import _pruned, _without
-from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored
+from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Scored
 from lhpost6_pin.discovery.verdict import reject_effects
-from lhpost6_pin.discovery.verdict_summary import said
+from lhpost6_pin.discovery.verdict_summary import summary
 from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.prepare import PreparedProblem, prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint
@@ -266,19 +267,19 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     assert [refusal([spring], one, less, numbers) for less in (clear, doubtful, weak)] == ["", "", ""]
     assert [refusal([rubs], one, less, numbers) for less in (clear, doubtful, weak)] == [
         "",
-        "explains what may be noise",
-        "does not lower what is left",
+        "within the uncertainty of the noise",
+        "does not lower the residual",
     ]
     by_chance = replace(one, held_out=np.array([30.0, 20.0, -7.0]))
     against = replace(one, held_out=np.array([40.0, 20.0, -17.0]))
     assert refusal([spring], by_chance, clear, numbers) == ""
-    assert refusal([spring], against, clear, numbers) == "makes tests worse that it was not fitted on"
+    assert refusal([spring], against, clear, numbers) == "fails cross-validation"
 
 
 def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     """Columns of two effects laid into what is left: with a third one, only these two go together."""
-    search, (numbers, calibration) = found.search, discovery_numbers()
-    linear = linearise(search.solution, calibration)
+    search = found.search
+    linear = linearise(search.solution, search.calibration)
     problem, base, background = search.problem, linear.base, linear.background
     hidden = [candidate("stray_spring", "platen.x"), candidate("asymmetric_friction", "V1")]
     size = [np.array([2e6]), np.array([2e4])]
@@ -290,9 +291,8 @@ def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     rest = [r + more for r, more in zip(background.residual, laid, strict=True)]
     side = background.side + np.array([s.T @ more for s, more in zip(background.slope, laid, strict=True)])
     more = replace(background, residual=rest, side=side)
-    weigh = Reweighting(problem, more, squares_by_column(search.refit.normal.residual), numbers)
     candidates = [candidate("valve_deadband", "H1"), *hidden]
-    pairs = score_pairs(problem, Linearisation(base, more, ()), weigh, candidates, numbers)
+    pairs = score_pairs(search, Linearisation(base, more, ()), candidates)
     assert [p.places for p in pairs if not p.refused] == [(1, 2)]
     assert pairs[0].places == (1, 2)
     np.testing.assert_allclose(np.concatenate(pairs[0].amplitudes), [2e6, 2e4], rtol=0.1)  # noise and the refit
@@ -432,19 +432,18 @@ def test_a_free_function_takes_the_place_of_names_it_beats_and_is_the_form_of_th
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
-    numbers, calibration = discovery_numbers()
     search = found.search
     helper = scored("asymmetric_friction", ("V1",), 50.0)
-    both = _fit_jointly(search, helper, calibration, numbers, lambda share: None)
-    both.added.insert(0, replace(search.added[0], candidate=helper.candidate))
+    both = _fit_jointly(search, helper, lambda share: None)
+    both = replace(both, added=(replace(search.added[0], candidate=helper.candidate), *both.added))
     assert len(both.problem.machine.parameters.effects) == 1 + len(search.problem.machine.parameters.effects)
-    left = _pruned(both, calibration, numbers)
+    left = _pruned(both)
     assert [one.candidate.family.name for one in left.added] == ["stribeck_friction"]
     assert set(left.problem.names) == set(search.problem.names)
     # the same place but for the last step of a search that ends where little is gained
     assert abs(left.objective - search.objective) < 3.0
-    alone = replace(search, added=[search.added[0], replace(search.added[0], candidate=helper.candidate)])
-    assert _without(alone, search.added[0].candidate, calibration).added == [alone.added[1]]
+    alone = replace(search, added=(search.added[0], replace(search.added[0], candidate=helper.candidate)))
+    assert _without(alone, search.added[0].candidate).added == (alone.added[1],)
 
 
 def test_an_effect_taken_out_leaves_the_machine_as_it_was(machine):
@@ -497,7 +496,7 @@ def test_the_command_goes_on_from_what_a_search_had_kept_to_the_same_verdict(
     save_campaign(rubbing, tmp_path)
     ended = lhpost6("discover", tmp_path, "--hold-out", *ASKED["hold_out"], "--out", folder)
     assert ended.code == 0, ended
-    assert "goes on where the search was interrupted, with 1 effects found" in caplog.text
+    assert "resuming the interrupted search, with 1 effects found" in caplog.text
     assert {p.name for p in folder.iterdir()} == {"verdict.json", "model.toml", "report.html"}
     entries, same = json.loads((folder / "verdict.json").read_text()), verdict_entries(found)
     for phase, gaps in same.pop("closure").items():  # the command goes through all phases
@@ -517,9 +516,9 @@ def test_every_candidate_can_be_added_to_a_guided_platen():
 
 
 def test_what_no_test_proves_is_said_to_be_unproven(found):
-    assert "held out" not in said(found)
-    assert said(replace(found, proof=None)).endswith(
-        "No test was held out to prove it: give more, or name one with --hold-out."
+    assert "held out" not in summary(found)
+    assert summary(replace(found, proof=None)).endswith(
+        "Not validated, as no test was held out: add tests, or name one with --hold-out."
     )
 
 

@@ -12,28 +12,28 @@ from ..machine.library import Family, Shape, families
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 
-__all__ = ["Candidate", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
+__all__ = ["Candidate", "first_shape", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A family on a group of components, with its shapes at given values; or an unknown that is set free."""
+    """A family on a group of components, with its shapes at given values; or an unknown released from its prior."""
 
     family: Family
     components: tuple[str, ...]
-    shape: tuple[tuple[str, float], ...]  # (name, value) of what is no amplitude
+    shape: tuple[tuple[str, float], ...]  # (name, value) of all but amplitudes
     release: str = ""  # the parameter or sensor error that is free of its prior; empty where an effect is added
 
     @property
     def name(self) -> str:
-        """Name of the effect in a machine, or of what is free."""
+        """Name of the effect in a machine, or of the released unknown."""
         return self.release or f"{self.family.name}_{'_'.join(self.components)}"
 
     @property
     def amplitudes(self) -> tuple[Shape, ...]:
-        """Numbers with which the effect vanishes."""
+        """Numbers in proportion to which the effect vanishes."""
         return tuple(s for s in self.family.shapes if s.amplitude)
 
     @property
@@ -59,12 +59,16 @@ class Candidate:
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         return machine.with_effect(self.family.name, self.components, name=self.name, **values)
 
+    def fit_parameters(self, amplitudes: tuple[float, ...], numbers: Parameters) -> tuple[FreeParameter, ...]:
+        """Unknowns of a joint fit; `numbers` are those of `models/procedures/discovery.toml`."""
+        return self.parameters(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
+
     def parameters(
         self, amplitudes: tuple[float, ...], spread: float, factor: float = 0.0
     ) -> tuple[FreeParameter, ...]:
-        """Unknowns of a fit that starts here: amplitudes within `spread` typical ones.
+        """Unknowns of a fit that starts here: amplitudes with a prior of `spread` typical ones.
 
-        Logarithms of shapes are within `factor`; without one shapes are left out.
+        Logarithms of shapes have a prior deviation `factor`; where it is zero, shapes are fixed.
         """
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         found = []
@@ -114,17 +118,22 @@ def with_warm_oil(machine: Machine, share: float) -> Machine:
 
 
 def _of_background(machine: Machine) -> list["Candidate"]:
-    """Effects of the library's background, on all of each kind that rubs."""
+    """Effects of the library's background, on all components of each kind that have friction."""
     found = []
     for family in families().values():
         names = family.components(machine) if family.search == "background" else ()
         for kind in dict.fromkeys(c.kind for c in machine.components):
             members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
-            one = Candidate(family, members, tuple((s.name, s.start[0]) for s in family.shapes if not s.amplitude))
+            one = Candidate(family, members, first_shape(family))
             typical = tuple(s.typical for s in one.amplitudes)
             if members and any(p[0] for p in one.on(machine, typical).added_effects[-1].params):
                 found.append(one)
     return found
+
+
+def first_shape(family: Family) -> tuple[tuple[str, float], ...]:
+    """First start of a family's shapes."""
+    return tuple((s.name, s.start[0]) for s in family.shapes if not s.amplitude)
 
 
 def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:

@@ -1,4 +1,4 @@
-"""A search that was interrupted goes on where it stood: what it has is kept in a file until it has ended."""
+"""Checkpoint of a search: an interrupted search resumes from it and reaches the same verdict."""
 
 import hashlib
 import logging
@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 
 class SearchCheckpoint(NamedTuple):
-    """Where a search stands between two steps."""
+    """State of a search between two steps."""
 
     machine: Machine  # as delivered, in the state that was tested
     held: tuple[int, ...]  # places of the tests that are held out
@@ -32,26 +32,26 @@ class SearchCheckpoint(NamedTuple):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Keeps the place of one search; without a path it keeps nothing."""
+    """File that holds the state of one search; without a path nothing is written."""
 
     path: Path | None
 
     def read(self) -> SearchCheckpoint | None:
-        """The place that was kept last; None if there is none."""
+        """The last state; None if there is none."""
         if self.path is None or not self.path.is_file():
             return None
-        place: SearchCheckpoint = joblib.load(self.path)
-        log.warning("goes on where the search was interrupted, with %d effects found", len(place.search.added))
-        return place
+        state: SearchCheckpoint = joblib.load(self.path)
+        log.warning("resuming the interrupted search, with %d effects found", len(state.search.added))
+        return state
 
-    def write(self, place: SearchCheckpoint) -> None:
-        """Keep a place, whole or not at all."""
+    def write(self, state: SearchCheckpoint) -> None:
+        """Write a state, whole or not at all."""
         if self.path is not None:
             with write_whole(self.path) as beside:
-                joblib.dump(place, beside)
+                joblib.dump(state, beside)
 
     def remove(self) -> None:
-        """Keep nothing any more: the search has ended."""
+        """Remove the file: the search has ended."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)
 
@@ -64,9 +64,9 @@ def make_checkpoint(
     hold_out: Sequence[str] | None,
     seed: int,
 ) -> Checkpoint:
-    """A bookmark in a folder for a search with these inputs, named by them: any other search does not see it.
+    """A checkpoint in a folder for a search with these inputs, named by their hash.
 
-    No effect made by hand has a name that says what it does: a machine with one gets a bookmark that keeps nothing.
+    An effect made by hand cannot be hashed: a machine with one gets a checkpoint without a path.
     """
     if folder is None or machine.own_effects:
         return Checkpoint(None)

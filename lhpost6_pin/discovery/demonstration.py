@@ -1,7 +1,6 @@
-"""A real earthquake on a table that has what its model lacks, and the search for it: what `lhpost6 demo` goes through.
+"""The demonstration of `lhpost6 demo`: an effect hidden in simulated tests of a real earthquake, and its search.
 
-The hidden effect and the tests are those of `models/procedures/demo.toml`; the search is the one of `discover`, told
-nothing of them.
+The hidden effect and the tests are those of `models/procedures/demo.toml`; the search is that of `discover`.
 """
 
 from collections.abc import Callable
@@ -28,14 +27,14 @@ EARTHQUAKE = "EQ"
 
 
 class OpenLoops(NamedTuple):
-    """The earthquake as measured, and as two models say that its spools would move the table."""
+    """The earthquake as measured, and as two models respond to its recorded spools."""
 
     measured: xr.Dataset
     delivered: xr.Dataset
     found: xr.Dataset
 
     def apart(self) -> tuple[float, float]:
-        """How far C ends up from where it was measured [m], with the model as delivered and with what was found."""
+        """Error of C's final position [m], of the model as delivered and with the effect found."""
         ends = [r["platen_displacement"].values[-1, :3] for r in self]
         return float(np.linalg.norm(ends[1] - ends[0])), float(np.linalg.norm(ends[2] - ends[0]))
 
@@ -48,7 +47,7 @@ def hidden_effect() -> tuple[str, str, dict[str, float]]:
 
 
 def measured_tests(machine: Machine, sensors: SensorSet, *, seed: int, progress: Progress | None = None) -> Campaign:
-    """Tests of a table that has the hidden effect, under the virtual 469D, as its sensors show them."""
+    """Tests of a table with the hidden effect, under the virtual 469D, as its sensors record them."""
     family, component, numbers = hidden_effect()
     table = machine.with_effect(family, (component,), name="", **numbers)
     settings = load_controller(machine.controller)
@@ -64,17 +63,17 @@ def searched(
     jobs: int = -1,
     progress: Progress | None = None,
 ) -> Discovery:
-    """What the search says of tests when all it knows is the machine without the effect; see `discover`."""
+    """Result of the search, given the machine without the effect; see `discover`."""
     return discover(
         machine, tests, sensors, hold_out=[EARTHQUAKE], phases=(1, 2), seed=seed, jobs=jobs, progress=progress
     )
 
 
 def open_loops(machine: Machine, found: Machine, tests: Campaign) -> OpenLoops:
-    """The earthquake's measured spools, let loose on the model as delivered and on the one with what was found."""
+    """The earthquake's measured spools in open loop, on the model as delivered and on the one with the effect found."""
     measured = next(r for r in tests.records if r.attrs["test"] == EARTHQUAKE)
     delivered, after = (
         replay(model, measured, attrs={"test": EARTHQUAKE, "title": title}, engine="fused").record
-        for model, title in ((machine, "model as delivered"), (found, "model with what was found"))
+        for model, title in ((machine, "model as delivered"), (found, "model with the effect found"))
     )
     return OpenLoops(measured, delivered, after)

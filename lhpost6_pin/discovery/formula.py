@@ -1,7 +1,7 @@
-"""A free function in few words: the sparse sum of simple forms that its values bear.
+"""Sparse formula of a tabulated function: a sum of a few simple forms.
 
 Forms are of x over its largest value, so that every coefficient has the function's own unit; waves are a pair of sine
-and cosine of one length. One after another is added while Schwarz's criterion falls.
+and cosine of one length. Forms are added one by one while Schwarz's criterion falls.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _SHORTEST = 4.0  # values in a wave, at least
 
 @dataclass(frozen=True)
 class Formula:
-    """Sum of coefficient times form, and the share of the values' squares about their mean that it bears."""
+    """Sum of coefficient times form, and the share of the values' variance that it explains."""
 
     terms: tuple[tuple[float, str], ...]
     share: float
@@ -79,7 +79,7 @@ def _forms(x: Array, unit: str) -> list[Form]:
 
 
 def _fit(forms: Sequence[Form], chosen: list[int], value: Array, weight: Array) -> tuple[Array, float]:
-    """Coefficients and the weighted squares that are left."""
+    """Coefficients and the weighted sum of squared residuals."""
     if not chosen:
         return np.zeros(0), float(np.sum((weight * value) ** 2))
     a = np.hstack([forms[k][0] for k in chosen])

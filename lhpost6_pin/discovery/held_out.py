@@ -1,9 +1,8 @@
-"""The proof: how far the model stands from tests that were not used, before and after.
+"""Validation on held-out tests: the normalised RMS error of the model before and after.
 
-Four models: as delivered; refitted, with known parameters and sensor errors as the search without any effect finds
-them; after, with the effects; and the floor, what sensor noise alone leaves. The gap of a phase of a test is the root
-mean square, over everything that moves, of the model's error in standard deviations of that noise, so that the floor is
-one; closure = (refitted - after) / (refitted - floor).
+Three models: as delivered; refitted, with parameters and sensor errors but no effect; after, with the effects. The gap
+of a phase of a test is the RMS, over all columns that move, of the model's error in standard deviations of the sensor
+noise, so that noise alone gives one (the floor); closure = (refitted - after) / (refitted - floor).
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +21,7 @@ from .search_state import Search, fitted_machine
 __all__ = ["FLOOR", "Gap", "Proof", "prove"]
 
 FLOOR = 1.0
-"""Gap that noise alone leaves."""
+"""Gap due to noise alone."""
 
 _COMPARED = {
     1: ("wrench", "struts"),
@@ -43,14 +42,14 @@ class Gap:
 
     @property
     def closure(self) -> float:
-        """Share of what is more than noise that the effects have closed; nan where next to nothing was open."""
+        """Share of the gap beyond noise that the effects have closed; nan where that is not applicable."""
         open_ = self.refitted - FLOOR
         return (self.refitted - self.after) / open_ if open_ > 0.1 else float("nan")
 
 
 @dataclass(frozen=True)
 class Proof:
-    """Gaps on tests that were not used, and the validations that they come from."""
+    """Gaps on held-out tests, and the validations that they come from."""
 
     gaps: tuple[Gap, ...]
     delivered: Validation
@@ -93,7 +92,7 @@ def prove(
 
 
 def _size(phase: Phase | None) -> float:
-    """Root mean square of the errors of a phase in deviations of noise; nan where it could not be compared."""
+    """RMS of the errors of a phase in deviations of noise; nan where it could not be compared."""
     if phase is None or phase.reason:
         return float("nan")
     found = [a.error_to_noise for a in phase.agreement if a.quantity in _COMPARED[phase.number] and a.moves]

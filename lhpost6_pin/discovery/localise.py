@@ -1,4 +1,4 @@
-"""Where a gap is: the misfit of every column of residuals in groups of bands of frequency."""
+"""Location of a misfit: every column of residuals in groups of frequency bands."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ __all__ = ["Spot", "gap_map", "worst_spots"]
 Complex = NDArray[np.complex128]
 
 _GROUPS = (0, 2, 4, 6)  # first bands of groups
-_MOST = 4  # spots that are said
+_MOST = 4  # spots that are reported
 
 
 class Spot(NamedTuple):
@@ -30,13 +30,13 @@ class Spot(NamedTuple):
     excess: float  # squares beyond noise
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """As in ``flow H3 A, 3 to 12 Hz``."""
         return f"{self.kind} {self.label}, {self.band[0]:g} to {self.band[1]:g} Hz"
 
 
-def gap_map(problem: Problem, rest: Sequence[Complex]) -> list[list[Spot]]:
-    """Of every column of a problem's residuals its spots by rising frequency; rest are whitened bins (m, c) by test."""
+def gap_map(problem: Problem, residual: Sequence[Complex]) -> list[list[Spot]]:
+    """Of every column of a problem's residuals its spots by rising frequency; `residual` by test (m, c)."""
     edges = problem.whitener.edges
     bands = list(pairwise(float(edges[k]) for k in (*_GROUPS, len(edges) - 1)))
     ends = [*(high for _, high in bands[:-1]), np.inf]
@@ -47,16 +47,16 @@ def gap_map(problem: Problem, rest: Sequence[Complex]) -> list[list[Spot]]:
         for label, column in zip(_labels(problem.machine, kind), columns.tolist(), strict=False):
             spots = []
             for band, tests in zip(bands, inside, strict=True):
-                squares = np.concatenate([np.abs(r[i, column]) ** 2 for r, i in zip(rest, tests, strict=True)])
+                squares = np.concatenate([np.abs(r[i, column]) ** 2 for r, i in zip(residual, tests, strict=True)])
                 mean = float(squares.mean()) if squares.size else float("nan")
                 spots.append(Spot(kind, label, band, mean, float(np.sum(squares - 1.0))))
             found.append(spots)
     return found
 
 
-def worst_spots(problem: Problem, rest: Sequence[Complex]) -> list[Spot]:
-    """Where most of what is more than noise is, by falling share; few of them."""
-    spots = [spot for row in gap_map(problem, rest) for spot in row if spot.excess > 0.0]
+def worst_spots(problem: Problem, residual: Sequence[Complex]) -> list[Spot]:
+    """The few spots with most of the residual beyond noise, by falling share."""
+    spots = [spot for row in gap_map(problem, residual) for spot in row if spot.excess > 0.0]
     spots.sort(key=lambda spot: -spot.excess)
     least = 0.1 * sum(spot.excess for spot in spots)
     return [spot for spot in spots if spot.excess >= least][:_MOST] or spots[:1]

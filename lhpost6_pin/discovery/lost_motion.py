@@ -1,8 +1,8 @@
-"""Play that the lengths of actuators show: it is in the model before the library is searched.
+"""Play identified from actuator lengths, before the library is searched.
 
-No equation of forces or oil tells play as plainly as a length sensor on the rod beside the platen's pose does: the rod
-changes sides with the sign of its force. Lengths are regressed on that sign together with all that sensors and geometry
-may be off by, each with its prior. What they say is the prior of the play; the rest is fitted about it.
+Play shows most clearly in a length sensor on the rod, compared with the platen's pose: the rod changes sides with the
+sign of its force. Lengths are regressed on that sign jointly with the errors of sensors and geometry, each with its
+prior. The estimate is the prior of the play in the search.
 """
 
 from collections.abc import Sequence
@@ -17,13 +17,12 @@ from ..core.progress import Progress, between
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import SensorComparison, loose_lengths
 from ..data.sensors import SensorSet
-from ..identification.calibration.fit import solve
 from ..machine.library import find_family
 from ..machine.parameters import Parameters
 from ..mechanics.plant import Plant
 from .acceptance import squares_by_column
 from .add_effects import with_candidate
-from .candidates import Candidate
+from .candidates import Candidate, first_shape
 from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
 __all__ = ["LostMotion", "lost_motion", "with_lost_motion"]
@@ -31,11 +30,11 @@ __all__ = ["LostMotion", "lost_motion", "with_lost_motion"]
 Array = NDArray[np.float64]
 
 _REWEIGHED = 3
-"""Times that what is left is taken for noise of its own power."""
+"""Times that the residual is reweighted by its own power."""
 
 
 class LostMotion(NamedTuple):
-    """A rod that the lengths show ahead of the platen by its force's sign."""
+    """Play of one actuator: its rod leads the platen by the sign of its force."""
 
     component: str
     half_play: float  # [m]
@@ -50,8 +49,8 @@ class LostMotion(NamedTuple):
 def lost_motion(
     plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, numbers: Parameters
 ) -> tuple[LostMotion, ...]:
-    """Play that the lengths of all records together tell beyond doubt; numbers are those of `models/procedures`."""
-    closing = dict(_shape())["closing_force"]
+    """Significant play from the lengths of all records; numbers are those of `models/procedures/discovery.toml`."""
+    closing = dict(first_shape(find_family("swivel_play")))["closing_force"]
     parts: dict[str, list[tuple[SensorComparison, Array]]] = {}
     for record in records:
         for name, comparison, side in loose_lengths(plant, record, sensors, closing):
@@ -83,19 +82,11 @@ def _play(parts: Sequence[tuple[SensorComparison, Array]]) -> tuple[float, float
     return float(theta[0]), float(np.sqrt(inverse[0, 0]))
 
 
-def _shape() -> tuple[tuple[str, float], ...]:
-    """Where a search for play starts, but for its size."""
-    return tuple((s.name, s.start[0]) for s in find_family("swivel_play").shapes if not s.amplitude)
-
-
-def with_lost_motion(
-    found: Search, lost: Sequence[LostMotion], calibration: Parameters, numbers: Parameters, progress: Progress
-) -> Search:
-    """The search with the play that the lengths tell; alike where all that may have it do."""
+def with_lost_motion(found: Search, lost: Sequence[LostMotion], progress: Progress) -> Search:
+    """The search with the play identified from lengths; one common value where all actuators have similar play."""
     groups = _groups(lost, found)
     for i, group in enumerate(groups):
-        share = between(progress, i / len(groups), (i + 1) / len(groups))
-        found = _with_play(found, group, calibration, numbers, share)
+        found = _with_play(found, group, between(progress, i / len(groups), (i + 1) / len(groups)))
     progress(1.0)
     return found
 
@@ -109,25 +100,19 @@ def _groups(lost: Sequence[LostMotion], found: Search) -> list[tuple[LostMotion,
     return [(one,) for one in lost]
 
 
-def _with_play(
-    found: Search, group: Sequence[LostMotion], calibration: Parameters, numbers: Parameters, progress: Progress
-) -> Search:
-    candidate = Candidate(find_family("swivel_play"), tuple(one.component for one in group), _shape())
+def _with_play(found: Search, group: Sequence[LostMotion], progress: Progress) -> Search:
+    family = find_family("swivel_play")
+    candidate = Candidate(family, tuple(one.component for one in group), first_shape(family))
     weight = np.array([one.deviation**-2.0 for one in group])
     size = float(weight @ [one.half_play for one in group] / weight.sum())
-    sd = float(weight.sum() ** -0.5)  # no wider: oil that a pin hammers tells of play, but wrongly
+    sd = float(weight.sum() ** -0.5)  # no wider: impacts bias the estimate of play from the oil
     own = tuple(
         replace(parameter, sd=sd) if parameter.name.endswith(".half_play") else parameter
-        for parameter in candidate.parameters((size,), numbers.number("fit.spread"), numbers.number("fit.factor"))
+        for parameter in candidate.fit_parameters((size,), found.numbers)
     )
-    ready, start = with_candidate(found, candidate, (size,), own, found.solution.x)
-    solution = solve(ready.problem, ready.replicas, calibration, start, progress, found.solution.normal, frugal=True)
-    more = Search(ready, solution, found.refit, list(found.added), found.rounds)
-    told = sum(one.gain for one in group)
-    contest = (FittedCandidate(candidate, 0.0, fitted_machine(solution)),)
+    more = found.solved(*with_candidate(found, candidate, (size,), own, found.solution.x), progress)
+    gain = sum(one.gain for one in group)
+    contest = (FittedCandidate(candidate, 0.0, fitted_machine(more.solution)),)
     fall = squares_by_column(found.residual) - squares_by_column(more.residual)
-    tried = len(found.problem.machine.double_acting)
-    more.added.append(
-        AddedEffect(candidate, told + found.objective - more.objective, 0, tried, contest, fall, 0.0, told)
-    )
-    return more
+    tried, whole = len(found.problem.machine.double_acting), gain + found.objective - more.objective
+    return more.with_effect(AddedEffect(candidate, whole, 0, tried, contest, fall, 0.0, gain))

@@ -1,8 +1,8 @@
-"""The next test: which of a menu would tell two names apart that a campaign cannot, simulated to show that it does.
+"""The next test: which of a menu would discriminate between two families that explain a campaign equally well.
 
-The machine with the one effect runs every test of `models/procedures/next_test.toml` in closed loop. What the machine
-with the other effect cannot explain of it, everything known and the effect itself refitted, is the log-likelihood by
-which that test would tell the two apart: its expected margin, to first order.
+The machine with the one effect runs every test of `models/procedures/next_test.toml` in closed loop. The residual of
+the machine with the other effect, all parameters and that effect refitted, is the log-likelihood by which it would
+discriminate: its expected margin, to first order.
 """
 
 from dataclasses import dataclass, replace
@@ -18,10 +18,8 @@ from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.normal_equations import NormalEquations
 from ..identification.calibration.prepare import prepare_problem
 from ..identification.residuals import RESIDUALS
-from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..simulation.simulated_campaign import load_procedure, simulate_campaign, tests_of
-from .candidates import Candidate
 from .search_state import FittedCandidate, Search
 
 __all__ = ["NextTest", "next_tests"]
@@ -32,26 +30,23 @@ MENU = "next_test"
 
 @dataclass(frozen=True)
 class NextTest:
-    """A test of the menu and how well it tells two families apart."""
+    """A test of the menu and how well it discriminates between two families."""
 
     test: str
     families: tuple[str, str]
-    margin: float  # expected log-likelihood by which the wrong one stands behind; nan where the test cannot be run
-    informative: bool  # whether that is enough
+    margin: float  # expected log-likelihood ratio; nan where the test cannot be run
+    informative: bool  # whether that is decisive
 
 
-def next_tests(
-    found: Search, settings: ControllerSettings, sensors: SensorSet, calibration: Parameters, numbers: Parameters
-) -> tuple[NextTest, ...]:
+def next_tests(found: Search, settings: ControllerSettings, sensors: SensorSet) -> tuple[NextTest, ...]:
     """For every added effect and each of its rivals, the menu's tests by falling margin."""
-    tests = tests_of(load_procedure(MENU))
-    told: list[NextTest] = []
+    tests, ranked = tests_of(load_procedure(MENU)), list[NextTest]()
     for added in found.added:
         for rival in added.rivals:
-            trial = partial(_trial, added.contest[0], rival, settings, sensors, calibration, numbers)
+            trial = partial(_trial, added.contest[0], rival, settings, sensors, found.calibration, found.numbers)
             trials = Parallel(n_jobs=found.problem.jobs, prefer="threads")(delayed(trial)(test) for test in tests)
-            told += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
-    return tuple(told)
+            ranked += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
+    return tuple(ranked)
 
 
 def _trial(
@@ -70,28 +65,22 @@ def _trial(
         run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
         return NextTest(test, names, float("nan"), informative=False)
-    ready = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1)
-    parameters = (*ready.problem.parameters, *_own_parameters(rival, numbers))
-    problem = ready.problem.with_machine(ready.problem.machine, parameters)
+    problem = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1).problem
+    problem = problem.with_machine(problem.machine, (*problem.parameters, *_own_parameters(rival, numbers)))
     margin = _margin(NormalEquations(problem, np.zeros(len(problem.prior)), lambda share: None))
     return NextTest(test, names, margin, informative=margin >= numbers.number("accept.apart"))
 
 
 def _own_parameters(rival: FittedCandidate, numbers: Parameters) -> tuple[FreeParameter, ...]:
-    """Parameters of the rival's effect where it was fitted; none of a parameter that was set free."""
+    """Parameters of the rival's effect where it was fitted; none of a released parameter."""
     candidate = rival.candidate
     if candidate.release:
         return ()
-    amplitudes = tuple(_value(rival.machine, candidate, s.name) for s in candidate.amplitudes)
-    shape = tuple((name, _value(rival.machine, candidate, name)) for name, _ in candidate.shape)
-    fitted = replace(candidate, shape=shape)
-    return fitted.parameters(amplitudes, numbers.number("fit.spread"), numbers.number("fit.factor"))
-
-
-def _value(machine: Machine, candidate: Candidate, number: str) -> float:
-    value = machine.parameters.effects[candidate.name].values[number].value
-    assert isinstance(value, float)
-    return value
+    parameters = rival.machine.parameters
+    effect = replace(parameters, quantities=parameters.effects[candidate.name].values)
+    amplitudes = tuple(effect.number(s.name) for s in candidate.amplitudes)
+    shape = tuple((name, effect.number(name)) for name, _ in candidate.shape)
+    return replace(candidate, shape=shape).fit_parameters(amplitudes, numbers)
 
 
 def _margin(normal: NormalEquations) -> float:

@@ -1,19 +1,18 @@
-"""What is left when the library has been searched: a free function of a leg's state.
+"""Residual function: a nonparametric function of a leg's state, fitted to the residual when the library is exhausted.
 
-A force along a leg, or alike along all of a kind, that is a piecewise linear function of position or speed, of a fading
-memory of positions or of how far the leg is from it, is fitted with everything else, as a candidate is. If it gains, on
-tests that it was not fitted on, too, something acts on those legs that has no name here.
+A force along a leg, or common to all legs of a kind, that is a piecewise linear function of position or velocity, of a
+fading memory of positions or of the travel since, is fitted jointly like a candidate. If it gains, also in
+cross-validation, an effect acts on those legs that the library does not contain.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.problem import Problem
 from ..identification.calibration.whitened_residuals import spectrum_of
 from ..identification.inverse_dynamics import leg_wrenches
 from ..identification.prepare import MeasuredTest
@@ -24,7 +23,9 @@ from ..machine.parameters import Parameters
 from ..mechanics.pose import leg_displacements, plant_motion
 from .acceptance import Reweighting
 from .formula import Formula, sparse_formula
+from .linearisation import Linearisation
 from .scores import make_block, score
+from .search_state import Search
 
 __all__ = ["ResidualFunction", "fit_residual_functions", "with_residual_function"]
 
@@ -42,16 +43,16 @@ _FAMILY: dict[State, str] = {
 
 @dataclass(frozen=True)
 class ResidualFunction:
-    """A free function of the state of legs, alike for all of them, fitted to what is left."""
+    """A function of the state of legs, common to all of them, fitted to the residual."""
 
     components: tuple[str, ...]
     state: State
-    memory: float  # time constant [s] of what is remembered; 0 where nothing is
+    memory: float  # time constant [s] of the state; 0 where it has none
     nodes: Array  # (k,) [m or m/s]
     value: Array  # (k,) [N]
     sd: Array  # (k,)
-    gain: float  # of log-likelihood, with what is left weighed anew
-    beyond: float  # of log-likelihood, by what even doubtful noise would not have
+    gain: float  # of log-likelihood, the residual reweighted
+    beyond: float  # of log-likelihood, beyond `doubt` times the stated noise
     held_out: Array  # (t,) linear gain on each test, fitted on the others
 
     @property
@@ -60,79 +61,69 @@ class ResidualFunction:
         return "m/s" if self.state == "velocity" else "m"
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The state in words."""
         return f"{self.state}, memory of {self.memory:g} s" if self.memory else self.state
 
     @property
     def formula(self) -> Formula:
-        """The function in few words."""
+        """A sparse formula of the function."""
         return sparse_formula(self.nodes, self.value, self.sd, self.unit)
 
 
-def with_residual_function(machine: Machine, left: ResidualFunction) -> Machine:
-    """The machine with the free function as an effect that is switched off: share = 1 switches it on."""
-    family = _FAMILY[left.state]
-    values = {f"force_{k + 1}": -float(v) for k, v in enumerate(left.value)}
-    values |= {"first": float(left.nodes[0]), "last": float(left.nodes[-1])}
-    if left.memory:
-        values |= {"memory": left.memory, "past": float(left.state == "past position")}
-    name = f"{family}_{'_'.join(left.components)}"
-    return machine.with_effect(family, left.components, name=name, share=0.0, **values)
+def with_residual_function(machine: Machine, function: ResidualFunction) -> Machine:
+    """The machine with the function as an effect that is switched off: share = 1 switches it on."""
+    family = _FAMILY[function.state]
+    values = {f"force_{k + 1}": -float(v) for k, v in enumerate(function.value)}
+    values |= {"first": float(function.nodes[0]), "last": float(function.nodes[-1])}
+    if function.memory:
+        values |= {"memory": function.memory, "past": float(function.state == "past position")}
+    name = f"{family}_{'_'.join(function.components)}"
+    return machine.with_effect(family, function.components, name=name, share=0.0, **values)
 
 
-def fit_residual_functions(
-    base: OperatingPoint, weigh: Reweighting, numbers: Parameters
-) -> tuple[ResidualFunction, ...]:
-    """Free functions of every leg's states and of those of all legs of a kind, by falling gain."""
-    problem = weigh.problem
-    seen = [_legs(base, t) for t in range(len(base.tests))]
-    kinds: dict[str, list[int]] = {}
-    for i, component in enumerate(base.plant.machine.components):
-        kinds.setdefault(component.kind, []).append(i)
-    found = []
-    for members in kinds.values():
+def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[ResidualFunction, ...]:
+    """Functions of every leg's states and of those of all legs of a kind, by falling gain."""
+    numbers, base, weigh = found.numbers, linear.base, Reweighting(found, linear.background)
+    problem, background, components = weigh.problem, linear.background, base.plant.machine.components
+    free, spread = np.full(NODES, np.inf), np.full(NODES, numbers.number("left.spread"))
+    tests = []
+    for test in base.tests:
+        moved = leg_displacements(base.plant, test.motion.displacement, test.motion.velocity)
+        unit = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, np.ones_like(moved[0]))
+        tests.append((test, moved, unit))  # elongations and rates (n, legs), wrenches (n, legs, 6) of unit forces
+
+    def fitted(names: tuple[str, ...], columns: Sequence[Complex]) -> ResidualFunction:
+        """The function whose values have these columns (m, c, k) of each test."""
+        one = score(background, make_block(background, columns), -free, free, spread)
+        less = weigh.lowered(background.explained(columns, one.amplitude), one)
+        return ResidualFunction(names, state, memory, nodes, one.amplitude, one.sd, *less[:2], one.held_out)
+
+    functions = []
+    for kind in dict.fromkeys(c.kind for c in components):
+        members = [i for i, c in enumerate(components) if c.kind == kind]
+        names = tuple(components[i].name for i in members)
         for state, memory in _states(numbers):
-            along = [_state(state, memory, *legs, test.dt) for (legs, _), test in zip(seen, base.tests, strict=True)]
+            along = [_state(state, memory, *moved, test.dt) for test, moved, _ in tests]
             low, high = (f([f(x[:, members]) for x in along]) for f in (np.min, np.max))
             if state != "velocity" and high - low < numbers.number("left.travel"):
                 continue
             nodes = np.linspace(low, high, NODES)
-            each = []
-            for i in members:
-                wrenches = [
-                    -w[:, i, :, None] * _hats(x[:, i], nodes)[:, None, :] for (_, w), x in zip(seen, along, strict=True)
+            each = [
+                [
+                    _whitened(problem, t, test, -unit[:, i, :, None] * _hats(x[:, i], nodes)[:, None, :])
+                    for t, ((test, _, unit), x) in enumerate(zip(tests, along, strict=True))
                 ]
-                each.append([_whitened(problem, t, base.tests[t], w) for t, w in enumerate(wrenches)])
-            names = [base.plant.machine.components[i].name for i in members]
-            make = partial(_fitted, weigh, numbers, state, memory, nodes)
-            found += [make((name,), columns) for name, columns in zip(names, each, strict=True)]
+                for i in members
+            ]
+            functions += [fitted((name,), columns) for name, columns in zip(names, each, strict=True)]
             if len(members) > 1:
-                found.append(make(tuple(names), [np.sum(parts, axis=0) for parts in zip(*each, strict=True)]))
-    return tuple(sorted(found, key=lambda left: -left.gain))
-
-
-def _fitted(
-    weigh: Reweighting,
-    numbers: Parameters,
-    state: State,
-    memory: float,
-    nodes: Array,
-    components: tuple[str, ...],
-    columns: Sequence[Complex],
-) -> ResidualFunction:
-    """The function whose values are worth these columns (m, c, k) of each test."""
-    background, free = weigh.background, np.full(NODES, np.inf)
-    spread = np.full(NODES, numbers.number("left.spread"))
-    one = score(background, make_block(background, columns), -free, free, spread)
-    less = weigh.lowered(background.explained(columns, one.amplitude), one)
-    return ResidualFunction(
-        components, state, memory, nodes, one.amplitude, one.sd, less.gain, less.beyond, one.held_out
-    )
+                functions.append(fitted(names, [np.sum(parts, axis=0) for parts in zip(*each, strict=True)]))
+    return tuple(sorted(functions, key=lambda one: -one.gain))
 
 
 def _states(numbers: Parameters) -> Iterator[tuple[State, float]]:
-    """States of legs, with the time constants of those that remember."""
+    """States of legs, with the time constants of those with a memory."""
     yield "position", 0.0
     yield "velocity", 0.0
     for memory in numbers.vector("left.memories"):
@@ -152,13 +143,6 @@ def _state(state: State, memory: float, position: Array, velocity: Array, dt: fl
     start = (1.0 - last) * position[0]  # at rest where it begins
     past, _ = lfilter([last, first], [1.0, -stay], position, axis=0, zi=start[None])
     return np.asarray(past if state == "past position" else position - past)
-
-
-def _legs(base: OperatingPoint, t: int) -> tuple[tuple[Array, Array], Array]:
-    """Elongations and their rates (n, legs) and wrenches of unit forces (n, legs, 6) of a test."""
-    motion = base.tests[t].motion
-    moved = leg_displacements(base.plant, motion.displacement, motion.velocity)
-    return moved, leg_wrenches(base.plant, plant_motion(base.plant, motion).q, np.ones_like(moved[0]))
 
 
 def _hats(x: Array, nodes: Array) -> Array:

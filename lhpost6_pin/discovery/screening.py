@@ -8,57 +8,37 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from ..core.progress import Progress
-from ..identification.calibration.fit import Solution
-from ..identification.calibration.problem import OperatingPoint, Problem
 from ..machine.library import Family
-from ..machine.parameters import Parameters
-from .acceptance import Lowered, Reweighting, refusal, squares_by_column
-from .background import make_background
+from .acceptance import Lowered, Reweighting, refusal
 from .candidate_columns import Columns, columns_of, side_by_side
 from .candidates import Candidate, list_candidates
+from .linearisation import Linearisation
 from .releases import block_of, list_releases
 from .scores import Background, Block, Score, less_noise, make_block, score
-from .search_state import Linearisation, Round, Scored, Search
+from .search_state import Round, Scored, Search
 
-__all__ = ["linearise", "screen", "weighing"]
+__all__ = ["screen"]
 
 Array = NDArray[np.float64]
 
 BATCH = 8
-"""Groups of candidates that are weighed at once."""
+"""Groups of candidates that are scored at once."""
 
 
-def linearise(solution: Solution, calibration: Parameters, replicas: Sequence[Problem] = ()) -> Linearisation:
-    """Normal equations of the background about a solution, with replicas of its problem where candidates are asked."""
-    problem, at = solution.normal.problem, solution.at
-    background = make_background(problem, solution.normal, at, calibration)
-    return Linearisation(
-        OperatingPoint(problem, at), background, tuple((one, OperatingPoint(one, at)) for one in replicas)
-    )
-
-
-def weighing(found: Search, linear: Linearisation, numbers: Parameters) -> Reweighting:
-    """What weighs candidates there."""
-    first = squares_by_column(found.refit.normal.residual)
-    return Reweighting(found.refit.normal.problem, linear.background, first, numbers)
-
-
-def screen(found: Search, linear: Linearisation, numbers: Parameters, progress: Progress) -> Round:
+def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     """Score all candidates."""
-    problem, base, background = found.problem, linear.base, linear.background
+    problem, numbers, base, background = found.problem, found.numbers, linear.base, linear.background
     taken = {a.candidate.name for a in found.added}
     groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
-    rest = found.solution.normal.residual
-    left = float(sum(np.sum(np.abs(r) ** 2) for r in rest) / sum(r.size for r in rest))
-    weigh = weighing(found, linear, numbers)
+    residual = found.solution.normal.residual
+    misfit = float(sum(np.sum(np.abs(r) ** 2) for r in residual) / sum(r.size for r in residual))
+    weigh, look = Reweighting(found, background), numbers.number("accept.look")
 
     def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
-        less = Lowered(one.gain, 0.0, 0.0, 0.0)
-        if one.gain >= numbers.number("accept.look"):
-            less = weigh.lowered(explained(), one)
+        less = weigh.lowered(explained(), one) if one.gain >= look else Lowered(one.gain, 0.0, 0.0, 0.0)
         why = refusal([candidate.family], one, less, numbers)
         if not why and less.gain < numbers.number("accept.again") * _found_there(found, candidate):
-            why = "may be the form of what was found there"
+            why = "may be due to the form of an effect added there"
         return Scored(candidate, one, less.gain, less.share, why)
 
     def of_group(group: Sequence[Candidate], columns: Columns, parts: Sequence[Array], block: Block) -> list[Scored]:
@@ -66,17 +46,17 @@ def screen(found: Search, linear: Linearisation, numbers: Parameters, progress: 
             pairs = zip(group, parts, strict=True)
             return [score(background, block.select(q), *c.bounds, c.spread(numbers)) for c, q in pairs]
 
-        found = scores(block)
-        if max(one.gain for one in found) >= numbers.number("accept.look"):
+        ones = scores(block)
+        if max(one.gain for one in ones) >= look:
             noisy = [columns_of(again, there, group)[0] for again, there in linear.replicas]
-            found = scores(less_noise(background, block, columns, noisy))
-        scored = []
-        for candidate, part, one in zip(group, parts, found, strict=True):
-            scored.append(judged(candidate, one, partial(background.explained, columns, part @ one.amplitude)))
-        return scored
+            ones = scores(less_noise(background, block, columns, noisy))
+        return [
+            judged(candidate, one, partial(background.explained, columns, part @ one.amplitude))
+            for candidate, part, one in zip(group, parts, ones, strict=True)
+        ]
 
     def of_batch(groups: Sequence[Sequence[Candidate]]) -> list[Scored]:
-        """Several groups with one pass through the background, which is what takes time."""
+        """Several groups with one pass through the background, which dominates the cost."""
         each = [columns_of(problem, base, group) for group in groups]
         block = make_block(background, side_by_side([columns for columns, _ in each]))
         ends = np.cumsum([0, *(columns[0].shape[-1] for columns, _ in each)])
@@ -88,21 +68,22 @@ def screen(found: Search, linear: Linearisation, numbers: Parameters, progress: 
         ]
 
     scored: list[Scored] = []
+    free = np.full(1, np.inf)
     for candidate in list_releases(problem):
         place = problem.names.index(candidate.release)
-        free = np.full(1, np.inf)
-        one = score(background, block_of(background, place), -free, free, np.full(1, numbers.number("fit.sensor_free")))
+        spread = np.full(1, numbers.number("fit.sensor_free"))
+        one = score(background, block_of(background, place), -free, free, spread)
         scored.append(judged(candidate, one, partial(_of_unknown, background, place, one.amplitude)))
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
         batches = [groups[i : i + BATCH] for i in range(0, len(groups), BATCH)]
         for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
             scored += some
             progress((done + 1) / len(batches))
-    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), left)
+    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), misfit)
 
 
 def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
-    """By falling gain; but of one family, fewer components come before more that gain less than `simpler` over them."""
+    """By falling gain; within a family, fewer components precede more that gain less than `simpler` over them."""
     found = sorted(scored, key=lambda one: -one.gain)
     most: dict[str, float] = {}
     for one in found:
@@ -117,7 +98,7 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
 
 
 def _found_there(found: Search, candidate: Candidate) -> float:
-    """Largest gain of what was added on the same components, and shows in the same residuals or is often confused."""
+    """Largest gain of an effect added on the same components that shows in the same residuals or is often confused."""
     one = candidate.family
 
     def alike(other: Family) -> bool:

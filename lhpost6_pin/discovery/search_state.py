@@ -1,47 +1,41 @@
-"""What a search knows: candidates as scored, rounds of screening, effects added, and where it stands."""
+"""State of a search: scored candidates, rounds of screening, effects added, and the joint solution."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identification.calibration.fit import Solution, misfit, objective
+from ..core.progress import Progress
+from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
 from ..identification.calibration.prepare import PreparedProblem
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
+from ..machine.parameters import Parameters
 from .candidates import Candidate
-from .scores import Background, Score
+from .scores import Score
 
-__all__ = [
-    "AddedEffect",
-    "FittedCandidate",
-    "Round",
-    "Scored",
-    "Search",
-    "Linearisation",
-    "best_per_family",
-    "fitted_machine",
-]
+__all__ = ["AddedEffect", "FittedCandidate", "Round", "Scored", "Search", "best_per_family", "fitted_machine"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A candidate with what it explains, and whether it may be added."""
+    """A candidate with its score, and whether it may be added."""
 
     candidate: Candidate
     score: Score
-    gain: float  # of log-likelihood, with what is left weighed anew; without that where the linear gain is too little
-    closure: float  # share of what is more than noise where it explains most
+    gain: float  # of log-likelihood, the residual reweighted; the linear gain where that is below the threshold
+    closure: float  # share explained of the residual beyond noise, in the column where it explains most
     refused: str  # why it is not added; empty if it may be
 
 
 def best_per_family(scored: Sequence[Scored], *, named: bool = False) -> list[Scored]:
-    """The first of each entry of the library, or of each name that a verdict gives."""
+    """The first of each entry of the library, or (`named`) of each family that a verdict reports."""
     found: dict[str, Scored] = {}
     for one in scored:
         family = one.candidate.family
@@ -51,10 +45,10 @@ def best_per_family(scored: Sequence[Scored], *, named: bool = False) -> list[Sc
 
 @dataclass(frozen=True)
 class FittedCandidate:
-    """A family that was fitted in full for the same place, and how far it stands behind the one that was added."""
+    """A candidate fitted jointly with all parameters, compared with the one that was added."""
 
     candidate: Candidate
-    behind: float  # log-likelihood; 0 for the one added, below that for one that is less simple
+    behind: float  # log-likelihood; 0 for the one added, negative for one that gains more but is less simple
     machine: Machine  # with it, all numbers as fitted
 
 
@@ -66,14 +60,14 @@ class AddedEffect:
     gain: float  # of log-likelihood and log-prior, of the joint fit
     round: int  # of the search, from 0
     tried: int  # candidates in that round
-    contest: tuple[FittedCandidate, ...]
-    fall: Array  # (c,) of the squares of what is left, by column
-    apart: float  # log-likelihood within which two families explained the campaign alike
-    from_lengths: float = 0.0  # log-likelihood of what is not in the search's residuals: lengths
+    contest: tuple[FittedCandidate, ...]  # itself, then the candidates fitted in its place
+    fall: Array  # (c,) of the sum of squared residuals, by column
+    apart: float  # log-likelihood within which two families explain the campaign equally well
+    from_lengths: float = 0.0  # log-likelihood of length sensors, which are not among the residuals
 
     @property
     def rivals(self) -> tuple[FittedCandidate, ...]:
-        """Those of other families that explain the campaign alike."""
+        """Those of other families that explain the campaign equally well."""
         near = [one for one in self.contest[1:] if one.behind < self.apart]
         return tuple(one for one in near if one.candidate.family.named != self.candidate.family.named)
 
@@ -92,37 +86,43 @@ class Round:
 
 
 @dataclass(frozen=True)
-class Linearisation:
-    """The search's place, ready for candidates."""
-
-    base: OperatingPoint
-    background: Background
-    replicas: tuple[tuple[Problem, OperatingPoint], ...]  # the same with more noise
-
-
-@dataclass
 class Search:
-    """Where a search stands, and how it came there."""
+    """A search at its current solution."""
 
-    ready: PreparedProblem
+    prepared: PreparedProblem
     solution: Solution
     refit: Solution  # without any effect
-    added: list[AddedEffect] = field(default_factory=list)
-    rounds: list[Round] = field(default_factory=list)
+    numbers: Parameters  # of `models/procedures/discovery.toml`
+    calibration: Parameters  # of `calibration.toml`, with the entries that `discovery.toml` replaces
+    added: tuple[AddedEffect, ...] = ()
+    rounds: tuple[Round, ...] = ()
+
+    def solved(self, prepared: PreparedProblem, start: Array, progress: Progress, **how: Any) -> "Search":
+        """The search with another problem solved from `start` (p,); `how` are options of `solve`.
+
+        Derivatives by unknowns that both problems share are reused.
+        """
+        rest = self.calibration, start, progress, self.solution.normal
+        solution = solve(prepared.problem, prepared.replicas, *rest, frugal=True, **how)
+        return replace(self, prepared=prepared, solution=solution)
+
+    def with_effect(self, effect: AddedEffect) -> "Search":
+        """The search with one more effect in its list."""
+        return replace(self, added=(*self.added, effect))
 
     @property
     def problem(self) -> Problem:
         """The problem with the effects added."""
-        return self.ready.problem
+        return self.prepared.problem
 
     @property
     def residual(self) -> list[NDArray[np.complex128]]:
-        """What is left at the solution: whitened bins (m, c) of every test."""
+        """Residual at the solution: whitened bins (m, c) of every test."""
         return self.solution.residual
 
     @property
     def power(self) -> float:
-        """Mean square of what is left, over all tests alike."""
+        """Mean square of the residual, each test with equal weight."""
         return float(np.mean([np.mean(np.abs(r) ** 2) for r in self.residual]))
 
     @property
@@ -131,7 +131,7 @@ class Search:
         return objective(self.problem, self.residual, self.solution.x)
 
     def misfit(self, kind: str) -> float:
-        """Mean square of what is left of one kind, over all tests alike; nan where there is none."""
+        """Mean square of one kind of residual, each test with equal weight; nan where there is none."""
         return float(np.mean(misfit(self.problem, self.residual)[:, RESIDUALS.index(kind)]))
 
 

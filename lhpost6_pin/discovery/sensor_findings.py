@@ -1,8 +1,7 @@
-"""Sensors that other sensors contradict: found before any force law is asked, and put right.
+"""Sensor faults found by cross-checking redundant sensors, independent of any force law, and corrected.
 
-Only quantities measured twice are asked here (`consistency`), where neither oil nor friction has a say: velocities and
-accelerations against the displacement, lengths against the pose, the skew of forces against pressures. What joins a
-force and a pressure is left to the search.
+Only redundant channels are compared (`consistency`): velocity and acceleration against displacement, lengths against
+the pose, the skew of forces against pressures. Gains and offsets of forces and pressures are left to the search.
 """
 
 from collections.abc import Sequence
@@ -25,19 +24,19 @@ _SKEWED = (*_CHECKS, "force against pressures")
 
 @dataclass(frozen=True)
 class SensorFault:
-    """A sensor that is off beyond its stated range: measured = (1 + gain) true + cross-talk + offset, and late."""
+    """A sensor beyond its stated range: measured = (1 + gain) true + cross-talk + offset, delayed."""
 
     kind: str  # "gain", "offset", "drift", "delay", or "cross x": of the acceleration along x
     channel: str
     column: str  # label within the channel; empty: all of it
     value: float
     unit: str
-    deviation: float  # standard, of noise and of what calibration leaves open
+    deviation: float  # standard, of noise and calibration uncertainty
     stated: float  # largest error that the sensors' file allows
 
     @property
     def name(self) -> str:
-        """As unknowns of a search are called."""
+        """As of the unknowns of a search."""
         return f"{self.kind} {self.channel}[{self.column}]" if self.column else f"{self.kind} {self.channel}"
 
     @property
@@ -49,13 +48,13 @@ class SensorFault:
 def find_sensor_faults(
     plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, loose: Sequence[str] = ()
 ) -> tuple[SensorFault, ...]:
-    """Faults of sensors that others contradict, pooled over records; raises what `check_sensors` does.
+    """Faults of redundant sensors, pooled over records; raises what `check_sensors` does.
 
-    Play of actuators that are `loose` shifts the means of their lengths, by how long a rod bears on either side.
+    Play of actuators that are `loose` shifts the means of their lengths.
     """
     findings = check_sensors(plant, records, sensors)
     late = _late(findings, sensors)
-    if late:  # a large delay looks like a gain as well
+    if late:  # a large delay biases the gain
         behind = {f.channel: f.value for f in late}
         findings = check_sensors(plant, [align_record(r, behind) for r in records], sensors)
     shifted = {f"actuator_displacement[{name}]" for name in loose}
@@ -65,7 +64,7 @@ def find_sensor_faults(
 
 
 def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | None:
-    """The gain, offset or cross-talk that a finding is of."""
+    """The gain, drift, offset or cross-talk of a finding; None for others."""
     channel, _, column = finding.channel.rstrip("]").partition("[")
     kind, error = finding.quantity, finding.estimate - finding.expected
     if kind == "gain" or kind.startswith("cross"):
@@ -80,13 +79,13 @@ def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | Non
 
 
 def _late(findings: Sequence[ConsistencyFinding], sensors: SensorSet) -> list[SensorFault]:
-    """Groups of channels of which most columns that can tell are late."""
+    """Groups of channels of which most testable columns are delayed."""
     faults = []
     for check in _SKEWED:
-        told = [f for f in findings if f.check == check and f.quantity == "delay" and f.verdict != "untested"]
-        off = [f for f in told if f.verdict == "suspicious"]
-        if 2 * len(off) > len(told):
-            group = told[0].channel.partition("[")[0]  # of one channel, all that are asked here
+        tested = [f for f in findings if f.check == check and f.quantity == "delay" and f.verdict != "untested"]
+        off = [f for f in tested if f.verdict == "suspicious"]
+        if 2 * len(off) > len(tested):
+            group = tested[0].channel.partition("[")[0]  # the same for all
             middle = sorted(off, key=lambda f: f.estimate)[len(off) // 2]
             error, stated = middle.estimate - middle.expected, sensors.delay_range.get(group, 0.0)
             faults.append(SensorFault("delay", group, "", error, "s", middle.deviation, stated))
@@ -95,7 +94,7 @@ def _late(findings: Sequence[ConsistencyFinding], sensors: SensorSet) -> list[Se
 
 def correct_records(records: Sequence[xr.Dataset], faults: Sequence[SensorFault]) -> list[xr.Dataset]:
     """Records without the gains and cross-talk of these faults of the platen's sensors; delays are aligned later."""
-    mended = []
+    corrected = []
     for record in records:
         out = record.copy(deep=True) if faults else record
         for fault in faults:
@@ -106,5 +105,5 @@ def correct_records(records: Sequence[xr.Dataset], faults: Sequence[SensorFault]
                 values[:, k] /= 1.0 + fault.value
             elif fault.kind.startswith("cross"):
                 values[:, k] -= fault.value * values[:, AXES.index(fault.kind.split()[1])]
-        mended.append(out)
-    return mended
+        corrected.append(out)
+    return corrected

@@ -1,7 +1,7 @@
-"""The verdict: which word a search's outcome deserves, and what it names.
+"""The verdict on a search: one word, the effects identified, and the parameters and sensors that differ.
 
-An effect is one that the search has added; or a parameter so far from what the machine file states, beyond calibration,
-that it stands for a mechanism of its own (seven times the leakage: worn seals).
+A fitted parameter within 3 sigma of its prior counts as calibration; beyond that it is reported as an effect of its
+family (seven times the leakage: worn seals).
 """
 
 from collections.abc import Callable, Sequence
@@ -67,10 +67,10 @@ class Verdict:
     effects: tuple[EffectFinding, ...]
     changed: dict[str, Estimate]  # parameters that differ from what the machine file states, within calibration
     sensors: tuple[SensorFinding, ...]
-    residual_function: ResidualFunction | None  # what has no name
-    untestable: tuple[str, ...]  # families that this campaign could not show, of typical size
-    nearest: tuple[str, ...] = ()  # families in the model that come nearest to what has no name
-    where: tuple[Spot, ...] = ()  # where most of what has no name is, by falling share
+    residual_function: ResidualFunction | None  # of the effect that was not identified
+    untestable: tuple[str, ...]  # families that this campaign could not show, at typical size
+    nearest: tuple[str, ...] = ()  # families in the model that come nearest to what was not identified
+    where: tuple[Spot, ...] = ()  # where most of the unexplained residual is, by falling share
 
 
 def judge(
@@ -78,16 +78,14 @@ def judge(
     left: Sequence[ResidualFunction],
     instead: Sequence[ResidualFunction],
     faults: Sequence[SensorFault],
-    calibration: Parameters,
-    numbers: Parameters,
 ) -> Verdict:
     """The verdict on a search.
 
-    left are free functions fitted to what is left, instead those fitted in place of all effects, both by falling gain;
-    faults are of sensors that were put right before.
+    left are residual functions fitted beside the effects, instead those fitted in place of them, both by falling gain;
+    faults are of sensors whose records were corrected before.
     """
-    problem, x, added = found.problem, found.solution.x, [a.candidate for a in found.added]
-    count = len(problem.parameters)
+    problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
+    count, added = len(problem.parameters), [a.candidate for a in found.added]
     own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.parameters])
     floor = calibration.number("fit.floor") * problem.stated
     floor[:count][own] = 0.0  # their priors are flat
@@ -113,55 +111,58 @@ def judge(
         for c in added
         if c.release == u.name
     )
-    errors = {s.name for s in released}
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
-    kept = [one for one in found.added if one.candidate.name not in errors]
-    effects = [_of_added(one, problem, estimate) for one in kept]
+    kept = [one for one in found.added if one.candidate.name not in {s.name for s in released}]
     changed = {}
     for i, parameter in enumerate(problem.parameters):
         sure = abs(x[i]) > calibration.number("report.deviations") * sd[i]
         material = abs(x[i]) > calibration.number("report.material") * problem.stated[i]
         if sure and material and not own[i] and parameter.name not in problem.free:
             changed[parameter.name] = estimate(i)
-    free, doubted = reject_effects(kept, left, instead, numbers)
-    doubted |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found, numbers)}
+    free, rejected = reject_effects(kept, left, instead, numbers)
+    rejected |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found)}
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
-    unnamed = free is not None or bool(doubted) or drifting or _more_than_noise(found, numbers)
-    nearest = tuple(e.family for e, one in zip(effects, kept, strict=True) if one.candidate.name in doubted)
-    effects = [e for e, one in zip(effects, kept, strict=True) if one.candidate.name not in doubted]
-    hidden, told = _untestable(found, numbers)
-    blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + told)
-    named = _merged(effects)
-    word = _word(named, changed, sensors, unnamed, blind)
-    spots = tuple(worst_spots(problem, found.residual)) if word == "unexplained" else ()
-    return Verdict(word, named, changed, sensors, free, hidden, nearest, spots)
+    unexplained = free is not None or bool(rejected) or drifting or _more_than_noise(found)
+    nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
+    effects = _merged([_of_added(one, problem, estimate) for one in kept if one.candidate.name not in rejected])
+    hidden, testable = _untestable(found)
+    blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
+    word: Word = "not_testable" if blind else "parameters_only" if changed else "none"
+    if unexplained:
+        word = "unexplained"
+    elif effects:
+        word = "ambiguous" if any(e.rivals for e in effects) else "named"
+    elif sensors:
+        word = "sensor"
+    spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
+    return Verdict(word, effects, changed, sensors, free, hidden, nearest, spots)
 
 
-def _untestable(found: Search, numbers: Parameters) -> tuple[tuple[str, ...], int]:
-    """Families of which no candidate's typical size stands clear of its deviation; and how many are not so."""
+def _untestable(found: Search) -> tuple[tuple[str, ...], int]:
+    """Families of which no candidate's typical size is significant; and how many others there are."""
     clear: dict[str, bool] = {}
     for one in found.rounds[-1].scored:
         if not one.candidate.release:
             shape, name = one.candidate.amplitudes[0], one.candidate.family.named
-            told = bool(one.score.sd[0] * numbers.number("verdict.clear") < shape.typical)
-            clear[name] = clear.get(name, False) or told
-    hidden = tuple(name for name, told in clear.items() if not told)
+            significant = bool(one.score.sd[0] * found.numbers.number("verdict.clear") < shape.typical)
+            clear[name] = clear.get(name, False) or significant
+    hidden = tuple(name for name, significant in clear.items() if not significant)
     return hidden, len(clear) - len(hidden)
 
 
 def _of_added(added: AddedEffect, problem: Problem, estimate: Callable[[int], Estimate]) -> EffectFinding:
     candidate = added.candidate
-    values = {}
-    for i, name in enumerate(problem.names):
-        if name == candidate.release or name.startswith(f"{candidate.name}."):
-            values[name.removeprefix(f"{candidate.name}.")] = estimate(i)
-    chance = float(chi2.sf(2.0 * added.gain, len(values)))
+    values = {
+        name.removeprefix(f"{candidate.name}."): estimate(i)
+        for i, name in enumerate(problem.names)
+        if name == candidate.release or name.startswith(f"{candidate.name}.")
+    }
     return EffectFinding(
         family=candidate.family.named,
         components=candidate.components,
         parameters=values,
         gain=added.gain,
-        p_value=min(1.0, chance * added.tried),
+        p_value=min(1.0, float(chi2.sf(2.0 * added.gain, len(values))) * added.tried),
         rivals=tuple(dict.fromkeys(one.candidate.family.named for one in added.rivals)),
         form=candidate.family.name,
     )
@@ -177,38 +178,40 @@ def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:
     merged: dict[str, EffectFinding] = {}
     for one in effects:
         key = one.family if "." in next(iter(one.parameters), "") else f"{one.family} {one.components}"
-        if key in merged:
-            first = merged[key]
-            components = tuple(dict.fromkeys((*first.components, *one.components)))
-            values = {**first.parameters, **one.parameters}
-            rivals = tuple(name for name in first.rivals if name in one.rivals)  # one mechanism, told by either kind
-            chance = min(first.p_value, one.p_value)
-            gain = first.gain + one.gain
-            merged[key] = replace(
-                first, components=components, parameters=values, gain=gain, p_value=chance, rivals=rivals
+        first = merged.get(key)
+        merged[key] = (
+            one
+            if first is None
+            else replace(
+                first,
+                components=tuple(dict.fromkeys((*first.components, *one.components))),
+                parameters={**first.parameters, **one.parameters},
+                gain=first.gain + one.gain,
+                p_value=min(first.p_value, one.p_value),
+                rivals=tuple(
+                    name for name in first.rivals if name in one.rivals
+                ),  # either kind excludes a rival of both
             )
-        else:
-            merged[key] = one
+        )
     return tuple(merged.values())
 
 
-def _more_than_noise(found: Search, numbers: Parameters) -> bool:
-    """Whether more is left than noise, and than the form of the effects found."""
-    limit, share = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
-    doubt, heard = numbers.number("accept.doubt"), ~_hammered(found)
+def _more_than_noise(found: Search) -> bool:
+    """Whether the residual exceeds noise, and what the form of the effects found may leave."""
+    limit, share, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "verdict.rest", "accept.doubt"))
     for kind in found.problem.kinds:
-        rows = found.problem.rows(kind) & heard
+        rows = found.problem.rows(kind) & ~_impacted(found)
         if not rows.any():
             continue
-        first, last = ([r[:, rows] for r in rest] for rest in (found.refit.normal.residual, found.residual))
+        first, last = ([r[:, rows] for r in tests] for tests in (found.refit.normal.residual, found.residual))
         misfit = float(np.mean([np.mean(np.abs(r) ** 2) for r in last]))
         if misfit > limit and _excess(last, doubt) > share * _excess(first, doubt):
             return True
     return False
 
 
-def _hammered(found: Search) -> NDArray[np.bool_]:
-    """Columns (c,) of actuators with play that the lengths tell: their pins hammer faster than records show."""
+def _impacted(found: Search) -> NDArray[np.bool_]:
+    """Columns (c,) of actuators with play identified from lengths: impacts are faster than the sampling rate."""
     names, columns = found.problem.machine.actuator_names, np.zeros(sum(found.problem.widths), bool)
     for one in found.added:
         for name in one.candidate.components if one.from_lengths else ():
@@ -216,20 +219,19 @@ def _hammered(found: Search) -> NDArray[np.bool_]:
     return columns
 
 
-def _excess(rest: Sequence[NDArray[np.complex128]], doubt: float) -> float:
-    """Squares of whitened residuals beyond what may be noise; no less than a tenth of noise."""
-    count = sum(r.size for r in rest)
-    return max(sum(float(np.sum(np.abs(r) ** 2)) for r in rest) - doubt * count, 0.1 * count)
+def _excess(residual: Sequence[NDArray[np.complex128]], doubt: float) -> float:
+    """Squares of whitened residuals beyond `doubt` times noise; at least a tenth of noise."""
+    count = sum(r.size for r in residual)
+    return max(sum(float(np.sum(np.abs(r) ** 2)) for r in residual) - doubt * count, 0.1 * count)
 
 
-def _leaves_much(added: AddedEffect, found: Search, numbers: Parameters) -> bool:
-    """Whether much is left of what an effect should have explained, where it explained most of it: a wrong name."""
-    limit, rest = numbers.number("verdict.unexplained"), numbers.number("verdict.rest")
-    where = (added.fall > 0.1 * added.fall.max()) & ~_hammered(found)
+def _leaves_much(added: AddedEffect, found: Search) -> bool:
+    """Whether an effect leaves much of the residual in the columns where it explained most: a wrong name."""
+    limit, share, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "verdict.rest", "accept.doubt"))
+    where = (added.fall > 0.1 * added.fall.max()) & ~_impacted(found)
     left = squares_by_column(found.residual)[where]
     noise = float(sum(len(r) for r in found.residual) * left.size)
-    excess = left.sum() - numbers.number("accept.doubt") * noise
-    return bool(left.sum() > limit * noise and excess > rest * added.fall[where].sum())
+    return bool(left.sum() > limit * noise and left.sum() - doubt * noise > share * added.fall[where].sum())
 
 
 def reject_effects(
@@ -238,47 +240,31 @@ def reject_effects(
     instead: Sequence[ResidualFunction],
     numbers: Parameters,
 ) -> tuple[ResidualFunction | None, set[str]]:
-    """What has no name, and the effects that are therefore no right names.
+    """The residual function that is reported, and the effects that it rejects.
 
-    A free function that explains far more than all forces that were added takes their place; one that is left beside
-    them doubts those that it outweighs, but where it is little of an effect found there it is only the form of that.
+    A function fitted in place of all forces that were added rejects them if it explains far more. One fitted beside
+    them rejects those that it outweighs; where it is small against an effect found there, it is attributed to the form
+    of that effect and not reported.
     """
+    n = numbers.number
+    share, least = n("accept.held_out"), n("left.gain")
+
+    def first(functions: Sequence[ResidualFunction]) -> ResidualFunction | None:
+        """The significant function that gains most, if it passes cross-validation."""
+        found = (o for o in functions if min(o.gain, o.beyond) > least and o.held_out.sum() > share * least)
+        return next(found, None)
+
     forces = [one for one in kept if "wrench" in one.candidate.family.shows_in]
-    better, free = _first(instead, numbers), _first(left, numbers)
-    if forces and better is not None and better.gain > numbers.number("left.better") * sum(one.gain for one in forces):
+    better, free = first(instead), first(left)
+    if forces and better is not None and better.gain > n("left.better") * sum(one.gain for one in forces):
         return better, {one.candidate.name for one in forces}
-    if free is None or any(_its_form(free, one, numbers) for one in forces):
+    if free is None:
         return None, set()
-    return free, {one.candidate.name for one in forces if _outweighed(one, free, numbers)}
-
-
-def _its_form(free: ResidualFunction, one: AddedEffect, numbers: Parameters) -> bool:
-    """Whether what has no name is so little of an effect found, there or elsewhere, that it is the form of that."""
-    there = set(free.components) <= set(one.candidate.components)
-    return free.gain < numbers.number("verdict.rest" if there else "verdict.elsewhere") * one.gain
-
-
-def _outweighed(one: AddedEffect, free: ResidualFunction, numbers: Parameters) -> bool:
-    """Whether what has no name explains more than this name, or much of it where it acts: then it is part of that."""
-    there = bool(set(one.candidate.components) & set(free.components))
-    return free.gain > (numbers.number("accept.again") if there else 1.0) * one.gain
-
-
-def _first(left: Sequence[ResidualFunction], numbers: Parameters) -> ResidualFunction | None:
-    """The free function that gains most, if it gains enough, beyond doubt and on tests that it was not fitted on."""
-    share, least = numbers.number("accept.held_out"), numbers.number("left.gain")
-    return next((o for o in left if min(o.gain, o.beyond) > least and o.held_out.sum() > share * least), None)
-
-
-def _word(
-    effects: Sequence[EffectFinding], changed: object, sensors: Sequence[SensorFinding], unnamed: bool, blind: bool
-) -> Word:
-    if unnamed:
-        return "unexplained"
-    if effects:
-        return "ambiguous" if any(e.rivals for e in effects) else "named"
-    if sensors:
-        return "sensor"
-    if blind:
-        return "not_testable"
-    return "parameters_only" if changed else "none"
+    legs, rejected = set(free.components), set()
+    for one in forces:
+        there = set(one.candidate.components)
+        if free.gain < n("verdict.rest" if legs <= there else "verdict.elsewhere") * one.gain:
+            return None, set()
+        if free.gain > (n("accept.again") if legs & there else 1.0) * one.gain:
+            rejected.add(one.candidate.name)
+    return free, rejected

@@ -1,4 +1,4 @@
-"""What a search leaves in its folder: verdict.json."""
+"""The verdict of a search as a file, verdict.json."""
 
 import math
 from dataclasses import asdict
@@ -40,7 +40,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         ],
         "closure": closure,
         "ambiguity": [[one.family, *one.rivals] for one in verdict.effects if one.rivals],
-        "unexplained": None if verdict.word != "unexplained" else _left(found),
+        "unexplained": None if verdict.word != "unexplained" else _unexplained(found),
         "not_testable": list(verdict.untestable),
         "next_test": [
             {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.informative}
@@ -62,7 +62,7 @@ def _finite(value: float) -> float | None:
 
 
 def advice(found: Discovery) -> list[str]:
-    """Tests that would tell rivals apart, in words of the library."""
+    """Tests that would discriminate between rivals, as the library states them."""
     rivals = [name for one in found.verdict.effects if one.rivals for name in (one.family, *one.rivals)]
     return [f"{name}: {find_family(name).tell_apart}" for name in dict.fromkeys(rivals)]
 
@@ -83,8 +83,8 @@ def _interval(value: Estimate) -> dict[str, Any]:
     return {"value": value.value, "unit": value.unit, "ci90": [value.low, value.high]}
 
 
-def _left(found: Discovery) -> dict[str, Any] | None:
-    left = found.verdict.residual_function
+def _unexplained(found: Discovery) -> dict[str, Any] | None:
+    function = found.verdict.residual_function
     known = {
         "nearest": list(found.verdict.nearest),
         "where": [
@@ -92,20 +92,20 @@ def _left(found: Discovery) -> dict[str, Any] | None:
             for s in found.verdict.where
         ],
     }
-    if left is None:
+    if function is None:
         return {**known, "component": None, "depends_on": "not known"}
-    formula = left.formula
+    formula = function.formula
     return {
         **known,
-        "component": left.components[0] if len(left.components) == 1 else None,
-        "components": list(left.components),
-        "depends_on": left.state,
-        "memory": left.memory or None,
-        "gain": left.gain,
-        "nodes": left.nodes.tolist(),
-        "value": left.value.tolist(),
-        "sd": left.sd.tolist(),
+        "component": function.components[0] if len(function.components) == 1 else None,
+        "components": list(function.components),
+        "depends_on": function.state,
+        "memory": function.memory or None,
+        "gain": function.gain,
+        "nodes": function.nodes.tolist(),
+        "value": function.value.tolist(),
+        "sd": function.sd.tolist(),
         "unit": "N",
-        "domain": [float(left.nodes[0]), float(left.nodes[-1]), left.unit],
+        "domain": [float(function.nodes[0]), float(function.nodes[-1]), function.unit],
         "formula": {"text": formula.text("N"), "share": formula.share},
     }

@@ -7,7 +7,7 @@ from rich.table import Table
 
 from ..core.console import make_console
 from ..discovery import Discovery
-from ..discovery.verdict_summary import said
+from ..discovery.verdict_summary import summary
 
 __all__ = ["print_discovery"]
 
@@ -16,7 +16,7 @@ def print_discovery(found: Discovery) -> None:
     """Print the verdict, the effects with their parameters, and the errors on held-out tests."""
     console = make_console()
     verdict = found.verdict
-    console.print(f"[bold]{verdict.word}[/]: {escape(said(found))}")
+    console.print(f"[bold]{verdict.word}[/]: {escape(summary(found))}")
     if verdict.effects:
         table = Table(
             "effect", "on", "number", "value", "90 % interval", "unit", title="Effects found", title_justify="left"

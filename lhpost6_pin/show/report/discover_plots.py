@@ -111,7 +111,7 @@ def gap_figure(found: Discovery) -> Figure:
 
 def residual_function_figure(function: ResidualFunction) -> Figure:
     """Return a residual function of an actuator's or strut's state with its band of ± 2 sigma."""
-    title = "Rate of elongation [m/s]" if function.state == "velocity" else f"Elongation: {function.words} [m]"
+    title = "Rate of elongation [m/s]" if function.state == "velocity" else f"Elongation: {function.description} [m]"
     layout = stacked_layout([f"Force along {where(function.components)} [kN]"], title, row_height=240)
     nodes, value, sd = function.nodes.tolist(), function.value / 1e3, function.sd / 1e3
     band = [*(value + 2 * sd).tolist(), *(value - 2 * sd)[::-1].tolist()]
@@ -137,7 +137,7 @@ def residual_function_figure(function: ResidualFunction) -> Figure:
         },
     ]
     place = where(function.components)
-    words = f"Force along {place} as a nonparametric function of {function.words}, fitted to the residual."
+    words = f"Force along {place} as a nonparametric function of {function.description}, fitted to the residual."
     return Figure("left", "Residual function", words, traces, layout, layout["height"])
 
 

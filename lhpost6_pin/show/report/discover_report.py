@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ...discovery import Discovery, save_verdict
 from ...discovery.verdict_file import advice
-from ...discovery.verdict_summary import said, title_of, where
+from ...discovery.verdict_summary import summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .control_blocks import load_of, numbers_used
@@ -48,7 +48,7 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
         kind="Discovery",
         title=f"Effects missing from {found.machine.name}, by {found.campaign}",
         asked=f"Identify effects missing from the model of {load_of(found.machine)}, from {tests}{held}.",
-        verdict=f"{verdict.word}: {said(found)}",
+        verdict=f"{verdict.word}: {summary(found)}",
         level=_LEVELS.get(verdict.word, "attention"),
         headlines=_headlines(found),
         sections=[
@@ -117,7 +117,7 @@ def _effect_blocks(found: Discovery) -> list[Markup]:
         words = "The residual exceeds noise and is not a function of an actuator's or strut's position or velocity."
         blocks.append(paragraph(words))
     if verdict.where:
-        blocks.append(paragraph(f"The largest residuals are in: {'; '.join(s.words for s in verdict.where)}."))
+        blocks.append(paragraph(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}."))
     if verdict.nearest:
         near = " and ".join(map(title_of, verdict.nearest))
         blocks.append(

@@ -108,7 +108,7 @@ def test_a_stroke_that_gives_way_to_a_chamber_is_said_and_not_passed_off_as_meas
     short = replace(found, parameters=(*found.parameters[:1], chamber, *found.parameters[2:]))
     short = replace(short, estimate=np.where(np.arange(7) == 1, chamber.coordinate(0.7), found.estimate))
     (said,) = cut_strokes(short)
-    assert said.startswith("horizontal.stroke, stated as 0.75 m, is cut to 0.6993 m")
+    assert said.startswith("horizontal.stroke, stated as 0.75 m, is reduced to 0.6993 m")
     assert said in page_of(short, tmp_path)
     print_calibration(short)
     assert said in " ".join(capsys.readouterr().out.split())
@@ -132,13 +132,13 @@ def test_simulation_is_let_go_farther_since_the_spools_noise_biases_it(found) ->
         )
         some = replace(found, subsets=(second, found.subsets[1]))
         assert [c.subset for c in contradictions(some)] == ["simulation"] * apart
-        assert f"Of 1 by simulation {apart or 'none'} does" in contradiction_summary(some)
+        assert f"Of 1 estimates by simulation, {apart} differ" in contradiction_summary(some)
 
 
 def test_contradictions_are_counted_beside_what_chance_makes(found) -> None:
-    assert contradiction_summary(found).startswith("1 of 2 estimates by single groups of residuals contradicts")
-    assert "about 0.005 would by chance" in contradiction_summary(found)  # two of 0.0027
-    assert contradiction_summary(replace(found, subsets=found.subsets[1:])).startswith("None of 1 estimates")
+    assert contradiction_summary(found).startswith("1 of 2 subset estimates")
+    assert "expected by chance: 0.005" in contradiction_summary(found)  # two of 0.0027
+    assert contradiction_summary(replace(found, subsets=found.subsets[1:])).startswith("0 of 1 subset estimates")
     assert contradiction_summary(replace(found, subsets=())) == ""
 
 
@@ -160,9 +160,11 @@ def test_pairs_of_sensors_that_are_alike_are_not_held_against_parameters(found) 
     correlation = np.eye(7)
     correlation[5, 6] = correlation[6, 5] = 0.99
     sensors = replace(found, covariance=correlation * np.outer(found.sd, found.sd))
-    assert correlation_summary(sensors).startswith("Parameters can be told apart")
-    assert "1 pair of errors of sensors cannot" in correlation_summary(sensors)
-    assert correlation_summary(replace(found, covariance=np.diag(found.sd**2))) == "All unknowns can be told apart."
+    assert correlation_summary(sensors).startswith("No parameter is strongly correlated")
+    assert "1 pair of errors of sensors, which" in correlation_summary(sensors)
+    assert (
+        correlation_summary(replace(found, covariance=np.diag(found.sd**2))) == "No unknowns are strongly correlated."
+    )
 
 
 # ---------------------------------------------------------------------------------------- page

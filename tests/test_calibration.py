@@ -510,9 +510,7 @@ def test_simulation_is_a_second_opinion_that_agrees(found, truth):
 def test_without_spools_there_is_no_second_opinion(problem):
     blind = problem.with_tests([t.with_channels(spool_position=None) for t in problem.tests])
     x = np.zeros(len(problem.prior))
-    assert (
-        by_simulation(blind, [], x, band=(0.3, 30.0), floor=0.05, told_below=0.9, progress=lambda share: None) is None
-    )
+    assert by_simulation(blind, [], x, calibration_numbers(), lambda share: None) is None
 
 
 def test_misfit_falls_to_the_noise(found):

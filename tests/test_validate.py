@@ -258,7 +258,9 @@ def test_a_column_moves_if_it_stands_out_of_the_noise_and_of_the_others(scale, m
     assert rows[1].moves is moves
     assert np.isfinite(rows[1].rrmse) == moves
     assert rows[1].error_to_noise == pytest.approx(0.1 * scale * np.sqrt(0.5) / 1e-4, rel=1e-2)
-    loud = agree([replace(pair, heard=np.full(2, 0.1))], 1 / 512, numbers)  # rms 0.71 is less than ten times that
+    loud = agree(
+        [replace(pair, sensor_noise=np.full(2, 0.1))], 1 / 512, numbers
+    )  # rms 0.71 is less than ten times that
     assert not loud[0].moves
 
 
@@ -317,7 +319,7 @@ def test_without_known_settings_there_is_no_closed_loop_unless_they_are_given(ma
 
 def test_two_tests_of_one_name_are_refused(machine, coarse):
     one, two = coarse.records
-    with pytest.raises(RecordError, match="test 'TX' is twice there"):
+    with pytest.raises(RecordError, match="two tests are named 'TX'"):
         validate(machine, Campaign("twins", (one, two.assign_attrs(test="TX"))))
 
 
@@ -332,7 +334,7 @@ def test_a_test_that_is_too_short_says_so_and_the_others_go_on(machine, coarse, 
 
 def test_nothing_to_compare_is_an_error_that_names_what_is_missing(machine, coarse):
     poor = coarse.records[0][["spool_command"]]
-    with pytest.raises(RecordError, match=r"nothing can be compared.*actuator_displacement"):
+    with pytest.raises(RecordError, match=r"no phase of any test is possible.*actuator_displacement"):
         validate(machine, Campaign("poor", (poor,)))
 
 

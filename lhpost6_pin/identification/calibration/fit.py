@@ -3,12 +3,12 @@
     minimise  2 sum |W r(x)|^2 + sum (x / prior)^2
 
 r are the residuals in the frequency domain (real and imaginary parts, hence the 2 for unit power), W whitens the noise
-that sensors leave in them. Noise is in the derivatives J of r, too, since every term of an equation is measured; then
-the sum of squares is least for an equation that is scaled down. The expectations of what noise adds to J^T r and J^T J
-are known from draws of simulated noise, and taken off (corrected normal equations, Fuller: Measurement Error Models,
-Wiley 1987, chapter 3). Where more than noise is left at the end (in a column of a test's residuals, in a band),
-the rest counts as noise, too: it is weighed less, and predicted deviations grow. The inverse of the normal matrix is
-the predicted covariance, with a floor under its deviations.
+that sensors leave in them. The derivatives J of r are noisy, too, since every term of an equation is measured: plain
+least squares would be biased towards zero (errors in variables). The contributions of noise to J^T r and J^T J, known
+from simulated draws, are subtracted (corrected normal equations, Fuller: Measurement Error Models, Wiley 1987,
+chapter 3). Where the final residual exceeds noise (in a column of a test, in a band), the excess counts as noise: it is
+weighed less, and predicted deviations grow. The inverse of the normal matrix is the predicted covariance, with a floor
+under its deviations.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
 OVERSHOT = 1000.0
-"""Log-likelihood by which a step must have made things worse to be taken back: corrections for noise cost hundreds."""
+"""Increase of the objective from which a step is rejected: corrections for noise alone cost hundreds."""
 
 
 def calibrate(
@@ -51,7 +51,7 @@ def calibrate(
     jobs: int = -1,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Calibrate a machine by the tests of a campaign, all at once.
+    """Calibrate a machine jointly by all tests of a campaign.
 
     Records are of one machine in one state, with the same channels; each may have its own sample rate. Servovalves are
     open as in the first. Deterministic for a seed (of the simulated noise), whatever the number of `jobs` (threads; -1:
@@ -63,23 +63,15 @@ def calibrate(
     """
     numbers = calibration_numbers()
     report = progress or (lambda share: None)
-    ready = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
-    problem, noisy = ready.problem, ready.noisy
+    prepared = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
+    problem = prepared.problem
     report(0.1)
-    found = solve(problem, ready.replicas, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
+    found = solve(problem, prepared.replicas, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
     normal, x = found.normal, found.x
     floor = numbers.number("fit.floor") * problem.prior
     covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64)
-    told_below = numbers.number("report.told")
-    simulated = by_simulation(
-        problem,
-        noisy[: int(numbers.number("simulation.draws")) * len(records)],
-        x,
-        band=numbers.vector("simulation.bands"),
-        floor=numbers.number("simulation.floor"),
-        told_below=told_below,
-        progress=between(report, 0.8, 1.0),
-    )
+    draws = prepared.noisy[: int(numbers.number("simulation.draws")) * len(records)]
+    simulated = by_simulation(problem, draws, x, numbers, between(report, 0.8, 1.0))
     report(1.0)
     return Calibration(
         machine=problem.machine,
@@ -91,7 +83,7 @@ def calibrate(
         estimate=x,
         covariance=covariance,
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*_subsets(problem, normal, found.at, floor, told_below), *([] if simulated is None else [simulated])),
+        subsets=(*_subsets(problem, normal, found.at, floor, numbers), *([simulated] if simulated else [])),
         misfit_before=found.misfit_before,
         misfit_after=misfit(problem, found.residual),
         rounds=found.rounds,
@@ -101,12 +93,12 @@ def calibrate(
 
 
 class Solution(NamedTuple):
-    """Where a search has ended."""
+    """Result of a Gauss-Newton search."""
 
     x: Array  # (p,) the unknowns
     at: Array  # (p,) where the normal equations are from
     normal: NormalEquations
-    residual: list[Complex]  # what is left at x: whitened bins (m, c) of every test
+    residual: list[Complex]  # at x: whitened bins (m, c) of every test
     misfit_before: Array  # (n_tests, n_kinds), at the start
     rounds: int
     converged: bool
@@ -125,15 +117,12 @@ def solve(
     settled: bool = False,
     near: Mask | bool = False,
 ) -> Solution:
-    """Search from `start` (p,) by Gauss-Newton steps.
+    """Search from `start` (p,) by Gauss-Newton steps, a rejected step shortened to a quarter.
 
-    Noise in the derivatives is corrected for from the second on, where they are `known` from the first.
-
-    Derivatives by unknowns of `known`, which is corrected, are taken from there and not evaluated again; `first` are
-    the normal equations at `start`, if they have been evaluated. A frugal search finds the correction at `start`, and
-    evaluates derivatives by gains, offsets and what hardly bends the equations there alone, all others as long as steps
-    gain much, or with `known` there alone; a settled one only those that `known` lacks, and those that are `near` (p,)
-    to them. A step that went too far is taken again, a quarter as long.
+    The correction for noise in the derivatives is evaluated in the second step, in a `frugal` search in the first.
+    Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
+    already evaluated. A frugal search evaluates derivatives by nearly linear unknowns only at `start`, all others while
+    steps gain much and nothing is `known`; a `settled` one only those that `known` lacks, and those `near` (p,) them.
     """
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
@@ -143,7 +132,7 @@ def solve(
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: NoiseBias | None = None
     normal: NormalEquations | None = None
-    held: NormalEquations | None = None  # that of `at`, from where the last step went
+    held: NormalEquations | None = None  # at `at`, where the last step began
     least = np.inf
     converged = False
     shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
@@ -160,7 +149,7 @@ def solve(
                 and done <= int(numbers.number("fit.renewals"))
             )
             normal = NormalEquations(problem, x, share, normal, again if renewed else np.zeros_like(again))
-        if done == (1 if frugal else 2):  # near enough to the end, and the same from there on
+        if done == (1 if frugal else 2):  # near enough to the solution, and kept from there on
             parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
             bias = NoiseBias(normal, replicas, x, parts, known)
         if bias is not None and (done > 1 or known is not None):
@@ -208,30 +197,27 @@ def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
 
 
 def _subsets(
-    problem: Problem, normal: NormalEquations, x: Array, floor: Array, told_below: float
+    problem: Problem, normal: NormalEquations, x: Array, floor: Array, numbers: Parameters
 ) -> tuple[Subset, ...]:
-    """What wrench along each axis, flows of each kind of actuator and gas law say by themselves, about normal's x (p,).
+    """Estimates from the wrench along each axis, flows of each kind of actuator, and gas law alone, about x (p,).
 
     Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
     """
-    machine, groups = problem.machine, []
+    machine = problem.machine
     names, double = machine.actuator_names, machine.double_acting
-    for k, axis in enumerate(AXES):
-        groups.append((f"wrench, {axis}", problem.rows("wrench", k)))
+    groups = [(f"wrench, {axis}", problem.rows("wrench", k)) for k, axis in enumerate(AXES)]
     for kind in dict.fromkeys(a.kind for a in machine.actuators):
         places = [i for i, a in enumerate(machine.actuators) if a.kind == kind]
-        places += [len(names) + double.index(names[i]) for i in list(places) if names[i] in double]
+        places += [len(names) + double.index(names[i]) for i in places if names[i] in double]
         groups.append((f"flow, {kind}", problem.rows("flow", *places)))
     groups.append(("gas law", problem.rows("gas")))
     found = []
     for name, columns in groups:
-        if not columns.any():
-            continue
-        h, g = normal.of(range(len(normal.residual)), columns)
-        h = positive(h, problem.prior)
-        covariance = np.linalg.inv(h + np.diag(problem.prior**-2.0))
-        sd = np.sqrt(np.diag(covariance))
-        estimate = x - covariance @ (g + x / problem.prior**2)
-        told = sd < told_below * problem.prior
-        found.append(Subset(name, np.where(told, estimate, np.nan), np.where(told, np.hypot(sd, floor), np.nan)))
+        if columns.any():
+            h, g = normal.of(range(len(normal.residual)), columns)
+            covariance = np.linalg.inv(positive(h, problem.prior) + np.diag(problem.prior**-2.0))
+            sd = np.sqrt(np.diag(covariance))
+            estimate = x - covariance @ (g + x / problem.prior**2)
+            known = sd < numbers.number("report.told") * problem.prior
+            found.append(Subset(name, np.where(known, estimate, np.nan), np.where(known, np.hypot(sd, floor), np.nan)))
     return tuple(found)

@@ -38,16 +38,16 @@ _MECHANICAL = (
 )
 
 _LEAST = 0.05
-"""Of its nominal value, what is positive has at least."""
+"""Least value of a positive number, relative to the nominal one."""
 
 _ROOM = 1.001
-"""Length of a chamber over the stroke that it leaves at least."""
+"""Least length of a chamber over the stroke."""
 
 _SCATTER: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("flow", "flow_curve", "leakage"), ("flow",)),
     **dict.fromkeys(("viscous", "seal_friction", "pad_friction"), ("wrench",)),
 }
-"""Numbers in which twins differ: parts that wear and are adjusted; and the residuals that can tell of each."""
+"""Numbers in which identical components differ by wear and adjustment, and the residuals that depend on each."""
 
 
 @dataclass(frozen=True)
@@ -55,22 +55,22 @@ class FreeParameter:
     """One coordinate of the machine; `sd` is its prior standard deviation."""
 
     name: str  # such as "horizontal.flow", "platen.mass[x]", "horizontal.platen_height"
-    paths: tuple[tuple[str, int], ...]  # what it turns: path in the machine file, and component of a vector or -1
+    paths: tuple[tuple[str, int], ...]  # what it sets: path in the machine file, and component of a vector or -1
     unit: str
     value: float  # nominal, in `unit`
     sd: float  # of the coordinate: in `unit` for a shift, else relative
     form: Literal["shift", "factor", "log"]  # coordinate value - nominal, value / nominal - 1, or ln(value / nominal)
-    shows_in: tuple[str, ...]  # residuals that can tell of it
-    lowest: float = -math.inf  # coordinate below which no machine can be built
+    shows_in: tuple[str, ...]  # residuals that depend on it
+    lowest: float = -math.inf  # least coordinate for which a machine can be built
     highest: float = math.inf
     step: float | None = None  # of the coordinate, for derivatives; None: the comparison's share of sd
     of: str = ""  # the kind's number that a component's own is a factor of
     place: int = -1  # actuator on whose residuals alone it acts; -1: on all
-    mirrored: bool = False  # points move away from the axis they are beside, those on it stay
+    mirrored: bool = False  # points move symmetrically about the axis, those on it stay
 
     @property
     def bends(self) -> bool:
-        """Whether the equations bend with it within its range: shifts in plan do not."""
+        """Whether residuals are nonlinear in it within its range: shifts in plan are not."""
         return not self.mirrored
 
     def at(self, coordinate: float) -> float:
@@ -80,7 +80,7 @@ class FreeParameter:
         return self.value * (1.0 + coordinate if self.form == "factor" else math.exp(coordinate))
 
     def within(self, low: float, high: float) -> "FreeParameter":
-        """The same parameter with its values between low and high, where its coordinate can say so."""
+        """The same parameter with its values between low and high."""
         bounds = (-math.inf if self.form == "log" and v <= 0.0 else self.coordinate(v) for v in (low, high))
         lowest, highest = bounds
         return replace(self, lowest=lowest, highest=highest)
@@ -95,8 +95,8 @@ class FreeParameter:
 def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = None) -> tuple[FreeParameter, ...]:
     """Parameters of all numbers of a machine that state an uncertainty: platen, oil, kinds, and heights of each kind.
 
-    Numbers that a single component overrides stay with the component; other geometry is left alone. A chamber is no
-    shorter than the `travel` [m] of its kind, how far it was seen to move either way; without that, than its stroke.
+    Numbers that a component overrides and other geometry are fixed. A chamber is no shorter than the measured `travel`
+    [m] of its kind either way; without that, than its stroke.
     """
     parameters = machine.parameters
     kinds = list(dict.fromkeys(c.kind for c in machine.components))
@@ -114,7 +114,7 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
 
 
 def _with_room(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:
-    """A chamber must hold oil where its piston has been."""
+    """A chamber is at least as long as its piston's travel."""
     kind, _, name = parameter.name.partition(".")
     if not name.startswith("chamber_"):
         return parameter
@@ -163,7 +163,7 @@ def _heights(machine: Machine, kind: str) -> list[FreeParameter]:
     found = []
     for end in ("platen_point", "base_point"):
         if bearing and end == "base_point":
-            continue  # the leg is measured from its zero length: where its foot stands says nothing
+            continue  # the leg is measured from its zero length: not identifiable
         paths = [(f"{c.name}.{end}", 2) for c in members]
         if bearing:
             paths.append(("platen.bearing_plane", 2))
@@ -184,7 +184,7 @@ def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None
 
 
 def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:
-    """Parameters of where, in plan, the points of each kind's components are: mirror images of each other, moved alike.
+    """Parameters of the points of each kind's components in plan: mirror images of each other, moved symmetrically.
 
     A bearing and its foot move together.
     """
@@ -208,10 +208,10 @@ def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:
 
 
 def scatter_parameters(machine: Machine, share: float, reach: float) -> tuple[FreeParameter, ...]:
-    """Parameters of twins that are not quite alike: factors, about one, of numbers that components of a kind share.
+    """Parameters of the scatter between identical components: factors, about one, of numbers that a kind shares.
 
-    share is their standard deviation, reach how many of it they may go. Components with numbers of their own are left
-    out, and kinds of which there is one.
+    share is their standard deviation, reach their bound in deviations. Components with numbers of their own are left
+    out, and kinds with one component.
     """
     found = []
     kinds = [c.kind for c in machine.components]
@@ -238,7 +238,7 @@ def drawn_coordinates(parameters: Sequence[FreeParameter], rng: np.random.Genera
 
 
 def with_parameters(machine: Machine, parameters: Sequence[FreeParameter], coordinates: Array) -> Machine:
-    """Copy of a machine with its parameters turned to coordinates (k,); raises ParameterError for what cannot be."""
+    """Copy of a machine with its parameters at coordinates (k,); raises ParameterError for an impossible machine."""
     return machine.with_params(parameter_changes(machine, parameters, coordinates))
 
 
@@ -247,8 +247,8 @@ def parameter_changes(
 ) -> dict[str, float | list[float]]:
     """New values by path for coordinates (k,), as `Machine.with_params` takes them."""
     values: dict[str, float | list[float]] = {}
-    turned = list(zip(parameters, coordinates, strict=True))
-    for parameter, x in turned:
+    pairs = list(zip(parameters, coordinates, strict=True))
+    for parameter, x in pairs:
         for path, i in parameter.paths if not parameter.of else ():
             if i < 0:
                 values[path] = parameter.at(float(x))
@@ -256,10 +256,10 @@ def parameter_changes(
             now = machine.parameters[path].value
             vector = values.setdefault(path, list(now) if isinstance(now, tuple) else [now])
             assert isinstance(vector, list)
-            # points of a kind may stand at different heights: each is shifted
+            # points of a kind may have different heights: each is shifted
             side = math.copysign(1.0, vector[i]) * bool(vector[i]) if parameter.mirrored else 1.0
             vector[i] = parameter.at(float(x)) if len(parameter.paths) == 1 else vector[i] + side * float(x)
-    for parameter, x in turned:
+    for parameter, x in pairs:
         if parameter.of:
             shared = values.get(parameter.of, machine.parameters[parameter.of].value)
             assert isinstance(shared, float)

@@ -1,4 +1,4 @@
-"""Normal equations of a calibration: summed by test and column as wanted, corrected for noise, solved within bounds."""
+"""Normal equations of a calibration: summed over tests and columns, corrected for noise, solved within bounds."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 
 class NormalEquations:
-    """Normal equations at x, H dx = -g: by test and column of the residuals, so that they can be summed as wanted."""
+    """Normal equations at x, H dx = -g, kept by test and column of the residuals to sum over any subset."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class NormalEquations:
     ) -> None:
         """Evaluate residuals and their derivatives at x (p,).
 
-        Derivatives by unknowns of `known` are taken from there, but for those to evaluate `again` (p,).
+        Derivatives by unknowns of `known` are reused, except those to evaluate `again` (p,).
         """
         self.problem = problem
         base = OperatingPoint(problem, x)
@@ -63,7 +63,7 @@ class NormalEquations:
         return other if self.bias is None else other.less(self.bias.scaled(times))
 
     def less(self, bias: "NoiseBias") -> "NormalEquations":
-        """Take off what noise adds, and weigh by what is left; before `whole` is asked for, which is kept."""
+        """Subtract the noise bias and weigh by the remaining power; call before `whole`, which is cached."""
         self.bias = bias
         self.power = excess(self.problem.whitener, self.residual, self.problem.frequency)
         return self
@@ -100,7 +100,7 @@ class NormalEquations:
 
 
 class NoiseBias:
-    """What noise adds to the normal equations: the mean product of its changes in slopes and residuals."""
+    """Bias of the normal equations by noise: the mean product of its changes in slopes and residuals."""
 
     def __init__(
         self,
@@ -110,9 +110,9 @@ class NoiseBias:
         reports: Sequence[Progress],
         known: NormalEquations | None = None,
     ) -> None:
-        """Evaluate the same at x with more noise in the tests, as often as there are replicas.
+        """Evaluate the same at x for every replica, each with more noise in the tests.
 
-        Changes of derivatives by unknowns of `known`, which is corrected, are taken from there.
+        Changes of derivatives by unknowns of `known`, which is corrected, are reused.
         """
         shared, fresh = _shared(normal.problem, known)
         self.residual: list[list[Complex]] = []  # by replica and test
@@ -126,7 +126,7 @@ class NoiseBias:
             self.slope.append(_together(changes, before, shared))
 
     def scaled(self, times: Sequence[Array]) -> "NoiseBias":
-        """The same where whitened bins (m, c) of each test are so many times larger."""
+        """The same with whitened bins (m, c) of each test scaled."""
         other = copy(self)
         other.residual = [[r * s for r, s in zip(rest, times, strict=True)] for rest in self.residual]
         other.slope = [
@@ -135,7 +135,7 @@ class NoiseBias:
         return other
 
     def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of one test and some columns, over the power of what is left in them."""
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power of the residual."""
         pairs = zip(self.slope, self.residual, strict=True)
         added = [squares([j[:, columns] for j in s[test]], r[test][:, columns], power) for s, r in pairs]
         matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
@@ -143,9 +143,9 @@ class NoiseBias:
 
 
 def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:
-    """Places in `known` by places in the problem, of unknowns to take from there; and which (p,) to evaluate.
+    """Places in `known` by places in the problem, of unknowns to reuse; and which (p,) to evaluate.
 
-    Those to evaluate again, if `again` says which; else those that `known` lacks.
+    The latter are those `again`, if given; else those that `known` lacks.
     """
     names = problem.names
     place = {} if known is None else {name: i for i, name in enumerate(known.problem.names)}
@@ -172,13 +172,13 @@ def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> 
 
 
 def positive(matrix: Array, prior: Array) -> Array:
-    """A normal matrix without negative directions, which are left where noise is all that a derivative has."""
+    """A normal matrix without its negative eigenvalues, which arise where a derivative is only noise."""
     value, vector = np.linalg.eigh(matrix * np.outer(prior, prior))
     return (vector * np.maximum(value, 0.0)) @ vector.T / np.outer(prior, prior)
 
 
 def bounds_of(problem: Problem, numbers: Parameters) -> tuple[Array, Array]:
-    """How far down and up every unknown may go (p,): within its own bounds, and the reach of its prior."""
+    """Lower and upper bounds (p,) of the unknowns: their own, and the reach of their priors."""
     known = np.arange(len(problem.prior)) < len(problem.parameters)
     reach = np.where(known, numbers.number("fit.reach"), numbers.number("fit.sensor_reach")) * problem.prior
     return np.maximum(-reach, problem.lowest), np.minimum(reach, problem.highest)

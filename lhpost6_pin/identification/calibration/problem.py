@@ -1,12 +1,12 @@
-"""A campaign made ready to be fitted: residuals of all tests and their derivatives by every unknown, whitened.
+"""The least-squares problem of a campaign: residuals of all tests and their derivatives by every unknown, whitened.
 
-Unknowns are the machine's parameters and the sensors' errors, in this order: x (p,), zero where nothing is off.
+Unknowns x (p,) are the machine's parameters, then the sensors' errors; zero at the nominal machine and perfect sensors.
 """
 
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -21,7 +21,7 @@ from ...mechanics.pose import leg_displacements
 from ..prepare import MeasuredTest
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
-from .sensor_errors import corrected, sensor_unknowns
+from .sensor_errors import SensorUnknown, corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
 
 __all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
@@ -32,7 +32,7 @@ Slopes = dict[int, Complex]
 """Derivatives (m, c) of a test's whitened bins, by the unknown's place in x."""
 
 KINDS = ("wrench", "flow", "gas", "force")
-"""Kinds of residuals that are compared unless others are asked for."""
+"""Kinds of residuals that are compared by default."""
 
 
 class ResidualBands(NamedTuple):
@@ -44,7 +44,7 @@ class ResidualBands(NamedTuple):
 
 
 class EvaluationGroup(NamedTuple):
-    """What is evaluated at once: unknowns that act on different rows."""
+    """Unknowns that act on different rows, so that one evaluation gives all their derivatives."""
 
     members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut whose rows it acts on; -1: all rows
     residuals: tuple[str, ...]  # kinds that it shows in
@@ -66,27 +66,27 @@ class Problem:
         others: Sequence[Machine] = (),
         preload: float = 0.0,
     ) -> None:
-        """Make it ready; `noisy` are the tests again, in order, any number of times, each with more noise added.
+        """Prepare the problem; `noisy` are draws of the tests in order, any number of times, each with more noise.
 
-        By how much residuals of `others` differ is noise, too: machines of which nobody knows which is right; and what
-        friction may hold when a test begins, a share `preload` of it. All tests have the same channels. Raises
-        RecordError where they are too short together.
+        Noise also has the differences of residuals between equally plausible machines (`others`), and friction's state
+        at the start of a test, of which a share `preload` of the force is unknown. All tests have the same channels.
+        Raises RecordError where they are too short together.
         """
         self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.present = frozenset(tests[0].channels)
         self.unknowns = tuple(u for u in unknowns if set(residuals_of(u.channel, self.present)) & set(kinds))
-        self.free: dict[str, float] = {}  # share of the stated deviation that priors of unknowns have, but for one
+        self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
         plant = make_plant(machine)
-        self._turn(machine, machine_parameters(machine, _travel(plant, tests)))
+        self._set(machine, machine_parameters(machine, _travel(plant, tests)))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
         noise = self._noise(plant, noisy, clean)
         instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
         for found, test, base in zip(noise, tests, clean, strict=True):
-            # what friction remembers is not known better than by its memory along the path as measured, and quieted;
-            # that counts as much as all draws together, and so do what it held before and each of the others
+            # friction's state is known no better than by the difference between the raw and the smoothed path; that
+            # weighs as much as all draws together, and so do the initial state and each of the other machines
             more = [evaluate_residuals(plant, replace(test, path=None), kinds)]
             if preload > 0.0:
                 held = follow(plant, test, start=_held(plant, preload, rng))
@@ -97,48 +97,54 @@ class Problem:
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
-    def _turn(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> None:
+    def _set(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
+        """Set the machine and its free parameters; returns itself."""
         self.machine, self.parameters = machine, parameters
-        self.names = (*(k.name for k in parameters), *(u.name for u in self.unknowns))
-        self.stated = np.array([*(k.sd for k in parameters), *(u.sd for u in self.unknowns)])
-        self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
+        both: tuple[FreeParameter | SensorUnknown, ...] = (*parameters, *self.unknowns)
         share = self.comparison.step
+        self.names = tuple(one.name for one in both)
+        self.stated = np.array([one.sd for one in both])
+        self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
         self.step = np.array([*(k.step or share * k.sd for k in parameters), *(share * u.sd for u in self.unknowns)])
         self.lowest = np.array([*(k.lowest for k in parameters), *(-np.inf for _ in self.unknowns)])
         self.highest = np.array([*(k.highest for k in parameters), *(np.inf for _ in self.unknowns)])
-        self.terms = self._terms()
+        self.groups = self._groups()
+        return self
+
+    def _with(self, **changes: Any) -> "Problem":
+        """Copy with some attributes replaced."""
+        other = copy(self)
+        vars(other).update(changes)
+        return other
 
     def with_machine(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
         """The same tests and noise with another machine, or other parameters."""
-        other = copy(self)
-        other._turn(machine, parameters)
-        return other
+        return self._with()._set(machine, parameters)
 
     def with_free(self, name: str, share: float) -> "Problem":
-        """The same with one more unknown free of its prior, whose deviation is `share` of the stated one now."""
-        other = copy(self)
-        other.free = {**self.free, name: share}
-        other._turn(self.machine, self.parameters)
-        return other
+        """The same with one more unknown released: its prior deviation is `share` times the stated one."""
+        return self._with(free={**self.free, name: share})._set(self.machine, self.parameters)
 
     def without_free(self, name: str) -> "Problem":
         """The same with an unknown's prior as stated again."""
-        other = copy(self)
-        other.free = {free: share for free, share in self.free.items() if free != name}
-        other._turn(self.machine, self.parameters)
-        return other
+        free = {other: share for other, share in self.free.items() if other != name}
+        return self._with(free=free)._set(self.machine, self.parameters)
 
     def with_tests(self, tests: Sequence[MeasuredTest]) -> "Problem":
-        """The same problem, weighed by the same noise, with the same tests seen another time."""
-        other = copy(self)
-        other.tests = tuple(tests)
-        return other
+        """The same problem and weights with another draw of the same tests."""
+        return self._with(tests=tuple(tests))
 
     def scaled(self, scale: Array) -> "Problem":
-        """The same problem, its whitened residuals in each test and band (t, b, c) times larger."""
-        other = copy(self)
-        other.whitener = self.whitener.scaled(scale)
-        return other
+        """The same problem, its whitened residuals scaled by test and band (t, b, c)."""
+        return self._with(whitener=self.whitener.scaled(scale))
+
+    def only(self, places: Sequence[int]) -> "Problem":
+        """The same problem with some of its tests; noise is weighed as with all."""
+        return self._with(
+            tests=tuple(self.tests[t] for t in places),
+            frequency=[self.frequency[t] for t in places],
+            whitener=self.whitener._replace(factor=self.whitener.factor[list(places)]),
+        )
 
     def noise_at(self, noisy: Sequence[MeasuredTest], x: Array) -> Array:
         """Mean squares (t, b, c) of whitened noise with the unknowns at x; `noisy` as when the problem was made."""
@@ -151,23 +157,15 @@ class Problem:
         return found
 
     def _noise(self, plant: Plant, noisy: Sequence[MeasuredTest], clean: Sequence[Residuals]) -> list[list[Complex]]:
-        """Bins (m, c) by which residuals of every test differ, each time that it is seen with more noise."""
+        """Change of the bins (m, c) of every test with each draw of noise."""
         found: list[list[Complex]] = [[] for _ in clean]
         for i, test in enumerate(noisy):
             at = i % len(clean)
             found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0])
         return found
 
-    def only(self, places: Sequence[int]) -> "Problem":
-        """The same problem with some of its tests; noise is weighed as with all."""
-        other = copy(self)
-        other.tests = tuple(self.tests[t] for t in places)
-        other.frequency = [self.frequency[t] for t in places]
-        other.whitener = self.whitener._replace(factor=self.whitener.factor[list(places)])
-        return other
-
     def rows(self, kind: str, *places: int) -> NDArray[np.bool_]:
-        """Columns of the stacked residuals that are of a kind, all or those at some places."""
+        """Mask of the stacked residuals' columns of a kind, all or those at some places."""
         at = RESIDUALS.index(kind)
         first, width = sum(self.widths[:at]), self.widths[at]
         mask = np.zeros(sum(self.widths), bool)
@@ -179,7 +177,7 @@ class Problem:
         return self.residual(OperatingPoint(self, x))
 
     def residual(self, base: "OperatingPoint") -> list[Complex]:
-        """Whitened bins (m, c) of every test where everything has been evaluated."""
+        """Whitened bins (m, c) of every test at an operating point."""
         pairs = zip(base.residuals, base.tests, strict=True)
         return [self._whitened(i, self.bins(r, test.dt)[0]) for i, (r, test) in enumerate(pairs)]
 
@@ -189,39 +187,39 @@ class Problem:
     def slopes(
         self, base: "OperatingPoint", free: NDArray[np.bool_], progress: Callable[[float], None]
     ) -> list[Slopes]:
-        """Derivatives of the whitened bins of every test by the unknowns that are free, by differences from a base."""
-        terms = [t for t in self.terms if any(free[i] for i, _ in t.members)]
+        """Derivatives of the whitened bins of every test by the unknowns in `free` (p,), by differences."""
+        groups = [g for g in self.groups if any(free[i] for i, _ in g.members)]
         out: list[Slopes] = [{} for _ in self.tests]
         with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
-            for done, found in enumerate(parallel(delayed(self._difference)(base, term, free) for term in terms)):
+            for done, found in enumerate(parallel(delayed(self._difference)(base, g, free) for g in groups)):
                 for i, changes in found:
                     for slopes, change in zip(out, changes, strict=True):
                         slopes[i] = change
-                progress((done + 1) / len(terms))
+                progress((done + 1) / len(groups))
         return out
 
     def _difference(
-        self, base: "OperatingPoint", term: EvaluationGroup, free: NDArray[np.bool_]
+        self, base: "OperatingPoint", group: EvaluationGroup, free: NDArray[np.bool_]
     ) -> list[tuple[int, list[Complex]]]:
-        x, parameters = base.x, len(self.parameters)
+        """Derivatives of every test's whitened bins, by place in x."""
+        x, count = base.x, len(self.parameters)
         step = np.where(x + self.step > self.highest, -self.step, self.step)
         more = np.zeros(len(x))
-        for i, _ in term.members:
+        for i, _ in group.members:
             more[i] = step[i]
-        if term.members[0][0] < parameters:
-            changes = self.change(base, self.plant_at(x + more), term.residuals)
-        else:  # what is left of an error after correction is as good as the error itself
-            tests = [corrected(t, self.unknowns, more[parameters:]) for t in base.tests]
-            changes = self.change(base, base.plant, term.residuals, tests)
+        if group.members[0][0] < count:
+            changes = self.change(base, self.plant_at(x + more), group.residuals)
+        else:  # from the corrected tests: derivatives are the same to first order
+            tests = [corrected(t, self.unknowns, more[count:]) for t in base.tests]
+            changes = self.change(base, base.plant, group.residuals, tests)
         out = []
-        for i, place in term.members:
-            if not free[i]:
-                continue
-            rows = np.ones(sum(self.widths), bool)
-            if place >= 0:
-                rows = self.rows("gas", place) if term.residuals == ("gas",) else self.rows_of_actuator(place)
-            slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
-            out.append((i, [self._whitened(t, slope) for t, slope in enumerate(slopes)]))
+        for i, place in group.members:
+            if free[i]:
+                rows = np.ones(sum(self.widths), bool)
+                if place >= 0:
+                    rows = self.rows("gas", place) if group.residuals == ("gas",) else self.rows_of_actuator(place)
+                slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
+                out.append((i, [self._whitened(t, slope) for t, slope in enumerate(slopes)]))
         return out
 
     def change(
@@ -243,11 +241,8 @@ class Problem:
         return changes
 
     def plant_at(self, x: Array) -> Plant:
-        """Plant with its parameters turned to x (p,)."""
+        """Plant with its parameters set to x (p,)."""
         return make_plant(with_parameters(self.machine, self.parameters, x[: len(self.parameters)]))
-
-    def _corrected(self, x: Array) -> list[MeasuredTest]:
-        return [corrected(t, self.unknowns, x[len(self.parameters) :]) for t in self.tests]
 
     def bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
         """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
@@ -264,41 +259,38 @@ class Problem:
         return out, f
 
     def rows_of_actuator(self, place: int) -> NDArray[np.bool_]:
-        """Columns of the stacked residuals that are of one actuator's chambers."""
+        """Mask of the stacked residuals' columns of one actuator."""
         names, double = self.machine.actuator_names, self.machine.double_acting
         rows = self.rows("flow", place) | self.rows("force", place) | self.rows("servo", place)
         if names[place] in double:
             rows |= self.rows("flow", len(names) + double.index(names[place]))
         return rows
 
-    def _terms(self) -> tuple[EvaluationGroup, ...]:
-        twins: dict[str, list[tuple[int, int]]] = {}
+    def _groups(self) -> tuple[EvaluationGroup, ...]:
+        found: dict[tuple[str, tuple[str, ...]], list[tuple[int, int]]] = {}
         for i, parameter in enumerate(self.parameters):
-            alone = parameter.of.partition(".")[2] if parameter.place >= 0 else parameter.name
-            twins.setdefault(alone, []).append((i, parameter.place))
-        terms = [EvaluationGroup(tuple(members), self.parameters[members[0][0]].shows_in) for members in twins.values()]
-        together: dict[str, list[tuple[int, int]]] = {}
-        for i, unknown in enumerate(self.unknowns):
-            together.setdefault(unknown.alone[0], []).append((len(self.parameters) + i, unknown.alone[1]))
-        for members in together.values():
-            channel = self.unknowns[members[0][0] - len(self.parameters)].channel
-            terms.append(EvaluationGroup(tuple(members), residuals_of(channel, self.present)))
-        return tuple(terms)
+            name = parameter.of.partition(".")[2] if parameter.place >= 0 else parameter.name
+            found.setdefault((name, parameter.shows_in), []).append((i, parameter.place))
+        for i, unknown in enumerate(self.unknowns, start=len(self.parameters)):
+            key = unknown.alone[0], residuals_of(unknown.channel, self.present)
+            found.setdefault(key, []).append((i, unknown.alone[1]))
+        return tuple(EvaluationGroup(tuple(members), shows_in) for (_, shows_in), members in found.items())
 
 
 class OperatingPoint:
-    """What differences are taken from: everything evaluated once at x."""
+    """Tests, paths and residuals evaluated at x, from which differences are taken."""
 
     def __init__(self, problem: Problem, x: Array) -> None:
         """Evaluate a problem's tests at x (p,)."""
-        self.x, self.plant, self.tests = x, problem.plant_at(x), problem._corrected(x)
+        self.x, self.plant = x, problem.plant_at(x)
+        self.tests = [corrected(t, problem.unknowns, x[len(problem.parameters) :]) for t in problem.tests]
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
 
 
 def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
-    """How far legs of each kind move either way in any test, and a little more [m]."""
+    """Largest travel of the legs of each kind either way, with a margin [m]."""
     moved = [np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests]
     kinds = [c.kind for c in plant.machine.components]
     most = np.max(moved, axis=0)
@@ -306,7 +298,7 @@ def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
 
 
 def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
-    """Hidden states (n_states,) of friction that holds a share of its force, one standard deviation either way."""
+    """Random hidden states (n_states,) of friction, their standard deviation a share of full force."""
     out = np.zeros(len(plant.states))
     for row in plant.rows:
         if not law_of(row).friction_memory:
@@ -317,5 +309,5 @@ def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
 
 
 def _less(after: Residuals, before: Residuals) -> Residuals:
-    """Change of residuals; no columns where the first has none."""
+    """Change of residuals; no columns where `after` has none."""
     return Residuals(*(a - b if a.shape[1] else a for a, b in zip(after, before, strict=True)))

@@ -1,4 +1,4 @@
-"""What a calibration has found."""
+"""Result of a calibration."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -19,7 +19,7 @@ Mask = NDArray[np.bool_]
 
 
 class Subset(NamedTuple):
-    """What one group of residuals, or simulation, says by itself; NaN where nothing."""
+    """Estimate from one group of residuals, or from simulation, alone; NaN where it is not informative."""
 
     name: str  # such as "gas law", "flow, horizontal", "wrench, x"
     estimate: Array  # (p,)
@@ -59,26 +59,26 @@ class Calibration:
 
     @property
     def limit(self) -> float:
-        """Predicted deviations beyond which an estimate differs from what it is compared with."""
+        """Predicted deviations beyond which an estimate counts as different."""
         return self.numbers.number("report.deviations")
 
     @property
     def noise_alone(self) -> float:
-        """Misfit up to which noise is all that is left."""
+        """Misfit up to which the residual counts as noise."""
         return self.numbers.number("report.misfit")
 
     @property
     def informed(self) -> Mask:
-        """Unknowns (p,) of which the campaign has told something: predicted deviation well below the prior."""
+        """Identifiable unknowns (p,): predicted deviation well below the prior."""
         return np.asarray(self.sd < self.numbers.number("report.informed") * self.prior)
 
     @property
     def calibrated(self) -> Machine:
-        """The machine with its parameters turned to the estimates."""
+        """The machine with its parameters set to the estimates."""
         return with_parameters(self.machine, self.parameters, self.estimate[: len(self.parameters)])
 
     def interval(self, i: int, probability: float = 0.9) -> tuple[float, float]:
-        """Confidence interval of parameter i in its unit; NaN where the fit did not converge, which leaves none."""
+        """Confidence interval of parameter i in its unit; NaN where the fit did not converge."""
         from scipy.stats import norm
 
         if not self.converged:
@@ -88,12 +88,11 @@ class Calibration:
         return min(low, high), max(low, high)
 
     def alike(self) -> list[tuple[str, str, float]]:
-        """Pairs of unknowns that the campaign cannot tell apart, with their correlation, strongest first."""
+        """Strongly correlated pairs of unknowns with their correlation, strongest first."""
         sd = self.sd
         correlation = self.covariance / np.outer(sd, sd)
-        found = []
-        for i, j in np.argwhere(np.triu(np.abs(correlation) >= self.numbers.number("report.alike"), 1)):
-            found.append((self.names[i], self.names[j], float(correlation[i, j])))
+        pairs = np.argwhere(np.triu(np.abs(correlation) >= self.numbers.number("report.alike"), 1))
+        found = [(self.names[i], self.names[j], float(correlation[i, j])) for i, j in pairs]
         return sorted(found, key=lambda pair: -abs(pair[2]))
 
 

@@ -1,9 +1,9 @@
-"""What a campaign says of the parameters by simulation: the plant driven by recorded spools, against what was measured.
+"""Estimates of the parameters by simulation: the plant driven by recorded spools, against the measured motion.
 
-Residuals ask each equation by itself and put measured motion into it; a simulation asks all of them together, and only
-the spool is measured. It tells less, since oil columns ring on the spool's noise and friction's memory starts unknown,
-but what it says does not share the weakness of the residuals: that their derivatives are as noisy as the motion. So it
-is a second opinion: one Gauss-Newton step of output errors from the joint estimate, sensor errors held at theirs.
+Residuals evaluate each equation separately along the measured motion; a simulation solves all of them together, with
+only the spool measured. It is less informative, since oil columns ring on the spool's noise and friction's initial
+state is unknown, but it is independent of the noise in the residuals' derivatives. It serves as a second opinion: one
+Gauss-Newton step of output errors from the joint estimate, sensor errors held at theirs.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...core.names import SAMPLE_RATE
 from ...data.signals import resample_band_limited
+from ...machine.parameters import Parameters
 from ...mechanics.plant import Plant, State
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, simulate
@@ -33,8 +34,8 @@ Complex = NDArray[np.complex128]
 STEPS = 4  # model steps a controller sample, as simulations take by default
 
 
-class _Drive(NamedTuple):
-    """A test ready to be simulated; n samples."""
+class _RecordedTest(NamedTuple):
+    """Spools of a test and the outputs to compare; n samples."""
 
     spool: Array  # (samples * STEPS, n_actuators) at the middle of every model step
     measured: Array  # (n, 6 + n_chambers) platen velocity, then chamber pressures
@@ -45,19 +46,16 @@ def by_simulation(
     problem: Problem,
     noisy: Sequence[MeasuredTest],
     x: Array,
-    *,
-    band: tuple[float, ...],
-    floor: float,
-    told_below: float,
+    numbers: Parameters,
     progress: Callable[[float], None],
 ) -> Subset | None:
     """Estimates of the parameters by open-loop simulation about x (p,), under the problem's priors; NaN for sensors.
 
-    noisy are the tests again, in order, any number of times, each with more noise. band are the edges [Hz] of bands of
-    frequency; floor goes under the deviations, as a share of the priors'; what is not told below told_below of theirs
-    is NaN. None where there is no such opinion: without spools and pressures, or if a run does not last.
+    noisy are draws of the tests in order, any number of times, each with more noise; `numbers` are those of
+    `models/procedures/calibration.toml`. NaN where the deviation exceeds `report.told` of the prior's. None without
+    spools and pressures, or if a run fails.
     """
-    count, tests = len(problem.parameters), len(problem.tests)
+    band, count, tests = numbers.vector("simulation.bands"), len(problem.parameters), len(problem.tests)
     if any(not {"spool_position", "chamber_pressure_a"} <= t.channels.keys() for t in problem.tests):
         return None
     prior, step = problem.prior[:count], problem.comparison.step * problem.prior[:count]
@@ -70,8 +68,8 @@ def by_simulation(
         turned[i] += h
         jobs.append((problem.plant_at(turned), drives))
 
-    def errors(plant: Plant, some: Sequence[_Drive]) -> list[Complex] | None:
-        """Bins of measured less simulated outputs of each drive; None if a run did not last."""
+    def errors(plant: Plant, some: Sequence[_RecordedTest]) -> list[Complex] | None:
+        """Bins of measured less simulated outputs of each drive; None if a run failed."""
         found = [_outputs(plant, drive) for drive in some]
         pairs = [(d, f) for d, f in zip(some, found, strict=True) if f is not None]
         return [_bins(d, d.measured - f, problem, band)[0] for d, f in pairs] if len(pairs) == len(some) else None
@@ -96,29 +94,29 @@ def by_simulation(
         matrix, side = matrix + more, side + change
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))
-    told, silent = sd < told_below * prior, np.full(len(x) - count, np.nan)
-    estimate = np.where(told, x[:count] - covariance @ side, np.nan)
-    sd = np.where(told, np.hypot(sd, floor * prior), np.nan)
-    return Subset("simulation", np.append(estimate, silent), np.append(sd, silent), part=False)
+    known, none = sd < numbers.number("report.told") * prior, np.full(len(x) - count, np.nan)
+    estimate = np.where(known, x[:count] - covariance @ side, np.nan)
+    sd = np.where(known, np.hypot(sd, numbers.number("simulation.floor") * prior), np.nan)
+    return Subset("simulation", np.append(estimate, none), np.append(sd, none), part=False)
 
 
-def _bins(drive: _Drive, values: Array, problem: Problem, band: tuple[float, ...]) -> tuple[Complex, Array]:
+def _bins(drive: _RecordedTest, values: Array, problem: Problem, band: tuple[float, ...]) -> tuple[Complex, Array]:
     dt = float(drive.time[-1]) / (len(drive.time) - 1)
     return spectrum_of(values, dt, band[0], band[-1], problem.comparison.edge)
 
 
-def _drive(test: MeasuredTest) -> _Drive:
+def _drive(test: MeasuredTest) -> _RecordedTest:
     time = np.asarray(test.dt * np.arange(test.samples), np.float64)
     steps = int(time[-1] * SAMPLE_RATE + 1e-6) * STEPS
     middle = (np.arange(steps) + 0.5) / (STEPS * SAMPLE_RATE)
-    return _Drive(resample_band_limited(test.channels["spool_position"], time, middle), _measured(test), time)
+    return _RecordedTest(resample_band_limited(test.channels["spool_position"], time, middle), _measured(test), time)
 
 
-def _noisier(drive: _Drive, test: MeasuredTest, other: MeasuredTest) -> _Drive:
-    """A drive with what more noise in its test adds."""
+def _noisier(drive: _RecordedTest, test: MeasuredTest, other: MeasuredTest) -> _RecordedTest:
+    """A recorded test with the added noise of another draw."""
     middle = (np.arange(len(drive.spool)) + 0.5) / (STEPS * SAMPLE_RATE)
     more = other.channels["spool_position"] - test.channels["spool_position"]
-    noise = [np.interp(middle, drive.time, column) for column in more.T]  # small: lines will do
+    noise = [np.interp(middle, drive.time, column) for column in more.T]  # small: linear interpolation will do
     measured = drive.measured + _measured(other) - _measured(test)
     return drive._replace(spool=drive.spool + np.stack(noise, axis=1), measured=measured)
 
@@ -128,7 +126,7 @@ def _measured(test: MeasuredTest) -> Array:
     return np.hstack([test.motion.velocity, test.pressure])
 
 
-def _outputs(plant: Plant, drive: _Drive) -> Array | None:
+def _outputs(plant: Plant, drive: _RecordedTest) -> Array | None:
     """Simulated platen velocity and chamber pressures (n, 6 + n_chambers) at a drive's samples."""
     from scipy.interpolate import CubicSpline
 

@@ -1,4 +1,4 @@
-"""What a calibration says of each unknown, in a word, and where single groups of residuals contradict all together."""
+"""The verdict of a calibration on each unknown, and subset estimates that differ from the joint estimate."""
 
 from typing import Literal, NamedTuple
 
@@ -24,7 +24,7 @@ Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
 
 
 def far(calibration: Calibration) -> Array:
-    """Estimates (p,) in predicted deviations from the nominal machine and from sensors without error."""
+    """Estimates (p,) in predicted deviations from the nominal machine and perfect sensors."""
     return np.asarray(calibration.estimate / calibration.sd)
 
 
@@ -38,8 +38,8 @@ def beyond(calibration: Calibration) -> NDArray[np.bool_]:
 def verdict_on(calibration: Calibration, i: int) -> Verdict:
     """The verdict on unknown i; the first that holds.
 
-    At its bound: as far from nominal as the fit lets it go, by its prior or by what can be built. Changed: `beyond`.
-    Unchanged: the campaign has told something of it, and it is nearer than that.
+    At its bound: at the limit set by its prior or by what can be built. Changed: `beyond`. Unchanged: identifiable and
+    not beyond.
     """
     count, prior, x = len(calibration.parameters), calibration.prior[i], calibration.estimate[i]
     reach = calibration.numbers.number("fit.reach" if i < count else "fit.sensor_reach") * prior
@@ -75,26 +75,26 @@ def stated_range(calibration: Calibration) -> Array:
 
 
 class Contradiction(NamedTuple):
-    """A group of residuals that by itself says something else than all together."""
+    """A subset estimate that differs from the joint estimate."""
 
     subset: str
     unknown: int
-    deviations: float  # signed distance, in deviations of what it would be if noise were all
+    deviations: float  # signed difference over its standard deviation
 
 
 def contradictions(calibration: Calibration) -> list[Contradiction]:
-    """Estimates of single groups that differ from those of all by more than the limit, farthest first.
+    """Subset estimates that differ from the joint ones by more than the limit, largest difference first.
 
-    The variance of the difference is that of the group less that of all (Hausman, Econometrica 46, 1978), since the
-    group is part of all; no less than what the search leaves open. Of simulation, which is no part, they add up; it has
-    a limit of its own.
+    The variance of the difference is that of the subset less that of the joint estimate (Hausman, Econometrica 46,
+    1978), since it is part of it; at least the convergence tolerance. For simulation, which is no part, the variances
+    add up; it has a limit of its own.
     """
-    left_open = calibration.numbers.number("fit.converged") * calibration.sd
+    tolerance = calibration.numbers.number("fit.converged") * calibration.sd
     simulation = calibration.numbers.number("simulation.deviations")
     found = []
     for subset in calibration.subsets:
         sign = -1.0 if subset.part else 1.0
-        variance = np.maximum(subset.sd**2 + sign * calibration.sd**2, left_open**2)  # NaN where it tells nothing
+        variance = np.maximum(subset.sd**2 + sign * calibration.sd**2, tolerance**2)  # NaN where not informative
         distance = (subset.estimate - calibration.estimate) / np.sqrt(variance)
         for i in np.flatnonzero(np.abs(distance) > (calibration.limit if subset.part else simulation)):
             found.append(Contradiction(subset.name, int(i), float(distance[i])))

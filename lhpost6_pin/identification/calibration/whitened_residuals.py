@@ -29,10 +29,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 BELIEF = 4.0
-"""Bins that the stated power of noise counts for, where a band shows more: few bins of a band cannot tell its power."""
+"""Weight of the stated noise power, in bins, where a band shows more: few bins estimate a power poorly."""
 
 CERTAIN = 9.0
-"""Squared partial correlation times samples from which two columns of noise count as correlated; chance gives one."""
+"""Squared partial correlation times samples from which two columns of noise count as correlated; one by chance."""
 
 
 def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tuple[Complex, Array]:
@@ -89,10 +89,10 @@ class Whitener(NamedTuple):
         """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
         out = np.empty_like(bins)
         band = self.band(f)
-        told = np.flatnonzero(bins.any(axis=(0, 2)))  # the rest would be multiplied for nothing
+        used = np.flatnonzero(bins.any(axis=(0, 2)))
         for b in np.unique(band):
-            part = bins[band == b][:, told]
-            mixed = self.factor[test, b][:, told] @ part.swapaxes(0, 1).reshape(len(told), len(part) * bins.shape[2])
+            part = bins[band == b][:, used]
+            mixed = self.factor[test, b][:, used] @ part.swapaxes(0, 1).reshape(len(used), len(part) * bins.shape[2])
             out[band == b] = mixed.reshape(-1, len(part), bins.shape[2]).swapaxes(0, 1)
         return out
 
@@ -102,7 +102,7 @@ def _band(edges: Array, f: Array) -> NDArray[np.intp]:
 
 
 def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[Array]) -> list[Array]:
-    """Power (m, k) of every test's whitened bins above that of noise, by column and band; one where there is none."""
+    """Power (m, k) of every test's whitened bins over that of noise, by column and band; at least one."""
     found = []
     for bins, f in zip(whitened, frequency, strict=True):
         means, counts = mean_squares(whitener, np.abs(bins) ** 2, f)
@@ -120,8 +120,8 @@ def mean_squares(whitener: Whitener, squares: Array, f: Array) -> tuple[Array, N
 def negative_log_likelihood(means: Array, counts: NDArray[np.intp]) -> Array:
     """Negative log-likelihood (k,) of bins by their `mean_squares`.
 
-    What is left counts as noise of unit power, or, where a band shows more of it, of a power in between: the stated
-    one counts as `BELIEF` bins. Its derivative by a mean is that of least squares over the power of `excess`.
+    The residual is modelled as noise of unit power, or, where a band shows more, of a power in between: the stated one
+    weighs as `BELIEF` bins. Its derivative by a mean is that of least squares over the power of `excess`.
     """
     more = (BELIEF + counts[:, None] * np.maximum(means, 1.0)) / (BELIEF + counts[:, None])
     return np.asarray(counts @ np.minimum(means, 1.0) + (BELIEF + counts) @ np.log(more))
@@ -130,9 +130,8 @@ def negative_log_likelihood(means: Array, counts: NDArray[np.intp]) -> Array:
 def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:
     """Whitener from realisations of every test's noise, bins (m, k) at its frequencies (m,).
 
-    Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. How they are
-    correlated is taken as the same in all tests, and for means as in the first band above: one test has too few bins
-    in a band to tell.
+    Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. Correlations are
+    pooled over all tests, and those of means with the first band: one test has too few bins in a band.
 
     Raises RecordError if all together still have too few.
     """
@@ -150,7 +149,7 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
             factors[t, b] = np.diag(1.0 / scale)
     for b in range(count):
         rows = np.vstack(scaled[b] + (scaled[1] if b == 0 else []))
-        if len(rows) <= CERTAIN:  # nothing could be told of correlations
+        if len(rows) <= CERTAIN:  # too few for correlations
             what = f"{len(rows)} samples of the noise between {edges[b]:g} and {edges[b + 1]:g} Hz"
             raise RecordError(f"the tests are too short together: they give {what}; add tests, or longer ones")
         factors[:, b] = _uncorrelated(rows.T @ rows.conj() / len(rows), len(rows)) @ factors[:, b]  # of E[x x^H]
@@ -160,31 +159,31 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
 def _uncorrelated(matrix: Complex, count: int) -> Complex:
     """Triangular matrix (k, k) that makes columns of a cross-spectral matrix (k, k) uncorrelated, with unit power.
 
-    Each column is rid of what those before it tell of it. Only columns whose correlation `count` samples show beyond
-    doubt are asked: correlations by chance would carry what is wrong in one kind of residual into all others.
+    Each column is regressed on those before it. Only columns with a significant correlation in `count` samples are
+    used: correlations by chance would propagate an error of one kind of residual into all others.
     """
     k = len(matrix)
     out = np.zeros((k, k), np.complex128)
     for i in range(k):
         power = float(matrix[i, i].real)
-        left, right = matrix[:i, :i].copy(), matrix[:i, i].copy()  # of columns before, rid of those that were asked
-        asked: list[int] = []
-        while len(asked) < i:
+        left, right = matrix[:i, :i].copy(), matrix[:i, i].copy()  # of columns before, less those that were used
+        used: list[int] = []
+        while len(used) < i:
             own = left.diagonal().real
             free = own > 1e-9 * matrix.diagonal().real[:i]
             share = np.where(free, np.abs(right) ** 2 / np.where(free, own, 1.0), 0.0) / max(power, 1e-12)
             j = int(np.argmax(share))
-            if share[j] * (count - len(asked)) < CERTAIN:
+            if share[j] * (count - len(used)) < CERTAIN:
                 break
-            asked.append(j)
+            used.append(j)
             power -= float(abs(right[j]) ** 2 / own[j])
             ratio = left[:, j] / own[j]
             right = right - ratio * right[j]
             left = left - np.outer(ratio, left[j])
         power = max(power, 1e-9 * float(matrix[i, i].real)) or 1.0
-        weights = np.linalg.solve(matrix[np.ix_(asked, asked)] + 1e-9 * np.eye(len(asked)), matrix[asked, i])
-        # what is left of a sample that was fitted is too small
-        scale = np.sqrt((1.0 - (len(asked) + 1) / count) / power)
+        weights = np.linalg.solve(matrix[np.ix_(used, used)] + 1e-9 * np.eye(len(used)), matrix[used, i])
+        # the residual of a regression is too small in the sample itself
+        scale = np.sqrt((1.0 - (len(used) + 1) / count) / power)
         out[i, i] = scale
-        out[i, asked] = -scale * weights.conj()
+        out[i, used] = -scale * weights.conj()
     return out

@@ -1,7 +1,7 @@
 """Three-phase validation of a campaign (report, Chapter 6): inverse dynamics, open loop, closed loop.
 
-`prepare` makes a test ready, `phases` compares it with the model, `agreement` and `spectra` say how well they agree,
-`valves` looks at spools and their commands, `validate` at a whole campaign.
+`prepare_tests` prepares a test, `phases` compares it with the model by `phase_agreement` and `band_spectra`,
+`valve_agreement` compares spools with their commands, and `validate` runs a whole campaign.
 """
 
 from .band_spectra import Spectrum

@@ -1,6 +1,6 @@
 """Spectra of what is compared, and the model's amplitude over the measured one in bands.
 
-Here nothing is low-passed at the band of the comparison, since half of the oil columns lie above it.
+Signals are not low-passed at the band of the comparison, since half of the oil columns lie above it.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ class Spectrum:
     frequency: Array
     measured: Array  # (f, k)
     model: Array  # (f, k)
-    ratio: Array  # (bands, k) amplitude of the model over the measurement; nan where there is only noise
+    ratio: Array  # (bands, k) amplitude of the model over the measurement; nan where noise prevails
 
 
 def estimate_spectrum(
@@ -38,13 +38,13 @@ def estimate_spectrum(
     dt: float,
     numbers: Numbers,
 ) -> Spectrum:
-    """Welch's estimate for both sides (n, k); noise (n, k) is a draw of what sensors add to the measurement."""
+    """Welch's estimate for both sides (n, k); noise (n, k) is a draw of the sensors' noise."""
     from scipy.signal import welch
 
     length = min(round(numbers.spectra.segment / dt), len(measured))
     f, ours = welch(measured, 1 / dt, nperseg=length, axis=0)
-    theirs, heard = (welch(x, 1 / dt, nperseg=length, axis=0)[1] for x in (model, noise))
-    return Spectrum(quantity, tuple(columns), f, ours, theirs, _band_ratios(f, ours, theirs, heard, numbers))
+    theirs, noisy = (welch(x, 1 / dt, nperseg=length, axis=0)[1] for x in (model, noise))
+    return Spectrum(quantity, tuple(columns), f, ours, theirs, _band_ratios(f, ours, theirs, noisy, numbers))
 
 
 def _band_ratios(f: Array, measured: Array, model: Array, noise: Array, numbers: Numbers) -> Array:
@@ -54,7 +54,7 @@ def _band_ratios(f: Array, measured: Array, model: Array, noise: Array, numbers:
     for b, (low, high) in enumerate(pairwise(edges)):
         inside = (f >= low) & (f < high)
         if inside.any():
-            ours, theirs, heard = (x[inside].mean(axis=0) for x in (measured, model, noise))
-            clear = ours > numbers.spectra.noise**2 * heard
+            ours, theirs, noisy = (x[inside].mean(axis=0) for x in (measured, model, noise))
+            clear = ours > numbers.spectra.noise**2 * noisy
             out[b] = np.sqrt(np.divide(theirs, ours, out=np.full(len(ours), np.nan), where=clear))
     return out

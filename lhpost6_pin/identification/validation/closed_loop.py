@@ -1,4 +1,4 @@
-"""What a record says of the closed loop it was made in: controller settings, reference or drive."""
+"""The closed loop that a record was made in: controller settings, reference or drive."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class Lag(NamedTuple):
-    """Delay of one axis behind what was asked for, of measurement and model [s]."""
+    """Delay of one axis behind the target, of measurement and model [s]."""
 
     column: str
     measured: float
@@ -30,34 +30,34 @@ class Lag(NamedTuple):
 
 
 def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> ControllerSettings:
-    """Settings that are given, else those shipped that the record's attribute `controller` names.
+    """Settings given, else the shipped ones that the record's attribute `controller` names.
 
-    Raises RecordError where neither is known: without its controller a closed loop cannot be simulated.
+    Raises RecordError where neither is known.
     """
     if given is not None:
         return given
-    said = record.attrs.get("controller")
+    named = record.attrs.get("controller")
     for path in sorted((models_folder() / "controllers").glob("*.toml")):
         settings = load_controller(path.stem)
-        if said in (path.stem, settings.name):
+        if named in (path.stem, settings.name):
             return settings
-    said = "no controller" if said is None else f"the controller {said!r}, which is not shipped"
-    raise RecordError(f"the record names {said}; give its settings as a TOML file with --controller")
+    named = "no controller" if named is None else f"the controller {named!r}, which is not shipped"
+    raise RecordError(f"the record names {named}; give its settings as a TOML file with --controller")
 
 
 def settings_source(record: xr.Dataset, settings: ControllerSettings, given: ControllerSettings | None) -> str:
-    """Where the settings of the closed loop come from, in words: others than the test's explain any difference."""
+    """Source of the closed loop's settings: those of the test, or others."""
     named = record.attrs.get("controller")
     if given is None or named == settings.name:
         return f"closed loop with the controller that the record names, “{settings.name}”"
-    said = "no controller" if named is None else f"“{named}”"
-    return f"closed loop with the controller given, “{settings.name}”; the record names {said}: settings may differ"
+    named = "no controller" if named is None else f"“{named}”"
+    return f"closed loop with the controller given, “{settings.name}”; the record names {named}: settings may differ"
 
 
 def drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:
     """Target at the controller's rate, and the drive (n, 6) if the test replayed one.
 
-    Velocity and acceleration of the reference are those stored, else derivatives low-passed at `high` [Hz]. Raises
+    Velocity and acceleration of the reference are those stored, else low-passed derivatives up to `high` [Hz]. Raises
     RecordError without reference_displacement, or for a drive file that is missing or of another mode.
     """
     if "drive" in record.attrs:

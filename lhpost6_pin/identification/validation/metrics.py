@@ -1,17 +1,21 @@
-"""Numbers by which tests are compared."""
+"""Numbers and references by which tests are compared."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ...control import ControllerSettings
 from ...core.files import models_folder
+from ...data.sensors import SensorSet
 from ...data.signals import Band
 from ...machine.parameters import Parameters, load_parameters
+from ...mechanics.linearize import OilColumnMode
 
-__all__ = ["HardlyMoving", "Numbers", "Resonances", "Spectra", "validation_numbers"]
+__all__ = ["ComparisonBasis", "HardlyMoving", "Numbers", "Resonances", "Spectra", "validation_numbers"]
 
 
 class HardlyMoving(NamedTuple):
-    """Below either of the first two a column hardly moves."""
+    """A column hardly moves below either of the first two."""
 
     noise: float  # times the sensor noise
     share: float  # of the column that moves most
@@ -19,7 +23,7 @@ class HardlyMoving(NamedTuple):
 
 
 class Spectra(NamedTuple):
-    """How spectra are estimated and summed up."""
+    """How spectra are estimated and averaged."""
 
     edges: tuple[float, ...]  # of bands [Hz]
     segment: float  # [s]
@@ -27,7 +31,7 @@ class Spectra(NamedTuple):
 
 
 class Resonances(NamedTuple):
-    """How an oil-column peak is looked for."""
+    """How an oil-column peak is found."""
 
     search: float  # relative, about the model's frequency
     prominence: float  # power over the median of the searched band
@@ -38,7 +42,7 @@ class ValveTransfer(NamedTuple):
     """How transfer functions of servovalves are estimated."""
 
     segment: float  # [s]
-    coherence: float  # of a spool with its command, below which nothing is shown
+    coherence: float  # of a spool with its command, below which it is not shown
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,15 @@ class Numbers:
     def shortest(self) -> float:
         """Length of a test that is long enough to be compared [s]: for the longest delay sought, and its edges."""
         return 8 * self.longest_delay + 4 * self.edge
+
+
+class ComparisonBasis(NamedTuple):
+    """What all tests of a campaign are compared with."""
+
+    sensors: SensorSet
+    numbers: Numbers
+    modes: Sequence[OilColumnMode]  # oil columns of the linear model
+    settings: ControllerSettings | None  # in place of those that records name
 
 
 def validation_numbers() -> Numbers:

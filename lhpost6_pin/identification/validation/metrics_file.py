@@ -24,7 +24,7 @@ _UNITS = {
 
 
 def metrics(found: Validation) -> dict[str, Any]:
-    """All numbers of a validation, SI, by test and phase; None for what is not known."""
+    """All numbers of a validation, SI, by test and phase; None where not known."""
     machine = found.machine
     return {
         "campaign": found.campaign,
@@ -75,7 +75,7 @@ def _ratios(spectrum: Spectrum, edges: tuple[float, ...]) -> dict[str, Any]:
 
 
 def _resonance(one: Resonance) -> dict[str, Any]:
-    def said(peak: Peak) -> dict[str, float]:
+    def entries(peak: Peak) -> dict[str, float]:
         return {"frequency": peak.frequency, "sharpness": peak.sharpness}
 
-    return {"linear_model": one.expected, "measured": said(one.measured), "model": said(one.model)}
+    return {"linear_model": one.expected, "measured": entries(one.measured), "model": entries(one.model)}

@@ -1,8 +1,8 @@
 """How well a model's signals agree with measured ones, column by column.
 
-Both sides come low-passed alike and on the same samples. Forces and pressures are compared less their means: a preload
-is nobody's achievement and would make errors of a vertical force look small, and an offset of a sensor would make them
-look large. The difference of the means stands by itself.
+Both sides have the same filter and samples. Forces and pressures are compared with their means removed: the static
+preload would dominate the norm of a vertical force, an offset of a sensor its error. The difference of the means is
+reported separately.
 """
 
 from collections.abc import Sequence
@@ -38,13 +38,13 @@ class ComparedQuantity:
     columns: tuple[str, ...]
     measured: Array  # (n, k)
     model: Array  # (n, k)
-    heard: Array  # (k,) standard deviation of the sensors' noise in the measurement
-    noise: Array  # (k,) that it leaves in the difference; more, where the model is driven by measured channels
-    calibration: Array | None = None  # (k,) that gains and offsets of sensors leave in its mean, where known
+    sensor_noise: Array  # (k,) standard deviation of the sensors' noise in the measurement
+    noise: Array  # (k,) of noise in the difference; larger where the model is driven by measured channels
+    calibration: Array | None = None  # (k,) of its mean by gains and offsets of sensors, where known
 
 
 class ColumnAgreement(NamedTuple):
-    """How one column agrees; not-a-number where it hardly moves, or for a ratio to nothing."""
+    """Agreement of one column; nan where it hardly moves, or for a ratio to zero."""
 
     quantity: str
     column: str
@@ -52,16 +52,16 @@ class ColumnAgreement(NamedTuple):
     moves: bool
     variation: float  # rms of the measurement about its mean
     error: float  # rms of model less measurement; of forces and pressures less its mean
-    noise: float  # standard deviation that sensor noise alone leaves in the error
-    error_aligned: float  # rms after taking the delay out; the same as before where there is none to take out
+    noise: float  # standard deviation of the error due to sensor noise alone
+    error_aligned: float  # rms, delay removed; the same as `error` where there is none
     rrmse: float  # [1]
-    rrmse_aligned: float  # [1] after taking the delay out
+    rrmse_aligned: float  # [1] delay removed
     delay: float  # of the model behind the measurement [s]
     peak_ratio: float  # model over measurement; a delay does not change it
     correlation: float
-    correlation_aligned: float  # after taking the delay out
+    correlation_aligned: float  # delay removed
     offset: float  # mean of model less measurement
-    offset_expected: float  # standard deviation that calibration of sensors leaves in it; nan where not known
+    offset_expected: float  # its standard deviation by calibration of sensors; nan where not known
     drift: float  # least-squares slope of the error [unit / s]
 
     @property
@@ -76,10 +76,10 @@ def unit_of(quantity: str, column: str) -> str:
 
 
 def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tuple[ColumnAgreement, ...]:
-    """Agreement of every column of every pair, the ends of the test left out.
+    """Agreement of every column of every quantity, without the ends of the test.
 
-    Displacement, velocity and acceleration of an axis have one delay, that of the velocity: an open loop drifts, and a
-    drifting displacement has none. Raises ValueError if a test is too short for the longest delay sought.
+    Displacement, velocity and acceleration of an axis share the delay of the velocity, since the displacement of an
+    open loop drifts. Raises ValueError if a test is too short for the longest delay sought.
     """
     edge = round(numbers.edge / dt)
     shared: dict[str, float] = {}
@@ -107,7 +107,7 @@ def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> NDArra
     weight = [per.get(unit_of(pair.quantity, column).split("/")[0], 1.0) for column in pair.columns]
     comparable = size * weight
     enough = (comparable >= numbers.hardly.share * comparable.max(initial=0.0)) & (comparable > 0.0)
-    return np.asarray(enough & (size >= numbers.hardly.noise * pair.heard))
+    return np.asarray(enough & (size >= numbers.hardly.noise * pair.sensor_noise))
 
 
 def _agree_one(pair: ComparedQuantity, k: int, moves: bool, late: float, part: slice, dt: float) -> ColumnAgreement:

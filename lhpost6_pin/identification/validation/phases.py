@@ -7,7 +7,7 @@
 Each phase engages more of the model: platen, struts and friction; then the oil; then the controller.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +18,9 @@ from ...core.names import AXES
 from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
 from ..decompose.record import take_apart
-from ..inverse_dynamics import Decomposition
 from .band_spectra import Spectrum, estimate_spectrum
 from .closed_loop import Lag, drive_of, settings_of, settings_source
-from .comparison_basis import ComparisonBasis
+from .metrics import ComparisonBasis
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
 from .prepare_tests import PreparedTest, wrench_calibration
 from .resonance import Resonance
@@ -33,10 +32,17 @@ Array = NDArray[np.float64]
 
 PHASES = {1: "inverse dynamics", 2: "open loop", 3: "closed loop"}
 
+_SIDES = (
+    ("wrench", "measured", "required"),
+    ("struts", "struts_measured", "struts"),
+    ("dissipative", "dissipative_measured", "dissipative"),
+)
+"""Quantities of inverse dynamics, with the names of both sides in `Decomposition`."""
+
 
 @dataclass(frozen=True)
 class Phase:
-    """One phase of one test; without pairs there is a `reason` why not."""
+    """One phase of one test; without pairs, `reason` states why."""
 
     number: int
     test: str
@@ -59,7 +65,7 @@ class Phase:
 
 
 def run_phase(number: int, test: PreparedTest, basis: ComparisonBasis) -> Phase:
-    """One phase of one test; what a test lacks for it, or a run that fails, becomes the phase's reason."""
+    """One phase of one test; a missing channel or a failed run becomes the phase's reason."""
     phases = {1: _inverse_dynamics, 2: _open_loop, 3: _closed_loop}
     try:
         return phases[number](test, basis)
@@ -72,21 +78,15 @@ def _inverse_dynamics(test: PreparedTest, basis: ComparisonBasis) -> Phase:
     columns = tuple(AXES[k] for k in axes)
     (found, notes), (again, _) = (take_apart(test.plant, one) for one in (test.test, test.again))
     calibration = wrench_calibration(test, basis.sensors)[axes]
-    sides: list[tuple[str, Callable[[Decomposition], Array | None], Callable[[Decomposition], Array]]] = [
-        ("wrench", lambda d: d.measured, lambda d: d.required),
-        ("struts", lambda d: d.struts_measured, lambda d: d.struts),
-        ("dissipative", lambda d: d.dissipative_measured, lambda d: d.dissipative),
-    ]
     pairs = []
-    for quantity, measured, model in sides:
-        ours, more = measured(found), measured(again)
-        if ours is not None and more is not None:
-            kept = [numbers.band.apply(x[:, axes], test.dt) for x in (ours, model(found), more, model(again))]
-            heard, noise = kept[2] - kept[0], kept[3] - kept[2] - kept[1] + kept[0]
+    for quantity, *sides in _SIDES:
+        values = [getattr(one, side) for one in (found, again) for side in sides]
+        if all(x is not None for x in values):
+            measured, model, more, again_model = (numbers.band.apply(x[:, axes], test.dt) for x in values)
+            sensor_noise, noise = more - measured, again_model - more - model + measured
             known = calibration if quantity == "wrench" else None
-            pairs.append(
-                ComparedQuantity(quantity, columns, kept[0], kept[1], heard.std(axis=0), noise.std(axis=0), known)
-            )
+            spread = sensor_noise.std(axis=0), noise.std(axis=0)
+            pairs.append(ComparedQuantity(quantity, columns, measured, model, *spread, known))
     ours, theirs, noise = (x[:, axes] for x in (found.measured, found.required, again.measured - found.measured))
     spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.dt, numbers)
     return Phase(1, test.name, test.time, tuple(pairs), agree(pairs, test.dt, numbers), spectrum, notes=notes)
@@ -116,7 +116,7 @@ def _closed_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
 def _of_run(
     number: int, test: PreparedTest, both: SimulatedComparison, channels: Sequence[str], basis: ComparisonBasis
 ) -> Phase:
-    pairs = both.pairs(channels)
+    pairs = both.quantities(channels)
     found = agree(pairs, test.dt, basis.numbers)
     moving = {a.column for a in found if a.quantity == "acceleration" and a.moves}
     shown = tuple(r for r in both.resonances() if r.column in moving)

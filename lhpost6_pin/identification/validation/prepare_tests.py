@@ -17,8 +17,7 @@ from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion, plant_motion
 from ..inverse_dynamics import leg_wrenches
 from ..prepare import AS_RECORDED, MeasuredTest, check_usable, prepare_test
-from .comparison_basis import ComparisonBasis
-from .metrics import Numbers
+from .metrics import ComparisonBasis, Numbers
 
 __all__ = ["PreparedTest", "prepare", "too_short", "total_wrench", "wrench_calibration"]
 

@@ -1,8 +1,8 @@
-"""The oil columns as a test shows them: where the platen's acceleration answers its axis's spools most.
+"""Oil-column resonances of a test: peaks of the response of the platen's acceleration to the spools.
 
-The spools of all actuators, taken to platen axes by kinematics, ask for a velocity; acceleration over that has a peak
-at the oil column, whatever the test's own spectrum. Its width at half the power is that of an oscillator's damping,
-2 zeta f, if nothing but damping limits it: neither a segment's resolution nor friction that sticks now and then.
+The spools of all actuators, transformed to platen axes by kinematics, command a velocity; the response of acceleration
+to it peaks at the oil column, whatever the test's own spectrum. The peak's width at half the power is 2 zeta f of an
+oscillator, if neither the segment's resolution nor stiction limits it.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 class Response:
     """Squared gain (f, k) from an axis's spools to its acceleration over `frequency` (f,) [Hz].
 
-    The coherence (f, k) is zero where spools or acceleration are no more than noise.
+    The coherence (f, k) is zero where noise dominates spools or acceleration.
     """
 
     frequency: Array
@@ -55,21 +55,21 @@ def estimate_response(
 ) -> Response:
     """Response of accelerations (n, k) of the plant's axes to spools (n, n_actuators), one axis at a time.
 
-    noise is a draw of what sensors add to either.
+    noise is a draw of the sensors' noise in either.
     """
     from scipy.signal import csd, welch
 
     to_axes = np.linalg.pinv(kinematic_jacobian(plant)[:, plant.axes]).T
-    asked = spool @ to_axes
-    each = {"fs": 1 / dt, "nperseg": min(round(numbers.spectra.segment / dt), len(asked)), "axis": 0}
-    f, given = welch(asked, **each)
-    answered, given_noise, noise_answered = (welch(x, **each)[1] for x in (acceleration, noise[0] @ to_axes, noise[1]))
-    _, cross = csd(asked, acceleration, **each)
+    commanded = spool @ to_axes
+    each = {"fs": 1 / dt, "nperseg": min(round(numbers.spectra.segment / dt), len(commanded)), "axis": 0}
+    f, given = welch(commanded, **each)
+    response, given_noise, response_noise = (welch(x, **each)[1] for x in (acceleration, noise[0] @ to_axes, noise[1]))
+    _, cross = csd(commanded, acceleration, **each)
     least = numbers.spectra.noise**2
-    clear = (given > least * given_noise) & (answered > least * noise_answered)
+    clear = (given > least * given_noise) & (response > least * response_noise)
     power = np.divide(np.abs(cross) ** 2, given**2, out=np.zeros_like(given), where=clear)
-    alike = np.divide(np.abs(cross) ** 2, given * answered, out=np.zeros_like(given), where=clear)
-    return Response(f, power, alike)
+    coherence = np.divide(np.abs(cross) ** 2, given * response, out=np.zeros_like(given), where=clear)
+    return Response(f, power, coherence)
 
 
 def find_resonances(

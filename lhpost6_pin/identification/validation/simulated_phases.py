@@ -1,6 +1,6 @@
-"""A simulated run laid over the test that it repeats, in open or closed loop."""
+"""A simulated run in open or closed loop, compared with the test that it repeats."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from ...simulation.rehearse import SimulatedTest
 from ..prepare import actuator_forces
 from .band_spectra import Spectrum, estimate_spectrum
 from .closed_loop import Lag
-from .comparison_basis import ComparisonBasis
+from .metrics import ComparisonBasis
 from .phase_agreement import MOTIONS, ComparedQuantity
 from .prepare_tests import PreparedTest, too_short, total_wrench, wrench_calibration
 from .resonance import Resonance, estimate_response, find_resonances
@@ -24,10 +24,10 @@ Array = NDArray[np.float64]
 
 
 class SimulatedComparison:
-    """A run and its test on the test's samples, as far as the run came.
+    """A run and its test on the test's samples, as far as the run lasted.
 
-    `again` is the run of the test with noise added once more, where the run depends on it: what that changes in the
-    difference of model and measurement is the noise of a pair.
+    `again` is the run of the test with another draw of noise, where the run depends on it: the change of the difference
+    between model and measurement is its noise.
     """
 
     def __init__(
@@ -52,101 +52,82 @@ class SimulatedComparison:
         """Samples (n,) that are compared [s]."""
         return self.test.time[: self.n]
 
-    def pairs(self, channels: Sequence[str]) -> list[ComparedQuantity]:
-        """Motion and total actuator force per axis, and channels per actuator; what is missing is noted."""
-        found = [self._motion(quantity) for quantity in MOTIONS]
-        if actuator_forces(self.test.machine, self.test.test.channels) is not None:
-            found.append(self._wrench())
-        return found + [self._channel(name) for name in channels if self._has(name)]
+    def quantities(self, channels: Sequence[str]) -> list[ComparedQuantity]:
+        """Motion and total actuator force per axis, and channels per actuator; missing channels are noted."""
+        plant, tests, runs = self.test.plant, (self.test.test, self.test.again), (self.ran, self.again)
+        found = []
+        for quantity in MOTIONS:
+            measured = [getattr(t.motion, quantity)[:, plant.axes] for t in tests]
+            model = [getattr(moved, quantity)[:, plant.axes] for moved in self.moved]
+            found.append(self._compared(quantity, self.axes, measured, model))
+        forces = [actuator_forces(plant.machine, t.channels) for t in tests]
+        if forces[0] is not None:
+            pairs = zip(tests, forces, strict=True)
+            measured = [total_wrench(plant, t.motion, f)[:, plant.axes] for t, f in pairs if f is not None]
+            model = [
+                total_wrench(plant, moved, run["actuator_force"].values)[:, plant.axes]
+                for moved, run in zip(self.moved, runs, strict=True)
+            ]
+            calibration = wrench_calibration(self.test, self.basis.sensors)[plant.axes]
+            found.append(self._compared("wrench", self.axes, measured, model, calibration))
+        for name in channels:
+            if name not in self.test.test.record:
+                self.notes.append(f"{name} was not recorded")
+            elif name in self.ran:
+                columns = [str(label) for label in self.ran[name][self.ran[name].dims[1]].values]
+                measured, model = [t.record[name].values for t in tests], [run[name].values for run in runs]
+                found.append(self._compared(name, columns, measured, model))
+        return found
 
-    def lags(self, asked: Array, pair: ComparedQuantity, moving: Sequence[str]) -> tuple[Lag, ...]:
-        """Delays behind the velocity (m, 6) that was asked for at the run's samples, of the columns that move."""
-        wanted = self._brought(asked[: len(self.clock)], self.basis.numbers.band)
+    def lags(self, target: Array, velocity: ComparedQuantity, moving: Sequence[str]) -> tuple[Lag, ...]:
+        """Delays behind the target velocity (m, 6) at the run's samples, of the columns that move."""
+        wanted = self._at_samples(target[: len(self.clock)], self.basis.numbers.band)
         longest = self.basis.numbers.longest_delay
         found = []
-        for k, column in enumerate(pair.columns):
+        for k, column in enumerate(velocity.columns):
             if column in moving:
-                reference = wanted[:, AXES.index(column)]
-                sides = (delay(reference, side[:, k], self.test.dt, longest) for side in (pair.measured, pair.model))
-                found.append(Lag(column, *map(float, sides)))
+                reference, sides = wanted[:, AXES.index(column)], (velocity.measured, velocity.model)
+                found.append(Lag(column, *(float(delay(reference, x[:, k], self.test.dt, longest)) for x in sides)))
         return tuple(found)
 
     def spectrum(self) -> Spectrum:
         """Spectra of the platen's acceleration."""
-        columns = self.test.plant.axes
-        ours, noise = (x[:, columns] for x in self._accelerations())
-        theirs = self._brought(self.moved[0].acceleration[:, columns], self.basis.sensors.band)
-        return estimate_spectrum("acceleration", self.axes, ours, theirs, noise, self.test.dt, self.basis.numbers)
+        measured, noise, model = self._accelerations()
+        return estimate_spectrum("acceleration", self.axes, measured, model, noise, self.test.dt, self.basis.numbers)
 
     def resonances(self) -> tuple[Resonance, ...]:
         """Oil columns; none without spool positions."""
         if "spool_position" not in self.test.test.record:
             return ()
-        plant, numbers, wide = self.test.plant, self.basis.numbers, self.basis.sensors.band
+        plant, numbers, dt = self.test.plant, self.basis.numbers, self.test.dt
         spool, more = (m.record["spool_position"].values[: self.n] for m in (self.test.test, self.test.again))
-        ours, noise = (x[:, plant.axes] for x in self._accelerations())
-        heard = more - spool, noise
-        measured = estimate_response(plant, spool, ours, heard, self.test.dt, numbers)
-        opened = self._brought(self.ran["spool_position"].values, wide)
-        moved = self._brought(self.moved[0].acceleration[:, plant.axes], wide)
-        model = estimate_response(plant, opened, moved, heard, self.test.dt, numbers)
+        acceleration, noise, moved = self._accelerations()
+        noises = more - spool, noise
+        measured = estimate_response(plant, spool, acceleration, noises, dt, numbers)
+        opened = self._at_samples(self.ran["spool_position"].values, self.basis.sensors.band)
+        model = estimate_response(plant, opened, moved, noises, dt, numbers)
         return find_resonances(self.axes, measured, model, self.basis.modes, numbers)
 
-    def _motion(self, quantity: str) -> ComparedQuantity:
-        axes = self.test.plant.axes
-        tests = self.test.test, self.test.again
-
-        def measured(draw: int) -> Array:
-            return np.asarray(getattr(tests[draw].motion, quantity)[:, axes])
-
-        def model(draw: int) -> Array:
-            return np.asarray(getattr(self.moved[draw], quantity)[:, axes])
-
-        return self._pair(quantity, self.axes, measured, model)
-
-    def _wrench(self) -> ComparedQuantity:
-        plant = self.test.plant
-        tests, runs = (self.test.test, self.test.again), (self.ran, self.again)
-
-        def measured(draw: int) -> Array:
-            force = actuator_forces(plant.machine, tests[draw].channels)
-            assert force is not None
-            return total_wrench(plant, tests[draw].motion, force)[:, plant.axes]
-
-        def model(draw: int) -> Array:
-            return total_wrench(plant, self.moved[draw], runs[draw]["actuator_force"].values)[:, plant.axes]
-
-        calibration = wrench_calibration(self.test, self.basis.sensors)[plant.axes]
-        return self._pair("wrench", self.axes, measured, model, calibration)
-
-    def _has(self, name: str) -> bool:
-        if name in self.test.test.record:
-            return name in self.ran
-        self.notes.append(f"{name} was not recorded")
-        return False
-
-    def _channel(self, name: str) -> ComparedQuantity:
-        tests, runs = (self.test.test.record, self.test.again.record), (self.ran, self.again)
-        columns = [str(label) for label in self.ran[name][self.ran[name].dims[1]].values]
-        return self._pair(name, columns, lambda i: tests[i][name].values, lambda i: runs[i][name].values)
-
-    def _pair(
+    def _compared(
         self,
         quantity: str,
         columns: Sequence[str],
-        measured: Callable[[int], Array],
-        model: Callable[[int], Array],
+        measured: Sequence[Array],
+        model: Sequence[Array],
         calibration: Array | None = None,
     ) -> ComparedQuantity:
-        """Pair of a quantity; both sides are functions of the draw, 0 the test itself and 1 with more noise."""
-        band, ours = self.basis.numbers.band, measured(0)
-        theirs, heard = model(0), band.apply(measured(1) - ours, self.test.dt)[: self.n]
-        noise = heard if self.again is self.ran else self._brought(model(1) - theirs, band) - heard
-        kept = band.apply(ours, self.test.dt)[: self.n], self._brought(theirs, band)
-        return ComparedQuantity(quantity, tuple(columns), *kept, heard.std(axis=0), noise.std(axis=0), calibration)
+        """Both sides of a quantity; each has two draws of noise."""
+        band = self.basis.numbers.band
+        sensor_noise = band.apply(measured[1] - measured[0], self.test.dt)[: self.n]
+        noise = sensor_noise
+        if self.again is not self.ran:
+            noise = self._at_samples(model[1] - model[0], band) - sensor_noise
+        kept = band.apply(measured[0], self.test.dt)[: self.n], self._at_samples(model[0], band)
+        spread = sensor_noise.std(axis=0), noise.std(axis=0)
+        return ComparedQuantity(quantity, tuple(columns), *kept, *spread, calibration)
 
-    def _brought(self, values: Array, band: Band) -> Array:
-        """A run's values, filtered, at the test's samples: picked where these are samples of the run, else between."""
+    def _at_samples(self, values: Array, band: Band) -> Array:
+        """A run's values, filtered, at the test's samples: selected where these coincide, else interpolated."""
         step = self.clock[1] - self.clock[0]
         kept, every = band.apply(values, step), max(round(self.test.dt / step), 1)
         picked = self.clock[::every][: self.n]
@@ -154,7 +135,8 @@ class SimulatedComparison:
             return np.asarray(kept[::every][: self.n])
         return resample_band_limited(kept, self.clock, self.time)
 
-    def _accelerations(self) -> tuple[Array, Array]:
-        """Measured acceleration (n, 6), and what noise adds to it."""
-        ours, more = (m.motion.acceleration[: self.n] for m in (self.test.test, self.test.again))
-        return ours, more - ours
+    def _accelerations(self) -> tuple[Array, Array, Array]:
+        """Measured acceleration (n, k) of the free axes, its noise, and the model's."""
+        axes = self.test.plant.axes
+        measured, more = (m.motion.acceleration[: self.n, axes] for m in (self.test.test, self.test.again))
+        return measured, more - measured, self._at_samples(self.moved[0].acceleration[:, axes], self.basis.sensors.band)

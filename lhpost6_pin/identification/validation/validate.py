@@ -21,8 +21,7 @@ from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
 from ..prepare import SIGNIFICANT, find_delays
-from .comparison_basis import ComparisonBasis
-from .metrics import Numbers, validation_numbers
+from .metrics import ComparisonBasis, Numbers, validation_numbers
 from .phases import PHASES, Phase, run_phase
 from .prepare_tests import prepare, too_short
 from .valve_agreement import Valves, find_valves
@@ -34,14 +33,14 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Validation:
-    """What a validation found: each phase of each test."""
+    """Result of a validation: each phase of each test."""
 
     campaign: str
     machine: Machine
     sensors: SensorSet
     numbers: Numbers
     skews: Mapping[str, Delay]  # between channel groups, taken out of all records
-    valves: Valves | None  # spools behind their commands; None where either was not recorded
+    valves: Valves | None  # delays of spools behind their commands; None where either was not recorded
     phases: tuple[Phase, ...]  # test by test
 
     @property
@@ -57,7 +56,7 @@ class Validation:
         return (min(known), max(known)) if known else None
 
     def phase(self, test: str, number: int) -> Phase | None:
-        """A phase of a test; None if it was not asked for."""
+        """A phase of a test; None if it was not requested."""
         return next((p for p in self.phases if (p.test, p.number) == (test, number)), None)
 
 
@@ -71,11 +70,11 @@ def validate(
     jobs: int = -1,
     progress: Progress | None = None,
 ) -> Validation:
-    """Compare a campaign with its machine in the phases asked for, tests over `jobs` threads.
+    """Compare a campaign with its machine in the given phases, tests over `jobs` threads.
 
-    settings replace what records say of their controller. Skews between channel groups that stand out of their errors
-    are taken out first. A phase that cannot be says why; RecordError if no phase of any test can be, or if two tests
-    have one name.
+    settings replace those that records name. Significant skews between channel groups are removed first. A missing
+    channel disables only the phases that need it, with a reason; RecordError if no phase of any test is possible, or if
+    two tests have one name.
     """
     _check_names(campaign)
     sensors, numbers = sensors or load_sensors(), validation_numbers()
@@ -98,7 +97,7 @@ def validate(
     every = tuple(phase for test in found for phase in test)
     if all(phase.reason for phase in every):
         why = "; ".join(dict.fromkeys(f"{p.test}, {PHASES[p.number]}: {p.reason}" for p in every))
-        raise RecordError(f"{campaign.name}: nothing can be compared: {why}")
+        raise RecordError(f"{campaign.name}: no phase of any test is possible: {why}")
     valves = find_valves(machine, enough, numbers)
     return Validation(campaign.name, machine, sensors, numbers, skews, valves, every)
 
@@ -117,7 +116,7 @@ def _check_names(campaign: Campaign) -> None:
     for name, twice in files.items():
         if len(twice) > 1:
             raise RecordError(
-                f"{campaign.name}: test {name!r} is twice there: {', '.join(twice)}; rename one (attribute test)"
+                f"{campaign.name}: two tests are named {name!r}: {', '.join(twice)}; rename one (attribute test)"
             )
 
 

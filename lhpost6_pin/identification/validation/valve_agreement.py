@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Valves:
-    """Spools (k,) behind their commands; transfer functions are those of the test that tells the delays best."""
+    """Delays of spools (k,) behind their commands; transfer functions of the test with the most accurate delays."""
 
     columns: tuple[str, ...]
     delay: Array  # (k,) over all tests [s]
@@ -60,8 +60,10 @@ def _response(command: Array, spool: Array, dt: float, numbers: Numbers) -> tupl
     from scipy.signal import csd, welch
 
     each = {"fs": 1 / dt, "nperseg": min(round(numbers.valves.segment / dt), len(command)), "axis": 0}
-    f, asked = welch(command, **each)
+    f, commanded = welch(command, **each)
     done, cross = welch(spool, **each)[1], csd(command, spool, **each)[1]
-    alike = np.divide(np.abs(cross) ** 2, asked * done, out=np.zeros_like(asked), where=asked * done > 0.0)
+    coherence = np.divide(
+        np.abs(cross) ** 2, commanded * done, out=np.zeros_like(commanded), where=commanded * done > 0.0
+    )
     nothing = np.full_like(cross, np.nan)
-    return f, np.divide(cross, asked, out=nothing, where=alike > numbers.valves.coherence)
+    return f, np.divide(cross, commanded, out=nothing, where=coherence > numbers.valves.coherence)

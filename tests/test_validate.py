@@ -258,9 +258,7 @@ def test_a_column_moves_if_it_stands_out_of_the_noise_and_of_the_others(scale, m
     assert rows[1].moves is moves
     assert np.isfinite(rows[1].rrmse) == moves
     assert rows[1].error_to_noise == pytest.approx(0.1 * scale * np.sqrt(0.5) / 1e-4, rel=1e-2)
-    loud = agree(
-        [replace(pair, sensor_noise=np.full(2, 0.1))], 1 / 512, numbers
-    )  # rms 0.71 is less than ten times that
+    loud = agree([replace(pair, sensor_noise=np.full(2, 0.1))], 1 / 512, numbers)  # rms 0.71
     assert not loud[0].moves
 
 

@@ -1,4 +1,4 @@
-"""Quantities that a record holds twice: what is compared with what, and what may lawfully differ.
+"""Pairs of redundant channels: what is compared, and by how much calibration errors may make them differ.
 
 `comparisons` turns a record into regressions y = X theta + noise, filtered by one band, for `consistency` to solve.
 """
@@ -26,25 +26,25 @@ __all__ = ["SensorComparison", "Regressor", "comparisons", "loose_lengths"]
 
 Array = NDArray[np.float64]
 
-BAND = Band(high=20.0)  # Hz: where motion is strong against noise
-TRIM = 0.1  # s: left out at both ends, where filtered records say little
+BAND = Band(high=20.0)  # Hz: where motion exceeds noise
+TRIM = 0.1  # s: cut off at both ends, where filters settle
 FAST = 0.3  # of the sampling rate: above it a command is fast
 
 
 class Regressor(NamedTuple):
-    """One column of X: what its coefficient is called, and what it should be; `delay` turns it into one."""
+    """One column of X: name and expected value of its coefficient, which `delay` turns into a delay."""
 
     quantity: str
     unit: str
     expected: float
     column: Array  # (n,)
     variance: float = 0.0  # of its noise
-    delay: float | None = None  # already taken out [s]; the coefficient is what is left, times minus the gain
-    beside: bool = False  # where noise hides it, the others still tell
+    delay: float | None = None  # already removed [s]; the coefficient is the remaining one, times minus the gain
+    beside: bool = False  # the others remain identifiable where noise hides it
 
     @property
     def due(self) -> float:
-        """What its coefficient should be."""
+        """Nominal value of its coefficient."""
         return self.expected if self.delay is None else 0.0
 
 
@@ -61,7 +61,7 @@ class SensorComparison(NamedTuple):
 
 
 class _View:
-    """A record as the comparisons see it: filtered, trimmed and thinned, with the noise that is left."""
+    """A record filtered, trimmed and thinned for comparison, with its remaining noise."""
 
     def __init__(self, plant: Plant, record: xr.Dataset, sensors: SensorSet) -> None:
         self.plant, self.record, self.sensors = plant, record, sensors
@@ -82,7 +82,7 @@ class _View:
 
     def signals(self, x: Array, *orders: int) -> list[Array]:
         """Derivatives of these orders of x (n, k) in the band, thinned and trimmed."""
-        x = BAND.apply(x, self.dt)[:: self.step]  # nothing is left to fold at 8 times the band
+        x = BAND.apply(x, self.dt)[:: self.step]  # no aliasing at 8 times the band
         derivatives = [x]
         for _ in range(max(orders)):
             derivatives.append(differentiate(derivatives[-1], self.step * self.dt))
@@ -99,17 +99,21 @@ class _View:
         return np.asarray(np.trapezoid(power, self.f, axis=0))
 
     def sd(self, name: str) -> tuple[float, float, float]:
-        """Calibration of a channel, one standard deviation: gain [1], offset [unit], delay [s].
-
-        What holds still within a digital step is off by a part of it, which is an offset, too.
-        """
+        """Calibration of a channel, one standard deviation: gain [1], offset [unit] with resolution, delay [s]."""
         s, step = self.sensors, resolution(self.values(name)) if self.has(name) else 0.0
         offset = float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0)))
         return s.gain_sd(name), offset, s.delay_sd(LAYOUT[name].group or name)
 
+    def compared(
+        self, check: str, channel: str, y: Array, variance: float, terms: Sequence[Regressor], errors: Sequence[Array]
+    ) -> SensorComparison:
+        """A comparison of one column y (n,) of a channel."""
+        columns = np.stack(errors, axis=1)
+        return SensorComparison(check, channel, y, float(variance), tuple(terms), columns, self.independent)
+
 
 def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[SensorComparison]:
-    """All comparisons that a record has the channels for."""
+    """All comparisons for which a record has the channels."""
     view = _View(plant, record, sensors)
     for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools, _redundant):
         yield from compare(view)
@@ -118,24 +122,17 @@ def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterato
 def loose_lengths(
     plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: float
 ) -> Iterator[tuple[str, SensorComparison, Array]]:
-    """Lengths of double-acting actuators against the platen's pose, each with the side (n,) that a loose pin bears on.
+    """Lengths of double-acting actuators against the platen's pose, each with the contact side (n,) of a loose pin.
 
-    The side, -1 to 1, is by the measured force, of which `closing` [N] presses most of the play out (`laws.play`).
+    The side, -1 to 1, follows from the measured force; `closing` [N] of it closes most of the play (`laws.play`).
     """
     view = _View(plant, record, sensors)
     if not view.has("actuator_force"):
         return
     force = view.values("actuator_force")
     side = view.signal(force / np.sqrt(force**2 + closing**2))
-    each = zip(plant.machine.actuator_names, _lengths(view), side.T, strict=False)  # no lengths: none
+    each = zip(plant.machine.actuator_names, _lengths(view), side.T, strict=False)  # none without lengths
     yield from (one for one in each if one[0] in plant.machine.double_acting)
-
-
-def _compared(
-    view: _View, check: str, channel: str, y: Array, variance: float, terms: list[Regressor], errors: Sequence[Array]
-) -> SensorComparison:
-    columns = np.stack(errors, axis=1)
-    return SensorComparison(check, channel, y, float(variance), tuple(terms), columns, view.independent)
 
 
 def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Regressor:
@@ -145,7 +142,7 @@ def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Regressor
 def _gain_terms(
     due: Array, rate: Array, noise: tuple[float, float] = (0.0, 0.0), *, delay: float = 0.0, level: float = 0.0
 ) -> list[Regressor]:
-    """Gain, delay and offset against what a column should be (n,) and its rate, with the noise variance of both."""
+    """Gain, delay and offset against the predicted column (n,) and its rate, with the noise variance of both."""
     offset = _offset_term(len(due), level)
     return [Regressor("gain", "1", 1.0, due, noise[0]), _delay_term(rate, noise[1], delay), offset]
 
@@ -158,7 +155,6 @@ def _forces(view: _View) -> Iterator[SensorComparison]:
     """actuator_force = P_A A_1 - P_B A_2."""
     if not view.has("actuator_force", "chamber_pressure_a"):
         return
-    machine = view.plant.machine
     force = view.signal(view.values("actuator_force"))
     a, rate_a = view.signals(view.values("chamber_pressure_a"), 0, 1)
     noise = {n: (view.variance(n), view.variance(n, 1)) for n in ("actuator_force", "chamber_pressure_a")}
@@ -169,9 +165,9 @@ def _forces(view: _View) -> Iterator[SensorComparison]:
         noise["chamber_pressure_b"] = view.variance("chamber_pressure_b"), view.variance("chamber_pressure_b", 1)
     (gain_f, offset_f, delay_f), (gain_a, offset_a, delay_p) = map(view.sd, ("actuator_force", "chamber_pressure_a"))
     gain_b, offset_b, _ = view.sd("chamber_pressure_b")
-    for i, actuator in enumerate(machine.actuators):
+    one = np.ones(len(force))
+    for i, actuator in enumerate(view.plant.machine.actuators):
         area_a, area_b = actuator.area_a, actuator.area_b
-        one = np.ones(len(force))
         push, rate = area_a * a[:, i], area_a * rate_a[:, i]
         still = area_a**2 * noise["chamber_pressure_a"][1][i]
         terms = [Regressor("gain a", "1", 1.0, push, area_a**2 * noise["chamber_pressure_a"][0][i])]
@@ -186,9 +182,8 @@ def _forces(view: _View) -> Iterator[SensorComparison]:
             errors += [gain_b * pull, area_b * offset_b * one]
         errors += [delay_f * rate, delay_p * rate]
         terms += [_delay_term(rate, still), _offset_term(len(force))]
-        channel = f"actuator_force[{actuator.name}]"
-        variance = noise["actuator_force"][0][i]
-        yield _compared(view, "force against pressures", channel, force[:, i], variance, terms, errors)
+        channel, variance = f"actuator_force[{actuator.name}]", noise["actuator_force"][0][i]
+        yield view.compared("force against pressures", channel, force[:, i], variance, terms, errors)
 
 
 def _geometry(view: _View, pose: Array) -> list[Array]:
@@ -215,18 +210,14 @@ def _lengths(view: _View) -> Iterator[SensorComparison]:
     """actuator_displacement against that of the measured platen pose; it may drift by its noise within a record."""
     if not view.has("actuator_displacement", "platen_displacement"):
         return
-    plant = view.plant
-    pose = view.values("platen_displacement")
+    plant, pose = view.plant, view.values("platen_displacement")
     legs = leg_displacements(plant, pose)[0][:, : plant.spools]
     measured, (due, rate) = view.signal(view.values("actuator_displacement")), view.signals(legs, 0, 1)
-    slow = view.signal(pose)
-    jacobian = kinematic_jacobian(plant)
+    slow, jacobian = view.signal(pose), kinematic_jacobian(plant)
     noise = [jacobian**2 @ view.variance("platen_displacement", k) for k in (0, 1)]
-    variance = view.variance("actuator_displacement")
-    geometry = _geometry(view, slow)
-    (gain_l, offset_l, delay_l), (gain_x, offset_x, delay_x) = map(
-        view.sd, ("actuator_displacement", "platen_displacement")
-    )
+    variance, geometry = view.variance("actuator_displacement"), _geometry(view, slow)
+    gain_l, offset_l, delay_l = view.sd("actuator_displacement")
+    gain_x, offset_x, delay_x = view.sd("platen_displacement")
     one = np.ones(len(slow))
     time = view.step * view.dt * (np.arange(len(slow), dtype=np.float64) - 0.5 * (len(slow) - 1))
     for i, name in enumerate(plant.machine.actuator_names):
@@ -236,12 +227,12 @@ def _lengths(view: _View) -> Iterator[SensorComparison]:
         errors.append(np.sqrt(variance[i]) * time / max(time[-1] - time[0], view.dt))
         errors += [jacobian[i, k] * (gain_x * slow[:, k] + offset_x) for k in range(6)]
         errors += [change[:, i] for change in geometry]
-        channel = f"actuator_displacement[{name}]"
-        yield _compared(view, "length against platen pose", channel, measured[:, i], variance[i], terms, errors)
+        check, channel = "length against platen pose", f"actuator_displacement[{name}]"
+        yield view.compared(check, channel, measured[:, i], variance[i], terms, errors)
 
 
 def _parity(view: _View) -> Iterator[SensorComparison]:
-    """What no pose explains of the actuators' lengths: as many combinations as there are more of them than axes."""
+    """Combinations of the actuators' lengths that are zero at any pose: one for each actuator in excess of the axes."""
     plant = view.plant
     if not view.has("actuator_displacement"):
         return
@@ -257,15 +248,14 @@ def _parity(view: _View) -> Iterator[SensorComparison]:
     variance = view.variance("actuator_displacement")
     for k, combination in enumerate(null.T):
         signals = [c * e[:, i] for i, c in enumerate(combination) for e in errors]
-        channel = f"actuator_displacement[parity {k + 1}]"
-        y = rest @ combination
-        yield _compared(view, "kinematic parity", channel, y, combination**2 @ variance, [], signals)
+        y, channel = rest @ combination, f"actuator_displacement[parity {k + 1}]"
+        yield view.compared("kinematic parity", channel, y, combination**2 @ variance, [], signals)
 
 
 def _rates(view: _View) -> Iterator[SensorComparison]:
     """platen_velocity and platen_acceleration against derivatives of platen_displacement.
 
-    An accelerometer may feel the two axes across its own, too; as much as its gain may be off is lawful.
+    An accelerometer may have cross-talk; as much as its gain uncertainty is allowed.
     """
     base = "platen_displacement"
     for order, name in ((1, "platen_velocity"), (2, "platen_acceleration")):
@@ -283,7 +273,7 @@ def _rates(view: _View) -> Iterator[SensorComparison]:
             terms += [Regressor(f"cross {AXES[k]}", "1", 0.0, due[:, k], noise[0][k], beside=True) for k in across]
             errors += [gain_m * due[:, k] for k in across]
             check = f"{name.split('_')[1]} against displacement"
-            yield _compared(view, check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
+            yield view.compared(check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
 
 
 def _struts(view: _View) -> Iterator[SensorComparison]:
@@ -305,7 +295,7 @@ def _struts(view: _View) -> Iterator[SensorComparison]:
         errors = [gain_p * whole, offset_p * one, gain_x * swing[:, k], delay_p * rate[:, k], delay_x * rate[:, k]]
         errors += [spread["pressure"] * whole, spread["polytropic_index"] * whole * np.log(whole / level[k])]
         channel = f"strut_pressure[{strut.name}]"
-        yield _compared(view, "strut pressure against gas law", channel, measured[:, k], variance[k], terms, errors)
+        yield view.compared("strut pressure against gas law", channel, measured[:, k], variance[k], terms, errors)
 
 
 def _relative_sd(view: _View, component: Any, key: str) -> float:
@@ -318,23 +308,19 @@ def _relative_sd(view: _View, component: Any, key: str) -> float:
 def _supply(view: _View) -> Iterator[SensorComparison]:
     """supply_pressure against the nominal one."""
     if view.has("supply_pressure"):
-        nominal = view.plant.machine.hydraulics.supply_pressure
-        y = view.signal(view.values("supply_pressure"))[:, 0]
-        gain, offset, _ = view.sd("supply_pressure")
-        errors = [gain * y, offset * np.ones(len(y))]
-        terms = [_offset_term(len(y), nominal)]
-        variance = view.variance("supply_pressure")[0]
-        yield _compared(view, "supply pressure against nominal", "supply_pressure", y, variance, terms, errors)
+        name, nominal = "supply_pressure", view.plant.machine.hydraulics.supply_pressure
+        y, (gain, offset, _) = view.signal(view.values(name))[:, 0], view.sd(name)
+        errors, terms = [gain * y, offset * np.ones(len(y))], [_offset_term(len(y), nominal)]
+        yield view.compared("supply pressure against nominal", name, y, view.variance(name)[0], terms, errors)
 
 
 def _spools(view: _View) -> Iterator[SensorComparison]:
     """spool_position against the command, late by the valve's delay.
 
-    Commands are recorded as they are, without a low-pass: what is fast in them says how much may have folded down.
+    Commands are recorded without a low-pass filter: their fast part bounds the aliasing.
     """
     if not view.has("spool_command", "spool_position"):
         return
-    delays = view.plant.delays
     command = due_spools(view.plant, view.values("spool_command"), view.dt)
     measured, (due, rate) = view.signal(view.values("spool_position")), view.signals(command, 0, 1)
     fast = command - Band(high=FAST / view.dt).apply(command, view.dt)
@@ -342,14 +328,14 @@ def _spools(view: _View) -> Iterator[SensorComparison]:
     variance = view.variance("spool_position")
     gain, offset, delay = view.sd("spool_position")
     for i, name in enumerate(view.plant.machine.actuator_names):
-        terms = _gain_terms(due[:, i], rate[:, i], delay=delays[i])
+        terms = _gain_terms(due[:, i], rate[:, i], delay=view.plant.delays[i])
         errors = [gain * due[:, i], offset * np.ones(len(due)), delay * rate[:, i], folded[:, i]]
         channel = f"spool_position[{name}]"
-        yield _compared(view, "spool against command", channel, measured[:, i], variance[i], terms, errors)
+        yield view.compared("spool against command", channel, measured[:, i], variance[i], terms, errors)
 
 
 def _redundant(view: _View) -> Iterator[SensorComparison]:
-    """A redundant channel against the one that measures the same."""
+    """A redundant channel against the one of the same quantity."""
     for name, base in ((n, c.same_as) for n, c in LAYOUT.items() if c.same_as and view.has(n, c.same_as)):
         measured, (due, rate) = view.signal(view.values(name)), view.signals(view.values(base), 0, 1)
         variance, noise = view.variance(name), [view.variance(base, k) for k in (0, 1)]
@@ -359,4 +345,4 @@ def _redundant(view: _View) -> Iterator[SensorComparison]:
             errors = [g * due[:, i] for g in (gain, gain_b)] + [d * rate[:, i] for d in (delay, delay_b)]
             errors += [o * np.ones(len(due)) for o in (offset, offset_b)]
             channel = channel_name(view.record[name], i)
-            yield _compared(view, f"{name} against {base}", channel, measured[:, i], variance[i], terms, errors)
+            yield view.compared(f"{name} against {base}", channel, measured[:, i], variance[i], terms, errors)

@@ -127,7 +127,7 @@ def test_offsets_and_gains_of_vertical_forces_add_in_squares(practice: tuple[Dec
 def test_skews_are_taken_out_unless_asked_not_to(triangle: xr.Dataset) -> None:
     plain, aligned = decompose_record(MACHINE, triangle, align=False), decompose_record(MACHINE, triangle)
     assert not plain.delays and plain.record is triangle
-    assert "actuator_displacement" in aligned.delays and "Skews taken out" in " ".join(aligned.notes)
+    assert "actuator_displacement" in aligned.delays and "Skews removed" in " ".join(aligned.notes)
     assert "aligned" in aligned.record.attrs
 
 

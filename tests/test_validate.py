@@ -164,7 +164,9 @@ def test_oil_columns_of_model_and_run_are_the_same_and_near_those_of_the_linear_
         assert one.model.frequency == pytest.approx(one.measured.frequency, rel=1e-4)  # but for what spools do within
         assert one.model.sharpness == pytest.approx(one.measured.sharpness, rel=1e-2)  # a sample
         assert one.expected == expected[one.column]
-        assert one.measured.frequency == pytest.approx(one.expected, rel=validation_numbers().resonance.search)
+        assert one.measured.frequency == pytest.approx(
+            one.expected, rel=validation_numbers().number("resonance.search")
+        )
 
 
 # What was put in ------------------------------------------------------------------------------------------------------

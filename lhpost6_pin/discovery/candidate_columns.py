@@ -1,7 +1,7 @@
-"""Columns: by how much the residuals change per unit of a candidate's amplitudes, in the frequency domain, whitened.
+"""Columns: derivatives of the whitened residuals by a candidate's amplitudes, in the frequency domain.
 
-Candidates of one family and shape that sit on different components are evaluated together where that is the same: what
-makes forces on legs has one wrench a leg, what alters the oil of an actuator acts on its own chambers.
+Candidates of one family and shape on different components are evaluated together where they are independent: a force
+along a leg has one wrench per leg, a modifier of an actuator's oil acts on its own chambers.
 """
 
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ Columns = list[Complex]
 
 
 def columns_of(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> tuple[Columns, list[Array]]:
-    """Columns of candidates alike but for their components; and how (k, q) each candidate's add up from them."""
+    """Columns of candidates that differ in components only; and each candidate's combination (k, q) of them."""
     first = candidates[0]
     effect = first.on(base.plant.machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1]
     legs = {c.name for c in base.plant.machine.components}
@@ -47,7 +47,7 @@ def columns_of(problem: Problem, base: OperatingPoint, candidates: Sequence[Cand
 
 
 def side_by_side(parts: Sequence[Columns]) -> Columns:
-    """Columns (m, c, k) of every test, all that these have."""
+    """Columns (m, c, k) of every test side by side."""
     return [np.concatenate(bins, axis=-1) for bins in zip(*parts, strict=True)]
 
 
@@ -63,7 +63,7 @@ def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate)
 
 
 def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
-    """Wrench of each candidate's force, all in one machine; what it gives, the actuators need not."""
+    """Wrench of each candidate's force, all in one machine; the actuators give so much less."""
     size = candidates[0].amplitudes[0].typical
     machine: Machine = base.plant.machine
     known = len(machine.effects)

@@ -1,8 +1,8 @@
-"""Screening: what each candidate would explain, with all known parameters and sensor errors refitted.
+"""Scores of candidates: the gain of each, with all parameters and sensor errors refitted, to first order.
 
-Everything is linear here: the residuals' derivatives by parameters, sensor errors and scatter between twins (the
-background), and by a candidate's amplitudes. The gain is the log-likelihood that the candidate adds to a refit without
-it; held out is what it adds to the prediction of each test, its amplitudes fitted on the others.
+The background are the residuals' derivatives by parameters, sensor errors and the scatter of identical components. The
+gain is the log-likelihood that a candidate adds to a refit without it; `held_out` is its gain in cross-validation, on
+each test with its amplitudes fitted on the others.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ Complex = NDArray[np.complex128]
 Columns = Sequence[Complex]
 
 WORTH = 0.5
-"""Log-likelihood below which it is not worth while to see what else moves."""
+"""Log-likelihood below which further steps are skipped."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Block:
     side: Array  # (t, q)
 
     def select(self, parts: Array) -> "Block":
-        """Block of amplitudes each of which is a sum of these, parts (k, q)."""
+        """Block of amplitudes that are sums of these, parts (k, q)."""
         return Block(self.cross @ parts, parts.T @ self.own @ parts, self.side @ parts)
 
 
@@ -44,7 +44,7 @@ class Block:
 class Background:
     """Normal equations of everything that is refitted in every comparison, by test; x in units of the priors.
 
-    Bins are real here: real parts, then imaginary parts, times the root of two over that of the power left in them.
+    Bins are real here: real parts, then imaginary parts, times the root of two over that of the remaining power.
     """
 
     slope: Sequence[Array]  # (n, p) of every test
@@ -52,18 +52,18 @@ class Background:
     root: Sequence[Array]  # (m, c) roots of power
     matrix: Array  # (t, p, p)
     side: Array  # (t, p)
-    place: Array  # (p,) where the background stands, in units of the priors
-    inward: Array  # (p,) zero; at its lowest +1, at its highest -1: what may move that way alone
+    place: Array  # (p,) of the solution, in units of the priors
+    inward: Array  # (p,) +1 at its lower bound, -1 at its upper: it may only move that way; else zero
     noise: Sequence[tuple[Sequence[Array], Sequence[Array]]] = ()  # by replica, test: changes of slope, of rest
 
     @property
     def free(self) -> Array:
-        """One, or zero for what is at a bound (p,)."""
+        """One, or zero at a bound (p,)."""
         return (self.inward == 0.0).astype(float)
 
     @cached_property
     def summed(self) -> list["_Summed"]:
-        """Its equations with the priors: of all tests, then of all but each."""
+        """Its equations with the priors: of all tests, then without each."""
         found, both, bound = [], np.outer(self.free, self.free), self.inward != 0.0
         for without in range(-1, len(self.matrix)):
             keep = np.arange(len(self.matrix)) != without
@@ -90,12 +90,12 @@ class Background:
 
     @property
     def gains(self) -> Array:
-        """Log-likelihood that what is at a bound gains by itself, of all tests and of all but each (1 + t,)."""
+        """Gain of the unknowns at a bound alone, of all tests and without each (1 + t,)."""
         return self._still[0]
 
     @property
     def alone(self) -> Array:
-        """What it changes (p,) where nothing is added."""
+        """Change (p,) without a candidate."""
         return self._still[1]
 
 
@@ -111,9 +111,9 @@ def make_block(background: Background, columns: Sequence[Complex]) -> Block:
 
 
 def less_noise(background: Background, block: Block, columns: Sequence[Complex], noisy: Sequence[Columns]) -> Block:
-    """The block without what noise adds to it: columns of the replicas differ by what noise makes of a candidate.
+    """The block corrected for noise, from the columns of the replicas.
 
-    Where noise is most of a column, as much of it is taken off as leaves half of its square.
+    The correction is limited to half of a column's square.
     """
     cross, own, side = block.cross.copy(), block.own.copy(), block.side.copy()
     for t, (column, root) in enumerate(zip(columns, background.root, strict=True)):
@@ -130,7 +130,7 @@ def less_noise(background: Background, block: Block, columns: Sequence[Complex],
 
 @dataclass(frozen=True)
 class Score:
-    """What a candidate explains."""
+    """Score of a candidate."""
 
     gain: float  # of log-likelihood
     amplitude: Array  # (q,)
@@ -142,10 +142,9 @@ class Score:
 def score(background: Background, block: Block, low: Array, high: Array, spread: Array) -> Score:
     """Score a candidate whose amplitudes (q,) are within low and high, with normal priors of deviations `spread`.
 
-    Held out on a test is by how much the candidate raises the log-probability of that test given the others, whatever
-    the background, with amplitudes as well as the others tell them: the gain of all tests less that of the others, and
-    less what it costs to have been unsure, half the logarithm by which the test narrows the amplitudes. What one test
-    alone excites costs little there; what tests contradict, much.
+    Cross-validation on a test is the candidate's gain in the log-probability of that test given the others, marginal
+    over the background and the amplitudes: the gain of all tests less that of the others, less half the logarithm by
+    which the test narrows the amplitudes. An effect excited in one test alone loses little there, a contradiction much.
     """
     whole, still = _profile(background, block, spread, -1), background.gains
     theta = whole.best(low, high)
@@ -162,19 +161,19 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
 
 
 class _Summed(NamedTuple):
-    """Equations of the background over some tests: of what is free, and of what is at a bound."""
+    """Equations of the background over some tests: of free unknowns, and of those at a bound."""
 
     keep: NDArray[np.bool_]  # (t,)
-    factor: tuple[Array, bool]  # of what is free
+    factor: tuple[Array, bool]  # of free unknowns
     right: Array  # (p,)
-    side: Array  # (f,) of what is at a bound
+    side: Array  # (f,) of those at a bound
     cross: Array  # (p, f)
     through: Array  # (p, f)
-    own: Array  # (f, f), what is free refitted
+    own: Array  # (f, f), free unknowns eliminated
 
 
 class _Profile(NamedTuple):
-    """Log-likelihood by a candidate's amplitudes and what is at a bound, theta (q + f,), the rest refitted for each."""
+    """Log-likelihood over a candidate's amplitudes and the unknowns at a bound, theta (q + f,), the rest eliminated."""
 
     schur: Array  # (q + f, q + f), priors in it
     side: Array  # (q + f,)
@@ -184,7 +183,7 @@ class _Profile(NamedTuple):
     inward: Array  # (p,)
 
     def best(self, low: Array, high: Array) -> Array:
-        """What gains most: amplitudes between low and high (q,), and what is at a bound moved inward or not at all."""
+        """Optimum: amplitudes between low and high (q,), unknowns at a bound moved inward or not at all."""
         count = len(low)
         way = self.inward[self.inward != 0.0]
         theta = np.zeros(len(self.side))
@@ -200,12 +199,12 @@ class _Profile(NamedTuple):
         value, vector = np.linalg.eigh(self.schur * np.outer(scale, scale))
         root = np.sqrt(np.maximum(value, 1e-9))
         wanted = -(vector.T @ (self.side * scale)) / root
-        # by active sets: few numbers, of which some tell nothing
+        # by active sets: few numbers, some not identifiable
         found = lsq_linear(root[:, None] * vector.T, wanted, bounds=(least, most), method="bvls")
         return np.asarray(found.x * scale)
 
     def gain(self, theta: Array) -> float:
-        """What theta gains over none."""
+        """Gain of theta over zero."""
         return -float(0.5 * theta @ self.schur @ theta + self.side @ theta)
 
     @property
@@ -215,7 +214,7 @@ class _Profile(NamedTuple):
         return float(np.linalg.slogdet(self.schur[:count, :count])[1])
 
     def change(self, theta: Array) -> Array:
-        """By how much the background moves (p,) with theta."""
+        """Change of the background (p,) with theta."""
         moved = -cho_solve(self.factor, self.right + self.cross @ theta)
         bound = self.inward != 0.0
         moved[bound] = theta[len(theta) - np.count_nonzero(bound) :]

@@ -1,4 +1,4 @@
-"""Residuals: where a model and a measured test disagree, equation by equation.
+"""Residuals of a model along a measured test, equation by equation.
 
     wrench   required less measured actuator wrench on the platen at C in {c} [N, N m]      (Eqs. 4-24 to 4-26)
     flow     L A / beta dP/dt + A dL/dt - Q, per chamber [m3/s]                              (Eqs. 4-2 to 4-5)
@@ -27,13 +27,7 @@ from .oil_residuals import MeasuredOil, oil_misses
 from .prepare import MeasuredTest, actuator_forces, oil_forces
 from .wrench_residuals import required_wrench, weigh_alike, wrench_residual
 
-__all__ = [
-    "RESIDUALS",
-    "Path",
-    "Residuals",
-    "evaluate_residuals",
-    "follow",
-]
+__all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow"]
 
 Array = NDArray[np.float64]
 
@@ -57,11 +51,11 @@ class Residuals(NamedTuple):
 
 
 class Path(NamedTuple):
-    """A test's motion in a plant's coordinates and ports, and the friction states that it leaves behind."""
+    """A test's motion in a plant's coordinates and ports, and the resulting friction states."""
 
     ports: PortPath
-    along: PortPath  # what friction follows
-    required: Array  # (n, 6) wrench at B in platen axes that the platen's inertia and weight ask for, on its free axes
+    along: PortPath  # for friction
+    required: Array  # (n, 6) wrench at B in platen axes for the platen's inertia and weight, on its free axes
     z: Array  # (n, n_states)
 
 
@@ -70,8 +64,8 @@ def follow(
 ) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
-    What does not differ from the `known` path of the same motion, of another plant, is taken from there. start
-    (n_states,) is what friction remembers from before the test, if not nothing.
+    What does not differ from the `known` path of the same motion with another plant is reused. start (n_states,) are
+    the friction states at the start of the test, if not zero.
     """
     there: dict[tuple[object, ...], Array] = {}
     before: dict[tuple[object, ...], slice] = {}
@@ -91,7 +85,7 @@ def follow(
         there = {key: old[:, place] for key, place in before.items()}
     rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
     fresh = {key: row for key, _, row in rows if key not in there}
-    # oscillators and heat average noise, and feel what a still path lacks
+    # oscillators and heat average noise, and need the raw motion
     parts: tuple[list[np.void], list[np.void]] = [], []
     for row in fresh.values():
         parts[test.path is not None and law_of(row).follows_motion].append(row)
@@ -100,7 +94,7 @@ def follow(
             marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
             there |= {_marched(row): marched[:, states_of(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))
-    still = 0  # states before it are those of the known path, in the same places: most of them
+    still = 0  # states before it are those of the known path, in the same places
     if before:
         still = min([z.shape[1], old.shape[1], *(at.start for key, at, _ in rows if before.get(key) != at)])
         z[:, :still] = old[:, :still]
@@ -127,7 +121,7 @@ def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
 
 
 def _geometry(plant: Plant) -> bytes:
-    """What the motion of a plant's ports and their force columns depend on, and which they are."""
+    """Key of a plant's ports: all that their motion and force columns depend on."""
     body = np.append(plant.body["rho_c"], plant.body["plane"]).tobytes()
     return body + plant.legs.tobytes() + " ".join(plant.ports).encode()
 
@@ -151,13 +145,13 @@ def evaluate_residuals(
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
         gas = np.log(measured["strut_pressure"] / gas_pressure(machine, length) / gas_ratio(plant, path.z))
-    told, servo = np.zeros((n, 0)), np.zeros((n, 0))
+    by_cell, servo = np.zeros((n, 0)), np.zeros((n, 0))
     oil = oil_forces(machine, measured)
     if "force" in only and oil is not None and "actuator_force" in measured:
-        told = measured["actuator_force"] - oil
+        by_cell = measured["actuator_force"] - oil
     if "servo" in only and {"spool_position", "spool_command"} <= measured.keys():
         servo = measured["spool_position"] - due_spools(plant, measured["spool_command"], test.dt)
-    return Residuals(wrench, flow, gas, told, servo, supplied)
+    return Residuals(wrench, flow, gas, by_cell, servo, supplied)
 
 
 def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:

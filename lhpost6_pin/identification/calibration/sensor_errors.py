@@ -2,11 +2,11 @@
 
     measured(t) = (1 + gain) true(t - delay) + offset
 
-Commands are held for a sample of the controller, and valves are late by no whole number of samples: a record may show
-each spool up to half such a sample early or late, beside the delay of the group.
+Commands are held for a sample of the controller, and the valves' delay is no whole number of samples: each spool of a
+record may be up to half such a sample early or late, in addition to the delay of the group.
 
 Displacement, velocity and acceleration of the platen are fused into one motion; each channel's gain acts on its share
-in it, to first order. Their skews have been taken out; what the others are late against is the platen's motion.
+in it, to first order. Their skews have been removed; delays of the others are relative to the platen's motion.
 """
 
 from collections.abc import Mapping, Sequence
@@ -70,9 +70,9 @@ def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) ->
 
 
 def _delays(sensors: SensorSet, channels: Mapping[str, Channel]) -> dict[str, float]:
-    """Standard deviation of the delay of every group that may be late against the platen's motion."""
+    """Standard deviation of the delay of every group relative to the platen's motion."""
     groups = {c.group or name: sensors.delay_sd(c.group or name) for name, c in channels.items() if c.role == "sensor"}
-    # a command is no measurement, but what records it has a clock of its own beside its companion's, and holds it
+    # a command is not measured, but recorded with another clock than its companion, and held
     for name, channel in channels.items():
         if channel.role == "command":
             groups[name] = 2.0 * max(sensors.delay_sd(other) for other in channel.companions)
@@ -80,9 +80,9 @@ def _delays(sensors: SensorSet, channels: Mapping[str, Channel]) -> dict[str, fl
 
 
 def _together(machine: Machine, kind: str, name: str, i: int, label: str, present: set[str]) -> tuple[str, int]:
-    """A sensor of one component that is not in the wrench acts on that component's residuals: one evaluation for all.
+    """A sensor of one component acts on that component's residuals, so that one evaluation serves all components.
 
-    Not so pressures that stand in for forces which were not measured: each is in the whole wrench.
+    Except for sensors in the wrench, such as pressures in place of measured forces.
     """
     components = machine.strut_names if label in machine.strut_names else machine.actuator_names
     if label not in components or "wrench" in residuals_of(name, present):
@@ -91,10 +91,7 @@ def _together(machine: Machine, kind: str, name: str, i: int, label: str, presen
 
 
 def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: Array) -> MeasuredTest:
-    """The test as perfect sensors would have shown it, if their errors were `values`, one an unknown.
-
-    What has no error is not copied.
-    """
+    """The test corrected for sensor errors `values` (one per unknown); channels without error are not copied."""
     off = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
     channels, rates = dict(test.channels), dict(test.rates)
     for tables in (channels, rates):
@@ -126,7 +123,7 @@ def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: A
 
 
 def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], errors: Array) -> xr.Dataset:
-    """A record as perfect sensors would have shown it, if these were their errors, one an unknown."""
+    """A record corrected for sensor errors, one per unknown."""
     out = record.copy(deep=True)
     off = [(u, float(v)) for u, v in zip(unknowns, errors, strict=True) if v != 0.0]
     columns = {str(name): int(np.prod(x.shape[1:])) for name, x in out.items()}
@@ -145,7 +142,7 @@ def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], er
 
 
 def _late(off: Sequence[tuple[SensorUnknown, float]], columns: Mapping[str, int]) -> dict[str, Array]:
-    """Delays (columns,) of the channels that are late, of those with so many `columns`."""
+    """Delays (columns,) of the delayed channels; `columns` are the channels with their numbers of columns."""
     late: dict[str, Array] = {}
     groups = sensor_groups()
     for unknown, value in off:

@@ -1,10 +1,10 @@
-"""A test taken apart into the forces behind it, compared with what was measured (report, Section 6.1).
+"""Decomposition of a test into forces, compared with the measured ones (report, Section 6.1).
 
     found = decompose_record(machine, record, sensors)      # forces and motion in the band that is compared
     agreement = find_agreement(found)                       # RRMSE per axis; the residual against noise and calibration
     save_ledger(found, "ledger.nc")
 
-`record` prepares a record and calls `inverse_dynamics`; `agreement` judges; `dataset` lays out and writes.
+`record` prepares a record and calls `inverse_dynamics`; `agreement` compares; `dataset` writes.
 """
 
 from .agreement import Level, Match, WrenchAgreement, find_agreement

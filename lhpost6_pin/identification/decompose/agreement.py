@@ -1,16 +1,16 @@
-"""How closely modelled and measured forces agree, and how large a residual sensors and parameters allow.
+"""Agreement of modelled and measured forces, and the residual expected from sensors and parameters.
 
-The residual is the required less the measured actuator wrench. Beside its mean and its standard deviation stand those
-that are to be expected:
+The residual is the required less the measured actuator wrench. Its mean and standard deviation are compared with those
+expected from:
 
-    noise       that of another draw of the sensors' noise, added to the record and taken apart once more
+    noise       another draw of the sensors' noise, added to the record and decomposed again
     sensors     gains and offsets of forces through the legs' wrenches; the skew between forces and motion times the
                 rate of the wrench; a gain of each axis's motion, through the model. Each at one standard deviation,
                 independent of each other
     parameters  every stated uncertainty of the platen's numbers and of the kinds of actuators and struts, one by one,
-                at one standard deviation; geometry is left out
+                at one standard deviation, without geometry
 
-Linear propagation: what each error alone changes in the residual, added in squares.
+Linear propagation: changes of the residual by each error, added in squares.
 """
 
 from collections.abc import Iterator
@@ -36,17 +36,17 @@ __all__ = ["WrenchAgreement", "Explanation", "Level", "Match", "find_agreement"]
 Array = NDArray[np.float64]
 
 Explanation = Literal["none needed", "noise", "sensors", "parameters", "nothing"]
-"""What suffices to explain a residual."""
+"""Sufficient explanation of a residual."""
 
 
 class Match(NamedTuple):
     """Modelled against measured forces, per axis (6,); the measured ones are the reference."""
 
     rrmse: Array
-    rrmse_varying: Array  # means taken off both
+    rrmse_varying: Array  # means removed
     peak_ratio: Array
     correlation: Array
-    delay: Array  # of the modelled behind the measured [s]; NaN where they are not alike
+    delay: Array  # of the modelled behind the measured [s]; NaN where they are not correlated
     delay_error: Array  # standard error [s]
 
 
@@ -59,16 +59,16 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class WrenchAgreement:
-    """What was found about a decomposed record."""
+    """Agreement of a decomposed record with its measured forces."""
 
     actuators: Match
     struts: Match | None  # None: no strut pressures
     dissipative: Match
     residual: Level
-    noise: Array  # (6,) standard deviation to be expected [N, N m]
-    sensors: Level  # to be expected of calibration errors
-    parameters: Level  # and of the machine's numbers
-    noise_range: float  # by how much the noise may be off, relative
+    noise: Array  # (6,) expected standard deviation [N, N m]
+    sensors: Level  # expected from calibration errors
+    parameters: Level  # expected from the machine's numbers
+    noise_range: float  # relative uncertainty of the noise
     coverage: float  # standard deviations of sensors and parameters that are allowed
 
     @property
@@ -78,13 +78,13 @@ class WrenchAgreement:
 
     @property
     def varying_explained(self) -> tuple[Explanation, ...]:
-        """What suffices for the varying part of the residual, per axis."""
+        """Sufficient explanation of the varying part of the residual, per axis."""
         most = (1.0 + self.noise_range) * self.noise
         return self._explained(self.residual.varying, most, self.sensors.varying, self.parameters.varying)
 
     @property
     def offset_explained(self) -> tuple[Explanation, ...]:
-        """What suffices for the mean of the residual, per axis; noise has none."""
+        """Sufficient explanation of the mean of the residual, per axis; noise has none."""
         zero = np.zeros(6)
         return self._explained(np.abs(self.residual.offset), zero, self.sensors.offset, self.parameters.offset)
 
@@ -106,7 +106,7 @@ class WrenchAgreement:
 
 
 def find_agreement(found: Decomposed, *, seed: int = 0) -> WrenchAgreement:
-    """Compare forces, and set the residual against what noise (drawn from seed), sensors and parameters allow."""
+    """Compare forces, and the residual with that expected from noise (drawn from seed), sensors and parameters."""
     numbers = decompose_numbers()
     forces = found.forces
     struts = forces.struts_measured
@@ -131,13 +131,13 @@ def find_agreement(found: Decomposed, *, seed: int = 0) -> WrenchAgreement:
 
 
 def _match(measured: Array, modelled: Array, dt: float, band: Band, required: float) -> Match:
-    alike = correlation(measured, modelled)
+    correlated = correlation(measured, modelled)
     varying = rrmse(measured - measured.mean(axis=0), modelled - modelled.mean(axis=0))
     moving = Band(band.high / 16, band.high, band.order)  # above the window's lobe
     late, error = phase_delay(measured, modelled, dt, moving)
     known = correlation(moving.apply(measured, dt), moving.apply(modelled, dt)) >= required
     late, error = (np.where(known, x, np.nan) for x in (late, error))
-    return Match(rrmse(measured, modelled), varying, peak_ratio(measured, modelled), alike, late, error)
+    return Match(rrmse(measured, modelled), varying, peak_ratio(measured, modelled), correlated, late, error)
 
 
 def _level(x: Array) -> Level:

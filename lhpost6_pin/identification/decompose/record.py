@@ -1,8 +1,9 @@
-"""From a record to its forces by inverse dynamics, and the band in which all is compared.
+"""Decomposition of a record into forces by inverse dynamics, and the band in which they are compared.
 
-A simulated record without noise is taken as it is. In a measured one groups of channels are aligned by their twins and
-the platen's motion is fused from all its sensors: hidden friction marched along raw displacement is shaken to nothing.
-Friction sees the motion in the sensors' whole band; what is compared is then filtered alike, and its edges are cut.
+A simulated record without noise is used as it is. In a measured one, groups of channels are aligned by redundant
+channels and the platen's motion is fused from all its sensors, since noise of the raw displacement would reduce the
+modelled friction. Friction follows the motion in the sensors' whole band; forces are then filtered for comparison, and
+their edges cut.
 """
 
 from collections.abc import Mapping
@@ -50,7 +51,7 @@ class ComparisonBand(NamedTuple):
 
 @dataclass(frozen=True)
 class Decomposed:
-    """A record taken apart: `whole` has all samples in the sensors' band, `forces` and `motion` what is compared."""
+    """A decomposed record: `whole` has all samples in the sensors' band, `forces` and `motion` the compared ones."""
 
     test: MeasuredTest  # aligned, if it was; its motion is in the sensors' band
     sensors: SensorSet | None  # None: the record is free of noise
@@ -58,8 +59,8 @@ class Decomposed:
     whole: Decomposition
     forces: Decomposition  # filtered, edges cut; its states are those of `whole`, cut
     motion: PlatenMotion  # the same
-    delays: Mapping[str, Delay]  # taken out, by group
-    notes: tuple[str, ...]  # where motion and forces come from, in words
+    delays: Mapping[str, Delay]  # removed, by group
+    notes: tuple[str, ...]  # sources of motion and forces
 
     @property
     def record(self) -> xr.Dataset:
@@ -101,17 +102,17 @@ def decompose_record(
     cutoff: float | None = None,
     align: bool = True,
 ) -> Decomposed:
-    """Take a record apart with a machine's equations; sensors are the LHPOST6's, cutoff [Hz] that of `decompose.toml`.
+    """Decompose a record with a machine's equations; sensors are the LHPOST6's, cutoff [Hz] that of `decompose.toml`.
 
-    Actuator forces come from chamber pressures where they were not measured. How many servovalves were open does not
-    matter here. Raises RecordError for what is missing, not finite, of another machine, out of stroke or too short;
-    SimulationError for a specimen with joints.
+    Actuator forces come from chamber pressures where they were not measured. The number of open servovalves has no
+    effect. Raises RecordError for a record that lacks channels, is not finite, of another machine, out of stroke or too
+    short; SimulationError for a specimen with joints.
     """
     check_usable(machine, record)
     comparison = _comparison(cutoff)
     if (rate := 1.0 / sample_interval(record)) <= comparison.band.high:
         raise RecordError(
-            f"{source_of(record)}: {rate:g} samples a second are too few to compare forces up "
+            f"{source_of(record)}: {rate:g} samples per second are too few to compare forces up "
             f"to {comparison.band.high:g} Hz; lower the cutoff"
         )
     plant = make_plant(machine)
@@ -127,18 +128,18 @@ def decompose_record(
     whole, notes = take_apart(plant, test)
     if delays:
         taken = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
-        notes = (*notes, f"Skews taken out: {taken}.")
+        notes = (*notes, f"Skews removed: {taken}.")
     n, cut = test.samples, round(comparison.edge / test.dt)
     if n - 2 * cut < 4 * cut:
         raise RecordError(
-            f"{source_of(record)}: {n * test.dt:.3g} s are too short; {comparison.edge:g} s at each end are left out"
+            f"{source_of(record)}: {n * test.dt:.3g} s are too short; {comparison.edge:g} s at each end are cut off"
         )
     forces, motion = filtered(whole, test.motion, comparison.band, test.dt, slice(cut, n - cut))
     return Decomposed(test, sensors, comparison, whole, forces, motion, delays, notes)
 
 
 def take_apart(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[str, ...]]:
-    """Inverse dynamics of a test, and where its forces and motion come from in words."""
+    """Inverse dynamics of a test, and notes on the sources of its forces and motion."""
     record, force = test.record, actuator_forces(plant.machine, test.channels)
     if force is None:
         if "chamber_pressure_a" in test.channels:
@@ -149,14 +150,14 @@ def take_apart(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[s
     words = ["Actuator forces as measured." if "actuator_force" in test.channels else by_pressures]
     struts = test.channels.get("strut_pressure") if plant.machine.struts else None
     if plant.machine.struts and struts is None:
-        words.append("Strut pressures were not measured: the model's struts stand in for them.")
+        words.append("Strut pressures were not measured: struts as modelled.")
     at_steps = not test.used and _at_model_step(record)
     if test.used:
         words.append(f"Platen motion fused from {', '.join(test.used)}.")
     else:
         words.append(
             "Simulated without noise: the platen's motion is the record's own"
-            + (", at the model's steps; forces see the velocity that they saw there." if at_steps else ".")
+            + (", at the model's steps; forces use the velocity of the step." if at_steps else ".")
         )
     time, path = record["time"].values, test.path
     found = inverse_dynamics(plant, time, test.motion, force, struts, path=path, model_step=at_steps)
@@ -196,7 +197,7 @@ def _comparison(cutoff: float | None) -> ComparisonBand:
     numbers = decompose_numbers()
     high = numbers.number("comparison.cutoff") if cutoff is None else cutoff
     if not high > 0.0:
-        raise RecordError(f"a cutoff of {high:g} Hz leaves nothing to compare; give one above zero")
+        raise RecordError(f"the cutoff must be above zero (got {high:g} Hz)")
     return ComparisonBand(
         Band(high=high, order=int(numbers.number("comparison.order"))), numbers.number("comparison.edge")
     )

@@ -1,7 +1,7 @@
 """Power and energy of every effect on the platen: its wrench times the twist of C, in {c}.
 
-Inertia's work is the change of kinetic energy, but for the work of Eq. 4-26's direction-dependent mass (`energy`); what
-is left beyond that is quadrature, and how far velocity and acceleration are derivatives of each other.
+Inertia's work is the change of kinetic energy, but for the work of Eq. 4-26's direction-dependent mass (`energy`); the
+rest is error of quadrature, and of velocity and acceleration as derivatives of each other.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class Work(NamedTuple):
     """Work on the platen over the samples compared, in the sensors' whole band."""
 
     time: Array  # (n,) [s]
-    effects: tuple[str, ...]  # (m,) of the ledger, actuators as measured, and what is unexplained
+    effects: tuple[str, ...]  # (m,) of the ledger, actuators as measured, and the unexplained rest
     power: Array  # (n, m) [W], positive into the platen
     energy: Array  # (n, m) since the first sample [J]
     inertia: Array  # (n,) work of inertia since the first sample [J]: the sum of all effects

@@ -17,9 +17,9 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement, find_work, save_ledger
-from lhpost6_pin.identification.decompose.ledger_table import print_agreement
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.decompose_table import print_agreement
 from lhpost6_pin.show.report import write_decompose_report
 from lhpost6_pin.simulation.rehearse import rehearse
 

@@ -41,7 +41,7 @@ def decompose(
     from ..data.records import load_record
     from ..data.sensors import load_sensors
     from ..identification.decompose import decompose_record, find_agreement, find_work, save_ledger
-    from ..identification.decompose.ledger_table import print_agreement
+    from ..show.decompose_table import print_agreement
     from ..show.report import write_decompose_report
     from ..show.results import agreement_entries
 

@@ -53,8 +53,8 @@ def validate(
     from ..data.sensors import load_sensors
     from ..identification.validation import metrics, save_metrics
     from ..identification.validation import validate as validate_campaign
-    from ..identification.validation.phase_table import print_validation
     from ..show.report.validate_report import write_validate_report
+    from ..show.validation_table import print_validation
 
     refuse_no_jobs(jobs, "tests at a time")
     wanted = _phases(phases)

@@ -15,7 +15,7 @@ from ..identification.calibration.calibration_summary import (
 from ..identification.calibration.verdicts import beyond, far, stated_range, verdict_on
 from ..identification.residuals import RESIDUALS
 
-__all__ = ["print_calibration"]
+__all__ = ["make_table", "print_calibration"]
 
 
 def print_calibration(calibration: Calibration) -> None:
@@ -36,7 +36,7 @@ def print_calibration(calibration: Calibration) -> None:
 
 
 def _parameters(calibration: Calibration) -> Table:
-    table = _table("Parameters", "name", "nominal", "estimate", "unit", "90 % interval", "sd/prior", "verdict")
+    table = make_table("Parameters", "name", "nominal", "estimate", "unit", "90 % interval", "sd/prior", "verdict")
     for i, parameter in enumerate(calibration.parameters):
         low, high = calibration.interval(i)
         estimate = parameter.at(float(calibration.estimate[i]))
@@ -52,7 +52,7 @@ def _sensors(calibration: Calibration) -> Table:
     outside, allowed = beyond(calibration), stated_range(calibration)
     found = [i for i in order if outside[i]]
     title = f"Errors of the sensors: {len(found)} of {len(order)} significant, {range_summary(calibration)}"
-    table = _table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
+    table = make_table(title, "error", "estimate", "unit", "of its range", "deviations", "sd/prior")
     for i in found:
         unknown, share = calibration.unknowns[i - first], abs(calibration.estimate[i]) / allowed[i]
         numbers = f"{calibration.estimate[i]:.4g}", unknown.unit, f"{share:.0%}", f"{distance[i]:+.1f}"
@@ -63,7 +63,7 @@ def _sensors(calibration: Calibration) -> Table:
 def _misfits(calibration: Calibration) -> Table:
     kinds = [k for k, after in enumerate(calibration.misfit_after.T) if np.isfinite(after).any()]
     title = "Misfit before, after; 1 is sensor noise alone"
-    table = _table(title, "test", *(RESIDUALS[k] for k in kinds))
+    table = make_table(title, "test", *(RESIDUALS[k] for k in kinds))
     for test, before, after in zip(calibration.tests, calibration.misfit_before, calibration.misfit_after, strict=True):
         table.add_row(escape(test), *(f"{before[k]:.3g}, {after[k]:.3g}" for k in kinds))
     return table
@@ -73,8 +73,9 @@ def _share(calibration: Calibration, i: int) -> str:
     return f"{calibration.sd[i] / calibration.prior[i]:.2g}"
 
 
-def _table(title: str, *heads: str) -> Table:
+def make_table(title: str, *heads: str, left: int = 1) -> Table:
+    """Empty table whose first columns, `left` of them, are flush left."""
     table = Table(title=escape(title), title_justify="left")
     for n, head in enumerate(heads):
-        table.add_column(escape(head), justify="right" if n else "left")
+        table.add_column(escape(head), justify="right" if n >= left else "left")
     return table

@@ -74,10 +74,7 @@ class Verdict:
 
 
 def judge(
-    found: Search,
-    left: Sequence[ResidualFunction],
-    instead: Sequence[ResidualFunction],
-    faults: Sequence[SensorFault],
+    found: Search, left: Sequence[ResidualFunction], instead: Sequence[ResidualFunction], faults: Sequence[SensorFault]
 ) -> Verdict:
     """The verdict on a search.
 

@@ -43,11 +43,7 @@ class _RecordedTest(NamedTuple):
 
 
 def by_simulation(
-    problem: Problem,
-    noisy: Sequence[MeasuredTest],
-    x: Array,
-    numbers: Parameters,
-    progress: Callable[[float], None],
+    problem: Problem, noisy: Sequence[MeasuredTest], x: Array, numbers: Parameters, progress: Callable[[float], None]
 ) -> Subset | None:
     """Estimates of the parameters by open-loop simulation about x (p,), under the problem's priors; NaN for sensors.
 

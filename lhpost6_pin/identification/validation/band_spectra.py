@@ -30,13 +30,7 @@ class Spectrum:
 
 
 def estimate_spectrum(
-    quantity: str,
-    columns: Sequence[str],
-    measured: Array,
-    model: Array,
-    noise: Array,
-    dt: float,
-    numbers: Numbers,
+    quantity: str, columns: Sequence[str], measured: Array, model: Array, noise: Array, dt: float, numbers: Numbers
 ) -> Spectrum:
     """Welch's estimate for both sides (n, k); noise (n, k) is a draw of the sensors' noise."""
     from scipy.signal import welch

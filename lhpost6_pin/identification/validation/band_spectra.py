@@ -35,7 +35,7 @@ def estimate_spectrum(
     """Welch's estimate for both sides (n, k); noise (n, k) is a draw of the sensors' noise."""
     from scipy.signal import welch
 
-    length = min(round(numbers.spectra.segment / dt), len(measured))
+    length = min(round(numbers.number("spectra.segment") / dt), len(measured))
     f, ours = welch(measured, 1 / dt, nperseg=length, axis=0)
     theirs, noisy = (welch(x, 1 / dt, nperseg=length, axis=0)[1] for x in (model, noise))
     return Spectrum(quantity, tuple(columns), f, ours, theirs, _band_ratios(f, ours, theirs, noisy, numbers))
@@ -43,12 +43,12 @@ def estimate_spectrum(
 
 def _band_ratios(f: Array, measured: Array, model: Array, noise: Array, numbers: Numbers) -> Array:
     """Amplitude of the model over that of the measurement (bands, k) from powers (f, k); nan where noise prevails."""
-    edges = numbers.spectra.edges
+    edges = numbers.bands
     out = np.full((len(edges) - 1, measured.shape[1]), np.nan)
     for b, (low, high) in enumerate(pairwise(edges)):
         inside = (f >= low) & (f < high)
         if inside.any():
             ours, theirs, noisy = (x[inside].mean(axis=0) for x in (measured, model, noise))
-            clear = ours > numbers.spectra.noise**2 * noisy
+            clear = ours > numbers.number("spectra.noise") ** 2 * noisy
             out[b] = np.sqrt(np.divide(theirs, ours, out=np.full(len(ours), np.nan), where=clear))
     return out

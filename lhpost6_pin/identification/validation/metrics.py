@@ -11,58 +11,42 @@ from ...data.signals import Band
 from ...machine.parameters import Parameters, load_parameters
 from ...mechanics.linearize import OilColumnMode
 
-__all__ = ["ComparisonBasis", "HardlyMoving", "Numbers", "Resonances", "Spectra", "validation_numbers"]
-
-
-class HardlyMoving(NamedTuple):
-    """A column hardly moves below either of the first two."""
-
-    noise: float  # times the sensor noise
-    share: float  # of the column that moves most
-    radius: float  # of rotations [m]
-
-
-class Spectra(NamedTuple):
-    """How spectra are estimated and averaged."""
-
-    edges: tuple[float, ...]  # of bands [Hz]
-    segment: float  # [s]
-    noise: float  # times the sensor noise in a band, below which there is no ratio
-
-
-class Resonances(NamedTuple):
-    """How an oil-column peak is found."""
-
-    search: float  # relative, about the model's frequency
-    prominence: float  # power over the median of the searched band
-    coherence: float  # of acceleration with spools, from which a peak counts
-
-
-class ValveTransfer(NamedTuple):
-    """How transfer functions of servovalves are estimated."""
-
-    segment: float  # [s]
-    coherence: float  # of a spool with its command, below which it is not shown
+__all__ = ["ComparisonBasis", "Numbers", "validation_numbers"]
 
 
 @dataclass(frozen=True)
 class Numbers:
     """Numbers of `models/procedures/validate.toml`."""
 
-    band: Band  # of all that is compared
-    edge: float  # left out at both ends [s]
-    longest_delay: float  # [s]
-    significant_skew: float  # standard errors
-    hardly: HardlyMoving
-    spectra: Spectra
-    resonance: Resonances
-    valves: ValveTransfer
-    reference_high: float  # [Hz]
     stated: Parameters
+
+    def number(self, path: str) -> float:
+        """Number at a path of the file."""
+        return self.stated.number(path)
+
+    @property
+    def band(self) -> Band:
+        """Filter of all that is compared."""
+        return Band(high=self.number("comparison.high"), order=int(self.number("comparison.order")))
+
+    @property
+    def edge(self) -> float:
+        """Cut off at both ends of a test [s]."""
+        return self.number("comparison.edge")
+
+    @property
+    def longest_delay(self) -> float:
+        """Longest delay between model and measurement that is searched [s]."""
+        return self.number("comparison.longest_delay")
+
+    @property
+    def bands(self) -> tuple[float, ...]:
+        """Edges of the bands of spectra [Hz]."""
+        return self.stated.vector("spectra.edges")
 
     @property
     def shortest(self) -> float:
-        """Length of a test that is long enough to be compared [s]: for the longest delay sought, and its edges."""
+        """Length of a test that is long enough to be compared [s]: for the longest delay and the edges."""
         return 8 * self.longest_delay + 4 * self.edge
 
 
@@ -77,17 +61,4 @@ class ComparisonBasis(NamedTuple):
 
 def validation_numbers() -> Numbers:
     """Read `models/procedures/validate.toml`."""
-    stated = load_parameters(models_folder() / "procedures" / "validate.toml")
-    n = stated.number
-    return Numbers(
-        band=Band(high=n("comparison.high"), order=int(n("comparison.order"))),
-        edge=n("comparison.edge"),
-        longest_delay=n("comparison.longest_delay"),
-        significant_skew=n("comparison.significant_skew"),
-        hardly=HardlyMoving(*(n(f"hardly_moving.{name}") for name in HardlyMoving._fields)),
-        spectra=Spectra(stated.vector("spectra.edges"), n("spectra.segment"), n("spectra.noise")),
-        resonance=Resonances(*(n(f"resonance.{name}") for name in Resonances._fields)),
-        valves=ValveTransfer(n("valves.segment"), n("valves.coherence")),
-        reference_high=n("reference.high"),
-        stated=stated,
-    )
+    return Numbers(load_parameters(models_folder() / "procedures" / "validate.toml"))

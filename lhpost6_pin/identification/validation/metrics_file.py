@@ -54,7 +54,7 @@ def _phase(phase: Phase, found: Validation) -> dict[str, Any]:
         row = {**one._asdict(), "error_to_noise": one.error_to_noise}
         out["agreement"].setdefault(row.pop("quantity"), {})[row.pop("column")] = row
     if phase.spectrum is not None:
-        out["amplitude_ratio"] = _ratios(phase.spectrum, found.numbers.spectra.edges)
+        out["amplitude_ratio"] = _ratios(phase.spectrum, found.numbers.bands)
     out["resonance"] = {r.column: _resonance(r) for r in phase.resonances}
     if phase.lags:
         out["behind_reference"] = {lag.column: {"measured": lag.measured, "model": lag.model} for lag in phase.lags}

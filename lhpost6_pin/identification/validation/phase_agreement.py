@@ -103,11 +103,11 @@ def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tup
 def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> NDArray[np.bool_]:
     """Which columns (k,) move enough to be judged by a ratio."""
     size = measured.std(axis=0)
-    per = {"m": 1.0, "rad": numbers.hardly.radius, "N m": 1.0 / numbers.hardly.radius}
+    per = {"m": 1.0, "rad": numbers.number("hardly_moving.radius"), "N m": 1.0 / numbers.number("hardly_moving.radius")}
     weight = [per.get(unit_of(pair.quantity, column).split("/")[0], 1.0) for column in pair.columns]
     comparable = size * weight
-    enough = (comparable >= numbers.hardly.share * comparable.max(initial=0.0)) & (comparable > 0.0)
-    return np.asarray(enough & (size >= numbers.hardly.noise * pair.sensor_noise))
+    enough = (comparable >= numbers.number("hardly_moving.share") * comparable.max(initial=0.0)) & (comparable > 0.0)
+    return np.asarray(enough & (size >= numbers.number("hardly_moving.noise") * pair.sensor_noise))
 
 
 def _agree_one(pair: ComparedQuantity, k: int, moves: bool, late: float, part: slice, dt: float) -> ColumnAgreement:

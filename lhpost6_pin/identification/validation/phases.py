@@ -101,7 +101,7 @@ def _open_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
 
 def _closed_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
     settings = settings_of(test.test.record, basis.settings)
-    target, drive = drive_of(test.test.record, settings, basis.numbers.reference_high)
+    target, drive = drive_of(test.test.record, settings, basis.numbers.number("reference.high"))
     engine = fastest_engine(test.plant)
     ran = rehearse(test.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
     both = SimulatedComparison(test, ran, None, basis)

@@ -61,11 +61,11 @@ def estimate_response(
 
     to_axes = np.linalg.pinv(kinematic_jacobian(plant)[:, plant.axes]).T
     commanded = spool @ to_axes
-    each = {"fs": 1 / dt, "nperseg": min(round(numbers.spectra.segment / dt), len(commanded)), "axis": 0}
+    each = {"fs": 1 / dt, "nperseg": min(round(numbers.number("spectra.segment") / dt), len(commanded)), "axis": 0}
     f, given = welch(commanded, **each)
     response, given_noise, response_noise = (welch(x, **each)[1] for x in (acceleration, noise[0] @ to_axes, noise[1]))
     _, cross = csd(commanded, acceleration, **each)
-    least = numbers.spectra.noise**2
+    least = numbers.number("spectra.noise") ** 2
     clear = (given > least * given_noise) & (response > least * response_noise)
     power = np.divide(np.abs(cross) ** 2, given**2, out=np.zeros_like(given), where=clear)
     coherence = np.divide(np.abs(cross) ** 2, given * response, out=np.zeros_like(given), where=clear)
@@ -95,13 +95,13 @@ def find_peak(f: Array, power: Array, coherence: Array, expected: float, numbers
     power has fallen to half, between samples by straight lines.
     """
     nothing = Peak(float("nan"), float("nan"))
-    span = numbers.resonance.search
+    span = numbers.number("resonance.search")
     inside = np.flatnonzero((f >= (1 - span) * expected) & (f <= (1 + span) * expected))
     if len(inside) < 5:
         return nothing
     top = int(inside[np.argmax(power[inside])])
-    stands_out = power[top] > numbers.resonance.prominence * np.median(power[inside])
-    if top in (inside[0], inside[-1]) or not stands_out or coherence[top] < numbers.resonance.coherence:
+    stands_out = power[top] > numbers.number("resonance.prominence") * np.median(power[inside])
+    if top in (inside[0], inside[-1]) or not stands_out or coherence[top] < numbers.number("resonance.coherence"):
         return nothing
     a, b, c = np.log(np.maximum(power[top - 1 : top + 2], np.finfo(float).tiny))
     shift = 0.5 * (a - c) / (a - 2 * b + c) if a - 2 * b + c < 0 else 0.0

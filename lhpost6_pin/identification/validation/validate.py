@@ -80,7 +80,7 @@ def validate(
     sensors, numbers = sensors or load_sensors(), validation_numbers()
     plant = make_plant(machine)
     enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
-    skews = find_delays(plant, enough, SIGNIFICANT._replace(significance=numbers.significant_skew))
+    skews = find_delays(plant, enough, SIGNIFICANT._replace(significance=numbers.number("comparison.significant_skew")))
     basis = ComparisonBasis(sensors, numbers, oil_column_modes(machine), settings)
     done, lock = [0], threading.Lock()
 

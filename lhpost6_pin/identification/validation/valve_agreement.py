@@ -59,11 +59,11 @@ def _response(command: Array, spool: Array, dt: float, numbers: Numbers) -> tupl
     """Frequencies (f,) and transfer functions (f, k), by Welch's averages."""
     from scipy.signal import csd, welch
 
-    each = {"fs": 1 / dt, "nperseg": min(round(numbers.valves.segment / dt), len(command)), "axis": 0}
+    each = {"fs": 1 / dt, "nperseg": min(round(numbers.number("valves.segment") / dt), len(command)), "axis": 0}
     f, commanded = welch(command, **each)
     done, cross = welch(spool, **each)[1], csd(command, spool, **each)[1]
     coherence = np.divide(
         np.abs(cross) ** 2, commanded * done, out=np.zeros_like(commanded), where=commanded * done > 0.0
     )
     nothing = np.full_like(cross, np.nan)
-    return f, np.divide(cross, commanded, out=nothing, where=coherence > numbers.valves.coherence)
+    return f, np.divide(cross, commanded, out=nothing, where=coherence > numbers.number("valves.coherence"))

@@ -177,7 +177,7 @@ def test_blocks(found: Validation, test: str) -> list[Markup]:
         for quantity in ACTUATORS:
             drawn = actuator_blocks(phase, quantity)
             figures += [details(f"Every actuator: {named(quantity)}", *drawn)] if drawn else []
-        spectra = details("Spectra", *spectrum_block(phase, axes, found.numbers.spectra.edges))
+        spectra = details("Spectra", *spectrum_block(phase, axes, found.numbers.bands))
         blocks.append(details(f"{title}{_short(phase)}", _metrics(phase), *figures, spectra))
     return blocks
 

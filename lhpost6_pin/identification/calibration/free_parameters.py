@@ -6,9 +6,10 @@ zero is the machine as given. The prior is normal with the stated standard devia
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from itertools import product
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,19 +99,18 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
     Numbers that a component overrides and other geometry are fixed. A chamber is no shorter than the measured `travel`
     [m] of its kind either way; without that, than its stroke.
     """
-    parameters = machine.parameters
-    kinds = list(dict.fromkeys(c.kind for c in machine.components))
-    sections = ("platen", "hydraulics", *kinds)
+    sections = {"platen", "hydraulics", *(c.kind for c in machine.components)}
     found: list[FreeParameter] = []
-    for path, quantity in parameters.items():
+    for path, quantity in machine.parameters.items():
         section, _, name = path.partition(".")
-        if section not in sections or quantity.sd is None or name == "bearing_plane":
-            continue
-        found += _parameters_of(path, name, quantity)
-    for kind in kinds:
-        found += _heights(machine, kind)
-    free = "xyz" if machine.motion == "free" else machine.motion
-    return tuple(_with_room(k, machine, travel or {}) for k in found if _felt(k, free))
+        if section in sections and quantity.sd is not None and name != "bearing_plane":
+            found += _parameters_of(path, name, quantity)
+    found += _heights(machine)
+    if machine.motion != "free":  # a guided platen: one mass, no inertia, no geometry
+        mass = f"platen.mass[{machine.motion}]"
+        found = [p for p in found if p.name == mass or not p.name.startswith("platen.")]
+        found = [p for p in found if not p.name.endswith("_height")]
+    return tuple(_with_room(p, machine, travel or {}) for p in found)
 
 
 def _with_room(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:
@@ -119,68 +119,42 @@ def _with_room(parameter: FreeParameter, machine: Machine, travel: Mapping[str, 
     if not name.startswith("chamber_"):
         return parameter
     stroke = max(a.stroke for a in machine.actuators if a.kind == kind)
-    return replace(
-        parameter, lowest=max(parameter.lowest, min(0.0, parameter.coordinate(_ROOM * travel.get(kind, stroke))))
-    )
-
-
-def _felt(parameter: FreeParameter, free: str) -> bool:
-    """False for a mass or inertia about an axis in which a guided platen cannot move, and for its geometry."""
-    if len(free) == 3:
-        return True
-    if parameter.name.startswith("platen."):
-        return parameter.name == f"platen.mass[{free}]"
-    return not parameter.name.endswith("_height")
+    least = min(0.0, parameter.coordinate(_ROOM * travel.get(kind, stroke)))
+    return replace(parameter, lowest=max(parameter.lowest, least))
 
 
 def _parameters_of(path: str, name: str, quantity: Quantity) -> list[FreeParameter]:
     shows_in: tuple[str, ...] = ("flow",) if name in _OIL else ("wrench", "gas") if name in _GAS else ("wrench",)
     if name not in _OIL + _GAS + _MECHANICAL:
         shows_in = RESIDUALS
-    values = quantity.value if isinstance(quantity.value, tuple) else (quantity.value,)
-    assert quantity.sd is not None
-    sds = quantity.sd if isinstance(quantity.sd, tuple) else (quantity.sd,) * len(values)
+    vector = isinstance(quantity.value, tuple)
+    values = np.atleast_1d(quantity.value).tolist()
+    sds = np.broadcast_to(np.asarray(quantity.sd, float), len(values)).tolist()
     found = []
     for i, (value, sd) in enumerate(zip(values, sds, strict=True)):
-        if sd <= 0.0:
-            continue
-        vector = isinstance(quantity.value, tuple)
-        label = f"{path}[{'xyz'[i]}]" if vector else path
-        at = ((path, i if vector else -1),)
-        if value > 0.0 and name != "centre_of_gravity":
-            found.append(
-                FreeParameter(label, at, quantity.unit, value, sd / value, "factor", shows_in, lowest=_LEAST - 1.0)
-            )
-        else:
+        label, at = f"{path}[{'xyz'[i]}]" if vector else path, ((path, i if vector else -1),)
+        if sd > 0.0 and value > 0.0 and name != "centre_of_gravity":
+            relative = FreeParameter(label, at, quantity.unit, value, sd / value, "factor", shows_in)
+            found.append(replace(relative, lowest=_LEAST - 1.0))
+        elif sd > 0.0:
             found.append(FreeParameter(label, at, quantity.unit, value, sd, "shift", shows_in))
     return found
 
 
-def _heights(machine: Machine, kind: str) -> list[FreeParameter]:
-    """Height of the platen points and of the base points of a kind, its components moved together."""
-    members = [c for c in machine.components if c.kind == kind]
-    bearing = getattr(members[0], "mount", "swivel") == "bearing"
+def _heights(machine: Machine) -> list[FreeParameter]:
+    """Height of the platen points and of the base points of each kind, its components moved together."""
     found = []
-    for end in ("platen_point", "base_point"):
-        if bearing and end == "base_point":
-            continue  # the leg is measured from its zero length: not identifiable
-        paths = [(f"{c.name}.{end}", 2) for c in members]
-        if bearing:
-            paths.append(("platen.bearing_plane", 2))
-        heights = [getattr(c, end)[2] for c in members]
-        sd = _mean_sd(machine, paths[: len(members)])
-        if sd is None:
-            continue
-        name = f"{kind}.{end.split('_')[0]}_height"
-        found.append(FreeParameter(name, tuple(paths), "m", float(np.mean(heights)), sd, "shift", _GEOMETRY))
+    for kind, members, bearing in _kinds(machine):
+        # from a bearing the leg is measured from its zero length: the height of its foot is not identifiable
+        for end in ("platen_point",) if bearing else ("platen_point", "base_point"):
+            paths = [(f"{c.name}.{end}", 2) for c in members]
+            if (sd := _mean_sd(machine, paths)) is not None:
+                if bearing:
+                    paths.append(("platen.bearing_plane", 2))
+                height = float(np.mean([getattr(c, end)[2] for c in members]))
+                name = f"{kind}.{end.split('_')[0]}_height"
+                found.append(FreeParameter(name, tuple(paths), "m", height, sd, "shift", _GEOMETRY))
     return found
-
-
-def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None:
-    """Mean stated deviation of components of vectors; None where one states none."""
-    stated = [machine.parameters[path].sd for path, _ in paths]
-    known = [sd[i] if isinstance(sd, tuple) else sd for sd, (_, i) in zip(stated, paths, strict=True) if sd is not None]
-    return float(np.mean(known)) if len(known) == len(paths) else None
 
 
 def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:
@@ -188,23 +162,31 @@ def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:
 
     A bearing and its foot move together.
     """
-    if machine.motion != "free":
-        return ()
     found = []
-    for kind in dict.fromkeys(c.kind for c in machine.components):
-        members = [c for c in machine.components if c.kind == kind]
-        bearing = getattr(members[0], "mount", "swivel") == "bearing"
+    for kind, members, bearing in _kinds(machine) if machine.motion == "free" else ():
         ends: tuple[tuple[str, ...], ...] = (("platen_point",), ("base_point",))
-        for points in (("platen_point", "base_point"),) if bearing else ends:
-            for i in range(2):
-                beside = [c for c in members if getattr(c, points[0])[i] != 0.0]
-                paths = tuple((f"{c.name}.{point}", i) for c in beside for point in points)
-                if len(beside) < 2 or (sd := _mean_sd(machine, paths)) is None:
-                    continue
+        for points, i in product((("platen_point", "base_point"),) if bearing else ends, range(2)):
+            beside = [c for c in members if getattr(c, points[0])[i] != 0.0]
+            paths = tuple((f"{c.name}.{point}", i) for c in beside for point in points)
+            if len(beside) > 1 and (sd := _mean_sd(machine, paths)) is not None:
                 value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
                 name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
                 found.append(FreeParameter(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=True))
     return tuple(found)
+
+
+def _kinds(machine: Machine) -> Iterator[tuple[str, list[Any], bool]]:
+    """Kinds of components with their members, and whether these are mounted on bearings."""
+    for kind in dict.fromkeys(c.kind for c in machine.components):
+        members = [c for c in machine.components if c.kind == kind]
+        yield kind, members, getattr(members[0], "mount", "swivel") == "bearing"
+
+
+def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None:
+    """Mean stated deviation of components of vectors; None where one states none."""
+    stated = [machine.parameters[path].sd for path, _ in paths]
+    known = [sd[i] if isinstance(sd, tuple) else sd for sd, (_, i) in zip(stated, paths, strict=True) if sd is not None]
+    return float(np.mean(known)) if len(known) == len(paths) else None
 
 
 def scatter_parameters(machine: Machine, share: float, reach: float) -> tuple[FreeParameter, ...]:

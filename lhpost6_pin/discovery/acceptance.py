@@ -38,7 +38,7 @@ class Reweighting:
         self.problem, self.background = found.refit.normal.problem, background
         self.first = squares_by_column(found.refit.normal.residual)
         self.doubt, self.much = found.numbers.number("accept.doubt"), found.numbers.number("accept.gain")
-        self.before = self._terms(background.alone, [np.zeros(len(r)) for r in background.residual])
+        self.before = self._terms(background.still[1], [np.zeros(len(r)) for r in background.residual])
 
     def _terms(self, change: Array, explained: Sequence[Array]) -> tuple[Array, Array, float]:
         """Terms of the objective for a change (p,) of the background and an explained part (n,) of every test.

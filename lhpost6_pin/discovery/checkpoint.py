@@ -18,7 +18,6 @@ from .search_state import Search
 
 __all__ = ["Checkpoint", "SearchCheckpoint", "make_checkpoint"]
 
-
 log = logging.getLogger(__name__)
 
 

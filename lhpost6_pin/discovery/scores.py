@@ -76,7 +76,8 @@ class Background:
         return found
 
     @cached_property
-    def _still(self) -> tuple[Array, Array]:
+    def still(self) -> tuple[Array, Array]:
+        """Without a candidate: gain of the unknowns at a bound, of all tests and without each (1 + t,); change (p,)."""
         tests, p, none = len(self.matrix), len(self.place), np.zeros(0)
         empty = Block(np.zeros((tests, p, 0)), np.zeros((tests, 0, 0)), np.zeros((tests, 0)))
         profiles = [_profile(self, empty, none, without) for without in range(-1, tests)]
@@ -87,16 +88,6 @@ class Background:
     def explained(self, columns: Columns, amplitude: Array) -> list[Array]:
         """Real bins (n,) of every test that columns (m, c, k) explain with amplitudes (k,)."""
         return [real_bins(c, root) @ amplitude for c, root in zip(columns, self.root, strict=True)]
-
-    @property
-    def gains(self) -> Array:
-        """Gain of the unknowns at a bound alone, of all tests and without each (1 + t,)."""
-        return self._still[0]
-
-    @property
-    def alone(self) -> Array:
-        """Change (p,) without a candidate."""
-        return self._still[1]
 
 
 def make_block(background: Background, columns: Sequence[Complex]) -> Block:
@@ -146,7 +137,7 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
     over the background and the amplitudes: the gain of all tests less that of the others, less half the logarithm by
     which the test narrows the amplitudes. An effect excited in one test alone loses little there, a contradiction much.
     """
-    whole, still = _profile(background, block, spread, -1), background.gains
+    whole, still = _profile(background, block, spread, -1), background.still[0]
     theta = whole.best(low, high)
     gain = whole.gain(theta) - float(still[0])
     held_out = []

@@ -235,12 +235,13 @@ def test_columns_that_are_zero_are_whitened_as_all_others():
 
 # ------------------------------------------------------------------------------------------------------- errors
 def test_correction_undoes_gain_offset_and_delay(problem, machine, sensors):
-    before = problem.tests[0]
-    after = replace(
-        before,
-        actuator_force=before.actuator_force * np.linspace(0.996, 1.004, 10),
-        pressure=before.pressure + np.linspace(-2e4, 2e4, 14),
-        spool=align(before.spool, -2e-4, before.dt),
+    before = problem.tests[0].channels
+    offsets = np.linspace(-2e4, 2e4, 14)
+    after = problem.tests[0].with_channels(
+        actuator_force=before["actuator_force"] * np.linspace(0.996, 1.004, 10),
+        chamber_pressure_a=before["chamber_pressure_a"] + offsets[:10],
+        chamber_pressure_b=before["chamber_pressure_b"] + offsets[10:],
+        spool_position=align(before["spool_position"], -2e-4, problem.tests[0].dt),
     )
     values = {
         f"gain actuator_force[{n}]": g
@@ -249,12 +250,14 @@ def test_correction_undoes_gain_offset_and_delay(problem, machine, sensors):
     chambers = [f"a[{n}]" for n in machine.actuator_names] + [f"b[{n}]" for n in machine.double_acting]
     values |= {f"offset chamber_pressure_{c}": o for c, o in zip(chambers, np.linspace(-2e4, 2e4, 14), strict=True)}
     values["delay spool_position"] = 2e-4
-    right = corrected(after, problem.unknowns, np.array([values.get(u.name, 0.0) for u in problem.unknowns]))
-    assert np.allclose(right.actuator_force, before.actuator_force, rtol=1e-13)
-    assert np.allclose(right.pressure, before.pressure, rtol=1e-13)
-    assert right.strut_pressure is before.strut_pressure  # what has no error is not copied
+    errors = np.array([values.get(u.name, 0.0) for u in problem.unknowns])
+    right = corrected(after, problem.unknowns, errors).channels
+    for name in ("actuator_force", "chamber_pressure_a", "chamber_pressure_b"):
+        assert np.allclose(right[name], before[name], rtol=1e-13)
+    assert right["strut_pressure"] is before["strut_pressure"]  # what has no error is not copied
     inside = slice(50, -50)  # what is shifted in and out at the ends is not known
-    assert np.abs(right.spool - before.spool)[inside].max() < 0.01 * np.abs(after.spool - before.spool)[inside].max()
+    shown, rest = (np.abs(x["spool_position"] - before["spool_position"])[inside] for x in (after.channels, right))
+    assert rest.max() < 0.01 * shown.max()
 
 
 def test_spools_are_late_together_and_each_by_part_of_a_sample(problem, campaign):
@@ -266,7 +269,8 @@ def test_spools_are_late_together_and_each_by_part_of_a_sample(problem, campaign
     each[1] = 0.5e-4
     test, record = problem.tests[0], campaign.records[1]
     right = corrected(test, problem.unknowns, values)
-    np.testing.assert_allclose(right.spool, align(test.spool, each, test.dt), rtol=0.0, atol=1e-15)  # rounding
+    due = align(test.channels["spool_position"], each, test.dt)
+    np.testing.assert_allclose(right.channels["spool_position"], due, rtol=0.0, atol=1e-15)  # rounding
     spool = corrected_record(record, problem.unknowns, values)["spool_position"].values
     due = align(record["spool_position"].values, each, sample_interval(record))
     np.testing.assert_allclose(spool, due, rtol=0.0, atol=1e-15)

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from ...control import ControllerSettings, load_controller
 from ...core.errors import RecordError
-from ...core.files import models_folder
+from ...core.files import shipped
 from ...core.names import AXES, SAMPLE_RATE
 from ...data.records import require
 from ...data.signals import differentiate, resample_band_limited
 from ...motions import Reference, Target
 from ...tuning.drives import load_drive
 
-__all__ = ["Lag", "drive_of", "settings_of", "settings_source"]
+__all__ = ["Lag", "drive_of", "settings_of"]
 
 Array = NDArray[np.float64]
 
@@ -29,29 +29,22 @@ class Lag(NamedTuple):
     model: float
 
 
-def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> ControllerSettings:
-    """Settings given, else the shipped ones that the record's attribute `controller` names.
+def settings_of(record: xr.Dataset, given: ControllerSettings | None) -> tuple[ControllerSettings, str]:
+    """Settings given, else the shipped ones that the record's attribute `controller` names; and a note on which.
 
     Raises RecordError where neither is known.
     """
-    if given is not None:
-        return given
-    named = record.attrs.get("controller")
-    for path in sorted((models_folder() / "controllers").glob("*.toml")):
-        settings = load_controller(path.stem)
-        if named in (path.stem, settings.name):
-            return settings
-    named = "no controller" if named is None else f"the controller {named!r}, which is not shipped"
-    raise RecordError(f"the record names {named}; give its settings as a TOML file with --controller")
-
-
-def settings_source(record: xr.Dataset, settings: ControllerSettings, given: ControllerSettings | None) -> str:
-    """Source of the closed loop's settings: those of the test, or others."""
-    named = record.attrs.get("controller")
-    if given is None or named == settings.name:
-        return f"closed loop with the controller that the record names, “{settings.name}”"
-    named = "no controller" if named is None else f"“{named}”"
-    return f"closed loop with the controller given, “{settings.name}”; the record names {named}: settings may differ"
+    name = record.attrs.get("controller")
+    loop = "closed loop with the controller"
+    if given is not None and name != given.name:
+        named = "no controller" if name is None else f"“{name}”"
+        return given, f"{loop} given, “{given.name}”; the record names {named}: settings may differ"
+    known = ((file, load_controller(file)) for file in shipped("controllers"))
+    settings = given or next((s for file, s in known if name in (file, s.name)), None)
+    if settings is None:
+        named = "no controller" if name is None else f"the controller {name!r}, which is not shipped"
+        raise RecordError(f"the record names {named}; give its settings as a TOML file with --controller")
+    return settings, f"{loop} that the record names, “{settings.name}”"
 
 
 def drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:

@@ -19,7 +19,7 @@ from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
 from ..decompose.record import take_apart
 from .band_spectra import Spectrum, estimate_spectrum
-from .closed_loop import Lag, drive_of, settings_of, settings_source
+from .closed_loop import Lag, drive_of, settings_of
 from .metrics import ComparisonBasis
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
 from .prepare_tests import PreparedTest, wrench_calibration
@@ -100,12 +100,12 @@ def _open_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
 
 
 def _closed_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
-    settings = settings_of(test.test.record, basis.settings)
+    settings, note = settings_of(test.test.record, basis.settings)
     target, drive = drive_of(test.test.record, settings, basis.numbers.number("reference.high"))
     engine = fastest_engine(test.plant)
     ran = rehearse(test.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
     both = SimulatedComparison(test, ran, None, basis)
-    both.notes.append(settings_source(test.test.record, settings, basis.settings))
+    both.notes.append(note)
     phase = _of_run(3, test, both, ("spool_command",), basis)
     velocity = phase.pair("velocity")
     assert velocity is not None

@@ -18,14 +18,8 @@ from ...machine.machine import Machine
 from ...machine.parameters import Quantity
 from ..residuals import RESIDUALS
 
-__all__ = [
-    "FreeParameter",
-    "drawn_coordinates",
-    "machine_parameters",
-    "plan_parameters",
-    "scatter_parameters",
-    "with_parameters",
-]
+__all__ = ["FreeParameter", "drawn_coordinates", "machine_parameters", "plan_parameters", "scatter_parameters"]
+__all__ += ["with_parameters"]
 
 Array = NDArray[np.float64]
 

@@ -7,17 +7,8 @@ from numpy.typing import NDArray
 
 from .result import Calibration
 
-__all__ = [
-    "Contradiction",
-    "Verdict",
-    "beyond",
-    "changed_parameters",
-    "contradictions",
-    "far",
-    "out_of_range",
-    "stated_range",
-    "verdict_on",
-]
+__all__ = ["Contradiction", "Verdict", "beyond", "changed_parameters", "contradictions", "far", "out_of_range"]
+__all__ += ["stated_range", "verdict_on"]
 
 Array = NDArray[np.float64]
 Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]

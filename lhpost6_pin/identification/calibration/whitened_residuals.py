@@ -14,16 +14,8 @@ from numpy.typing import NDArray
 
 from ...core.errors import RecordError
 
-__all__ = [
-    "Whitener",
-    "excess",
-    "make_whitener",
-    "mean_squares",
-    "real_bins",
-    "real_rows",
-    "spectrum_of",
-    "negative_log_likelihood",
-]
+__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "real_rows", "spectrum_of"]
+__all__ += ["negative_log_likelihood"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -12,17 +12,5 @@ from .dataset import ledger_dataset, save_ledger
 from .record import ComparisonBand, Decomposed, decompose_numbers, decompose_record
 from .work import Work, find_work
 
-__all__ = [
-    "WrenchAgreement",
-    "ComparisonBand",
-    "Decomposed",
-    "Level",
-    "Match",
-    "Work",
-    "decompose_numbers",
-    "decompose_record",
-    "find_agreement",
-    "find_work",
-    "ledger_dataset",
-    "save_ledger",
-]
+__all__ = ["WrenchAgreement", "ComparisonBand", "Decomposed", "Level", "Match", "Work", "decompose_numbers"]
+__all__ += ["decompose_record", "find_agreement", "find_work", "ledger_dataset", "save_ledger"]

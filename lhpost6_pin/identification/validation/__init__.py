@@ -13,18 +13,5 @@ from .resonance import Peak, Resonance
 from .validate import Validation, validate
 from .valve_agreement import Valves
 
-__all__ = [
-    "PHASES",
-    "ColumnAgreement",
-    "Lag",
-    "ComparedQuantity",
-    "Peak",
-    "Phase",
-    "Resonance",
-    "Spectrum",
-    "Validation",
-    "Valves",
-    "metrics",
-    "save_metrics",
-    "validate",
-]
+__all__ = ["PHASES", "ColumnAgreement", "Lag", "ComparedQuantity", "Peak", "Phase", "Resonance", "Spectrum"]
+__all__ += ["Validation", "Valves", "metrics", "save_metrics", "validate"]

@@ -122,22 +122,12 @@ def _agree_one(pair: ComparedQuantity, k: int, moves: bool, late: float, part: s
     if moves:
         ratio, peak, alike = (float(f(measured, model)) for f in (rrmse, peak_ratio, correlation))
         ratio_aligned, alike_aligned = (float(f(measured, shifted)) for f in (rrmse, correlation))
+    column = pair.columns[k]
+    calibration = float("nan") if pair.calibration is None else float(pair.calibration[k])
+    rms = [float(np.sqrt(np.mean(x**2))) for x in (error, shifted - measured)]
     return ColumnAgreement(
-        pair.quantity,
-        pair.columns[k],
-        unit_of(pair.quantity, pair.columns[k]),
-        moves,
-        float(measured.std()),
-        float(np.sqrt(np.mean(error**2))),
-        float(pair.noise[k]),
-        float(np.sqrt(np.mean((shifted - measured) ** 2))),
-        ratio,
-        ratio_aligned,
-        late,
-        peak,
-        alike,
-        alike_aligned,
-        offset,
-        float("nan") if pair.calibration is None else float(pair.calibration[k]),
-        float(drift_rate(error, dt)),
+        *(pair.quantity, column, unit_of(pair.quantity, column), moves),
+        *(float(measured.std()), rms[0], float(pair.noise[k]), rms[1]),
+        *(ratio, ratio_aligned, late, peak, alike, alike_aligned),
+        *(offset, calibration, float(drift_rate(error, dt))),
     )

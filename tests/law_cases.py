@@ -1,0 +1,333 @@
+"""Every law with plausible parameters, ports and starting states, and the ranges of arguments, for `test_law_battery`.
+
+A new law needs one entry in `_ROWS`. Parameters are of the size of the machine's but not the machine's, so that a test
+of a law cannot lean on them.
+"""
+
+import inspect
+import math
+import pkgutil
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from lhpost6_pin import laws
+from lhpost6_pin.effects.actuator import start_line
+from lhpost6_pin.effects.dispatch import LAWS
+from lhpost6_pin.effects.effect import Effect
+from lhpost6_pin.effects.evaluate import advance_states, apply_forces, state_rates
+from lhpost6_pin.effects.modifiers import supply_of
+from lhpost6_pin.effects.table import effect_table, state_names
+from lhpost6_pin.laws import (
+    backlash,
+    ball,
+    bouc_wen,
+    bulk,
+    by_memory,
+    chamber,
+    constant,
+    dahl_instead,
+    drag,
+    end_stop,
+    gas_heat,
+    gas_leak,
+    leaks,
+    lines,
+    load_friction,
+    nitrogen_strut,
+    oscillator,
+    platen_body,
+    play,
+    smooth_ball,
+    spool,
+    spring,
+    stribeck,
+    supply,
+    tabulated,
+    valve_path,
+    viscous,
+    warm_up,
+)
+from lhpost6_pin.laws.contract import Law, parameter_units
+from lhpost6_pin.laws.hydraulic import Hydraulic
+
+PORTS = ("leg", "leg.x", "leg.y")
+"""A leg, and two slip directions of its pad."""
+SUPPLY = (20e6, 0.5e6)
+FLOW = 1.1e-4  # m3/s/sqrt(Pa)
+OIL = (900e6, 500.0)
+DOUBLE = Hydraulic(0.2, 0.13, 0.8 * FLOW, 0.5 * FLOW, FLOW, 0.65 * FLOW, 1.3, 4.6e-11, 0.8, 0.7, *OIL)
+SINGLE = Hydraulic(0.5, 0.0, FLOW, 0.0, FLOW, 0.0, 1.05, 4.6e-11, 0.3, 0.0, *OIL)
+GAS = (15e6, 0.15, 2.0, 1.7)
+WAVE = 4e3 * np.sin(np.arange(tabulated.NODES))
+
+
+def s_at(t: float) -> np.ndarray:
+    """Coordinates (3,) [m] of a smooth motion of the ports, 2 mm at 3, 2 and 5 Hz."""
+    return np.array([0.002 * (math.sin(w * t + phase) - math.sin(phase)) for w, phase in _TURNS])
+
+
+def sd_at(t: float) -> np.ndarray:
+    """Rates (3,) [m/s] of the same."""
+    return np.array([0.002 * w * math.cos(w * t + phase) for w, phase in _TURNS])
+
+
+_TURNS = tuple((2 * math.pi * f, phase) for f, phase in ((3.0, 0.0), (2.0, 0.4), (5.0, 1.1)))
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One law on its ports, beside an actuator where it needs one."""
+
+    law: str
+    p: Any  # its parameters
+    z_start: tuple[float, ...] = ()
+    port: str = "leg"
+    on: Hydraulic | None = None  # the actuator beside it, or that it modifies
+    exact: bool = True  # one step along a straight path is as good as many
+    passive: bool = False  # at no instant does it give energy that it has not stored
+    cycle: float = 0.0  # mean power that a cycle loses at least, over the largest
+    name: str = ""
+
+    def __str__(self) -> str:
+        """Name in the list of tests."""
+        return self.name or f"{self.law}-{self.port}"
+
+    @property
+    def attributes(self) -> Law:
+        """Attributes of its law."""
+        return LAWS[self.law]
+
+    @cached_property
+    def effects(self) -> list[Effect]:
+        """The actuator, if any, and the law."""
+        actuator = self.p if self.law == "hydraulic" else self.on
+        oil = [] if actuator is None else [Effect("oil", "hydraulic", ("leg",), (actuator[:12],), "test", (0,))]
+        return oil if self.law == "hydraulic" else [*oil, effect_of(self.law, self.p, self.port)]
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """Its table; the last row is the law's, or that of the actuator which it modifies."""
+        return effect_table(self.effects, PORTS)
+
+    @property
+    def supply(self) -> supply.Supply:
+        """Supply of its machine."""
+        return supply_of(self.effects, state_names(self.effects), *SUPPLY)
+
+    @cached_property
+    def pressures(self) -> int:
+        """Number of chamber pressures, which are its first states."""
+        return 0 if self.rows["spool"][0] < 0 else 2 if self.rows["numbers"][0, 1] > 0.0 else 1
+
+    @cached_property
+    def spool(self) -> np.ndarray:
+        """Spools (1,) [1]."""
+        return np.array([(0.0, -0.03, 0.02)[self.pressures]])
+
+    @cached_property
+    def z(self) -> np.ndarray:
+        """States at the start."""
+        z, pressures = np.zeros(len(state_names(self.effects))), ((), (12e6,), (6e6, 9e6))[self.pressures]
+        start = (*pressures, *self.z_start)
+        z[: len(start)] = start
+        if self.rows["modified"][0]:
+            start_line(self.rows[0], self.spool[0], *(*pressures, 0.0)[:2], *SUPPLY, z)
+        return z
+
+    def forces(self, s: np.ndarray, sd: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of the last row on its ports (3,), and of all rows on all ports."""
+        force, total = np.zeros((len(self.rows), 3)), np.zeros(len(PORTS))
+        apply_forces(self.rows, s, sd, z, force, total)
+        return force[-1], total
+
+    def rates(self, t: float, z: np.ndarray) -> np.ndarray:
+        """Rates of the hidden states along the motion."""
+        zd = np.zeros(len(z))
+        state_rates(self.rows, s_at(t), sd_at(t), self.spool, self.supply, z, zd)
+        return zd
+
+    def march(self, duration: float, steps: int, turn: bool = False) -> np.ndarray:
+        """Hidden states at every step along the motion (steps + 1, n_states); half-way the spool may turn round."""
+        z, dt, shared, out = self.z.copy(), duration / steps, self.supply, [self.z.copy()]
+        for k in range(steps):
+            s, after = s_at(k * dt), s_at((k + 1) * dt)
+            x = -self.spool if turn and 2 * k >= steps else self.spool
+            advance_states(self.rows, s, after - s, dt, x, shared, z)
+            out.append(z.copy())
+        return np.array(out)
+
+    def with_parameter(self, name: str) -> "Case":
+        """The same with half of one parameter, or with one where it is zero."""
+        value = getattr(self.p, name)
+        return replace(self, p=self.p._replace(**{name: 0.5 * value if np.any(value) else 1.0}))
+
+
+def effect_of(law: str, p: Any, port: str = "leg", name: str = "more") -> Effect:
+    """An effect of a law's parameters."""
+    numbers = np.hstack(p)[: len(parameter_units(LAWS[law]))]
+    return Effect(name, law, (port,), (tuple(numbers.tolist()),), "test")
+
+
+_RUB = (9e3, 2e-4, 0.1)
+_THREE = "leg.x leg.y leg"
+_ROWS = (
+    Case("hydraulic", DOUBLE, passive=True, exact=False, name="hydraulic-double"),
+    Case("hydraulic", SINGLE, passive=True, exact=False, name="hydraulic-single"),
+    Case("nitrogen_strut", nitrogen_strut.Gas(*GAS), passive=True),
+    Case("bouc_wen_1d", bouc_wen.Friction(*_RUB), (0.3,), cycle=0.05),
+    Case("bouc_wen_2d", bouc_wen.Friction(17e3, 1e-3, 0.1), (0.3, -0.4), cycle=0.05),
+    Case("viscous", viscous.Viscous(15e3), passive=True, cycle=0.05),
+    Case("constant", constant.Constant(3e3)),
+    Case("stribeck", stribeck.Stribeck(*_RUB, 0.02), (0.3,), cycle=0.005),
+    Case("asymmetric", bouc_wen.Friction(*_RUB), (0.3,)),
+    Case("dahl_instead", dahl_instead.DahlInstead(*_RUB, 3e-4), (0.3, -0.4, 0.1, 0.5)),
+    Case("dahl_instead", dahl_instead.DahlInstead(*_RUB, 3e-4), (0.3, 0.0, 0.1, 0.0), "leg -"),
+    Case("load_friction", load_friction.LoadFriction(0.02, *_RUB[1:], 0.2, 0.13), (0.3, -0.4), on=DOUBLE, cycle=0.005),
+    Case("load_friction", load_friction.LoadFriction(0.02, *_RUB[1:], 0.5, 0.0), (0.3, 0.0), "leg -", SINGLE),
+    Case("ball", ball.Ball(*_RUB), (-0.3, -0.4, 0.2), _THREE, cycle=0.005),
+    Case("ball", ball.Ball(*_RUB), (-0.3, -0.4, 0.2), "leg.x leg.y", cycle=0.005),
+    Case("smooth_ball", smooth_ball.SmoothBall(9e3, 0.01), (), _THREE, passive=True, cycle=0.005),
+    Case("smooth_ball", smooth_ball.SmoothBall(9e3, 0.01), (), "leg.x leg.y", passive=True, cycle=0.005),
+    Case("warm_up", warm_up.WarmUp(*_RUB, 0.3), (0.3, 0.01), cycle=0.005),
+    Case("backlash", backlash.Backlash(9e3, 2e-4, 5e-4), (1e-4,), passive=True, cycle=0.005),
+    Case("drag", drag.Drag(9e3, 1.7), passive=True, cycle=0.005),
+    Case("spring", spring.Spring(9e5, 1.5), passive=True),
+    Case("spring", spring.Spring(9e5, 1.5), (), "leg -", passive=True),
+    Case("by_position", tabulated.Table(0.8, -1e-3, 1e-3, WAVE)),
+    Case("by_speed", tabulated.Table(0.8, -0.02, 0.03, np.roll(WAVE, 5))),
+    Case("by_memory", by_memory.MemoryTable(0.8, -1e-3, 1e-3, WAVE, 0.3, 0.4), (1e-4,)),
+    Case("end_stop", end_stop.EndStop(9e5, 1e-3, 2.0), passive=True),
+    Case("oscillator", oscillator.Oscillator(5e3, 60.0, 0.05, 0.0, 1.5, -0.7), (1e-3, 0.02), _THREE, cycle=0.005),
+    Case("gas_leak", gas_leak.GasLeak(1e-2, *GAS, 0.03), (0.4,)),
+    Case("gas_heat", gas_heat.GasHeat(0.7, *GAS, 0.1), (0.001,), exact=False),  # where it goes is not linear in s
+)
+
+MODIFIERS: dict[str, Any] = {
+    "extra_leakage": leaks.ExtraLeakage(3e-11),
+    "turbulent_leakage": leaks.TurbulentLeakage(3e-7),
+    "external_leakage": leaks.ExternalLeakage(5e-11, 0.4),
+    "null_leakage": leaks.NullLeakage(1e-6, 0.05),
+    "null_bias": spool.NullBias(0.01),
+    "deadband": spool.Deadband(0.005),
+    "flow_curve": spool.FlowCurve(0.2, 0.5, 1.0),
+    "entrained_air": bulk.EntrainedAir(0.02, 1.2),
+    "cavitation": bulk.Cavitation(0.5, 15e6),  # far above what it is, so that the cases are in it
+    "dead_volume": chamber.DeadVolume(0.02, -0.3),
+    "play": play.Play(5e-4, 2e4),
+    "line": lines.Line(2e-3, 0.3),
+    "supply_line": lines.SupplyLine(2e6, 25.0, 0.1),
+    "supply_droop": supply.SupplyDroop(6e6, 0.02, 1.3),
+    "back_pressure": supply.BackPressure(3e7, 0.03),
+    "valve_delay": valve_path.ValveDelay(1e-3),
+    "valve_lag": valve_path.ValveLag(2e-3),
+    "thrust_direction": platen_body.ThrustDirection(0.3),
+    "more_inertia": platen_body.MoreInertia(*(1e3 * k for k in range(1, 11))),
+}
+"""Parameters of the laws that modify others."""
+
+OIL_CASES = tuple(
+    Case(
+        law,
+        p,
+        port="leg" if LAWS[law].modifies == "oil" else "supply",
+        on=actuator,
+        exact=False,
+        passive=law != "external_leakage",  # oil below the return pressure draws some from there
+        name=f"{law}-{'double' if actuator is DOUBLE else 'single'}",
+    )
+    for law, p in MODIFIERS.items()
+    if LAWS[law].modifies in ("oil", "supply")
+    for actuator in (DOUBLE, SINGLE)
+)
+"""Modifiers of oil and supply, each on both kinds of actuators."""
+ACTUATORS = _ROWS[:2]
+CASES = (*_ROWS, *OIL_CASES)
+OWN = _ROWS[2:]  # laws of which a row needs the law's functions alone
+WITH_STATES = tuple(c for c in CASES if c.attributes.states or c.attributes.modifies)
+EXACT = tuple(c for c in OWN if c.attributes.states and c.exact)
+WITHOUT_POTENTIAL = tuple(c for c in CASES if c.cycle)
+PASSIVE = tuple(c for c in CASES if c.passive)
+
+
+def takes(function: Any) -> list[str]:
+    """Names of a compiled function's arguments."""
+    return list(inspect.signature(function.py_func).parameters)
+
+
+def module_of(law: str) -> Any:
+    """The module of a law that makes forces."""
+    return import_module(f"lhpost6_pin.laws.{law}")
+
+
+BY_PATH = tuple(c for c in EXACT if "dt" not in takes(module_of(c.law).advance))
+"""Cases whose states know the path and not the time."""
+
+# ------------------------------------------------------------------------------------------------ arguments by name
+KERNELS = {
+    f"{m.name}.{name}": function
+    for m in pkgutil.iter_modules(laws.__path__)
+    for name, function in vars(import_module(f"lhpost6_pin.laws.{m.name}")).items()
+    if name in import_module(f"lhpost6_pin.laws.{m.name}").__all__ and hasattr(function, "py_func")
+}
+"""Every compiled function of `laws/`."""
+
+FULL = DOUBLE._replace(
+    turbulent=3e-7, external=5e-11, external_side=0.4, null_leakage=1e-6, null_width=0.05, null_bias=0.01,
+    overlap=0.005, air=0.02, air_index=1.2, voids=0.5, vapour_pressure=8e6, curve_error=0.2, curve_side=0.5,
+    curve_power=1.0, line_time=2e-3, line_damping=0.3, play=5e-4, play_force=2e4, supply_inertance=2e6,
+    supply_frequency=25.0, supply_damping=0.1,
+)  # fmt: skip
+"""An actuator with all modifiers."""
+
+_RANGES = {
+    (-1.0, 1.0): "v v_2 v_3 v_x v_y spool opened x side flow rate fed velocity",
+    (-0.57, 0.57): "z z_x z_y z_1 z_2 z_3 d_x d_y",
+    (-2e-3, 2e-3): "s s_2 s_3 offset stretch past_position",
+    (-3e-3, 3e-3): "d d_2 d_3 dx dy stroke",
+    (1e-5, 1e-3): "dt",
+    (-1e-2, 1e-2): "exchanged",
+    (0.0, 0.5): "shape mean_speed flow_a flow_b elongation at length_rate drawn returned",
+    (1e-4, 2e-3): "yield_slip time",
+    (0.5, 2.0): "flow_curve power length index gas_length area area_a area_b error",
+    (-1e5, 22e6): "pressure pressure_a pressure_b chamber half_a half_b",
+    (15e6, 25e6): "high supply",
+    (1e5, 1e6): "low back vapour",
+    (5e8, 1.5e9): "bulk",
+    (1.0, 2e3): "linear_below lowest",
+    (0.0, 2e-4): "k_supply k_return",
+    (0.0, 1e-6): "coefficient leakage",
+    (3e-3, 0.1): "overlap width air share damping",
+    (-1e6, 1e6): "load force drop work change_a change_b",
+    (0.0, 1e-3): "play",
+    (2e2, 5e5): "closing",
+    (0.0, 2e4): "friction",
+    (-1e-8, 0.0): "slope_a slope_b",
+    (0.0, 1e-10): "across",
+    (1e9, 1e11): "rise_per_oil_a rise_per_oil_b",
+    (-1e3, 1e3): "orifice.signed_root.x",
+    (-1.5, 1.5): "first last",
+}
+RANGES = {name: ends for ends, names in _RANGES.items() for name in names.split()}
+"""Ranges that arguments are drawn from, by name, or by module, function and name."""
+
+
+def drawn(kernel: str, rng: np.random.Generator) -> list[Any]:
+    """Arguments of a kernel."""
+    module = kernel.split(".")[0]
+    parameters = {c.law: c.p for c in OWN} | {"hydraulic": FULL, "supply": supply.Supply(*SUPPLY, 6e6, 0.02, 3e7, 0.03)}
+    special = {
+        "p": lambda: type(p := parameters[module])(*(x * rng.uniform(0.9, 1.1) for x in p)),
+        "planar": lambda: rng.random() < 0.5,
+        "modified": lambda: rng.random() < 0.5,
+        "valve": lambda: (*rng.uniform(-0.5, 0.5, 2), *rng.uniform(-1e-8, 0.0, 2)),
+        "values": lambda: WAVE * rng.uniform(0.9, 1.1),
+    }
+    found = []
+    for name in takes(KERNELS[kernel]):
+        ends = RANGES.get(f"{kernel}.{name}") or RANGES.get(name)
+        found.append(special[name]() if name in special else rng.uniform(*ends))
+    return found

@@ -169,7 +169,7 @@ def test_both_engines_run_it_alike(family: str) -> None:
 def test_inverse_dynamics_and_residuals_leave_the_same(family: str) -> None:
     machine = with_family(family)
     plant, measured = make_plant(machine), measured_of(shaken(machine, samples=200))
-    found = inverse_dynamics(plant, measured.dt * np.arange(200), measured.motion, measured.actuator_force)
+    found = inverse_dynamics(plant, measured.dt * np.arange(200), measured.motion, measured.channels["actuator_force"])
     whole = found.struts + found.dissipative + found.ledger.wrench[:, found.ledger.effect("gravity")]
     scale = np.abs(found.ledger.wrench).max()
     # every force beside the oil's is the gas's or dissipative; a sum in another order
@@ -220,7 +220,7 @@ def test_a_record_at_the_models_steps_comes_apart_to_rounding_with_the_velocity_
         engine="fused",
     )
     measured = measured_of(run)
-    found = inverse_dynamics(run.plant, run.time, measured.motion, measured.actuator_force, model_step=True)
+    found = inverse_dynamics(run.plant, run.time, measured.motion, measured.channels["actuator_force"], model_step=True)
     assert np.abs(found.residual).max() < 1e-3  # of meganewtons: rounding of Euler angles and back
 
 

@@ -324,9 +324,9 @@ def test_a_specimen_weighs_on_the_actuators_and_a_structure_does_not() -> None:
 def test_friction_under_load_grows_with_the_measured_force() -> None:
     machine = base().with_effect("load_dependent_friction", ("H1",), coefficient=0.01)
     plant, measured = make_plant(machine), measured_of(shaken(machine, samples=300))
-    ledger = inverse_dynamics(plant, measured.dt * np.arange(300), measured.motion, measured.actuator_force).ledger
+    ledger = inverse_dynamics(plant, measured.dt * np.arange(300), measured.motion, measured.channels["actuator_force"]).ledger
     seal = ledger.force[:, ledger.row("seal_friction.H1")] / -machine.actuators[0].seal_friction
-    expected = -0.01 * np.abs(measured.actuator_force[:, 0]) * seal
+    expected = -0.01 * np.abs(measured.channels["actuator_force"][:, 0]) * seal
     np.testing.assert_allclose(ledger.force[:, ledger.row("load_dependent_friction.H1")], expected, rtol=1e-9)
 
 

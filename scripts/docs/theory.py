@@ -2,15 +2,16 @@
 
 import ast
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import LAWS
+from lhpost6_pin.laws.contract import parameter_units
 from lhpost6_pin.machine.library import families, make_effect
 from lhpost6_pin.machine.machine import load_machine
 
@@ -20,43 +21,53 @@ __all__ = ["PAGES", "law", "law_modules", "laws_of", "page_of_law", "tests_of", 
 
 ROOT = Path(__file__).parents[2]
 PAGES: dict[str, tuple[str, ...]] = {
-    "orifice": ("hydraulic_double", "hydraulic_single"),
-    "chamber": ("hydraulic_double", "hydraulic_single", "extra_leakage", "external_leakage", "dead_volume"),
+    "orifice": ("orifice",),
+    "chamber": ("chamber", "hydraulic"),
     "strut": ("nitrogen_strut",),
-    "bouc_wen": ("bouc_wen_1d", "bouc_wen_2d"),
+    "bouc_wen": ("bouc_wen", "bouc_wen_1d", "bouc_wen_2d"),
     "viscous": ("viscous",),
     "friction": ("stribeck", "asymmetric", "load_friction", "warm_up"),
     "dahl": ("dahl_instead",),
     "ball": ("ball", "smooth_ball"),
     "backlash": ("backlash",),
     "spring": ("spring", "end_stop", "drag"),
-    "tabulated": ("by_position", "by_speed", "by_memory"),
-    "leaks": ("turbulent_leakage", "null_leakage"),
-    "bulk": ("entrained_air", "cavitation"),
-    "spool": ("null_bias", "deadband", "flow_curve"),
-    "lines": ("line", "supply_line"),
+    "tabulated": ("tabulated", "by_position", "by_speed", "by_memory"),
+    "leaks": ("leaks",),
+    "bulk": ("bulk",),
+    "spool": ("spool",),
+    "lines": ("lines",),
     "play": ("play",),
     "gas": ("gas_leak", "gas_heat"),
     "oscillator": ("oscillator",),
-    "supply": ("supply_droop", "back_pressure", "valve_delay", "valve_lag"),
-    "platen": ("constant", "thrust_direction", "more_inertia"),
+    "supply": ("supply", "valve_path"),
+    "platen": ("constant", "platen_body"),
 }
-"""Laws of the registry by their page; the first pages are modules of `laws/` of the same name."""
+"""Modules of `laws/` by page."""
 
 
 def law_modules() -> tuple[str, ...]:
-    """Modules of `laws/` by name."""
-    return tuple(p.stem for p in sorted((ROOT / "lhpost6_pin" / "laws").glob("*.py")) if p.stem != "__init__")
+    """Modules of `laws/` with equations, by name."""
+    stems = sorted(p.stem for p in (ROOT / "lhpost6_pin" / "laws").glob("*.py"))
+    return tuple(stem for stem in stems if stem not in ("__init__", "contract"))
+
+
+def laws_on(page: str) -> tuple[str, ...]:
+    """Laws of the registry on a page; the orifice is part of the actuator's."""
+    found: list[str] = ["hydraulic"] if page == "orifice" else []
+    for name in PAGES[page]:
+        module = import_module(f"lhpost6_pin.laws.{name}")
+        found += [name] if hasattr(module, "LAW") else getattr(module, "LAWS", ())
+    return tuple(found)
 
 
 def page_of_law(name: str) -> str:
     """Page of a law; StopIteration for a law that is missing in PAGES."""
-    return next(page for page in reversed(PAGES) if name in PAGES[page])
+    return next(page for page in reversed(PAGES) if name in laws_on(page))
 
 
 def laws_of(page: str) -> str:
     """Uses of the laws of a page: effects of the nominal machine, families of the library."""
-    mine = PAGES[page]
+    mine = laws_on(page)
     rows = [(_numbers(law), "machine", code_cell(e.name), cell(e.source)) for law, e in _standard() if law in mine]
     rows += [
         (
@@ -72,7 +83,7 @@ def laws_of(page: str) -> str:
 
 
 def _numbers(law: str) -> str:
-    params = LAWS[law].params
+    params = parameter_units(LAWS[law])
     some = params if len(params) <= 12 else params[:3]
     numbers = ", ".join(f"{name.replace('_', ' ')} {cell(f'[{unit}]')}" for name, unit in some)
     return f"{code_cell(law)}: {numbers}{'' if some is params else ', ...'}"
@@ -96,11 +107,11 @@ def _of_library() -> tuple[tuple[str, str], ...]:
 
 
 def law(page: str) -> str:
-    """Generated part of a page on a module of `laws/`: equation and code, uses, tests."""
+    """Generated part of a page on modules of `laws/`: equation and code, uses, tests."""
     return "\n\n".join(
         (
             "## Equation and code",
-            _module(f"lhpost6_pin.laws.{page}"),
+            *(_module(name, len(PAGES[page]) > 1) for name in PAGES[page]),
             "## Uses",
             laws_of(page),
             "## Tests",
@@ -109,75 +120,47 @@ def law(page: str) -> str:
     )
 
 
-def _module(path: str) -> str:
-    options = ("heading_level: 3", "show_root_heading: false", "show_root_toc_entry: false")
-    return "\n      ".join([f"::: {path}\n    options:", *options])
+def _module(name: str, several: bool) -> str:
+    heading = f"### `laws/{name}.py`\n\n" if several else ""
+    level = f"heading_level: {4 if several else 3}"
+    options = (level, "show_root_heading: false", "show_root_toc_entry: false")
+    return heading + "\n      ".join([f"::: lhpost6_pin.laws.{name}\n    options:", *options])
 
 
 # ---------------------------------------------------------------------------------------------------------- the tests
-class Battery(NamedTuple):
-    """A file of tests, the file of its cases, and the variable of its cases of laws."""
-
-    file: str
-    cases: str
-    laws: str
-
-
-BATTERIES = (
-    Battery("test_laws.py", "cases.py", "CASES"),
-    Battery("test_library_mechanical.py", "test_library_mechanical.py", "CASES"),
-    Battery("test_library_oil.py", "test_library_oil.py", "NUMBERS"),
-)
-"""Test files of laws: tests on all kernels of a file, on all laws, and on single ones."""
+FILES = ("test_law_battery.py", "test_mechanical_effects.py", "test_oil_effects.py")
+"""Test files of laws: tests on all of them, with cases in `tests/law_cases.py`, and on single ones."""
 
 
 def tests_of(page: str) -> str:
     """Tests that cover the kernels or laws of a page, and those that call its kernels directly."""
-    kernels = set(import_module(f"lhpost6_pin.laws.{page}").__all__)
     parts = []
-    for battery in BATTERIES:
-        functions = [
-            n for n in tree(battery.file).body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")
-        ]
-        over = {f.name: _over(f, battery, page) for f in functions}
-        single = [f for f in functions if over[f.name] is None and kernels & set(_of_module(f, page, battery.file))]
-        for title, some in (
-            ("on all kernels and laws of this page", [f for f in functions if over[f.name]]),
-            ("on these kernels", single),
-        ):
+    for file in FILES:
+        functions = [n for n in tree(file).body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")]
+        covering = [f for f in functions if _covers(f, page)]
+        single = [f for f in functions if f not in covering and _calls(f, page, file)]
+        for title, some in (("on all kernels and laws of this page", covering), ("on these kernels", single)):
             if some:
                 lines = [f"- {cell(f.name.removeprefix('test_').replace('_', ' '))}" for f in some]
-                parts.append(f"`tests/{battery.file}`, {title}:\n\n" + "\n".join(lines))
+                parts.append(f"`tests/{file}`, {title}:\n\n" + "\n".join(lines))
     return "\n\n".join(parts)
 
 
-def _over(function: ast.FunctionDef, battery: Battery, page: str) -> bool | None:
-    """Whether a parametrised test covers the kernels or laws of a page; None for other tests."""
-    said = " ".join(ast.unparse(d) for d in function.decorator_list)
-    words = set(re.findall(r"\w+", said))
-    if "KERNELS" in words:
-        return page in _names_in(battery.cases, "KERNELS")
-    if not words & {battery.laws, "every_law"}:
-        return None
-    laws = [LAWS[law] for law in PAGES[page] if law in _names_in(battery.cases, battery.laws)]
-    if "not LAWS" in said:
-        laws = [law for law in laws if not law.stores_energy]
-    elif ".states" in said:
-        laws = [law for law in laws if law.states]
-    return bool(laws)
+def _covers(function: ast.FunctionDef, page: str) -> bool:
+    """Whether a test is parametrised over cases, laws or kernels of a page."""
+    words = re.findall(r"\w+", " ".join(ast.unparse(d) for d in function.decorator_list))
+    return any(_names_in(word) & {*laws_on(page), *(f"{name}.py" for name in PAGES[page])} for word in words)
 
 
 @cache
-def _names_in(file: str, variable: str) -> frozenset[str]:
-    """Names and strings in the value of a variable of a test file."""
-    nodes = [
-        inner
-        for n in tree(file).body
-        if isinstance(n, ast.Assign) and any(isinstance(t, ast.Name) and t.id == variable for t in n.targets)
-        for inner in ast.walk(n.value)
-    ]
-    names = {n.id for n in nodes if isinstance(n, ast.Name)}
-    return frozenset(names | {str(n.value) for n in nodes if isinstance(n, ast.Constant)})
+def _names_in(variable: str) -> frozenset[str]:
+    """Laws in the value of a variable of `tests/law_cases.py`; modules with their suffix where it holds kernels."""
+    if str(ROOT / "tests") not in sys.path:
+        sys.path.append(str(ROOT / "tests"))
+    found = getattr(import_module("law_cases"), variable, ())
+    if isinstance(found, Mapping):
+        return frozenset(f"{name.split('.')[0]}.py" if "." in name else name for name in found)
+    return frozenset(case.law for case in found if hasattr(case, "law")) if isinstance(found, tuple) else frozenset()
 
 
 @cache
@@ -186,14 +169,15 @@ def tree(file: str) -> ast.Module:
     return ast.parse((ROOT / "tests" / file).read_text(encoding="utf-8"))
 
 
-def _of_module(function: ast.FunctionDef, page: str, file: str) -> Iterator[str]:
-    """Names of a module that a function uses, as `module.name` or imported."""
-    direct = _imported(file).get(page, set())
-    for node in ast.walk(function):
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == page:
-            yield node.attr
-        elif isinstance(node, ast.Name) and node.id in direct:
-            yield node.id
+def _calls(function: ast.FunctionDef, page: str, file: str) -> bool:
+    """Whether a test uses what a module of a page exports, as `module.name` or imported."""
+    exported = {name: set(import_module(f"lhpost6_pin.laws.{name}").__all__) for name in PAGES[page]}
+    direct = {x for name in exported for x in _imported(file).get(name, set()) & exported[name]}
+    return any(
+        (isinstance(n, ast.Name) and n.id in direct)
+        or (isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name) and n.attr in exported.get(n.value.id, ()))
+        for n in ast.walk(function)
+    )
 
 
 @cache

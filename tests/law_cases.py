@@ -16,43 +16,15 @@ import numpy as np
 
 from lhpost6_pin import laws
 from lhpost6_pin.effects.actuator import start_line
-from lhpost6_pin.effects.dispatch import LAWS
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces, state_rates
 from lhpost6_pin.effects.modifiers import supply_of
+from lhpost6_pin.effects.registry import LAWS, parameters_of
 from lhpost6_pin.effects.table import effect_table, state_names
-from lhpost6_pin.laws import (
-    backlash,
-    ball,
-    bouc_wen,
-    bulk,
-    by_memory,
-    chamber,
-    constant,
-    dahl_instead,
-    drag,
-    end_stop,
-    gas_heat,
-    gas_leak,
-    leaks,
-    lines,
-    load_friction,
-    nitrogen_strut,
-    oscillator,
-    platen_body,
-    play,
-    smooth_ball,
-    spool,
-    spring,
-    stribeck,
-    supply,
-    tabulated,
-    valve_path,
-    viscous,
-    warm_up,
-)
 from lhpost6_pin.laws.contract import Law, parameter_units
 from lhpost6_pin.laws.hydraulic import Hydraulic
+from lhpost6_pin.laws.supply import Supply
+from lhpost6_pin.laws.tabulated import NODES
 
 PORTS = ("leg", "leg.x", "leg.y")
 """A leg, and two slip directions of its pad."""
@@ -62,7 +34,7 @@ OIL = (900e6, 500.0)
 DOUBLE = Hydraulic(0.2, 0.13, 0.8 * FLOW, 0.5 * FLOW, FLOW, 0.65 * FLOW, 1.3, 4.6e-11, 0.8, 0.7, *OIL)
 SINGLE = Hydraulic(0.5, 0.0, FLOW, 0.0, FLOW, 0.0, 1.05, 4.6e-11, 0.3, 0.0, *OIL)
 GAS = (15e6, 0.15, 2.0, 1.7)
-WAVE = 4e3 * np.sin(np.arange(tabulated.NODES))
+WAVE = 4e3 * np.sin(np.arange(NODES))
 
 
 def s_at(t: float) -> np.ndarray:
@@ -114,7 +86,7 @@ class Case:
         return effect_table(self.effects, PORTS)
 
     @property
-    def supply(self) -> supply.Supply:
+    def supply(self) -> Supply:
         """Supply of its machine."""
         return supply_of(self.effects, state_names(self.effects), *SUPPLY)
 
@@ -172,78 +144,76 @@ def effect_of(law: str, p: Any, port: str = "leg", name: str = "more") -> Effect
     return Effect(name, law, (port,), (tuple(numbers.tolist()),), "test")
 
 
+def _case(law: str, *numbers: Any, z: tuple[float, ...] = (), **more: Any) -> Case:
+    return Case(law, LAWS[law].parameters(*numbers), z, **more)
+
+
 _RUB = (9e3, 2e-4, 0.1)
 _THREE = "leg.x leg.y leg"
 _ROWS = (
-    Case("hydraulic", DOUBLE, passive=True, exact=False, name="hydraulic-double"),
-    Case("hydraulic", SINGLE, passive=True, exact=False, name="hydraulic-single"),
-    Case("nitrogen_strut", nitrogen_strut.Gas(*GAS), passive=True),
-    Case("bouc_wen_1d", bouc_wen.Friction(*_RUB), (0.3,), cycle=0.05),
-    Case("bouc_wen_2d", bouc_wen.Friction(17e3, 1e-3, 0.1), (0.3, -0.4), cycle=0.05),
-    Case("viscous", viscous.Viscous(15e3), passive=True, cycle=0.05),
-    Case("constant", constant.Constant(3e3)),
-    Case("stribeck", stribeck.Stribeck(*_RUB, 0.02), (0.3,), cycle=0.005),
-    Case("asymmetric", bouc_wen.Friction(*_RUB), (0.3,)),
-    Case("dahl_instead", dahl_instead.DahlInstead(*_RUB, 3e-4), (0.3, -0.4, 0.1, 0.5)),
-    Case("dahl_instead", dahl_instead.DahlInstead(*_RUB, 3e-4), (0.3, 0.0, 0.1, 0.0), "leg -"),
-    Case("load_friction", load_friction.LoadFriction(0.02, *_RUB[1:], 0.2, 0.13), (0.3, -0.4), on=DOUBLE, cycle=0.005),
-    Case("load_friction", load_friction.LoadFriction(0.02, *_RUB[1:], 0.5, 0.0), (0.3, 0.0), "leg -", SINGLE),
-    Case("ball", ball.Ball(*_RUB), (-0.3, -0.4, 0.2), _THREE, cycle=0.005),
-    Case("ball", ball.Ball(*_RUB), (-0.3, -0.4, 0.2), "leg.x leg.y", cycle=0.005),
-    Case("smooth_ball", smooth_ball.SmoothBall(9e3, 0.01), (), _THREE, passive=True, cycle=0.005),
-    Case("smooth_ball", smooth_ball.SmoothBall(9e3, 0.01), (), "leg.x leg.y", passive=True, cycle=0.005),
-    Case("warm_up", warm_up.WarmUp(*_RUB, 0.3), (0.3, 0.01), cycle=0.005),
-    Case("backlash", backlash.Backlash(9e3, 2e-4, 5e-4), (1e-4,), passive=True, cycle=0.005),
-    Case("drag", drag.Drag(9e3, 1.7), passive=True, cycle=0.005),
-    Case("spring", spring.Spring(9e5, 1.5), passive=True),
-    Case("spring", spring.Spring(9e5, 1.5), (), "leg -", passive=True),
-    Case("by_position", tabulated.Table(0.8, -1e-3, 1e-3, WAVE)),
-    Case("by_speed", tabulated.Table(0.8, -0.02, 0.03, np.roll(WAVE, 5))),
-    Case("by_memory", by_memory.MemoryTable(0.8, -1e-3, 1e-3, WAVE, 0.3, 0.4), (1e-4,)),
-    Case("end_stop", end_stop.EndStop(9e5, 1e-3, 2.0), passive=True),
-    Case("oscillator", oscillator.Oscillator(5e3, 60.0, 0.05, 0.0, 1.5, -0.7), (1e-3, 0.02), _THREE, cycle=0.005),
-    Case("gas_leak", gas_leak.GasLeak(1e-2, *GAS, 0.03), (0.4,)),
-    Case("gas_heat", gas_heat.GasHeat(0.7, *GAS, 0.1), (0.001,), exact=False),  # where it goes is not linear in s
+    _case("hydraulic", *DOUBLE, passive=True, exact=False, name="hydraulic-double"),
+    _case("hydraulic", *SINGLE, passive=True, exact=False, name="hydraulic-single"),
+    _case("nitrogen_strut", *GAS, passive=True),
+    _case("bouc_wen_1d", *_RUB, z=(0.3,), cycle=0.05),
+    _case("bouc_wen_2d", 17e3, 1e-3, 0.1, z=(0.3, -0.4), cycle=0.05),
+    _case("viscous", 15e3, passive=True, cycle=0.05),
+    _case("constant", 3e3),
+    _case("stribeck", *_RUB, 0.02, z=(0.3,), cycle=0.005),
+    _case("asymmetric", *_RUB, z=(0.3,)),
+    _case("dahl_instead", *_RUB, 3e-4, z=(0.3, -0.4, 0.1, 0.5)),
+    _case("dahl_instead", *_RUB, 3e-4, z=(0.3, 0.0, 0.1, 0.0), port="leg -"),
+    _case("load_friction", 0.02, *_RUB[1:], 0.2, 0.13, z=(0.3, -0.4), on=DOUBLE, cycle=0.005),
+    _case("load_friction", 0.02, *_RUB[1:], 0.5, 0.0, z=(0.3, 0.0), port="leg -", on=SINGLE),
+    _case("ball", *_RUB, z=(-0.3, -0.4, 0.2), port=_THREE, cycle=0.005),
+    _case("ball", *_RUB, z=(-0.3, -0.4, 0.2), port="leg.x leg.y", cycle=0.005),
+    _case("smooth_ball", 9e3, 0.01, port=_THREE, passive=True, cycle=0.005),
+    _case("smooth_ball", 9e3, 0.01, port="leg.x leg.y", passive=True, cycle=0.005),
+    _case("warm_up", *_RUB, 0.3, z=(0.3, 0.01), cycle=0.005),
+    _case("backlash", 9e3, 2e-4, 5e-4, z=(1e-4,), passive=True, cycle=0.005),
+    _case("drag", 9e3, 1.7, passive=True, cycle=0.005),
+    _case("spring", 9e5, 1.5, passive=True),
+    _case("spring", 9e5, 1.5, port="leg -", passive=True),
+    _case("by_position", 0.8, -1e-3, 1e-3, WAVE),
+    _case("by_speed", 0.8, -0.02, 0.03, np.roll(WAVE, 5)),
+    _case("by_memory", 0.8, -1e-3, 1e-3, WAVE, 0.3, 0.4, z=(1e-4,)),
+    _case("end_stop", 9e5, 1e-3, 2.0, passive=True),
+    _case("oscillator", 5e3, 60.0, 0.05, 0.0, 1.5, -0.7, z=(1e-3, 0.02), port=_THREE, cycle=0.005),
+    _case("gas_leak", 1e-2, *GAS, 0.03, z=(0.4,)),
+    _case("gas_heat", 0.7, *GAS, 0.1, z=(0.001,), exact=False),  # where it goes is not linear in s
 )
 
-MODIFIERS: dict[str, Any] = {
-    "extra_leakage": leaks.ExtraLeakage(3e-11),
-    "turbulent_leakage": leaks.TurbulentLeakage(3e-7),
-    "external_leakage": leaks.ExternalLeakage(5e-11, 0.4),
-    "null_leakage": leaks.NullLeakage(1e-6, 0.05),
-    "null_bias": spool.NullBias(0.01),
-    "deadband": spool.Deadband(0.005),
-    "flow_curve": spool.FlowCurve(0.2, 0.5, 1.0),
-    "entrained_air": bulk.EntrainedAir(0.02, 1.2),
-    "cavitation": bulk.Cavitation(0.5, 15e6),  # far above what it is, so that the cases are in it
-    "dead_volume": chamber.DeadVolume(0.02, -0.3),
-    "play": play.Play(5e-4, 2e4),
-    "line": lines.Line(2e-3, 0.3),
-    "supply_line": lines.SupplyLine(2e6, 25.0, 0.1),
-    "supply_droop": supply.SupplyDroop(6e6, 0.02, 1.3),
-    "back_pressure": supply.BackPressure(3e7, 0.03),
-    "valve_delay": valve_path.ValveDelay(1e-3),
-    "valve_lag": valve_path.ValveLag(2e-3),
-    "thrust_direction": platen_body.ThrustDirection(0.3),
-    "more_inertia": platen_body.MoreInertia(*(1e3 * k for k in range(1, 11))),
+_NUMBERS: dict[str, tuple[float, ...]] = {
+    "extra_leakage": (3e-11,),
+    "turbulent_leakage": (3e-7,),
+    "external_leakage": (5e-11, 0.4),
+    "null_leakage": (1e-6, 0.05),
+    "null_bias": (0.01,),
+    "deadband": (0.005,),
+    "flow_curve": (0.2, 0.5, 1.0),
+    "entrained_air": (0.02, 1.2),
+    "cavitation": (0.5, 15e6),  # far above what it is, so that the cases are in it
+    "dead_volume": (0.02, -0.3),
+    "play": (5e-4, 2e4),
+    "line": (2e-3, 0.3),
+    "supply_line": (2e6, 25.0, 0.1),
+    "supply_droop": (6e6, 0.02, 1.3),
+    "back_pressure": (3e7, 0.03),
+    "valve_delay": (1e-3,),
+    "valve_lag": (2e-3,),
+    "thrust_direction": (0.3,),
+    "more_inertia": tuple(1e3 * k for k in range(1, 11)),
 }
+MODIFIERS: dict[str, Any] = {law: LAWS[law].parameters(*numbers) for law, numbers in _NUMBERS.items()}
 """Parameters of the laws that modify others."""
 
+_PORT_OF = {"oil": "leg", "supply": "supply"}
 OIL_CASES = tuple(
-    Case(
-        law,
-        p,
-        port="leg" if LAWS[law].modifies == "oil" else "supply",
-        on=actuator,
-        exact=False,
-        passive=law != "external_leakage",  # oil below the return pressure draws some from there
-        name=f"{law}-{'double' if actuator is DOUBLE else 'single'}",
-    )
+    Case(law, p, (), _PORT_OF[LAWS[law].modifies], on, False, law != "external_leakage", name=f"{law}-{kind}")
     for law, p in MODIFIERS.items()
-    if LAWS[law].modifies in ("oil", "supply")
-    for actuator in (DOUBLE, SINGLE)
+    if LAWS[law].modifies in _PORT_OF
+    for kind, on in (("double", DOUBLE), ("single", SINGLE))
 )
-"""Modifiers of oil and supply, each on both kinds of actuators."""
+"""Modifiers of oil and supply on both kinds of actuators. Oil below the return pressure draws some from outside."""
 ACTUATORS = _ROWS[:2]
 CASES = (*_ROWS, *OIL_CASES)
 OWN = _ROWS[2:]  # laws of which a row needs the law's functions alone
@@ -275,16 +245,12 @@ KERNELS = {
 }
 """Every compiled function of `laws/`."""
 
-FULL = DOUBLE._replace(
-    turbulent=3e-7, external=5e-11, external_side=0.4, null_leakage=1e-6, null_width=0.05, null_bias=0.01,
-    overlap=0.005, air=0.02, air_index=1.2, voids=0.5, vapour_pressure=8e6, curve_error=0.2, curve_side=0.5,
-    curve_power=1.0, line_time=2e-3, line_damping=0.3, play=5e-4, play_force=2e4, supply_inertance=2e6,
-    supply_frequency=25.0, supply_damping=0.1,
-)  # fmt: skip
+_ALL = [effect_of(law, p, name=law) for law, p in MODIFIERS.items() if LAWS[law].modifies == "oil"]
+FULL = parameters_of(effect_table([*ACTUATORS[0].effects, *_ALL], PORTS)[0])
 """An actuator with all modifiers."""
 
 _RANGES = {
-    (-1.0, 1.0): "v v_2 v_3 v_x v_y spool opened x side flow rate fed velocity",
+    (-1.0, 1.0): "v v_2 v_3 v_x v_y spool opened x side flow rate fed velocity error",
     (-0.57, 0.57): "z z_x z_y z_1 z_2 z_3 d_x d_y",
     (-2e-3, 2e-3): "s s_2 s_3 offset stretch past_position",
     (-3e-3, 3e-3): "d d_2 d_3 dx dy stroke",
@@ -292,7 +258,7 @@ _RANGES = {
     (-1e-2, 1e-2): "exchanged",
     (0.0, 0.5): "shape mean_speed flow_a flow_b elongation at length_rate drawn returned",
     (1e-4, 2e-3): "yield_slip time",
-    (0.5, 2.0): "flow_curve power length index gas_length area area_a area_b error",
+    (0.5, 2.0): "flow_curve power length index gas_length area area_a area_b",
     (-1e5, 22e6): "pressure pressure_a pressure_b chamber half_a half_b",
     (15e6, 25e6): "high supply",
     (1e5, 1e6): "low back vapour",
@@ -318,7 +284,7 @@ RANGES = {name: ends for ends, names in _RANGES.items() for name in names.split(
 def drawn(kernel: str, rng: np.random.Generator) -> list[Any]:
     """Arguments of a kernel."""
     module = kernel.split(".")[0]
-    parameters = {c.law: c.p for c in OWN} | {"hydraulic": FULL, "supply": supply.Supply(*SUPPLY, 6e6, 0.02, 3e7, 0.03)}
+    parameters = {c.law: c.p for c in OWN} | {"hydraulic": FULL, "supply": Supply(*SUPPLY, 6e6, 0.02, 3e7, 0.03)}
     special = {
         "p": lambda: type(p := parameters[module])(*(x * rng.uniform(0.9, 1.1) for x in p)),
         "planar": lambda: rng.random() < 0.5,

@@ -8,6 +8,7 @@ from lhpost6_pin.effects import evaluate as stage
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.effects.table import effect_table
+from lhpost6_pin.laws.contract import parameter_units
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.machine.port_names import PLATEN_PORTS
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
@@ -101,7 +102,7 @@ def test_a_two_port_law_takes_the_stem_of_a_pad(machine: Machine) -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_wrong_number_of_numbers_lists_what_the_law_takes(law: str) -> None:
-    names = [name for name, _ in LAWS[law].params]
+    names = [name for name, _ in parameter_units(LAWS[law])]
     with pytest.raises(ParameterError, match="rub on H1.*" + r" \[.*".join(names) + r" \["):
         Effect("rub", law, ("H1",), ((1.0,) * (len(names) + 1),), "test")
 
@@ -116,8 +117,8 @@ def test_numbers_must_be_finite_and_one_set_a_port() -> None:
 def test_only_a_hydraulic_law_takes_a_spool() -> None:
     with pytest.raises(ParameterError, match="viscous law takes no spool"):
         Effect("rub", "viscous", ("H1",), ((1.0,),), "test", (0,))
-    with pytest.raises(ParameterError, match="hydraulic_single law takes one spool"):
-        Effect("jack", "hydraulic_single", ("H1",), ((1.0,) * 12,), "test")
+    with pytest.raises(ParameterError, match="a hydraulic law takes one spool"):
+        Effect("jack", "hydraulic", ("H1",), ((1.0,) * 12,), "test")
 
 
 def test_a_name_is_taken_once(machine: Machine) -> None:

@@ -36,10 +36,9 @@ from scipy.integrate import solve_ivp
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.effects import actuator, evaluate
 from lhpost6_pin.effects import supply as shared
-from lhpost6_pin.effects.dispatch import LAWS
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.modifiers import added_inertias, command_path, supply_of, thrust_shares
-from lhpost6_pin.effects.registry import parameters_of, shapes_of, states_of
+from lhpost6_pin.effects.registry import LAWS, parameters_of, shapes_of, states_of
 from lhpost6_pin.effects.table import effect_table, state_names
 from lhpost6_pin.laws.contract import parameter_sizes, parameter_units
 from lhpost6_pin.laws.hydraulic import leak_flows, valve_flows
@@ -232,22 +231,32 @@ def test_one_straight_step_is_as_good_as_many(case: Case) -> None:
 
 
 @over(BY_PATH)
-def test_only_the_path_counts_not_the_speed(case: Case) -> None:
-    way, at, z = np.array([1.5e-3, -0.8e-3, 0.4e-3]), states_of(case.rows[-1]), case.z.copy()
+def test_a_slip_is_advanced_as_an_ode_solver_does_at_any_speed_and_in_any_pieces(case: Case) -> None:
+    """Slips of some yield displacements of any direction, one after the other, at constant and at growing speed."""
+    rng, at, z = np.random.default_rng(2), states_of(case.rows[-1]), case.z.copy()
+    reach = 2.0 * getattr(case.p, "yield_slip", getattr(case.p, "yield_turn", 0.0))
+    for k in range(16):
+        way, before, share = reach * rng.normal(size=3), z.copy(), rng.uniform()
 
-    def along(speed: Any) -> np.ndarray:
-        def right(t: float, z: np.ndarray) -> np.ndarray:
+        def right(t: float, z: np.ndarray, k: int = k, way: np.ndarray = way) -> np.ndarray:
             zd = np.zeros(len(z))
-            evaluate.state_rates(case.rows, np.zeros(3), speed(t) * way, case.spool, case.supply, z, zd)
+            speed = 3 * t**2 if k % 2 else 1.0
+            evaluate.state_rates(case.rows, np.zeros(3), speed * way, case.spool, case.supply, z, zd)
             zd[: case.pressures] = 0.0
             return zd
 
-        return solve_ivp(right, (0.0, 1.0), case.z, max_step=0.01, rtol=1e-12, atol=1e-12, method="DOP853").y[at, -1]
-
-    steady, uneven = along(lambda t: 1.0), along(lambda t: 3 * t**2)
-    evaluate.advance_states(case.rows, np.zeros(3), way, 0.1, case.spool, case.supply, z)
-    np.testing.assert_allclose(uneven, steady, atol=1e-8)  # the solver's error at the law's kinks
-    np.testing.assert_allclose(z[at], steady, atol=1e-8)
+        options = dict(max_step=0.01, rtol=1e-12, atol=1e-12, method="DOP853")
+        exact = solve_ivp(right, (0.0, 1.0), before, **options).y[at, -1]
+        pieces = before.copy()
+        evaluate.advance_states(case.rows, np.zeros(3), way, 0.1, case.spool, case.supply, z)
+        evaluate.advance_states(case.rows, np.zeros(3), share * way, 0.1, case.spool, case.supply, pieces)
+        evaluate.advance_states(case.rows, np.zeros(3), (1.0 - share) * way, 0.1, case.spool, case.supply, pieces)
+        z[: case.pressures] = case.z[: case.pressures]
+        np.testing.assert_allclose(z[at], exact, atol=1e-7)  # the solver's own error where the rate has kinks
+        np.testing.assert_allclose(pieces[at], z[at], atol=1e-10)  # a zero is found to rounding of the slip
+        assert all(
+            np.linalg.norm(part) < 1.0 + 1e-9 for part in np.split(z[at], 2 if z[at].size == 4 else 1)
+        )  # Z, and d
 
 
 @over(tuple(c for c in WITH_STATES if c.on is not SINGLE))  # a single chamber knows no sides and no weight

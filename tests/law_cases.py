@@ -271,14 +271,20 @@ _RANGES = {
     (0.0, 1e-3): "play",
     (2e2, 5e5): "closing",
     (0.0, 2e4): "friction",
-    (-1e-8, 0.0): "slope_a slope_b",
     (0.0, 1e-10): "across",
-    (1e9, 1e11): "rise_per_oil_a rise_per_oil_b",
     (-1e3, 1e3): "orifice.signed_root.x",
     (-1.5, 1.5): "first last",
 }
 RANGES = {name: ends for ends, names in _RANGES.items() for name in names.split()}
 """Ranges that arguments are drawn from, by name, or by module, function and name."""
+PAIRS = {
+    "chamber.pressure_rises.flow": (-0.5, 0.5),
+    "chamber.pressure_rises.area": (0.05, 0.6),
+    "slope": (-1e-8, 0.0),
+    "rise_per_oil": (1e9, 1e11),
+    "chambers": (-1e5, 22e6),
+}
+"""The same of what holds a value for each chamber."""
 
 
 def drawn(kernel: str, rng: np.random.Generator) -> list[Any]:
@@ -294,6 +300,11 @@ def drawn(kernel: str, rng: np.random.Generator) -> list[Any]:
     }
     found = []
     for name in takes(KERNELS[kernel]):
-        ends = RANGES.get(f"{kernel}.{name}") or RANGES.get(name)
-        found.append(special[name]() if name in special else rng.uniform(*ends))
+        whole = f"{kernel}.{name}"
+        if name in special:
+            found.append(special[name]())
+        elif ends := PAIRS.get(whole) or PAIRS.get(name):
+            found.append(tuple(rng.uniform(*ends, 2).tolist()))
+        else:
+            found.append(rng.uniform(*(RANGES.get(whole) or RANGES[name])))
     return found

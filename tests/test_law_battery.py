@@ -47,6 +47,8 @@ from lhpost6_pin.laws.supply import varies
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.energy import row_power
 
+pytestmark = pytest.mark.long
+
 
 def over(cases: tuple[Case, ...]) -> pytest.MarkDecorator:
     """Run a test on cases."""
@@ -161,13 +163,12 @@ def test_the_compiled_actuator_equals_its_python_original(case: Case) -> None:
     pressures = shared.supply_pressures(case.supply, case.z)
     np.testing.assert_array_equal(pressures, shared.supply_pressures.py_func(case.supply, case.z))
     one, other = case.z.copy(), case.z.copy()
-    advance = (case.spool, *pressures)
-    actuator.advance_modified(case.rows[0], s, 1e-3 * sd, 1e-3, *advance, one)
-    actuator.advance_actuator.py_func(plain[0], True, s, 1e-3 * sd, 1e-3, *advance, other)
+    actuator.advance_modified(case.rows[0], s, 1e-3 * sd, 1e-3, case.spool, pressures, one)
+    actuator.advance_actuator.py_func(plain[0], True, s, 1e-3 * sd, 1e-3, case.spool, pressures, other)
     np.testing.assert_allclose(one, other, rtol=1e-12)  # rounding
     one, other = np.zeros_like(one), np.zeros_like(one)
-    actuator.fill_rates(case.rows[0], s, sd, *advance, case.z, one)
-    actuator.fill_rates.py_func(plain[0], s, sd, *advance, case.z, other)
+    actuator.fill_rates(case.rows[0], s, sd, case.spool, *pressures, case.z, one)
+    actuator.fill_rates.py_func(plain[0], s, sd, case.spool, *pressures, case.z, other)
     np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-9)  # rounding of small differences of flows
     one, other = case.z.copy(), case.z.copy()
     if varies(case.supply):

@@ -18,6 +18,8 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
+pytestmark = pytest.mark.long
+
 MECHANICAL = {
     "stribeck_friction": (("H1", "V2"), {}),
     "asymmetric_friction": (("H1",), {}),

@@ -37,7 +37,7 @@ def advanced(p: hydraulic.Hydraulic, opened: float, pressures: tuple, at: float,
     """Pressures of an actuator of the report one step on; `opened` is its valve's opening."""
     spool = orifice.spool_for_opening(opened, p.flow_curve)
     valve = hydraulic.valve_flows(p, False, spool, *pressures, *SUPPLY)
-    return hydraulic.step_pressures(p, False, valve, *pressures, SUPPLY[1], at, stroke, dt)
+    return hydraulic.step_pressures(p, False, valve, pressures, SUPPLY[1], at, stroke, dt)
 
 
 # ---------------------------------------------------------------------------------------- orifices

@@ -28,6 +28,6 @@ def test_the_demonstration_finds_what_it_hides(lhpost6, tmp_path):
     assert after < 0.1 * before
     machine = load_machine()
     assert len(load_campaign(tmp_path / "measured", machine).records) == 3
-    assert f"{family}_{component}" in {e.name for e in load_machine(str(tmp_path / "model.toml")).alterations}
+    assert f"{family}_{component}" in {e.name for e in load_machine(str(tmp_path / "model.toml")).modifiers}
     for page in ("report.html", "view.html"):
         assert (tmp_path / page).read_text().startswith("<!DOCTYPE html>")

@@ -112,5 +112,5 @@ def test_7_a_hidden_effect_is_found(tmp_path):
     assert effect["family"] == "bearing_thrust_direction"
     low, high = effect["parameters"]["share"]["ci90"]
     assert low < 1.0 < high  # the typical size is what is hidden
-    (added,) = load_machine(tmp_path / "model.toml").alterations
+    (added,) = load_machine(tmp_path / "model.toml").modifiers
     assert added.name.startswith("bearing_thrust_direction")

@@ -3,8 +3,8 @@
 import numpy as np
 import xarray as xr
 
-from lhpost6_pin.data.alignment import gas_pressure
 from lhpost6_pin.data.records import make_record
+from lhpost6_pin.mechanics.gas_pressure import strut_pressures
 from lhpost6_pin.mechanics.plant import Plant
 from lhpost6_pin.mechanics.pose import PlatenMotion, leg_displacements
 
@@ -43,7 +43,7 @@ def measured(plant: Plant, seed: int = 0, duration: float = 20.0) -> tuple[xr.Da
         "actuator_force": force,
         "chamber_pressure_a": a,
         "chamber_pressure_b": b,
-        "strut_pressure": gas_pressure(machine, legs[:, count:]),
+        "strut_pressure": strut_pressures(machine, legs[:, count:]),
         "supply_pressure": np.full(len(t), machine.hydraulics.supply_pressure),
         "spool_command": command,
         "spool_position": late,

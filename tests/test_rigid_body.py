@@ -25,11 +25,10 @@ from lhpost6_pin.machine.port_names import PLATEN_PORTS
 from lhpost6_pin.mechanics import kinematics as kin
 from lhpost6_pin.mechanics.forward_dynamics import platen_acceleration
 from lhpost6_pin.mechanics.plant import make_plant
-from lhpost6_pin.mechanics.platen_steps import integrate_platen, platen_difference
+from lhpost6_pin.mechanics.required_wrench import refuse_joints
 from lhpost6_pin.mechanics.rigid_body import lumped_inertia, make_model, platen_inertia
 from lhpost6_pin.mechanics.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
 from lhpost6_pin.mechanics.workspace import make_workspace
-from lhpost6_pin.simulation.engine_fused import refuse_joints
 
 BOB, ARM, BOB_INERTIA, POST = 500.0, 2.0, 25.0, 200.0  # of pendulum.urdf: kg, m, kg m2 about Y, kg
 G = 9.80665
@@ -149,68 +148,9 @@ def test_fused_forward_dynamics_take_a_rigid_specimen_anywhere_on_the_platen():
         assert np.allclose(a, pin.aba(plant.model, data, q, v, ws.motion[TAU]), rtol=1e-12, atol=1e-11)
 
 
-@pytest.mark.parametrize("turn", [0.0, 1e-9, 1e-4, 9.9e-3, 1.01e-2, 0.3, 2.0])  # series below 0.01 rad, sines above
-def test_fused_pose_step_is_pinocchios(turn):
-    plant = plant_named("lhpost6")
-    rng = np.random.default_rng(7)
-    for _, q, _, _ in random_states(plant, 8):
-        axis = rng.standard_normal(3)
-        dq = np.concatenate([rng.uniform(-0.1, 0.1, 3), turn * axis / np.linalg.norm(axis)])
-        out = np.zeros(7)
-        integrate_platen(q, dq, plant.axes, out)
-        wanted = pin.integrate(plant.model, q, dq)
-        assert np.allclose(out[:3], wanted[:3], rtol=0.0, atol=2e-15)
-        same_sign = np.sign(out[3:] @ wanted[3:])  # q and -q are one rotation
-        assert np.allclose(out[3:], same_sign * wanted[3:], rtol=0.0, atol=2e-15)
-        assert np.linalg.norm(out[3:]) == pytest.approx(1.0, abs=1e-15)
-
-
-@pytest.mark.parametrize("turn", [0.0, 1e-9, 1e-4, 1.9e-2, 2.1e-2, 0.3, 2.0])  # series below a sine of 0.01
-def test_difference_of_poses_undoes_a_pose_step_and_is_pinocchios(turn):
-    plant = plant_named("lhpost6")
-    rng = np.random.default_rng(8)
-    for _, q, _, _ in random_states(plant, 8):
-        axis = rng.standard_normal(3)
-        dq = np.concatenate([rng.uniform(-0.1, 0.1, 3), turn * axis / np.linalg.norm(axis)])
-        after, out = np.zeros(7), np.zeros(6)
-        integrate_platen(q, dq, plant.axes, after)
-        platen_difference(q, after, plant.axes, out)
-        assert np.allclose(out, dq, rtol=0.0, atol=4e-15)  # rounding of positions and quaternions of order one
-        pinocchios = pin.difference(plant.model, q, after)
-        assert np.allclose(out, pinocchios, rtol=0.0, atol=1e-8)  # its logarithm is off by 3e-9 (4.1.0)
-        after[3:] *= -1.0  # the other quaternion of the same pose
-        platen_difference(q, after, plant.axes, out)
-        assert np.allclose(out, dq, rtol=0.0, atol=4e-15)
-
-
-def test_fused_pose_step_may_write_over_its_input():
-    plant = plant_named("lhpost6")
-    _, q, v, _ = list(random_states(plant, 4))[-1]
-    out = np.zeros(7)
-    integrate_platen(q, 1e-3 * v, plant.axes, out)
-    integrate_platen(q, 1e-3 * v, plant.axes, q)
-    assert np.array_equal(out, q)
-
-
-def test_fused_quaternion_stays_unit_however_many_steps_are_taken():
-    plant = plant_named("lhpost6")
-    q = plant.zero_state().q.copy()
-    dq = np.array([0.0, 0.0, 0.0, 1e-4, -2e-4, 3e-4])
-    for _ in range(20000):
-        integrate_platen(q, dq, plant.axes, q)
-    # each step's rounding is corrected by the next: no growth with their number
-    assert np.linalg.norm(q[3:]) == pytest.approx(1.0, abs=5e-16)
-
-
-def test_guided_platen_moves_along_its_guide_only():
+def test_a_guided_platen_has_one_coordinate_and_the_mass_along_its_guide():
     plant = make_plant(machine_named("uniaxial").with_params(platen__mass=[4.5e3, 4e3, 5e3]))
-    out = np.zeros(1)
-    integrate_platen(np.array([0.2]), np.array([0.05]), plant.axes, out)
-    assert out[0] == 0.25
-    platen_difference(np.array([0.2]), np.array([0.25]), plant.axes, out)
-    assert out[0] == pytest.approx(0.05, abs=1e-16)
     assert plant.model.nq == plant.model.nv == 1
-    # its mass is the one along the guide
     assert pin.crba(plant.model, plant.model.createData(), np.zeros(1))[0, 0] == plant.machine.platen.mass[0]
 
 

@@ -18,6 +18,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from ..machine.machine import Machine
+from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.pose import leg_displacements
 from .channels import LAYOUT, sensor_groups
@@ -29,9 +30,7 @@ __all__ = [
     "align_record",
     "combine_delays",
     "due_spools",
-    "gas_pressure",
     "group_delays",
-    "hydraulic_force",
     "oil_force",
     "phase_delay",
     "slow_delay",
@@ -180,7 +179,7 @@ def due_spools(plant: Plant, command: Array, dt: float) -> Array:
     return lag(late, plant.lags, dt) if plant.lags.any() else late
 
 
-def hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
+def _hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
     """P_A A_1 - P_B A_2 (n, actuators) of the measured chamber pressures [N]; NaN where one is missing."""
     a = record["chamber_pressure_a"].sel(actuator=list(machine.actuator_names)).values
     if "chamber_pressure_b" in record:
@@ -196,14 +195,6 @@ def oil_force(machine: Machine, pressure_a: Array, pressure_b: Array) -> Array:
     double = [a.area_b is not None for a in machine.actuators]
     force[:, double] -= pressure_b * np.array([a.area_b for a in machine.actuators if a.area_b is not None])
     return np.asarray(force, np.float64)
-
-
-def gas_pressure(machine: Machine, elongation: Array) -> Array:
-    """Nitrogen pressure (n, struts) at elongations (n, struts) [m] of the struts: P_0 (1 + dL / L_c0)^-n (Eq. 4-8)."""
-    struts = machine.struts
-    pressure, length = np.array([s.pressure for s in struts]), np.array([s.gas_length for s in struts])
-    index = np.array([s.polytropic_index for s in struts])
-    return pressure * (1 + elongation / length) ** -index
 
 
 def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, str, Array, Array]]:
@@ -225,9 +216,9 @@ def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, s
             measured = differentiate(record["actuator_displacement"].values, dt)
             yield "actuator_displacement", base, measured, differentiate(legs[:, :count], dt)
         if "strut_pressure" in record:
-            gas = gas_pressure(plant.machine, legs[:, count:])
+            gas = strut_pressures(plant.machine, legs[:, count:])
             yield "strut_pressure", base, record["strut_pressure"].values, gas
     if {"actuator_force", "chamber_pressure_a"} <= set(record.data_vars):
-        force = hydraulic_force(plant.machine, record)
+        force = _hydraulic_force(plant.machine, record)
         whole = np.isfinite(force).all(axis=0)
         yield "chamber_pressure", "actuator_force", force[:, whole], record["actuator_force"].values[:, whole]

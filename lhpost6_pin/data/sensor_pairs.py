@@ -12,9 +12,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from ..core.names import AXES
+from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.pose import forward_kinematics, leg_displacements
-from .alignment import due_spools, gas_pressure
+from .alignment import due_spools
 from .channels import LAYOUT, channel_name
 from .conditioning import resolution
 from .fusion import kinematic_jacobian
@@ -283,7 +284,7 @@ def _struts(view: _View) -> Iterator[SensorComparison]:
         return
     elongation = leg_displacements(plant, view.values("platen_displacement"))[0][:, plant.spools :]
     level = np.array([s.pressure for s in machine.struts])
-    due = gas_pressure(machine, elongation) - level
+    due = strut_pressures(machine, elongation) - level
     measured, (swing, rate) = view.signal(view.values("strut_pressure")), view.signals(due, 0, 1)
     variance = view.variance("strut_pressure")
     (gain_p, offset_p, delay_p), (gain_x, _, delay_x) = map(view.sd, ("strut_pressure", "platen_displacement"))

@@ -16,16 +16,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.alignment import due_spools, gas_pressure
+from ..data.alignment import due_spools
 from ..effects.registry import PORTS, actuator_rows, law_of, shapes_of, states_of
-from ..mechanics.gas_pressure import gas_ratio
+from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import plant_motion
+from ..mechanics.required_wrench import require_alike, required_wrench
 from .inverse_dynamics import march_states, with_loads
 from .oil_residuals import MeasuredOil, oil_misses
 from .prepare import MeasuredTest, actuator_forces, oil_forces
-from .wrench_residuals import required_wrench, weigh_alike, wrench_residual
+from .wrench_residuals import wrench_residual
 
 __all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow"]
 
@@ -77,7 +78,7 @@ def follow(
         required = required_wrench(plant, moved, ports.turn)
     else:
         ports, along, required, old = known[1]
-        if not weigh_alike(known[0], plant):
+        if not require_alike(known[0], plant):
             required = required_wrench(plant, plant_motion(plant, test.motion), ports.turn)
         if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
             return Path(ports, along, required, old)
@@ -144,7 +145,7 @@ def evaluate_residuals(
     gas = np.zeros((n, 0))
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
-        gas = np.log(measured["strut_pressure"] / gas_pressure(machine, length) / gas_ratio(plant, path.z))
+        gas = np.log(measured["strut_pressure"] / strut_pressures(machine, length) / gas_ratio(plant, path.z))
     by_cell, servo = np.zeros((n, 0)), np.zeros((n, 0))
     oil = oil_forces(machine, measured)
     if "force" in only and oil is not None and "actuator_force" in measured:

@@ -5,9 +5,11 @@ from numpy.typing import NDArray
 
 from ..effects.gas import log_ratio
 from ..effects.registry import law_of
+from ..laws.nitrogen_strut import gas_pressure
+from ..machine.machine import Machine
 from .plant import Plant
 
-__all__ = ["gas_ratio"]
+__all__ = ["gas_ratio", "strut_pressures"]
 
 Array = NDArray[np.float64]
 
@@ -22,3 +24,10 @@ def gas_ratio(plant: Plant, z: Array) -> Array:
         if law_of(row).acts_on_gas:
             ratio[:, row["port"] - plant.spools] += np.expm1(log_ratio(row, z))
     return ratio
+
+
+def strut_pressures(machine: Machine, elongation: Array) -> Array:
+    """Nitrogen pressures (n, n_struts) [Pa] at elongations (n, n_struts) [m]: P_0 (1 + dL / L_c0)^-n (Eq. 4-7)."""
+    numbers = np.array([(s.pressure, s.gas_length, s.polytropic_index) for s in machine.struts]).reshape(-1, 3)
+    law = gas_pressure.py_func  # type: ignore[attr-defined]  # the scalar law as plain Python takes whole columns
+    return np.asarray(law(elongation, *numbers.T), np.float64)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..core.compiled import compiled
 from ..core.errors import RecordError
 from .plant import Plant
-from .platen_steps import platen_difference
 from .pose import PlantMotion
 from .schemes import DS, SD, S, port_rates, pose_stage, set_twist
+from .spatial import difference
 from .workspace import make_workspace
 
 __all__ = ["PortPath", "ports_along"]
@@ -54,7 +54,7 @@ def _ports_along(q, v, tables, ws, path):
     step = np.zeros(axes.size)
     for k in range(q.shape[0]):
         if k > 0:
-            platen_difference(q[k - 1], q[k], axes, step)
+            difference(q[k - 1], q[k], axes, step)
             set_twist(step, axes, frame)
             port_rates(J, frame, port[DS])
         status = pose_stage(q[k], tables, ws)

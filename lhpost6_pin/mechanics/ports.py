@@ -20,6 +20,7 @@ from ..core.compiled import compiled, compiled_inline
 from ..effects.modifiers import thrust_shares
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS
+from .spatial import from_body, matrix_to_rpy, quaternion_to_matrix, to_body
 
 __all__ = [
     "BODY",
@@ -106,16 +107,7 @@ def platen_pose(q, axes, body, frame):
     its displacement [m] along axes[0], and does not turn.
     """
     if axes.size == 6:
-        x, y, z, w = q[3], q[4], q[5], q[6]
-        frame[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-        frame[0, 1] = 2.0 * (x * y - z * w)
-        frame[0, 2] = 2.0 * (x * z + y * w)
-        frame[1, 0] = 2.0 * (x * y + z * w)
-        frame[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-        frame[1, 2] = 2.0 * (y * z - x * w)
-        frame[2, 0] = 2.0 * (x * z - y * w)
-        frame[2, 1] = 2.0 * (y * z + x * w)
-        frame[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+        quaternion_to_matrix(q[3], q[4], q[5], q[6], frame)
         for k in range(3):
             frame[3, k] = q[k]
     else:
@@ -154,9 +146,10 @@ def _swivel_ports(frame, legs, s, J, B):
         if k < 0:
             continue
         px, py, pz = leg.rho[0], leg.rho[1], leg.rho[2]
-        dx = frame[3, 0] + frame[0, 0] * px + frame[0, 1] * py + frame[0, 2] * pz - leg.base_point[0]
-        dy = frame[3, 1] + frame[1, 0] * px + frame[1, 1] * py + frame[1, 2] * pz - leg.base_point[1]
-        dz = frame[3, 2] + frame[2, 0] * px + frame[2, 1] * py + frame[2, 2] * pz - leg.base_point[2]
+        gx, gy, gz = from_body(frame, leg.rho)
+        dx = frame[3, 0] + gx - leg.base_point[0]
+        dy = frame[3, 1] + gy - leg.base_point[1]
+        dz = frame[3, 2] + gz - leg.base_point[2]
         level = math.sqrt(dx * dx + dy * dy)
         length = math.sqrt(level * level + dz * dz)
         s[k] = -math.atan2(dz, level)
@@ -168,24 +161,16 @@ def _swivel_ports(frame, legs, s, J, B):
             # e . (u x v) / L = (e x u) . v / L, and e_1 x u = -e_2, e_2 x u = e_1
             ex, ey, ez = (e1x, e1y, 0.0) if n == 0 else (e2x, e2y, e2z)
             fx, fy, fz = (-e2x, -e2y, -e2z) if n == 0 else (e1x, e1y, 0.0)
-            fx, fy, fz = fx / length, fy / length, fz / length
-            _row(
-                J,
-                k + n,
-                frame[0, 0] * fx + frame[1, 0] * fy + frame[2, 0] * fz,
-                frame[0, 1] * fx + frame[1, 1] * fy + frame[2, 1] * fz,
-                frame[0, 2] * fx + frame[1, 2] * fy + frame[2, 2] * fz,
-                px,
-                py,
-                pz,
-            )
+            fx, fy, fz = to_body(frame, (fx / length, fy / length, fz / length))
+            _row(J, k + n, fx, fy, fz, px, py, pz)
+            turn_x, turn_y, turn_z = to_body(frame, (ex, ey, ez))
             for j in range(6):
                 J[k + 2 + n, j] = -J[k + n, j]
-            for j in range(3):
-                J[k + 2 + n, 3 + j] += frame[0, j] * ex + frame[1, j] * ey + frame[2, j] * ez
-        for j in range(3):
-            J[k + 4, j] = 0.0
-            J[k + 4, 3 + j] = (frame[0, j] * dx + frame[1, j] * dy + frame[2, j] * dz) / length
+            J[k + 2 + n, 3] += turn_x
+            J[k + 2 + n, 4] += turn_y
+            J[k + 2 + n, 5] += turn_z
+        J[k + 4, 0] = J[k + 4, 1] = J[k + 4, 2] = 0.0
+        J[k + 4, 3], J[k + 4, 4], J[k + 4, 5] = to_body(frame, (dx / length, dy / length, dz / length))
         for n in range(k, k + 5):
             for j in range(6):
                 B[n, j] = J[n, j]
@@ -294,8 +279,6 @@ def evaluate_ports(frame, legs, body, s, J, B):
     for k in range(first, first + 6):
         for j in range(6):
             J[k, j] = B[k, j]
-    s[first + 3] = math.atan2(r21, r22)
-    s[first + 4] = -math.asin(min(1.0, max(-1.0, r20)))
-    s[first + 5] = math.atan2(r10, r00)
+    s[first + 3], s[first + 4], s[first + 5] = matrix_to_rpy(frame)
     if s.size > first + 6:
         _swivel_ports(frame, legs, s, J, B)

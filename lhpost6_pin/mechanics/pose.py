@@ -13,7 +13,19 @@ from numpy.typing import NDArray
 from ..core.compiled import compiled, compiled_inline
 from ..core.errors import RecordError
 from .plant import Plant
-from .ports import evaluate_ports
+from .ports import evaluate_ports, platen_pose
+from .spatial import (
+    cross,
+    from_body,
+    matrix_to_rpy,
+    rpy_acceleration,
+    rpy_rate,
+    rpy_to_matrix,
+    rpy_to_quaternion,
+    to_body,
+    turning,
+    turning_rate,
+)
 
 __all__ = [
     "PlantMotion",
@@ -45,129 +57,95 @@ class PlantMotion(NamedTuple):
 
 
 def rotation(euler: Array) -> Array:
-    """Rotation matrices s_R_b (..., 3, 3) of Euler angles (..., 3) alpha, beta, gamma [rad] (Eq. 3-5)."""
-    euler = np.asarray(euler, float)
-    ca, cb, cg = np.moveaxis(np.cos(euler), -1, 0)
-    sa, sb, sg = np.moveaxis(np.sin(euler), -1, 0)
-    out = np.empty((*euler.shape[:-1], 3, 3))
-    out[..., 0, 0], out[..., 0, 1], out[..., 0, 2] = cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa
-    out[..., 1, 0], out[..., 1, 1], out[..., 1, 2] = sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa
-    out[..., 2, 0], out[..., 2, 1], out[..., 2, 2] = -sb, cb * sa, cb * ca
+    """Rotation matrices s_R_b (n, 3, 3) of Euler angles (n, 3) alpha, beta, gamma [rad] (Eq. 3-5)."""
+    out = np.zeros((len(euler), 3, 3))
+    _rotations(np.ascontiguousarray(euler, float), out)
     return out
 
 
-def _euler_map(euler: Array) -> Array:
-    """Matrix b_J_E (..., 3, 3) from Euler angle rates to the angular velocity in platen axes (Eq. 3-11)."""
-    out = np.zeros((*euler.shape[:-1], 3, 3))
-    ca, sa = np.cos(euler[..., 0]), np.sin(euler[..., 0])
-    cb, sb = np.cos(euler[..., 1]), np.sin(euler[..., 1])
-    out[..., 0, 0], out[..., 0, 2] = 1.0, -sb
-    out[..., 1, 1], out[..., 1, 2] = ca, cb * sa
-    out[..., 2, 1], out[..., 2, 2] = -sa, cb * ca
-    return out
-
-
-def _euler_map_rate(euler: Array, rates: Array) -> Array:
-    """Time derivative of `_euler_map`."""
-    out = np.zeros((*euler.shape[:-1], 3, 3))
-    ca, sa = np.cos(euler[..., 0]), np.sin(euler[..., 0])
-    cb, sb = np.cos(euler[..., 1]), np.sin(euler[..., 1])
-    da, db = rates[..., 0], rates[..., 1]
-    out[..., 0, 2] = -cb * db
-    out[..., 1, 1], out[..., 1, 2] = -sa * da, cb * ca * da - sb * sa * db
-    out[..., 2, 1], out[..., 2, 2] = -ca * da, -cb * sa * da - sb * ca * db
-    return out
-
-
-def _turn(matrix: Array, vector: Array) -> Array:
-    return np.einsum("...ij,...j->...i", matrix, vector)
+@compiled
+def _rotations(euler, out):
+    for k in range(len(out)):
+        rpy_to_matrix(euler[k], out[k])
 
 
 def platen_motion(plant: Plant, q: Array, v: Array, a: Array) -> PlatenMotion:
     """Motion of C and Euler angles, each (n, 6), from a plant's q (n, nq), v (n, nv), a (n, nv) (Eqs. 3-11, 3-18)."""
-    n = len(q)
-    if plant.axes.size != 6:
-        motion = [np.zeros((n, 6)) for _ in range(3)]
-        for out, column in zip(motion, (q, v, a), strict=True):
-            out[:, plant.axes[0]] = column[:, 0]
-        return PlatenMotion(*motion)
-    x, y, z, w = q[:, 3:7].T
-    r = np.empty((n, 3, 3))
-    r[:, 0, 0], r[:, 0, 1], r[:, 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
-    r[:, 1, 0], r[:, 1, 1], r[:, 1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-    r[:, 2, 0], r[:, 2, 1], r[:, 2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-    euler = np.stack(
-        [
-            np.arctan2(r[:, 2, 1], r[:, 2, 2]),
-            -np.arcsin(np.clip(r[:, 2, 0], -1, 1)),
-            np.arctan2(r[:, 1, 0], r[:, 0, 0]),
-        ],
-        axis=1,
-    )
-    rho = plant.body[0]["rho_c"]
-    linear, omega = v[:, :3], v[:, 3:6]
-    euler_map = _euler_map(euler)
-    rates = np.asarray(np.linalg.solve(euler_map, omega[..., None])[..., 0], np.float64)
-    turning = a[:, 3:6] - _turn(_euler_map_rate(euler, rates), rates)
-    seconds = np.linalg.solve(euler_map, turning[..., None])[..., 0]
-    velocity_c = linear + np.cross(omega, rho)
-    acceleration_c = a[:, :3] + np.cross(a[:, 3:6], rho) + np.cross(omega, velocity_c)
-    return PlatenMotion(
-        np.hstack([q[:, :3] + r @ rho, euler]),
-        np.hstack([_turn(r, velocity_c), rates]),
-        np.hstack([_turn(r, acceleration_c), seconds]),
-    )
+    motion = PlatenMotion(*np.zeros((3, len(q), 6)))
+    moved = PlantMotion(*(np.ascontiguousarray(x, float) for x in (q, v, a)))
+    _platen_motion(moved, plant.axes, plant.body, motion)
+    return motion
+
+
+@compiled
+def _platen_motion(moved, axes, body, motion):
+    q, v, a = moved
+    displacement, velocity, acceleration = motion
+    frame = np.zeros((8, 3))
+    for k in range(len(q)):
+        if axes.size != 6:
+            displacement[k, axes[0]], velocity[k, axes[0]] = q[k, 0], v[k, 0]
+        else:
+            rho, linear, omega = body[0].rho_c, v[k], v[k, 3:6]
+            platen_pose(q[k], axes, body, frame)
+            displacement[k, :3] = frame[3]
+            _add(from_body(frame, rho), displacement[k])
+            _set(matrix_to_rpy(frame), displacement[k, 3:])
+            tx, ty, tz = cross(omega, rho)
+            _set(from_body(frame, (linear[0] + tx, linear[1] + ty, linear[2] + tz)), velocity[k])
+            _set(rpy_rate(frame, omega), velocity[k, 3:])
+        pose_acceleration(frame, body, axes, v[k], a[k], acceleration[k])
+
+
+@compiled_inline
+def _set(x, out):
+    out[0], out[1], out[2] = x[0], x[1], x[2]
+
+
+@compiled_inline
+def _add(x, out):
+    out[0] += x[0]
+    out[1] += x[1]
+    out[2] += x[2]
 
 
 def plant_motion(plant: Plant, motion: PlatenMotion) -> PlantMotion:
     """Inverse of `platen_motion`: q, v, a of the platen joint from the motion of C and Euler angles."""
     if plant.axes.size != 6:
         return PlantMotion(*(m[:, plant.axes] for m in motion))
-    euler, rates, seconds = (m[:, 3:] for m in motion)
-    r = rotation(euler)
-    rho = plant.body[0]["rho_c"]
-    euler_map = _euler_map(euler)
-    omega = _turn(euler_map, rates)
-    alpha = _turn(euler_map, seconds) + _turn(_euler_map_rate(euler, rates), rates)
-    back = np.swapaxes(r, 1, 2)
-    velocity_c = _turn(back, motion.velocity[:, :3])
-    linear = velocity_c - np.cross(omega, rho)
-    rise = _turn(back, motion.acceleration[:, :3]) - np.cross(omega, velocity_c) - np.cross(alpha, rho)
-    return PlantMotion(
-        np.hstack([motion.displacement[:, :3] - r @ rho, _quaternion(euler)]),
-        np.hstack([linear, omega]),
-        np.hstack([rise, alpha]),
-    )
+    n = len(motion.displacement)
+    found = PlantMotion(np.zeros((n, 7)), np.zeros((n, 6)), np.zeros((n, 6)))
+    _plant_motion(PlatenMotion(*(np.ascontiguousarray(x, float) for x in motion)), plant.body, found)
+    return found
 
 
-def _quaternion(euler: Array) -> Array:
-    """Unit quaternions (n, 4) as x, y, z, w of Euler angles (n, 3)."""
-    ca, cb, cg = np.cos(0.5 * euler).T
-    sa, sb, sg = np.sin(0.5 * euler).T
-    return np.stack(
-        [
-            sa * cb * cg - ca * sb * sg,
-            ca * sb * cg + sa * cb * sg,
-            ca * cb * sg - sa * sb * cg,
-            ca * cb * cg + sa * sb * sg,
-        ],
-        axis=1,
-    )
+@compiled
+def _plant_motion(motion, body, found):
+    displacement, velocity, acceleration = motion
+    q, v, a = found
+    frame, rho = np.zeros((8, 3)), body[0].rho_c
+    for k in range(len(q)):
+        euler, rates = displacement[k, 3:], velocity[k, 3:]
+        frame_of_pose(displacement[k], body, frame)
+        q[k, :3] = frame[3]
+        q[k, 3], q[k, 4], q[k, 5], q[k, 6] = rpy_to_quaternion(euler)
+        omega, alpha = turning(euler, rates), turning_rate(euler, rates, acceleration[k, 3:])
+        of_c = to_body(frame, velocity[k])
+        rise, bend = to_body(frame, acceleration[k]), cross(omega, of_c)
+        tx, ty, tz = cross(omega, rho)
+        ax, ay, az = cross(alpha, rho)
+        _set((of_c[0] - tx, of_c[1] - ty, of_c[2] - tz), v[k])
+        _set(omega, v[k, 3:])
+        _set((rise[0] - bend[0] - ax, rise[1] - bend[1] - ay, rise[2] - bend[2] - az), a[k])
+        _set(alpha, a[k, 3:])
 
 
 @compiled
 def frame_of_pose(pose, body, frame):
     """Rows 0 to 3 of frame from pose (6,): displacement of C and Euler angles (Eqs. 3-5, 3-12)."""
-    ca, cb, cg = np.cos(pose[3]), np.cos(pose[4]), np.cos(pose[5])
-    sa, sb, sg = np.sin(pose[3]), np.sin(pose[4]), np.sin(pose[5])
-    frame[0, 0], frame[0, 1], frame[0, 2] = cg * cb, cg * sb * sa - sg * ca, cg * sb * ca + sg * sa
-    frame[1, 0], frame[1, 1], frame[1, 2] = sg * cb, sg * sb * sa + cg * ca, sg * sb * ca - cg * sa
-    frame[2, 0], frame[2, 1], frame[2, 2] = -sb, cb * sa, cb * ca
-    for k in range(3):
-        lever = 0.0
-        for j in range(3):
-            lever += frame[k, j] * body[0].rho_c[j]
-        frame[3, k] = pose[k] - lever
+    rpy_to_matrix(pose[3:], frame)
+    lever = from_body(frame, body[0].rho_c)
+    frame[3, 0], frame[3, 1], frame[3, 2] = pose[0] - lever[0], pose[1] - lever[1], pose[2] - lever[2]
 
 
 @compiled
@@ -176,12 +154,10 @@ def pose_jacobian(pose, body, frame, J, out):
     ca, sa, cb, sb = np.cos(pose[3]), np.sin(pose[3]), np.cos(pose[4]), np.sin(pose[4])
     rho = body[0].rho_c
     for i in range(out.shape[0]):
-        for k in range(3):
-            out[i, k] = J[i, 0] * frame[k, 0] + J[i, 1] * frame[k, 1] + J[i, 2] * frame[k, 2]
+        _set(from_body(frame, J[i]), out[i])
         # a turn about B moves C: v_B = v_C - omega x rho, so omega sees moment - rho x force
-        mx = J[i, 3] - (rho[1] * J[i, 2] - rho[2] * J[i, 1])
-        my = J[i, 4] - (rho[2] * J[i, 0] - rho[0] * J[i, 2])
-        mz = J[i, 5] - (rho[0] * J[i, 1] - rho[1] * J[i, 0])
+        tx, ty, tz = cross(rho, J[i])
+        mx, my, mz = J[i, 3] - tx, J[i, 4] - ty, J[i, 5] - tz
         out[i, 3] = mx
         out[i, 4] = ca * my - sa * mz
         out[i, 5] = -sb * mx + cb * sa * my + cb * ca * mz
@@ -206,29 +182,12 @@ def pose_acceleration(frame, body, axes, v, a, out):
         out[:] = 0.0
         out[axes[0]] = a[0]
         return
-    rho = body[0].rho_c
-    wx, wy, wz = v[3], v[4], v[5]
-    cx = v[0] + wy * rho[2] - wz * rho[1]
-    cy = v[1] + wz * rho[0] - wx * rho[2]
-    cz = v[2] + wx * rho[1] - wy * rho[0]
-    ax = a[0] + a[4] * rho[2] - a[5] * rho[1] + wy * cz - wz * cy
-    ay = a[1] + a[5] * rho[0] - a[3] * rho[2] + wz * cx - wx * cz
-    az = a[2] + a[3] * rho[1] - a[4] * rho[0] + wx * cy - wy * cx
-    for k in range(3):
-        out[k] = frame[k, 0] * ax + frame[k, 1] * ay + frame[k, 2] * az
-    sb = -frame[2, 0]
-    cb = np.sqrt(1.0 - sb * sb)
-    sa, ca = frame[2, 1] / cb, frame[2, 2] / cb
-    dg = (sa * wy + ca * wz) / cb
-    db = ca * wy - sa * wz
-    da = wx + sb * dg
-    # alpha - (d b_J_E/dt) rates, then b_J_E solved for the second derivatives
-    tx = a[3] + cb * db * dg
-    ty = a[4] + sa * da * db - (cb * ca * da - sb * sa * db) * dg
-    tz = a[5] + ca * da * db + (cb * sa * da + sb * ca * db) * dg
-    out[5] = (sa * ty + ca * tz) / cb
-    out[4] = ca * ty - sa * tz
-    out[3] = tx + sb * out[5]
+    rho, omega, alpha = body[0].rho_c, v[3:6], a[3:6]
+    tx, ty, tz = cross(omega, rho)
+    bx, by, bz = cross(omega, (v[0] + tx, v[1] + ty, v[2] + tz))
+    rx, ry, rz = cross(alpha, rho)
+    _set(from_body(frame, (a[0] + rx + bx, a[1] + ry + by, a[2] + rz + bz)), out)
+    _set(rpy_acceleration(frame, rpy_rate(frame, omega), alpha), out[3:])
 
 
 @compiled

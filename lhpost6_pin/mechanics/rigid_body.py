@@ -70,18 +70,11 @@ def _with_added(inertia: Any, machine: Machine) -> Any:
         if machine.motion != "free":  # what turns has no part
             inertia = pin.Inertia(total, inertia.lever, inertia.inertia)
             continue
-        lever = (inertia.mass * inertia.lever + np.array([more.first_x, more.first_y, more.first_z])) / total
-        about_b = inertia.matrix()[3:, 3:] + np.array(
-            [
-                [more.second_xx, more.second_xy, more.second_xz],
-                [more.second_xy, more.second_yy, more.second_yz],
-                [more.second_xz, more.second_yz, more.second_zz],
-            ]
-        )
-        about_middle = about_b + total * pin.skew(lever) @ pin.skew(lever)
-        if np.linalg.eigvalsh(about_middle)[0] <= 0.0:
+        first, second = (more.first_x, more.first_y, more.first_z), (more.second_xx, more.second_xy, more.second_yy)
+        added = [more.mass, *first, *second, more.second_xz, more.second_yz, more.second_zz]
+        inertia = pin.Inertia.FromDynamicParameters(inertia.toDynamicParameters() + added)
+        if np.linalg.eigvalsh(inertia.inertia)[0] <= 0.0:
             raise ParameterError(f"{name}: its moments and products leave the platen no inertia")
-        inertia = pin.Inertia(total, lever, about_middle)
     return inertia
 
 

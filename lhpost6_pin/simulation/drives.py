@@ -11,8 +11,8 @@ from ..core.errors import SimulationError, UnknownNameError
 from ..core.names import ENGINES
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant, State
+from ..mechanics.required_wrench import refuse_joints
 from ..mechanics.schemes import steps_a_sample
-from .engine_fused import refuse_joints
 
 __all__ = ["ClosedLoop", "Drive", "OpenLoop", "PluggedLoop", "check_drive", "check_options", "check_run"]
 

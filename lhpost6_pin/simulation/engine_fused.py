@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 
 from ..control.loop import control_sample
 from ..core.compiled import compiled
-from ..core.errors import SimulationError
 from ..mechanics.forward_dynamics import platen_acceleration
-from ..mechanics.plant import Plant
-from ..mechanics.platen_steps import integrate_platen
 from ..mechanics.schemes import (
     DQ,
     TAU,
@@ -27,8 +24,9 @@ from ..mechanics.schemes import (
     rates_stage,
     staggered_stage,
 )
+from ..mechanics.spatial import integrate
 
-__all__ = ["Log", "Signals", "Span", "refuse_joints", "run_fused"]
+__all__ = ["Log", "Signals", "Span", "run_fused"]
 
 Array = NDArray[np.float64]
 
@@ -64,15 +62,6 @@ class Log(NamedTuple):
     spool: Array  # (n, n_actuators) mean over the sample
 
 
-def refuse_joints(plant: Plant) -> None:
-    """Raise SimulationError for a specimen with free joints."""
-    if plant.articulated:
-        raise SimulationError(
-            "the fused engine takes a platen with a rigid specimen at most; take the engine pinocchio for free joints "
-            "(--engine pinocchio), or lock them (--locked)"
-        )
-
-
 @compiled
 def _accelerate(tables, ws, a):
     """Fill a (n_axes,) from the torque, pose and twist in ws."""
@@ -88,7 +77,7 @@ def _euler_step(dt, tables, ws, spool):
         return status
     _accelerate(tables, ws, motion[A])
     motion[DQ] = dt * motion[V]
-    integrate_platen(q, motion[DQ], tables.axes, q)
+    integrate(q, motion[DQ], tables.axes, q)
     for k in range(motion.shape[1]):
         motion[V, k] += dt * motion[A, k]
     for k in range(z.size):
@@ -110,7 +99,7 @@ def _rk4_step(dt, tables, ws, spool):
         if stage > 0:
             for k in range(n):
                 motion[DQ, k] = reach * dt * step[k]
-            integrate_platen(q, motion[DQ], axes, q_at)
+            integrate(q, motion[DQ], axes, q_at)
             for k in range(z.size):
                 z_at[k] = z0[k] + reach * dt * zd[k]
         else:
@@ -133,7 +122,7 @@ def _rk4_step(dt, tables, ws, spool):
         for k in range(z.size):
             sum_z[k] += weight * zd[k]
     motion[DQ] = dt * sum_q
-    integrate_platen(q, motion[DQ], axes, q)
+    integrate(q, motion[DQ], axes, q)
     for k in range(n):
         motion[V, k] = v0[k] + dt * sum_v[k]
     for k in range(z.size):
@@ -180,7 +169,7 @@ def run_fused(span, tables, ws, control, signals, log):
         status = 0
         for j in range(steps):
             if span.scheme == 0:
-                integrate_platen(q, motion[DQ], tables.axes, q)
+                integrate(q, motion[DQ], tables.axes, q)
                 status = staggered_stage(q, dt, tables, ws, window[j])
                 if status != 0:
                     break

@@ -4,7 +4,7 @@
     ledger.force[:, ledger.row("actuators_4_way.H1")]         # [N]
     ledger.wrench[:, ledger.effect("pad_friction")]           # (n, 6) at C in {c}
 
-It evaluates the run's states with the stages that the engines run; only the rigid body's part is pin.rnea.
+It evaluates the run's states with the stages that the engines run; a specimen with joints is pin.rnea's.
 Inertia = sum of all effects and the weight (Eqs. 4-24 to 4-26), each as a wrench on the platen at C.
 """
 
@@ -20,7 +20,10 @@ from ..core.compiled import compiled, compiled_inline
 from ..core.errors import UnknownNameError
 from ..effects.registry import PORTS
 from ..mechanics.plant import Plant
+from ..mechanics.pose import PlantMotion
+from ..mechanics.required_wrench import rigid_wrenches, wrenches_at_c
 from ..mechanics.schemes import V_SEEN, forces_stage, pose_stage
+from ..mechanics.spatial import act_force
 from ..mechanics.tables import Tables
 from ..mechanics.workspace import Workspace, make_workspace
 from .simulate import Run
@@ -106,7 +109,8 @@ def force_ledger(run: "Run | States") -> Ledger:
     by_effect = np.zeros((n, len(effects), 6))
     turn = np.zeros((n, 3, 3))
     _forces(*history_of(run), by_row, by_effect, turn)
-    inertia, gravity = (_at_c(turn, plant, w) for w in _rigid_wrenches(run))
+    at_b = _articulated(run) if plant.articulated else rigid_wrenches(plant, PlantMotion(run.q, run.v, run.a), turn)
+    inertia, gravity = (wrenches_at_c(plant, turn, w) for w in at_b)
     names = [e.name for e in effects]
     wrench = np.concatenate([by_effect, gravity[:, None]], axis=1)
     names.append("gravity")
@@ -153,14 +157,10 @@ def _forces(q, v, z, tables, ws, by_row, by_effect, turn):
 @compiled_inline
 def add_at_c(force, B, port, rho, frame, out):
     """Add the wrench at C in {c} of a force on a port to out (6,); B (n_ports, 6) at B in platen axes, rho its C."""
-    b0, b1, b2 = B[port, 0], B[port, 1], B[port, 2]
-    # from B to C: the moment less rho x force
-    mx = B[port, 3] - (rho[1] * b2 - rho[2] * b1)
-    my = B[port, 4] - (rho[2] * b0 - rho[0] * b2)
-    mz = B[port, 5] - (rho[0] * b1 - rho[1] * b0)
+    unit, moment = act_force(frame, rho, B[port], B[port, 3:])
     for j in range(3):
-        out[j] += force * (frame[j, 0] * b0 + frame[j, 1] * b1 + frame[j, 2] * b2)
-        out[3 + j] += force * (frame[j, 0] * mx + frame[j, 1] * my + frame[j, 2] * mz)
+        out[j] += force * unit[j]
+        out[3 + j] += force * moment[j]
 
 
 @compiled_inline
@@ -173,45 +173,21 @@ def add_row_at_c(force, B, row, rho, frame, out):
         add_at_c(force[2], B, row.port_3, rho, frame, out)
 
 
-def _rigid_wrenches(run: "Run | States") -> tuple[Array, Array]:
-    """Inertial wrench and weight (n, 6) of platen and specimen at B in platen axes (Eqs. 4-24, 4-26)."""
-    plant = run.plant
-    body = plant.body[0]
+def _articulated(run: "Run | States") -> tuple[Array, Array]:
+    """Inertial wrench and weight (n, 6) at B in platen axes of a platen whose specimen has joints, by pin.rnea."""
+    plant, body = run.plant, run.plant.body[0]
     weightless = plant.model.copy()
     weightless.gravity = pin.Motion.Zero()
-    data, rnea = weightless.createData(), pin.rnea
-    inertia = np.zeros((len(run.time), 6))
+    models = [(model, model.createData()) for model in (weightless, plant.model)]
+    zero = np.zeros(plant.model.nv)
+    inertia, weight = np.zeros((2, len(run.time), 6))
     for k, (q, v, a) in enumerate(zip(run.q, run.v, run.a, strict=True)):
-        rnea(weightless, data, q, v, a)
-        inertia[k] = data.f[1].vector
+        for (model, data), rates in zip(models, ((v, a), (zero, zero)), strict=True):
+            pin.rnea(model, data, q, *rates)
+        (_, moving), (_, still) = models
+        inertia[k], weight[k] = moving.f[1].vector, -still.f[1].vector
+        weight[k, :3] -= body["weight_extra"] * still.liMi[1].rotation[2]
     twist, rise = np.zeros((2, len(run.time), 6))
     twist[:, plant.axes], rise[:, plant.axes] = (x[:, : plant.axes.size] for x in (run.v, run.a))
     inertia[:, :3] += body["mass_extra"] * (rise[:, :3] + np.cross(twist[:, 3:], twist[:, :3]))
-    gravity, down = _weight(plant, run.q)
-    gravity[:, :3] -= body["weight_extra"] * down
-    return inertia, gravity
-
-
-def _weight(plant: Plant, poses: Array) -> tuple[Array, Array]:
-    """Weight (n, 6) of the Inertias at B in platen axes, and the vertical (n, 3) in platen axes, at poses (n, nq)."""
-    model, data = plant.model, plant.model.createData()
-    zero = np.zeros(model.nv)
-    weight, down = np.zeros((len(poses), 6)), np.zeros((len(poses), 3))
-    if plant.model.nv != 6:
-        for k, q in enumerate(poses):
-            pin.rnea(model, data, q, zero, zero)
-            weight[k], down[k] = -data.f[1].vector, data.liMi[1].rotation[2]
-        return weight, down
-    # one rigid body: its weight is linear in the direction of the vertical, which is the last row of s_R_b
-    x, y, z, w = poses[:, 3:7].T
-    down = np.stack([2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)], axis=1)
-    fall = np.zeros((6, 3))
-    fall[:3] = -plant.machine.platen.gravity * np.eye(3)
-    return down @ (model.inertias[1].matrix() @ fall).T, down
-
-
-def _at_c(turn: Array, plant: Plant, wrench: Array) -> Array:
-    """Wrench (n, 6) at C in {c} from that at B in platen axes; turn (n, 3, 3) is s_R_b (Eqs. 4-20 to 4-22)."""
-    force = wrench[:, :3]
-    moment = wrench[:, 3:] - np.cross(plant.body[0]["rho_c"], force)
-    return np.hstack([np.einsum("nij,nj->ni", turn, x) for x in (force, moment)])
+    return inertia, weight

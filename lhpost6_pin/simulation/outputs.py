@@ -7,11 +7,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
-from ..laws.nitrogen_strut import gas_pressure
-from ..mechanics.gas_pressure import gas_ratio
+from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
 from .simulate import Run
@@ -31,21 +31,19 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     plant, machine = run.plant, run.plant.machine
     motion = platen_motion(plant, run.q, run.v, run.a)
     legs, _ = leg_displacements(plant, motion.displacement)
-    rows, oil = plant.rows[plant.tables.actuators], plant.actuators
+    rows = plant.rows[plant.tables.actuators]
     states = rows["state"]
     ahead = np.zeros((len(run.z), plant.spools))
     rod_travels(rows, run.z, ahead)  # a stroke is measured between barrel and rod
     double = np.array([name in machine.double_acting for name in machine.actuator_names])
     pressure_a = run.z[:, states]
     pressure_b = run.z[:, states[double] + 1]
-    force = pressure_a * oil.area_a
-    force[:, double] -= pressure_b * oil.area_b[double]
     channels: dict[str, Any] = {
         "platen_displacement": motion.displacement,
         "platen_velocity": motion.velocity,
         "platen_acceleration": motion.acceleration,
         "actuator_displacement": legs[:, : plant.spools] + ahead,
-        "actuator_force": force,
+        "actuator_force": oil_force(machine, pressure_a, pressure_b),
         "chamber_pressure_a": pressure_a,
         "spool_position": run.spool,
         "supply_pressure": _supply_pressure(run),
@@ -54,7 +52,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     if double.any():
         channels["chamber_pressure_b"] = pressure_b
     if machine.struts:
-        channels["strut_pressure"] = _strut_pressure(run, legs[:, plant.spools :]) * gas_ratio(plant, run.z)
+        channels["strut_pressure"] = strut_pressures(machine, legs[:, plant.spools :]) * gas_ratio(plant, run.z)
     if run.command is not None:
         channels["spool_command"] = run.command
     if reference is not None:
@@ -85,13 +83,6 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     if valves:
         facts["valves_per_horizontal_actuator"] = int(valves[0])
     return make_record(run.time, channels, labels, {**facts, **attrs})
-
-
-def _strut_pressure(run: Run, elongation: Array) -> Array:
-    law = gas_pressure.py_func  # type: ignore[attr-defined]  # the scalar law as plain Python takes whole columns
-    struts = run.plant.machine.struts
-    columns = (law(x, s.pressure, s.gas_length, s.polytropic_index) for x, s in zip(elongation.T, struts, strict=True))
-    return np.column_stack(list(columns))
 
 
 def _supply_pressure(run: Run) -> Array:

@@ -1,0 +1,96 @@
+"""What a motion of the platen requires: inertial wrench and weight, with a rigid specimen; pin.rnea is its oracle.
+
+At B in platen axes, with I the Inertia at B, V = (v, omega), g_b gravity in platen axes and dM the directional mass
+that no Inertia holds (see `rigid_body`):
+
+    inertia = I dV/dt + V x* (I V) + dM (dv/dt + omega x v)              (Eqs. 4-26, 4-28)
+    weight  = I g_b + (m_z - m_0) g_b                                    (Eq. 4-24)
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.compiled import compiled
+from ..core.errors import SimulationError
+from .plant import Plant
+from .pose import PlantMotion
+from .spatial import act_force, cross, to_body
+
+__all__ = ["refuse_joints", "require_alike", "required_wrench", "rigid_wrenches", "wrenches_at_c"]
+
+Array = NDArray[np.float64]
+
+
+def refuse_joints(plant: Plant) -> None:
+    """Raise SimulationError for a specimen with free joints."""
+    if plant.articulated:
+        raise SimulationError(
+            "the fused engine takes a platen with a rigid specimen at most; take the engine pinocchio for free joints "
+            "(--engine pinocchio), or lock them (--locked)"
+        )
+
+
+def require_alike(some: Plant, other: Plant) -> bool:
+    """Whether two plants require the same wrench for a motion."""
+    one, two = ((p.tables.inertia.tobytes(), p.body["mass_extra"].tobytes()) for p in (some, other))
+    return one == two and bool(some.body["weight_extra"] == other.body["weight_extra"])
+
+
+def rigid_wrenches(plant: Plant, motion: PlantMotion, turn: Array) -> tuple[Array, Array]:
+    """Inertial wrench and weight (n, 6) at B in platen axes [N, N m]; turn (n, 3, 3) is the platen's rotation.
+
+    Raises SimulationError for an articulated specimen.
+    """
+    refuse_joints(plant)
+    n = len(motion.q)
+    twist, rate = np.zeros((2, n, 6))
+    twist[:, plant.axes], rate[:, plant.axes] = motion.v, motion.a
+    inertia, weight = np.zeros((2, n, 6))
+    _rigid_wrenches(twist, rate, np.ascontiguousarray(turn), plant.tables, inertia, weight)
+    return inertia, weight
+
+
+@compiled
+def _rigid_wrenches(twist, rate, turn, tables, inertia, weight):
+    plain, g = tables.inertia[0].plain, tables.inertia[0].gravity
+    extra, heavier = tables.body[0].mass_extra, tables.body[0].weight_extra
+    momentum = np.zeros(6)
+    for k in range(twist.shape[0]):
+        down = to_body(turn[k], (0.0, 0.0, -1.0))
+        for i in range(6):
+            momentum[i] = 0.0
+            for j in range(6):
+                momentum[i] += plain[i, j] * twist[k, j]
+                inertia[k, i] += plain[i, j] * rate[k, j]
+            for j in range(3):
+                weight[k, i] += plain[i, j] * g * down[j]
+        omega = twist[k, 3:]
+        bend, bias = cross(omega, momentum), cross(omega, twist[k])
+        turning, drift = cross(omega, momentum[3:]), cross(twist[k], momentum)
+        for i in range(3):
+            inertia[k, i] += bend[i] + extra[i] * (rate[k, i] + bias[i])
+            inertia[k, 3 + i] += turning[i] + drift[i]
+            weight[k, i] += heavier * down[i]
+
+
+def required_wrench(plant: Plant, motion: PlantMotion, turn: Array) -> Array:
+    """Wrench (n, 6) [N, N m] at B in platen axes that a motion requires beyond the weight, on the free axes."""
+    inertia, weight = rigid_wrenches(plant, motion, turn)
+    required = np.zeros_like(inertia)
+    required[:, plant.axes] = (inertia - weight)[:, plant.axes]
+    return required
+
+
+def wrenches_at_c(plant: Plant, turn: Array, wrench: Array) -> Array:
+    """Wrenches (n, 6) at C in {c} of those at B in platen axes; turn (n, 3, 3) is s_R_b (Eqs. 4-20 to 4-22)."""
+    out = np.zeros_like(wrench)
+    _at_c(turn, plant.body, np.ascontiguousarray(wrench), out)
+    return out
+
+
+@compiled
+def _at_c(turn, body, wrench, out):
+    for k in range(wrench.shape[0]):
+        force, moment = act_force(turn[k], body[0].rho_c, wrench[k], wrench[k, 3:])
+        for j in range(3):
+            out[k, j], out[k, 3 + j] = force[j], moment[j]

@@ -214,9 +214,9 @@ OIL_CASES = tuple(
     for kind, on in (("double", DOUBLE), ("single", SINGLE))
 )
 """Modifiers of oil and supply on both kinds of actuators. Oil below the return pressure draws some from outside."""
-ACTUATORS = _ROWS[:2]
+ACTUATORS = tuple(c for c in _ROWS if c.law == "hydraulic")
 CASES = (*_ROWS, *OIL_CASES)
-OWN = _ROWS[2:]  # laws of which a row needs the law's functions alone
+OWN = tuple(c for c in _ROWS if c.law != "hydraulic")  # laws of which a row needs the law's functions alone
 WITH_STATES = tuple(c for c in CASES if c.attributes.states or c.attributes.modifies)
 EXACT = tuple(c for c in OWN if c.attributes.states and c.exact)
 WITHOUT_POTENTIAL = tuple(c for c in CASES if c.cycle)

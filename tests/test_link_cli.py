@@ -2,14 +2,14 @@
 
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 from commands import refused
+from test_link_server import served
 
 from lhpost6_pin.data.records import load_record
-from lhpost6_pin.interfaces.link import LinkMode, ServedPlant, open_socket, serve
+from lhpost6_pin.interfaces.link import LinkMode
 
 pytestmark = pytest.mark.long
 
@@ -27,14 +27,8 @@ GUARD = 120  # [s] no wait is meant to last so long
 @pytest.fixture
 def port(plant, rest):
     """Port of a plant served in lock-step by a thread."""
-    stop = threading.Event()
-    with open_socket(port=0) as sock:
-        table = ServedPlant(plant, rest, LinkMode.LOCK_STEP)
-        thread = threading.Thread(target=serve, args=(sock, table), kwargs={"stop": stop})
-        thread.start()
-        yield sock.getsockname()[1]
-        stop.set()
-        thread.join(GUARD)
+    with served(plant, rest) as (_, address):
+        yield address[1]
 
 
 @pytest.mark.parametrize("mode", [m.label for m in LinkMode])

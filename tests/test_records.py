@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from data_files import LABELS
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.core.names import AXES
@@ -17,11 +18,6 @@ from lhpost6_pin.data.layout_faults import layout_faults
 from lhpost6_pin.data.records import load_record, make_record, require, save_record
 
 RECORDS = Path(__file__).parent / "data" / "records"
-LABELS = {
-    "actuator": ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"],
-    "horizontal": ["H1", "H2", "H3", "H4"],
-    "strut": ["S1", "S2", "S3"],
-}
 SIZES = {"axis": 6} | {dim: len(labels) for dim, labels in LABELS.items()}
 
 

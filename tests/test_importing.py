@@ -82,7 +82,7 @@ BAD_469D = {
     "cut in the header": (GOOD, lambda b: b[: 7 * 128 + 50], ("DESC.CHAN_2", "missing")),
     "no samples": (GOOD, lambda b: b[: 11 * 128], ("0 sample",)),
     "too many channels": (header(CHANNELS, 1 / RATE, {"CHANNELS": "4"}), bytes, ("CHANNELS is 4", "DESC.CHAN_4")),
-    "far too many": (header(CHANNELS, 1 / RATE, {"CHANNELS": 8 * "9"}), bytes, ("CHANNELS is 99999999", "DESC.CHAN_4")),
+    "far too many": (header(CHANNELS, 1 / RATE, {"CHANNELS": 8 * "9"}), bytes, ("CHANNELS is 99999999", "are 3")),
     "too few channels": (header(CHANNELS, 1 / RATE, {"CHANNELS": "2"}), bytes, ("CHANNELS is 2", "3")),
     "channels no number": (header(CHANNELS, 1 / RATE, {"CHANNELS": "three"}), bytes, ("CHANNELS is 'three'",)),
     "no channels": (header(CHANNELS, 1 / RATE, {"CHANNELS": None}), bytes, ("CHANNELS is missing",)),

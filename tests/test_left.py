@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from lhpost6_pin.effects.evaluate_added import advance_added, apply_added
 
 from lhpost6_pin.discovery.formula import sparse_formula
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, with_residual_function
 from lhpost6_pin.effects.effect import Effect
-from lhpost6_pin.effects.registry import NODES
+from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table
+from lhpost6_pin.laws.supply import Supply
+from lhpost6_pin.laws.tabulated import NODES
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.machine_toml import save_machine_toml
 
@@ -70,8 +71,8 @@ def test_what_is_remembered_is_the_law_s_hidden_state() -> None:
     z = np.zeros(1)
     for k in range(len(x)):
         force, port_force = np.zeros((1, 3)), np.zeros(1)
-        apply_added(rows, x[k, :1], np.zeros(1), z, force, port_force)
+        apply_forces(rows, x[k, :1], np.zeros(1), z, force, port_force)
         assert force[0, 0] == pytest.approx(-past[k, 0], abs=1e-12)  # rounding
         if k + 1 < len(x):
-            advance_added(rows, x[k, :1], x[k + 1, :1] - x[k, :1], dt, z)
+            advance_states(rows, x[k, :1], x[k + 1, :1] - x[k, :1], dt, np.zeros(1), Supply(2e7, 5e5), z)
     np.testing.assert_array_equal(_state("recent travel", memory, x, x, dt), x - past)

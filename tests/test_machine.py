@@ -273,7 +273,7 @@ def test_effect_on_a_port_that_is_not_there_lists_those_that_are():
         ("viscous", ("H1",), ((1.0, 2.0),), "2 numbers given; viscous takes coefficient"),
         ("viscous", ("H1", "H2"), ((1.0,),), "1 sets of numbers for 2 ports"),
         ("viscous", ("H1",), ((float("nan"),),), "not finite"),
-        ("hydraulic_single", ("V1",), ((1.0,) * 12,), "takes one spool"),
+        ("hydraulic", ("V1",), ((1.0,) * 12,), "takes one spool"),
     ],
 )
 def test_effect_that_cannot_be_is_refused_when_made(law, ports, params, message):

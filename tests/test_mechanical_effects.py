@@ -33,6 +33,8 @@ from lhpost6_pin.mechanics.ports import evaluate_ports
 from lhpost6_pin.mechanics.rigid_body import platen_inertia
 from lhpost6_pin.simulation.ledger import force_ledger
 
+pytestmark = pytest.mark.long
+
 base = cache(load_machine)
 
 

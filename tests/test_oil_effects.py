@@ -28,6 +28,8 @@ from lhpost6_pin.mechanics.schemes import spool_windows
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate
 
+pytestmark = pytest.mark.long
+
 base = cache(load_machine)
 OPENED = st.floats(-1.0, 1.0)
 PRESSURE = st.floats(-1e6, 25e6)

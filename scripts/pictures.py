@@ -22,7 +22,7 @@ from lhpost6_pin.data.records import load_record
 
 ROOT = Path(__file__).parents[1]
 AMPLIFY = 2.5
-VIEWER, REPORT = (1280, 640), (1000, 1085)  # width and height of the window [pixels]
+VIEWER, REPORT = (1280, 640), (1000, 1112)  # width and height of the window [pixels]
 NEARER = "viewer.camera.zoom = 1.25; viewer.camera.updateProjectionMatrix(); viewer.set_dirty()"
 
 

@@ -1,11 +1,12 @@
 """Write `effects/views.py` and `effects/dispatch.py`: from a row of the effect table to the functions of its law.
 
-    python scripts/generate_dispatch.py [--check]
+    python scripts/generate_dispatch.py [--check] [--out FOLDER]
 
 Reads every module of `laws/` that exports LAW or LAWS and the signatures of its functions (`laws.contract`). The files
 are checked in, since numba's cache keeps no functions that are made while a program runs; --check only compares.
 """
 
+import argparse
 import inspect
 import pkgutil
 import subprocess
@@ -194,11 +195,15 @@ def _loop(names: list[str], single: dict[str, Any]) -> str:
 
 def main() -> int:
     """Write the files, or compare them."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a file is not current")
+    parser.add_argument("--out", type=Path, default=FOLDER, help="folder of the files (default: the package's)")
+    options = parser.parse_args()
     texts = write()
-    if "--check" in sys.argv[1:]:
-        return int(any((FOLDER / name).read_text(encoding="utf-8") != text for name, text in texts.items()))
+    if options.check:
+        return int(any((options.out / name).read_text(encoding="utf-8") != text for name, text in texts.items()))
     for name, text in texts.items():
-        (FOLDER / name).write_text(text, encoding="utf-8")
+        (options.out / name).write_text(text, encoding="utf-8")
     return 0
 
 

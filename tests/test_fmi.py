@@ -343,7 +343,7 @@ def test_parameters_choose_scheme_rate_and_changes_of_the_machine(folder, rest):
     "parameters, reason",
     [
         ({"scheme": "verlet"}, "no scheme named 'verlet'"),
-        ({"steps_per_second": 3000}, "3000 model steps a second"),
+        ({"steps_per_second": 3000}, "got 3000"),
         ({"override": "[platen]\nmas = { value = 1.0 }"}, "platen.mas"),
         ({"override": "= 1"}, "not a TOML file"),
     ],

@@ -254,10 +254,10 @@ def test_a_slip_is_advanced_as_an_ode_solver_does_at_any_speed_and_in_any_pieces
         evaluate.advance_states(case.rows, np.zeros(3), (1.0 - share) * way, 0.1, case.spool, case.supply, pieces)
         z[: case.pressures] = case.z[: case.pressures]
         np.testing.assert_allclose(z[at], exact, atol=1e-7)  # the solver's own error where the rate has kinks
+        np.testing.assert_allclose(z[at][2:4], exact[2:4], atol=1e-9 if case.law == "dahl_instead" else 1e-7)  # none
         np.testing.assert_allclose(pieces[at], z[at], atol=1e-10)  # a zero is found to rounding of the slip
-        assert all(
-            np.linalg.norm(part) < 1.0 + 1e-9 for part in np.split(z[at], 2 if z[at].size == 4 else 1)
-        )  # Z, and d
+        most = 1.0 + (1e-9 if "bouc_wen" in case.law else 1e-12)  # rounding of long exponentials in the plane
+        assert all(np.linalg.norm(part) <= most for part in np.split(z[at], 2 if z[at].size == 4 else 1))  # Z, and d
 
 
 @over(tuple(c for c in WITH_STATES if c.on is not SINGLE))  # a single chamber knows no sides and no weight

@@ -44,7 +44,7 @@ def test_three_peer_files_go_to_x_y_z_and_are_cut_to_the_shortest(tmp_path):
     ("change", "message"),
     [
         (("NPTS=  203", "NPTS=  204"), "204 points, the file has 203"),
-        (("UNITS OF G", "UNITS OF CM"), "no acceleration"),
+        (("UNITS OF G", "UNITS OF CM"), "CM is not an acceleration"),
         (("ACCELERATION", "VELOCITY"), r"use the \.AT2 file"),
         (("NPTS=", "POINTS="), "NPTS"),
         (("DT=   0.0050", "DT=   0.0000"), "time step"),

@@ -294,8 +294,8 @@ def test_run_that_diverges_stops_and_names_a_remedy(plant, rest, engine):
     [
         ({"scheme": "magic"}, "no scheme named 'magic'"),
         ({"engine": "steam"}, "no engine named 'steam'"),
-        ({"steps_per_second": 1000}, "1000 model steps"),
-        ({"steps_per_second": 3000}, "3000 model steps"),
+        ({"steps_per_second": 1000}, "got 1000"),
+        ({"steps_per_second": 3000}, "got 3000"),
         ({"samples": 0}, "nothing to simulate"),
         ({"samples": 3}, "spool has 4 rows"),
         ({"record_every": 0}, "record_every must be at least 1"),

@@ -124,7 +124,7 @@ def _sums(c: SensorComparison) -> _Sums:
 
 
 def _pooled(parts: Sequence[_Sums]) -> _Sums:
-    totals: list[Any] = [sum(values) for values in zip(*(p[1:] for p in parts), strict=True)]
+    totals: list[Any] = [sum(values) for values in zip(*(part[1:] for part in parts), strict=True)]
     return _Sums(parts[-1].terms, *totals)
 
 

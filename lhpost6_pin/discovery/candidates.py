@@ -126,7 +126,7 @@ def _of_background(machine: Machine) -> list["Candidate"]:
             members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
             one = Candidate(family, members, first_shape(family))
             typical = tuple(s.typical for s in one.amplitudes)
-            if members and any(p[0] for p in one.on(machine, typical).added_effects[-1].params):
+            if members and any(numbers[0] for numbers in one.on(machine, typical).added_effects[-1].params):
                 found.append(one)
     return found
 

@@ -133,7 +133,8 @@ def rest_pressures(p: Hydraulic, force: float, supply: Pressures) -> tuple[tuple
 
     The spool feeds the leak across the piston; with no leak, its limit as the leak vanishes.
     """
-    area_a, area_b, k_pa, k_bt, k_at, k_pb, curve, leakage = p[:8]
+    area_a, area_b, curve, leakage = p.area_a, p.area_b, p.flow_curve, p.leakage
+    k_pa, k_bt, k_at, k_pb = p.flow_pa, p.flow_bt, p.flow_at, p.flow_pb
     high, low = supply[:2]
     if area_b == 0.0:
         pressure = force / area_a
@@ -159,7 +160,8 @@ def rest_pressures(p: Hydraulic, force: float, supply: Pressures) -> tuple[tuple
 
 def unloaded_speeds(p: Hydraulic, force: float, supply: Pressures) -> tuple[float, float]:
     """Steady piston speeds [m/s] at full opening under the rest force: extending, retracting (Eqs. 4-2, 4-5)."""
-    area_a, area_b, k_pa, k_bt, k_at, k_pb = p[:6]
+    area_a, area_b = p.area_a, p.area_b
+    k_pa, k_bt, k_at, k_pb = p.flow_pa, p.flow_bt, p.flow_at, p.flow_pb
     high, low = supply[:2]
     if area_b == 0.0:
         pressure = force / area_a

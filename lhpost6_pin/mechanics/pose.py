@@ -256,7 +256,8 @@ def gauss_newton(displacement, pose, axes, legs, body, n_ports, steps, tolerance
 
 
 @compiled
-def _track(displacement, axes, legs, body, n_ports, steps, tolerance, pose, residual):
+def _track(displacement, tables, n_ports, steps, tolerance, pose, residual):
+    axes, legs, body = tables.axes, tables.legs, tables.body
     at = np.zeros(6)
     for k in range(displacement.shape[0]):
         residual[k] = gauss_newton(displacement[k], at, axes, legs, body, n_ports, steps, tolerance)
@@ -283,7 +284,7 @@ def forward_kinematics(
         name = plant.machine.actuator_names[column]
         raise RecordError(f"actuator_displacement[{name}] at sample {sample} is not finite; mend or cut the record")
     pose, residual = np.zeros((len(measured), 6)), np.full(len(measured), np.nan)
-    _track(measured, plant.axes, plant.legs, plant.body, len(plant.ports), steps, tolerance, pose, residual)
+    _track(measured, plant.tables, len(plant.ports), steps, tolerance, pose, residual)
     lost = np.flatnonzero(~np.isfinite(residual))
     if lost.size:
         raise RecordError(f"actuator_displacement at sample {lost[0]} fits no pose of the platen; check its channels")

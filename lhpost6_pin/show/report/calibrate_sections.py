@@ -168,9 +168,9 @@ def correlation_blocks(calibration: Calibration) -> list[Markup]:
         "or difference (positive), in prior deviations, is determined much better than either alone."
     )
     groups = (
-        ("Between parameters", [p for p in pairs if p[0] in own and p[1] in own], LISTED),
-        ("Between a parameter and a sensor", [p for p in pairs if (p[0] in own) != (p[1] in own)], LISTED),
-        ("Between sensors", [p for p in pairs if p[0] not in own and p[1] not in own], 0),  # all collapsed
+        ("Between parameters", [(a, b, *r) for a, b, *r in pairs if a in own and b in own], LISTED),
+        ("Between a parameter and a sensor", [(a, b, *r) for a, b, *r in pairs if (a in own) != (b in own)], LISTED),
+        ("Between sensors", [(a, b, *r) for a, b, *r in pairs if a not in own and b not in own], 0),  # all collapsed
     )
     blocks = [how]
     for caption, found, listed in groups:

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import pytest
-
 import lhpost6_pin
 
 PACKAGE = Path(lhpost6_pin.__file__).parent
@@ -76,9 +74,6 @@ def test_laws_know_nothing_but_numbers_and_modules_list_what_they_export():
     assert not [name for name, path in MODULES.items() if name not in exports and path.name != "__init__.py"]
 
 
-LATER = pytest.mark.xfail(strict=False, reason="`motions.ac156.ac156` takes each option of the motion as an argument")
-
-
 def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
     """Every function with the module that it is in."""
     for name, tree in TREES.items():
@@ -89,7 +84,6 @@ def decorators(function: ast.FunctionDef) -> str:
     return " ".join(map(ast.unparse, function.decorator_list))
 
 
-@LATER
 def test_no_function_takes_a_list_of_arguments_that_nobody_can_follow():
     """At most 12, and 8 by place but in compiled code; each option of a command is one."""
     long = []

@@ -8,6 +8,7 @@ A_FLX, holds, and falls to A_RIG. Horizontal: A_FLX = S_DS (1 + 2 z/h) <= 1.6 S_
 
 import logging
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,59 +38,62 @@ def required_spectrum(
     return np.exp(np.interp(np.log(frequency), np.log(knees), levels))
 
 
-def ac156(
-    *,
-    name: str,
-    sds: float,
-    height_ratio: float,
-    knees: Sequence[float],
-    lowest_ratio: float,
-    flexible_cap: float,
-    rigid_ratio: float,
-    rigid_cap: float,
-    vertical_flexible: float,
-    vertical_rigid: float,
-    tolerance_below: float,
-    tolerance_above: float,
-    damping: float,
-    rise: float,
-    hold: float,
-    decay: float,
-    high_pass: "Sequence[float] | float",
-    highest: float,
-    time_step: float,
-    seed: int,
-) -> GroundMotion:
+class Ac156(NamedTuple):
+    """Numbers of a motion: the spectrum's, the record's, and where nothing is left."""
+
+    sds: float  # design spectral acceleration S_DS [m/s2]
+    height_ratio: float  # z/h [1]
+    knees: Sequence[float]  # (4,) [Hz]
+    lowest_ratio: float  # at the first knee, over the flexible level
+    flexible_cap: float  # A_FLX over S_DS, at most
+    rigid_ratio: float  # A_RIG over S_DS (1 + 2 z/h)
+    rigid_cap: float  # A_RIG over S_DS, at most
+    vertical_flexible: float  # the same ratios of the vertical, whatever z/h
+    vertical_rigid: float
+    tolerance_below: float  # of the spectrum, relative
+    tolerance_above: float
+    damping: float  # share of critical
+    rise: float  # of the envelope [s]
+    hold: float
+    decay: float
+    high_pass: Sequence[float] | float  # corner [Hz], one or one for each axis
+    highest: float  # corner of the low-pass [Hz]
+    time_step: float  # [s]
+    seed: int
+
+
+def ac156(*, name: str, **numbers: Any) -> GroundMotion:
     """Tri-axial acceleration [m/s^2] whose response spectra match AC156 from the second to the last knee.
 
-    `sds` [m/s^2] and `height_ratio` z/h set the level. Below `high_pass` [Hz] (one, or one for each axis)
-    nothing is left, which keeps the displacement within a table's stroke; the spectrum is then not met far
-    below the second knee. The axes are independent: each has its own noise, drawn with `seed`.
+    numbers are those of `Ac156`; `sds` and `height_ratio` set the level. Below `high_pass` nothing is left, which keeps
+    the displacement within a table's stroke; the spectrum is then not met far below the second knee. The axes are
+    independent: each has its own noise, drawn with `seed`.
 
     Raises MotionError for impossible levels.
     """
-    corners = np.broadcast_to(np.asarray(high_pass, dtype=float), (3,))
-    if not (sds > 0 and 0 <= height_ratio <= 1 and (corners > 0).all() and (corners < knees[1]).all()):
+    n = Ac156(**numbers)
+    corners = np.broadcast_to(np.asarray(n.high_pass, dtype=float), (3,))
+    if not (n.sds > 0 and 0 <= n.height_ratio <= 1 and (corners > 0).all() and (corners < n.knees[1]).all()):
         raise MotionError(
-            f"{name}: S_DS {sds:g} m/s^2, z/h {height_ratio:g}, high-pass {high_pass} Hz; need S_DS > 0, "
-            f"0 <= z/h <= 1 and corners between 0 and {knees[1]} Hz"
+            f"{name}: S_DS {n.sds:g} m/s^2, z/h {n.height_ratio:g}, high-pass {n.high_pass} Hz; need S_DS > 0, "
+            f"0 <= z/h <= 1 and corners between 0 and {n.knees[1]} Hz"
         )
-    factor = 1 + 2 * height_ratio
-    horizontal = sds * min(factor, flexible_cap), sds * min(rigid_ratio * factor, rigid_cap)
-    levels = (horizontal, horizontal, (vertical_flexible * sds, vertical_rigid * sds))
-    duration = rise + hold + decay
-    time = np.arange(round(duration / time_step) + 1) * time_step
-    envelope = smooth_step(time / rise)[0] * smooth_step((duration - time) / decay)[0]
-    octaves = np.log2(knees[-1] / knees[1])
-    matched = knees[1] * 2 ** np.linspace(0, octaves, int(np.ceil(octaves * _PER_OCTAVE)) + 1)
-    middle = np.sqrt((1 - tolerance_below) * (1 + tolerance_above))
-    tolerance = np.log((1 + tolerance_above) / middle)
-    generators = np.random.default_rng(seed).spawn(3)
+    factor = 1 + 2 * n.height_ratio
+    horizontal = n.sds * min(factor, n.flexible_cap), n.sds * min(n.rigid_ratio * factor, n.rigid_cap)
+    levels = (horizontal, horizontal, (n.vertical_flexible * n.sds, n.vertical_rigid * n.sds))
+    duration = n.rise + n.hold + n.decay
+    time = np.arange(round(duration / n.time_step) + 1) * n.time_step
+    envelope = smooth_step(time / n.rise)[0] * smooth_step((duration - time) / n.decay)[0]
+    octaves = np.log2(n.knees[-1] / n.knees[1])
+    matched = n.knees[1] * 2 ** np.linspace(0, octaves, int(np.ceil(octaves * _PER_OCTAVE)) + 1)
+    middle = np.sqrt((1 - n.tolerance_below) * (1 + n.tolerance_above))
+    tolerance = np.log((1 + n.tolerance_above) / middle)
+    generators = np.random.default_rng(n.seed).spawn(3)
     channels = {}
     for axis, (flexible, rigid), corner, generator in zip("xyz", levels, corners, generators, strict=True):
-        wanted = middle * required_spectrum(matched, flexible, rigid, knees, lowest_ratio)
+        wanted = middle * required_spectrum(matched, flexible, rigid, n.knees, n.lowest_ratio)
         channels[axis], deviation = _matched_noise(
-            time, envelope, matched, wanted, damping, (corner, highest), _MARGIN * tolerance, generator
+            time, envelope, matched, wanted, n.damping, (corner, n.highest), _MARGIN * tolerance, generator
         )
         if deviation > tolerance:
             _log.warning(
@@ -98,8 +102,8 @@ def ac156(
                 axis,
                 np.exp(deviation),
             )
-    source = f"ICC-ES AC156 spectrum, S_DS {sds:.4g} m/s^2, z/h {height_ratio:g}, seed {seed}"
-    return make_motion(name, time_step, channels, "acceleration", source)
+    source = f"ICC-ES AC156 spectrum, S_DS {n.sds:.4g} m/s^2, z/h {n.height_ratio:g}, seed {n.seed}"
+    return make_motion(name, n.time_step, channels, "acceleration", source)
 
 
 def _matched_noise(

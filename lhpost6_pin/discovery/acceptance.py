@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Complex
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
 from ..machine.library import Family
 from ..machine.parameters import Parameters
@@ -17,8 +17,6 @@ from .scores import Background, Score
 from .search_state import Search
 
 __all__ = ["Lowered", "Reweighting", "gate", "refusal", "squares_by_column"]
-
-Array = NDArray[np.float64]
 
 
 class Lowered(NamedTuple):
@@ -71,7 +69,7 @@ class Reweighting:
         return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
 
 
-def squares_by_column(residual: Sequence[NDArray[np.complex128]]) -> Array:
+def squares_by_column(residual: Sequence[Complex]) -> Array:
     """Sums (c,) of squared whitened bins (m, c) over all tests."""
     return np.asarray(sum((np.abs(r) ** 2).sum(axis=0) for r in residual))
 

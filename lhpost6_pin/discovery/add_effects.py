@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Mask
 from ..core.progress import Progress, between
 from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.prepare import PreparedProblem
@@ -20,8 +20,6 @@ from .pairs import score_pairs
 from .search_state import AddedEffect, FittedCandidate, Scored, Search, best_per_family, fitted_machine
 
 __all__ = ["add_effect", "refined", "with_candidate"]
-
-Array = NDArray[np.float64]
 
 
 def add_effect(found: Search, linear: Linearisation, progress: Progress) -> Search | None:
@@ -169,7 +167,7 @@ def with_candidate(
     return prepared, np.insert(x, len(problem.parameters), np.zeros(len(own)))
 
 
-def _near(problem: Problem, candidate: Candidate) -> NDArray[np.bool_]:
+def _near(problem: Problem, candidate: Candidate) -> Mask:
     """Unknowns (p,) whose derivatives change much with an effect: for one of the oil, those of oil and valves."""
     flows = [k.shows_in == ("flow",) for k in problem.parameters]
     return np.array([*flows, *(u.alone[1] >= 0 for u in problem.unknowns)]) & ("flow" in candidate.family.shows_in)

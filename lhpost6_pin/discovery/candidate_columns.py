@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Complex
 from ..effects.registry import LAWS
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
@@ -21,8 +21,6 @@ from .candidates import Candidate
 
 __all__ = ["Columns", "columns_of", "side_by_side"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Columns = list[Complex]
 """Whitened bins (m, c, k) of every test."""
 

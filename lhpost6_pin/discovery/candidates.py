@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.calibration import FreeParameter
 from ..identification.residuals import RESIDUALS
 from ..machine.library import Family, Shape, families
@@ -13,8 +13,6 @@ from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 
 __all__ = ["Candidate", "first_shape", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..core.arrays import Array
 
 __all__ = ["Formula", "sparse_formula"]
 
-Array = NDArray[np.float64]
 Form = tuple[Array, tuple[str, ...]]
 
 _MOST = 3  # forms

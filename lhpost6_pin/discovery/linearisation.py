@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Complex
 from ..identification.calibration.fit import Solution
 from ..identification.calibration.normal_equations import NormalEquations, bounds_of, positive
 from ..identification.calibration.problem import OperatingPoint, Problem
@@ -14,8 +14,6 @@ from ..machine.parameters import Parameters
 from .scores import Background
 
 __all__ = ["Linearisation", "linearise"]
-
-Array = NDArray[np.float64]
 
 
 class Linearisation(NamedTuple):
@@ -40,7 +38,7 @@ def _background(problem: Problem, normal: NormalEquations, x: Array, calibration
     """
     prior = problem.prior
 
-    def rows(slopes: Sequence[NDArray[np.complex128]], root: Array) -> Array:
+    def rows(slopes: Sequence[Complex], root: Array) -> Array:
         """Real rows (n, p) of derivatives (m, c), in units of the priors."""
         return (real_rows(slopes, root) * prior[:, None]).T
 

@@ -5,8 +5,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Complex
 from ..core.names import AXES
 from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
@@ -14,7 +14,6 @@ from ..machine.machine import Machine
 
 __all__ = ["Spot", "gap_map", "worst_spots"]
 
-Complex = NDArray[np.complex128]
 
 _GROUPS = (0, 2, 4, 6)  # first bands of groups
 _MOST = 4  # spots that are reported

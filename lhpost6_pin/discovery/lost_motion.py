@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Progress, between
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import SensorComparison, loose_lengths
@@ -27,7 +27,6 @@ from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
 __all__ = ["LostMotion", "lost_motion", "with_lost_motion"]
 
-Array = NDArray[np.float64]
 
 _REWEIGHED = 3
 """Times that the residual is reweighted by its own power."""

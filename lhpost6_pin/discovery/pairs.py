@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..identification.calibration.problem import OperatingPoint, Problem
 from .acceptance import Reweighting, gate, refusal
 from .candidate_columns import Columns, columns_of, side_by_side
@@ -20,8 +21,6 @@ from .scores import Score, less_noise, make_block, score
 from .search_state import Search
 
 __all__ = ["CandidatePair", "score_pairs"]
-
-Array = NDArray[np.float64]
 
 
 class CandidatePair(NamedTuple):

@@ -4,9 +4,6 @@ In every refit parameters stay within a few prior deviations, and sensor errors 
 must not bias them. One that truly is far off is identified like an effect, by the gain of its release.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..data.channels import LAYOUT
 from ..identification.calibration.problem import Problem
 from ..machine.library import find_family
@@ -15,7 +12,6 @@ from .scores import Background, Block
 
 __all__ = ["block_of", "list_releases"]
 
-Array = NDArray[np.float64]
 
 _PARAMETER = {
     "flow": "flow_curve_error",

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Complex
 from ..identification.calibration.problem import Problem
 from ..identification.calibration.whitened_residuals import spectrum_of
 from ..identification.inverse_dynamics import leg_wrenches
@@ -29,8 +29,6 @@ from .search_state import Search
 
 __all__ = ["ResidualFunction", "fit_residual_functions", "with_residual_function"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 State = Literal["position", "velocity", "recent travel", "past position"]
 
 _FAMILY: dict[State, str] = {

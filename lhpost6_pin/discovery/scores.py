@@ -11,16 +11,14 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
+from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration.whitened_residuals import real_bins
 
 __all__ = ["Background", "Block", "Score", "less_noise", "make_block", "score"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Columns = Sequence[Complex]
 
 WORTH = 0.5
@@ -154,7 +152,7 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
 class _Summed(NamedTuple):
     """Equations of the background over some tests: of free unknowns, and of those at a bound."""
 
-    keep: NDArray[np.bool_]  # (t,)
+    keep: Mask  # (t,)
     factor: tuple[Array, bool]  # of free unknowns
     right: Array  # (p,)
     side: Array  # (f,) of those at a bound

@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.progress import Progress
 from ..machine.library import Family
 from .acceptance import Lowered, Reweighting, refusal
@@ -19,7 +19,6 @@ from .search_state import Round, Scored, Search
 
 __all__ = ["screen"]
 
-Array = NDArray[np.float64]
 
 BATCH = 8
 """Groups of candidates that are scored at once."""

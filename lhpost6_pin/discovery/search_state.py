@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Complex
 from ..core.progress import Progress
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
@@ -19,8 +19,6 @@ from .candidates import Candidate
 from .scores import Score
 
 __all__ = ["AddedEffect", "FittedCandidate", "Round", "Scored", "Search", "best_per_family", "fitted_machine"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ class Search:
         return self.prepared.problem
 
     @property
-    def residual(self) -> list[NDArray[np.complex128]]:
+    def residual(self) -> list[Complex]:
         """Residual at the solution: whitened bins (m, c) of every test."""
         return self.solution.residual
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
+from ..core.arrays import Complex, Mask
 from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import squares_by_column
@@ -22,7 +22,6 @@ from .sensor_findings import SensorFault
 
 __all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
-Array = NDArray[np.float64]
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
 
 
@@ -207,7 +206,7 @@ def _more_than_noise(found: Search) -> bool:
     return False
 
 
-def _impacted(found: Search) -> NDArray[np.bool_]:
+def _impacted(found: Search) -> Mask:
     """Columns (c,) of actuators with play identified from lengths: impacts are faster than the sampling rate."""
     names, columns = found.problem.machine.actuator_names, np.zeros(sum(found.problem.widths), bool)
     for one in found.added:
@@ -216,7 +215,7 @@ def _impacted(found: Search) -> NDArray[np.bool_]:
     return columns
 
 
-def _excess(residual: Sequence[NDArray[np.complex128]], doubt: float) -> float:
+def _excess(residual: Sequence[Complex], doubt: float) -> float:
     """Squares of whitened residuals beyond `doubt` times noise; at least a tenth of noise."""
     count = sum(r.size for r in residual)
     return max(sum(float(np.sum(np.abs(r) ** 2)) for r in residual) - doubt * count, 0.1 * count)

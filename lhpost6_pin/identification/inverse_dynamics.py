@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..core.errors import SimulationError
 from ..effects.evaluate import advance_states
@@ -28,8 +29,6 @@ from ..mechanics.workspace import make_workspace
 from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
 
 __all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity", "with_loads"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

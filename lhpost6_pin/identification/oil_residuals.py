@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..effects.actuator import advance_line, start_line, supplied
 from ..effects.supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
@@ -17,8 +18,6 @@ from ..laws.hydraulic import leak_flows, oil_modulus, rod_travel, rod_velocity
 from ..laws.supply import varies
 
 __all__ = ["MeasuredOil", "oil_misses"]
-
-Array = NDArray[np.float64]
 
 
 class MeasuredOil(NamedTuple):

@@ -17,8 +17,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..data.alignment import Delay, align_record, group_delays, oil_force
 from ..data.channels import LAYOUT, MOTION, channel_name
@@ -32,8 +32,6 @@ from ..mechanics.pose import PlatenMotion
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
 __all__ += ["actuator_forces", "find_delays", "oil_forces", "check_usable", "prepare", "prepare_test", "source_of"]
-
-Array = NDArray[np.float64]
 
 
 class Policy(NamedTuple):

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.alignment import due_spools
 from ..effects.registry import PORTS, actuator_rows, law_of, shapes_of, states_of
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
@@ -30,7 +31,6 @@ from .wrench_residuals import wrench_residual
 
 __all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow"]
 
-Array = NDArray[np.float64]
 
 RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
 """Kinds of residuals."""

@@ -6,6 +6,7 @@ All at B in platen axes on the platen's free axes until they are summed; results
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..effects.evaluate import apply_forces
 from ..effects.registry import PORTS
@@ -14,8 +15,6 @@ from ..mechanics.port_path import PortPath
 from ..simulation.ledger import add_at_c, add_row_at_c
 
 __all__ = ["wrench_residual", "row_wrenches"]
-
-Array = NDArray[np.float64]
 
 
 def wrench_residual(plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array) -> Array:

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex, Mask
 from ...core.names import AXES
 from ...core.progress import Progress, between
 from ...data.sensors import SensorSet
@@ -33,9 +33,6 @@ from .whitened_residuals import mean_squares, negative_log_likelihood
 
 __all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 
 OVERSHOT = 1000.0
 """Increase of the objective from which a step is rejected: corrections for noise alone cost hundreds."""

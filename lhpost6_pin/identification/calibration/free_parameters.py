@@ -12,8 +12,8 @@ from itertools import product
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...machine.machine import Machine
 from ...machine.parameters import Quantity
 from ..residuals import RESIDUALS
@@ -21,7 +21,6 @@ from ..residuals import RESIDUALS
 __all__ = ["FreeParameter", "drawn_coordinates", "machine_parameters", "plan_parameters", "scatter_parameters"]
 __all__ += ["with_parameters"]
 
-Array = NDArray[np.float64]
 
 _OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus")
 _GAS = ("pressure", "polytropic_index")

@@ -5,18 +5,14 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...machine.parameters import Parameters
 from .problem import OperatingPoint, Problem, Slopes
 from .whitened_residuals import excess, real_bins, real_rows
 
 __all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive", "squares"]
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 
 
 class NormalEquations:

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import RecordError, SimulationError
 from ...data.channels import calibrated_channels, channel_name
 from ...data.layout_faults import layout_faults
@@ -21,8 +21,6 @@ from .problem import KINDS, Problem, ResidualBands
 from .whitened_residuals import spectrum_of
 
 __all__ = ["PreparedProblem", "policy_of", "prepare_problem"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex, Mask
 from ...data.channels import residuals_of
 from ...data.sensors import SensorSet
 from ...effects.registry import law_of, states_of
@@ -26,8 +26,6 @@ from .whitened_residuals import make_whitener, mean_squares, spectrum_of
 
 __all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Slopes = dict[int, Complex]
 """Derivatives (m, c) of a test's whitened bins, by the unknown's place in x."""
 
@@ -164,7 +162,7 @@ class Problem:
             found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0])
         return found
 
-    def rows(self, kind: str, *places: int) -> NDArray[np.bool_]:
+    def rows(self, kind: str, *places: int) -> Mask:
         """Mask of the stacked residuals' columns of a kind, all or those at some places."""
         at = RESIDUALS.index(kind)
         first, width = sum(self.widths[:at]), self.widths[at]
@@ -184,9 +182,7 @@ class Problem:
     def _whitened(self, test: int, bins: Complex) -> Complex:
         return np.asarray(self.whitener.apply(test, bins[..., None], self.frequency[test])[..., 0])
 
-    def slopes(
-        self, base: "OperatingPoint", free: NDArray[np.bool_], progress: Callable[[float], None]
-    ) -> list[Slopes]:
+    def slopes(self, base: "OperatingPoint", free: Mask, progress: Callable[[float], None]) -> list[Slopes]:
         """Derivatives of the whitened bins of every test by the unknowns in `free` (p,), by differences."""
         groups = [g for g in self.groups if any(free[i] for i, _ in g.members)]
         out: list[Slopes] = [{} for _ in self.tests]
@@ -199,7 +195,7 @@ class Problem:
         return out
 
     def _difference(
-        self, base: "OperatingPoint", group: EvaluationGroup, free: NDArray[np.bool_]
+        self, base: "OperatingPoint", group: EvaluationGroup, free: Mask
     ) -> list[tuple[int, list[Complex]]]:
         """Derivatives of every test's whitened bins, by place in x."""
         x, count = base.x, len(self.parameters)
@@ -258,7 +254,7 @@ class Problem:
                 at += part.shape[1]
         return out, f
 
-    def rows_of_actuator(self, place: int) -> NDArray[np.bool_]:
+    def rows_of_actuator(self, place: int) -> Mask:
         """Mask of the stacked residuals' columns of one actuator."""
         names, double = self.machine.actuator_names, self.machine.double_acting
         rows = self.rows("flow", place) | self.rows("force", place) | self.rows("servo", place)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Mask
 from ...core.files import models_folder
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -13,9 +13,6 @@ from .free_parameters import FreeParameter, with_parameters
 from .sensor_errors import SensorUnknown
 
 __all__ = ["Calibration", "Subset", "calibration_numbers"]
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 class Subset(NamedTuple):

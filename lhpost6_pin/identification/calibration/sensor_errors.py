@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.names import AXES
 from ...data.channels import LAYOUT, Channel, channel_unit, residuals_of, sensor_groups
 from ...data.records import sample_interval
@@ -26,8 +26,6 @@ from ...mechanics.pose import PlatenMotion
 from ..prepare import MeasuredTest
 
 __all__ = ["SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex
 from ...core.names import SAMPLE_RATE
 from ...data.signals import resample_band_limited
 from ...machine.parameters import Parameters
@@ -28,8 +28,6 @@ from .whitened_residuals import excess, make_whitener, spectrum_of
 
 __all__ = ["by_simulation"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 STEPS = 4  # model steps a controller sample, as simulations take by default
 

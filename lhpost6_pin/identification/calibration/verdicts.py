@@ -3,14 +3,13 @@
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Mask
 from .result import Calibration
 
 __all__ = ["Contradiction", "Verdict", "beyond", "changed_parameters", "contradictions", "far", "out_of_range"]
 __all__ += ["stated_range", "verdict_on"]
 
-Array = NDArray[np.float64]
 Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
 
 
@@ -19,7 +18,7 @@ def far(calibration: Calibration) -> Array:
     return np.asarray(calibration.estimate / calibration.sd)
 
 
-def beyond(calibration: Calibration) -> NDArray[np.bool_]:
+def beyond(calibration: Calibration) -> Mask:
     """Sensor errors that differ from zero by more than the limit; parameters that do so and by a material amount."""
     material = calibration.numbers.number("report.material") * calibration.prior
     material[len(calibration.parameters) :] = 0.0

@@ -12,13 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex
 from ...core.errors import RecordError
 
 __all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "real_rows", "spectrum_of"]
 __all__ += ["negative_log_likelihood"]
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 BELIEF = 4.0
 """Weight of the stated noise power, in bins, where a band shows more: few bins estimate a power poorly."""

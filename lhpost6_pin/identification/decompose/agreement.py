@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...data.alignment import phase_delay
 from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band, correlation, differentiate, peak_ratio, rrmse
@@ -33,7 +33,6 @@ from .record import Decomposed, decompose_numbers, take_apart
 
 __all__ = ["WrenchAgreement", "Explanation", "Level", "Match", "find_agreement"]
 
-Array = NDArray[np.float64]
 
 Explanation = Literal["none needed", "noise", "sensors", "parameters", "nothing"]
 """Sufficient explanation of a residual."""

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import RecordError
 from ...core.files import models_folder
 from ...data.alignment import Delay, align_record
@@ -38,8 +38,6 @@ from ..prepare import (
 )
 
 __all__ = ["ComparisonBand", "Decomposed", "decompose_numbers", "decompose_record", "filtered", "take_apart"]
-
-Array = NDArray[np.float64]
 
 
 class ComparisonBand(NamedTuple):

@@ -7,15 +7,14 @@ rest is error of quadrature, and of velocity and acceleration as derivatives of 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...mechanics.pose import rotation
 from ...mechanics.rigid_body import platen_inertia
 from .record import Decomposed
 
 __all__ = ["Work", "delivered_by", "find_work"]
 
-Array = NDArray[np.float64]
 
 UNEXPLAINED = "unexplained"
 

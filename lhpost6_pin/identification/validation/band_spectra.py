@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from .metrics import Numbers
 
 __all__ = ["Spectrum", "estimate_spectrum"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ...control import ControllerSettings, load_controller
+from ...core.arrays import Array
 from ...core.errors import RecordError
 from ...core.files import shipped
 from ...core.names import AXES, SAMPLE_RATE
@@ -17,8 +17,6 @@ from ...motions import Reference, Target
 from ...tuning.drives import load_drive
 
 __all__ = ["Lag", "drive_of", "settings_of"]
-
-Array = NDArray[np.float64]
 
 
 class Lag(NamedTuple):

@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Mask
 from ...data.channels import LAYOUT, channel_unit
 from ...data.signals import align, correlation, delay, drift_rate, peak_ratio, rrmse
 from .metrics import Numbers
 
 __all__ = ["MOTIONS", "ColumnAgreement", "ComparedQuantity", "agree", "unit_of"]
 
-Array = NDArray[np.float64]
 
 MOTIONS = ("displacement", "velocity", "acceleration")
 """Quantities of the platen that share the delay found on their velocity."""
@@ -100,7 +99,7 @@ def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tup
     return tuple(sorted(found, key=lambda a: order[a.quantity]))
 
 
-def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> NDArray[np.bool_]:
+def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> Mask:
     """Which columns (k,) move enough to be judged by a ratio."""
     size = measured.std(axis=0)
     per = {"m": 1.0, "rad": numbers.number("hardly_moving.radius"), "N m": 1.0 / numbers.number("hardly_moving.radius")}

@@ -10,9 +10,7 @@ Each phase engages more of the model: platen, struts and friction; then the oil;
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...core.arrays import Array
 from ...core.errors import LhpostError
 from ...core.names import AXES
 from ...simulation.rehearse import rehearse, replay
@@ -28,7 +26,6 @@ from .simulated_phases import SimulatedComparison
 
 __all__ = ["PHASES", "Phase", "run_phase"]
 
-Array = NDArray[np.float64]
 
 PHASES = {1: "inverse dynamics", 2: "open loop", 3: "closed loop"}
 

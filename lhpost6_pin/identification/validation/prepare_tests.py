@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...data.records import require
 from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
@@ -21,7 +21,6 @@ from .metrics import ComparisonBasis, Numbers
 
 __all__ = ["PreparedTest", "prepare", "too_short", "total_wrench", "wrench_calibration"]
 
-Array = NDArray[np.float64]
 
 SEED = 1  # of the second draw of noise: results repeat
 

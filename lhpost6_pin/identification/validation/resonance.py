@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...data.fusion import kinematic_jacobian
 from ...mechanics.linearize import OilColumnMode
 from ...mechanics.plant import Plant
 from .metrics import Numbers
 
 __all__ = ["Peak", "Resonance", "Response", "estimate_response", "find_peak", "find_resonances"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

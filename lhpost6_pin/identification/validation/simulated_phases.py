@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import SimulationError
 from ...core.names import AXES
 from ...data.signals import Band, delay, resample_band_limited
@@ -19,8 +19,6 @@ from .prepare_tests import PreparedTest, too_short, total_wrench, wrench_calibra
 from .resonance import Resonance, estimate_response, find_resonances
 
 __all__ = ["SimulatedComparison"]
-
-Array = NDArray[np.float64]
 
 
 class SimulatedComparison:

@@ -9,16 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex
 from ...data.alignment import combine_delays, phase_delay
 from ...data.records import sample_interval
 from ...machine.machine import Machine
 from .metrics import Numbers
 
 __all__ = ["Valves", "find_valves"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class Valves:
     model: Array  # (k,) of the machine [s]
     test: str
     frequency: Array  # (f,) [Hz]
-    response: NDArray[np.complex128]  # (f, k) [1]; nan where spool and command are not coherent
+    response: Complex  # (f, k) [1]; nan where spool and command are not coherent
 
 
 def find_valves(machine: Machine, records: Sequence[xr.Dataset], numbers: Numbers) -> Valves | None:
@@ -55,7 +53,7 @@ def find_valves(machine: Machine, records: Sequence[xr.Dataset], numbers: Number
     return Valves(tuple(names), each[:, 0], each[:, 1], model, str(record.attrs.get("test", "test")), f, response)
 
 
-def _response(command: Array, spool: Array, dt: float, numbers: Numbers) -> tuple[Array, NDArray[np.complex128]]:
+def _response(command: Array, spool: Array, dt: float, numbers: Numbers) -> tuple[Array, Complex]:
     """Frequencies (f,) and transfer functions (f, k), by Welch's averages."""
     from scipy.signal import csd, welch
 

@@ -112,3 +112,18 @@ def test_no_number_of_a_law_is_read_by_its_place():
         if any(isinstance(part, ast.Constant) and isinstance(part.value, int) for part in ast.walk(node.slice))
     ]
     assert not places
+
+
+def test_no_function_without_reference_counts_returns_an_array():
+    """What `compiled_inline` returns is numbers: an array, which it would not count, could be freed while in use."""
+    found = []
+    for name, function in functions():
+        if decorators(function) != "compiled_inline":
+            continue
+        nodes = list(ast.walk(function))
+        arrays = {ast.unparse(n.value) for n in nodes if isinstance(n, ast.Subscript)}
+        arrays |= {ast.unparse(n.value) for n in nodes if isinstance(n, ast.Attribute) and n.attr in ("size", "shape")}
+        given = [n.value for n in nodes if isinstance(n, ast.Return) and n.value]
+        parts = [e for value in given for e in (value.elts if isinstance(value, ast.Tuple) else [value])]
+        found += [f"{name}.{function.name}" for e in parts if ast.unparse(e) in arrays or "view(" in ast.unparse(e)]
+    assert not found

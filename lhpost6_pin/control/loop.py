@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import compiled, compiled_inline
+from ..core.compiled import compiled, compiled_inline, compiled_views
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
 from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
@@ -118,7 +118,7 @@ def pack_control(
 _AXIS_SIZE, _ACTUATOR_SIZE, _CANCELLER_SIZE = (d.itemsize // 8 for d in (AXIS, ACTUATOR, CANCELLER))
 
 
-@compiled_inline
+@compiled_views
 def unpack_control(packed):
     """Controller's tables from `ControlTables.packed`."""
     axes, n, cancellers = int(packed[0]), int(packed[1]), int(packed[2])

@@ -22,7 +22,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-__all__ = ["cache_folder", "compiled", "compiled_inline"]
+__all__ = ["cache_folder", "compiled", "compiled_inline", "compiled_views"]
 
 log = logging.getLogger(__name__)
 
@@ -94,18 +94,24 @@ def compiled(function: _F) -> _F:
 
     The pure Python original stays at ``.py_func`` and is the reference in tests.
     """
-    return _jit(function, inline=False)
+    return _jit(function)
 
 
 def compiled_inline(function: _F) -> _F:
-    """As `compiled`, and put into every compiled caller: for pieces of a step that take many arrays.
+    """As `compiled`, and put into every compiled caller: for pieces of a step, numbers out and no array made.
 
-    An array is seven words to pass: handing a dozen to a function called once a step costs as much as its work.
+    An array is seven words to pass: handing a dozen to a function called once a step costs as much as its work. Nor are
+    references counted, which costs as much again: the caller holds the arrays, so none may be returned.
     """
-    return _jit(function, inline=True)
+    return _jit(function, forceinline=True, _nrt=False)
 
 
-def _jit(function: _F, *, inline: bool) -> _F:
+def compiled_views(function: _F) -> _F:
+    """As `compiled`, and put into every compiled caller: for a function that returns views of the arrays it takes."""
+    return _jit(function, forceinline=True)
+
+
+def _jit(function: _F, **more: bool) -> _F:
     folder = cache_folder()
     config = cast(Any, numba.config)
     before = config.CACHE_DIR
@@ -114,7 +120,7 @@ def _jit(function: _F, *, inline: bool) -> _F:
         "error_model": "numpy",
         "nogil": True,
         "fastmath": {"contract", "nsz", "arcp"},
-        "forceinline": inline,
+        **more,
     }
     try:
         return cast(_F, numba.njit(cache=folder is not None, **options)(function))

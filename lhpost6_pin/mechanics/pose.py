@@ -223,7 +223,7 @@ def gauss_newton_step(displacement, s, K, axes, pose):
         miss = s[i] - displacement[i]
         for a in range(free):
             right[a] += K[i, axes[a]] * miss
-            for b in range(free):
+            for b in range(a + 1):  # `_solve` reads the lower triangle
                 normal[a, b] += K[i, axes[a]] * K[i, axes[b]]
     step = _solve(normal, right)
     largest = 0.0

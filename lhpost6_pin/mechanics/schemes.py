@@ -135,7 +135,8 @@ def staggered_stage(q, dt, tables, ws, spool):
     set_twist(motion[V_MID], tables.axes, frame)
     port_rates(JB[0], frame, port[DS])
     start = port[FORCE]  # free until the forces are known
-    start[:] = port[S]
+    for i in range(start.size):
+        start[i] = port[S, i]
     status = pose_stage(q, tables, ws)
     if status != 0:
         return status

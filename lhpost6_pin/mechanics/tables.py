@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import compiled_inline
+from ..core.compiled import compiled_views
 from ..effects.registry import ROW
 from ..laws.supply import Supply
 from .forward_dynamics import INERTIA
@@ -53,7 +53,7 @@ def pack_tables(
     return Tables._make([packed, *parts[:-1], others[-1]])
 
 
-@compiled_inline
+@compiled_views
 def unpack_tables(packed):
     """Tables from `Tables.packed`."""
     at = packed[: _PARTS + 1].view(np.int64)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import compiled_inline
+from ..core.compiled import compiled_views
 from ..effects.registry import PORTS
 from .plant import Plant, State
 from .schemes import V
@@ -47,7 +47,7 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
     return ws
 
 
-@compiled_inline
+@compiled_views
 def unpack_workspace(buffer):
     """Workspace from its buffer."""
     nq, states, nv = int(buffer[0]), int(buffer[1]), int(buffer[2])

@@ -8,7 +8,6 @@ are checked in, since numba's cache keeps no functions that are made while a pro
 
 import argparse
 import inspect
-import pkgutil
 import subprocess
 import sys
 from importlib import import_module
@@ -16,38 +15,18 @@ from pathlib import Path
 from typing import Any
 
 from lhpost6_pin import laws
+from lhpost6_pin.effects.registry import CODES, INLINED
 from lhpost6_pin.laws.contract import Law, parameter_sizes
 
 FOLDER = Path(__file__).parents[1] / "lhpost6_pin" / "effects"
 PORTS = ("port", "port_2", "port_3")
 
-VIEWS = '''"""Laws by name and code, a row's numbers as the parameters of its law; by `scripts/generate_dispatch.py`.
-
-A row's code says its law, its numbers are the law's parameters in order.
-"""
-
-from collections.abc import Mapping
+VIEWS = '''"""A row's numbers as the parameters of its law: written by `scripts/generate_dispatch.py`, do not edit."""
 
 from ..core.compiled import compiled_inline
 from ..laws import {modules}
-from ..laws.contract import Law
 
-__all__ = ["CODES", "HYDRAULIC", "INLINED", "LAWS", "MOST_NUMBERS", {names}]
-
-CODES: Mapping[str, int] = {codes}
-"""Codes of the laws that have rows."""
-
-INLINED = {inlined}
-"""Codes below it are those of the report's laws."""
-
-HYDRAULIC = {hydraulic}
-"""Code of the actuators' law."""
-
-MOST_NUMBERS = {most}
-"""Numbers of the law that has most parameters."""
-
-LAWS: Mapping[str, Law] = {laws}
-"""All laws by name."""
+__all__: list[str] = []  # as `views.view_...` alone
 '''
 
 DISPATCH = '''"""From a row of the effect table to its law: written by `scripts/generate_dispatch.py`, do not edit.
@@ -59,7 +38,7 @@ the loops; the others are called.
 
 from ..core.compiled import compiled, compiled_inline
 from ..laws import {modules}
-from .views import {names}
+from . import views
 
 __all__ = ["advance_called", "advance_inlined", "apply_forces", "power", "rates"]
 
@@ -67,7 +46,7 @@ __all__ = ["advance_called", "advance_inlined", "apply_forces", "power", "rates"
 @compiled
 def _load(row, z):
     """Force of the actuator on the same leg [N]."""
-    k, p = row.actuator_state, view_load_friction(row.numbers)
+    k, p = row.actuator_state, views.view_load_friction(row.numbers)
     return z[k] * p.area_a - (z[k + 1] * p.area_b if p.area_b > 0.0 else 0.0)
 '''
 
@@ -81,32 +60,17 @@ ABOUT = {
 
 def write() -> dict[str, str]:
     """The texts of the files."""
-    found = {m.name: import_module(f"lhpost6_pin.laws.{m.name}") for m in pkgutil.iter_modules(laws.__path__)}
-    every = {name: m for name, m in found.items() if hasattr(m, "LAW") or hasattr(m, "LAWS")}
-    single = {name: m for name, m in every.items() if hasattr(m, "LAW") and not m.LAW.modifies}
-    acting = sorted(single, key=lambda name: (not single[name].LAW.inlined, name))
-    of = [(name, f"{name}.LAW") for name in acting]
-    for name, module in every.items():
-        of += [(law, f'{name}.LAWS["{law}"]') for law in getattr(module, "LAWS", {})]
-        of += [(name, f"{name}.LAW")] if hasattr(module, "LAW") and module.LAW.modifies else []
-    views = VIEWS.format(
-        modules=_names(every),
-        names=", ".join(f'"view_{name}"' for name in acting),
-        codes={name: i for i, name in enumerate(acting)},
-        inlined=sum(single[name].LAW.inlined for name in acting),
-        hydraulic=acting.index("hydraulic"),
-        most=max(sum(parameter_sizes(m.LAW).values()) for m in single.values()),
-        laws="{" + ", ".join(f'"{name}": {law}' for name, law in of) + "}",
-    )
-    inlined = [name for name in acting if single[name].LAW.inlined]
-    chains = DISPATCH.format(modules=_names(single), names=_names(f"view_{name}" for name in acting))
-    chains += _chain("force_called", "row, s, sd, z", "force", acting[len(inlined) :], acting, single)
-    chains += _loop(inlined, single)
-    chains += _chain("advance_inlined", "row, s, ds, dt, z", "advance", inlined, acting, single)
-    chains += _chain("advance_called", "row, s, ds, dt, z", "advance", acting[len(inlined) :], acting, single)
-    chains += _chain("rates", "row, s, sd, z, zd", "rates", acting, acting, single)
-    chains += _chain("power", "row, s, z, work", "power", acting, acting, single)
-    texts = {"views.py": views + "".join(_view(name, single[name]) for name in acting), "dispatch.py": chains}
+    acting = {name: import_module(f"{laws.__name__}.{name}") for name in CODES}
+    inlined, called = list(acting)[:INLINED], list(acting)[INLINED:]
+    chains = DISPATCH.format(modules=_names(acting))
+    chains += _chain("force_called", "row, s, sd, z", "force", called, acting)
+    chains += _loop(inlined, acting)
+    chains += _chain("advance_inlined", "row, s, ds, dt, z", "advance", inlined, acting)
+    chains += _chain("advance_called", "row, s, ds, dt, z", "advance", called, acting)
+    chains += _chain("rates", "row, s, sd, z, zd", "rates", list(acting), acting)
+    chains += _chain("power", "row, s, z, work", "power", list(acting), acting)
+    views = VIEWS.format(modules=_names(acting)) + "".join(_view(name, module) for name, module in acting.items())
+    texts = {"views.py": views, "dispatch.py": chains}
     return {name: _formatted(text, FOLDER / name) for name, text in texts.items()}
 
 
@@ -134,7 +98,7 @@ def _view(name: str, module: Any) -> str:
 def _call(name: str, of: str, module: Any, p: str = "") -> str:
     """The call of a law's function, its parameters in `p` or by their view."""
     takes = inspect.signature(getattr(module, of).py_func).parameters
-    p = p or f"view_{name}(row.numbers)"
+    p = p or f"views.view_{name}(row.numbers)"
     return f"{name}.{of}({', '.join(p if a == 'p' else _argument(a, module.LAW, p) for a in takes)})"
 
 
@@ -153,14 +117,14 @@ def _argument(name: str, law: Law, p: str) -> str:
     return {"dt": "dt", "work": "work", "load": "_load(row, z)", "planar": "row.port_2 >= 0"}[name]
 
 
-def _chain(name: str, arguments: str, of: str, names: list[str], acting: list[str], single: dict[str, Any]) -> str:
+def _chain(name: str, arguments: str, of: str, names: list[str], acting: dict[str, Any]) -> str:
     """One function of the file: a chain over the laws whose module exports `of`."""
     kind = "compiled_inline" if name.endswith("inlined") else "compiled"
     text = f'\n\n@{kind}\ndef {name}({arguments}):\n    """{ABOUT[of]}"""\n'
     word = "if"
-    for law_name in (n for n in names if hasattr(single[n], of)):
-        law, call = single[law_name].LAW, _call(law_name, of, single[law_name])
-        text += f"    {word} row.law == {acting.index(law_name)}:\n"
+    for law_name in (n for n in names if hasattr(acting[n], of)):
+        law, call = acting[law_name].LAW, _call(law_name, of, acting[law_name])
+        text += f"    {word} row.law == {CODES[law_name]}:\n"
         if of in ("force", "power"):
             parts = [call, *["0.0"] * 2] if of == "force" and law.ports[1] == 1 else [call]
             if of == "force" and law.ports[1] == 2:
@@ -175,16 +139,16 @@ def _chain(name: str, arguments: str, of: str, names: list[str], acting: list[st
     return text + {"force": "    return 0.0, 0.0, 0.0\n", "power": "    return -work, 0.0\n"}.get(of, "")
 
 
-def _loop(names: list[str], single: dict[str, Any]) -> str:
+def _loop(names: list[str], acting: dict[str, Any]) -> str:
     """The loop over a table that fills the ledger; a function a row in place of its branches would be slower."""
     text = "\n\n@compiled_inline\ndef apply_forces(rows, s, sd, z, force, port_force):\n"
     text += '    """Fill the ledger force (n_rows, 3) and its sum per port."""\n    port_force[:] = 0.0\n'
     text += "    for i in range(rows.size):\n        row = rows[i]\n        second = third = 0.0\n"
     for code, name in enumerate(names):
-        parts = ", ".join(("first", "second", "third")[: single[name].LAW.ports[1]])
+        parts = ", ".join(("first", "second", "third")[: acting[name].LAW.ports[1]])
         text += f"        {'elif' if code else 'if'} row.law == {code}:\n"
-        text += f"            p_{code} = view_{name}(row.numbers)\n"
-        text += f"            {parts} = {_call(name, 'force', single[name], f'p_{code}')}\n"
+        text += f"            p_{code} = views.view_{name}(row.numbers)\n"
+        text += f"            {parts} = {_call(name, 'force', acting[name], f'p_{code}')}\n"
     text += "        else:\n            first, second, third = force_called(row, s, sd, z)\n"
     text += "".join(f"        force[i, {k}] = {v}\n" for k, v in enumerate(("first", "second", "third")))
     text += "        port_force[row.port] += first\n"

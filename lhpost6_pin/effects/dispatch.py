@@ -31,31 +31,7 @@ from ..laws import (
     viscous,
     warm_up,
 )
-from .views import (
-    view_asymmetric,
-    view_backlash,
-    view_ball,
-    view_bouc_wen_1d,
-    view_bouc_wen_2d,
-    view_by_memory,
-    view_by_position,
-    view_by_speed,
-    view_constant,
-    view_dahl_instead,
-    view_drag,
-    view_end_stop,
-    view_gas_heat,
-    view_gas_leak,
-    view_hydraulic,
-    view_load_friction,
-    view_nitrogen_strut,
-    view_oscillator,
-    view_smooth_ball,
-    view_spring,
-    view_stribeck,
-    view_viscous,
-    view_warm_up,
-)
+from . import views
 
 __all__ = ["advance_called", "advance_inlined", "apply_forces", "power", "rates"]
 
@@ -63,7 +39,7 @@ __all__ = ["advance_called", "advance_inlined", "apply_forces", "power", "rates"
 @compiled
 def _load(row, z):
     """Force of the actuator on the same leg [N]."""
-    k, p = row.actuator_state, view_load_friction(row.numbers)
+    k, p = row.actuator_state, views.view_load_friction(row.numbers)
     return z[k] * p.area_a - (z[k + 1] * p.area_b if p.area_b > 0.0 else 0.0)
 
 
@@ -71,52 +47,62 @@ def _load(row, z):
 def force_called(row, s, sd, z):
     """Forces of a row on its first, second and third port [N or N m]."""
     if row.law == 5:
-        return asymmetric.force(view_asymmetric(row.numbers), z[row.state]), 0.0, 0.0
+        return asymmetric.force(views.view_asymmetric(row.numbers), z[row.state]), 0.0, 0.0
     if row.law == 6:
-        return backlash.force(view_backlash(row.numbers), z[row.state]), 0.0, 0.0
+        return backlash.force(views.view_backlash(row.numbers), z[row.state]), 0.0, 0.0
     if row.law == 7:
-        return ball.force(view_ball(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2])
+        return ball.force(views.view_ball(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2])
     if row.law == 8:
-        return by_memory.force(view_by_memory(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+        return by_memory.force(views.view_by_memory(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
     if row.law == 9:
-        return by_position.force(view_by_position(row.numbers), s[row.port]), 0.0, 0.0
+        return by_position.force(views.view_by_position(row.numbers), s[row.port]), 0.0, 0.0
     if row.law == 10:
-        return by_speed.force(view_by_speed(row.numbers), sd[row.port]), 0.0, 0.0
+        return by_speed.force(views.view_by_speed(row.numbers), sd[row.port]), 0.0, 0.0
     if row.law == 11:
-        return constant.force(view_constant(row.numbers)), 0.0, 0.0
+        return constant.force(views.view_constant(row.numbers)), 0.0, 0.0
     if row.law == 12:
         first, second = dahl_instead.force(
-            view_dahl_instead(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2], z[row.state + 3]
+            views.view_dahl_instead(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2], z[row.state + 3]
         )
         return first, second, 0.0
     if row.law == 13:
-        return drag.force(view_drag(row.numbers), sd[row.port]), 0.0, 0.0
+        return drag.force(views.view_drag(row.numbers), sd[row.port]), 0.0, 0.0
     if row.law == 14:
-        return end_stop.force(view_end_stop(row.numbers), s[row.port]), 0.0, 0.0
+        return end_stop.force(views.view_end_stop(row.numbers), s[row.port]), 0.0, 0.0
     if row.law == 15:
-        return gas_heat.force(view_gas_heat(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+        return gas_heat.force(views.view_gas_heat(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
     if row.law == 16:
-        return gas_leak.force(view_gas_leak(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+        return gas_leak.force(views.view_gas_leak(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
     if row.law == 17:
         first, second = load_friction.force(
-            view_load_friction(row.numbers), _load(row, z), z[row.state], z[row.state + 1]
+            views.view_load_friction(row.numbers), _load(row, z), z[row.state], z[row.state + 1]
         )
         return first, second, 0.0
     if row.law == 18:
         return oscillator.force(
-            view_oscillator(row.numbers), sd[row.port], sd[row.port_2], sd[row.port_3], z[row.state], z[row.state + 1]
+            views.view_oscillator(row.numbers),
+            sd[row.port],
+            sd[row.port_2],
+            sd[row.port_3],
+            z[row.state],
+            z[row.state + 1],
         )
     if row.law == 19:
         return smooth_ball.force(
-            view_smooth_ball(row.numbers), sd[row.port], sd[row.port_2], (sd[row.port_3] if row.port_3 >= 0 else 0.0)
+            views.view_smooth_ball(row.numbers),
+            sd[row.port],
+            sd[row.port_2],
+            (sd[row.port_3] if row.port_3 >= 0 else 0.0),
         )
     if row.law == 20:
-        first, second = spring.force(view_spring(row.numbers), s[row.port], (s[row.port_2] if row.port_2 >= 0 else 0.0))
+        first, second = spring.force(
+            views.view_spring(row.numbers), s[row.port], (s[row.port_2] if row.port_2 >= 0 else 0.0)
+        )
         return first, second, 0.0
     if row.law == 21:
-        return stribeck.force(view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
+        return stribeck.force(views.view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
     if row.law == 22:
-        return warm_up.force(view_warm_up(row.numbers), z[row.state], z[row.state + 1]), 0.0, 0.0
+        return warm_up.force(views.view_warm_up(row.numbers), z[row.state], z[row.state + 1]), 0.0, 0.0
     return 0.0, 0.0, 0.0
 
 
@@ -128,19 +114,19 @@ def apply_forces(rows, s, sd, z, force, port_force):
         row = rows[i]
         second = third = 0.0
         if row.law == 0:
-            p_0 = view_bouc_wen_1d(row.numbers)
+            p_0 = views.view_bouc_wen_1d(row.numbers)
             first = bouc_wen_1d.force(p_0, z[row.state])
         elif row.law == 1:
-            p_1 = view_bouc_wen_2d(row.numbers)
+            p_1 = views.view_bouc_wen_2d(row.numbers)
             first, second = bouc_wen_2d.force(p_1, z[row.state], z[row.state + 1])
         elif row.law == 2:
-            p_2 = view_hydraulic(row.numbers)
+            p_2 = views.view_hydraulic(row.numbers)
             first = hydraulic.force(p_2, z[row.state], (z[row.state + 1] if p_2.area_b > 0.0 else 0.0))
         elif row.law == 3:
-            p_3 = view_nitrogen_strut(row.numbers)
+            p_3 = views.view_nitrogen_strut(row.numbers)
             first = nitrogen_strut.force(p_3, s[row.port])
         elif row.law == 4:
-            p_4 = view_viscous(row.numbers)
+            p_4 = views.view_viscous(row.numbers)
             first = viscous.force(p_4, sd[row.port])
         else:
             first, second, third = force_called(row, s, sd, z)
@@ -158,10 +144,10 @@ def apply_forces(rows, s, sd, z, force, port_force):
 def advance_inlined(row, s, ds, dt, z):
     """Advance a row's hidden states over one step in which the ports move by ds from s."""
     if row.law == 0:
-        z[row.state] = bouc_wen_1d.advance(view_bouc_wen_1d(row.numbers), ds[row.port], z[row.state])
+        z[row.state] = bouc_wen_1d.advance(views.view_bouc_wen_1d(row.numbers), ds[row.port], z[row.state])
     elif row.law == 1:
         z[row.state], z[row.state + 1] = bouc_wen_2d.advance(
-            view_bouc_wen_2d(row.numbers), ds[row.port], ds[row.port_2], z[row.state], z[row.state + 1]
+            views.view_bouc_wen_2d(row.numbers), ds[row.port], ds[row.port_2], z[row.state], z[row.state + 1]
         )
 
 
@@ -169,12 +155,12 @@ def advance_inlined(row, s, ds, dt, z):
 def advance_called(row, s, ds, dt, z):
     """Advance a row's hidden states over one step in which the ports move by ds from s."""
     if row.law == 5:
-        z[row.state] = asymmetric.advance(view_asymmetric(row.numbers), ds[row.port], z[row.state])
+        z[row.state] = asymmetric.advance(views.view_asymmetric(row.numbers), ds[row.port], z[row.state])
     elif row.law == 6:
-        z[row.state] = backlash.advance(view_backlash(row.numbers), ds[row.port], z[row.state])
+        z[row.state] = backlash.advance(views.view_backlash(row.numbers), ds[row.port], z[row.state])
     elif row.law == 7:
         z[row.state], z[row.state + 1], z[row.state + 2] = ball.advance(
-            view_ball(row.numbers),
+            views.view_ball(row.numbers),
             ds[row.port],
             ds[row.port_2],
             (ds[row.port_3] if row.port_3 >= 0 else 0.0),
@@ -183,10 +169,10 @@ def advance_called(row, s, ds, dt, z):
             z[row.state + 2],
         )
     elif row.law == 8:
-        z[row.state] = by_memory.advance(view_by_memory(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
+        z[row.state] = by_memory.advance(views.view_by_memory(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
     elif row.law == 12:
         z[row.state], z[row.state + 1], z[row.state + 2], z[row.state + 3] = dahl_instead.advance(
-            view_dahl_instead(row.numbers),
+            views.view_dahl_instead(row.numbers),
             ds[row.port],
             (ds[row.port_2] if row.port_2 >= 0 else 0.0),
             row.port_2 >= 0,
@@ -196,12 +182,12 @@ def advance_called(row, s, ds, dt, z):
             z[row.state + 3],
         )
     elif row.law == 15:
-        z[row.state] = gas_heat.advance(view_gas_heat(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
+        z[row.state] = gas_heat.advance(views.view_gas_heat(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
     elif row.law == 16:
-        z[row.state] = gas_leak.advance(view_gas_leak(row.numbers), dt, z[row.state])
+        z[row.state] = gas_leak.advance(views.view_gas_leak(row.numbers), dt, z[row.state])
     elif row.law == 17:
         z[row.state], z[row.state + 1] = load_friction.advance(
-            view_load_friction(row.numbers),
+            views.view_load_friction(row.numbers),
             ds[row.port],
             (ds[row.port_2] if row.port_2 >= 0 else 0.0),
             row.port_2 >= 0,
@@ -210,7 +196,7 @@ def advance_called(row, s, ds, dt, z):
         )
     elif row.law == 18:
         z[row.state], z[row.state + 1] = oscillator.advance(
-            view_oscillator(row.numbers),
+            views.view_oscillator(row.numbers),
             ds[row.port],
             ds[row.port_2],
             ds[row.port_3],
@@ -219,10 +205,10 @@ def advance_called(row, s, ds, dt, z):
             z[row.state + 1],
         )
     elif row.law == 21:
-        z[row.state] = stribeck.advance(view_stribeck(row.numbers), ds[row.port], z[row.state])
+        z[row.state] = stribeck.advance(views.view_stribeck(row.numbers), ds[row.port], z[row.state])
     elif row.law == 22:
         z[row.state], z[row.state + 1] = warm_up.advance(
-            view_warm_up(row.numbers), ds[row.port], dt, z[row.state], z[row.state + 1]
+            views.view_warm_up(row.numbers), ds[row.port], dt, z[row.state], z[row.state + 1]
         )
 
 
@@ -230,18 +216,18 @@ def advance_called(row, s, ds, dt, z):
 def rates(row, s, sd, z, zd):
     """Fill the rates of a row's hidden states."""
     if row.law == 0:
-        zd[row.state] = bouc_wen_1d.rates(view_bouc_wen_1d(row.numbers), sd[row.port], z[row.state])
+        zd[row.state] = bouc_wen_1d.rates(views.view_bouc_wen_1d(row.numbers), sd[row.port], z[row.state])
     elif row.law == 1:
         zd[row.state], zd[row.state + 1] = bouc_wen_2d.rates(
-            view_bouc_wen_2d(row.numbers), sd[row.port], sd[row.port_2], z[row.state], z[row.state + 1]
+            views.view_bouc_wen_2d(row.numbers), sd[row.port], sd[row.port_2], z[row.state], z[row.state + 1]
         )
     elif row.law == 5:
-        zd[row.state] = asymmetric.rates(view_asymmetric(row.numbers), sd[row.port], z[row.state])
+        zd[row.state] = asymmetric.rates(views.view_asymmetric(row.numbers), sd[row.port], z[row.state])
     elif row.law == 6:
-        zd[row.state] = backlash.rates(view_backlash(row.numbers), sd[row.port], z[row.state])
+        zd[row.state] = backlash.rates(views.view_backlash(row.numbers), sd[row.port], z[row.state])
     elif row.law == 7:
         zd[row.state], zd[row.state + 1], zd[row.state + 2] = ball.rates(
-            view_ball(row.numbers),
+            views.view_ball(row.numbers),
             sd[row.port],
             sd[row.port_2],
             (sd[row.port_3] if row.port_3 >= 0 else 0.0),
@@ -250,10 +236,10 @@ def rates(row, s, sd, z, zd):
             z[row.state + 2],
         )
     elif row.law == 8:
-        zd[row.state] = by_memory.rates(view_by_memory(row.numbers), s[row.port], z[row.state])
+        zd[row.state] = by_memory.rates(views.view_by_memory(row.numbers), s[row.port], z[row.state])
     elif row.law == 12:
         zd[row.state], zd[row.state + 1], zd[row.state + 2], zd[row.state + 3] = dahl_instead.rates(
-            view_dahl_instead(row.numbers),
+            views.view_dahl_instead(row.numbers),
             sd[row.port],
             (sd[row.port_2] if row.port_2 >= 0 else 0.0),
             z[row.state],
@@ -262,12 +248,12 @@ def rates(row, s, sd, z, zd):
             z[row.state + 3],
         )
     elif row.law == 15:
-        zd[row.state] = gas_heat.rates(view_gas_heat(row.numbers), s[row.port], z[row.state])
+        zd[row.state] = gas_heat.rates(views.view_gas_heat(row.numbers), s[row.port], z[row.state])
     elif row.law == 16:
-        zd[row.state] = gas_leak.rates(view_gas_leak(row.numbers), z[row.state])
+        zd[row.state] = gas_leak.rates(views.view_gas_leak(row.numbers), z[row.state])
     elif row.law == 17:
         zd[row.state], zd[row.state + 1] = load_friction.rates(
-            view_load_friction(row.numbers),
+            views.view_load_friction(row.numbers),
             sd[row.port],
             (sd[row.port_2] if row.port_2 >= 0 else 0.0),
             z[row.state],
@@ -275,13 +261,18 @@ def rates(row, s, sd, z, zd):
         )
     elif row.law == 18:
         zd[row.state], zd[row.state + 1] = oscillator.rates(
-            view_oscillator(row.numbers), sd[row.port], sd[row.port_2], sd[row.port_3], z[row.state], z[row.state + 1]
+            views.view_oscillator(row.numbers),
+            sd[row.port],
+            sd[row.port_2],
+            sd[row.port_3],
+            z[row.state],
+            z[row.state + 1],
         )
     elif row.law == 21:
-        zd[row.state] = stribeck.rates(view_stribeck(row.numbers), sd[row.port], z[row.state])
+        zd[row.state] = stribeck.rates(views.view_stribeck(row.numbers), sd[row.port], z[row.state])
     elif row.law == 22:
         zd[row.state], zd[row.state + 1] = warm_up.rates(
-            view_warm_up(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
+            views.view_warm_up(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
         )
 
 
@@ -289,15 +280,15 @@ def rates(row, s, sd, z, zd):
 def power(row, s, z, work):
     """Dissipated power [W] and stored energy [J] of a row that does `work` [W] on its ports."""
     if row.law == 3:
-        return nitrogen_strut.power(view_nitrogen_strut(row.numbers), s[row.port])
+        return nitrogen_strut.power(views.view_nitrogen_strut(row.numbers), s[row.port])
     if row.law == 6:
-        return backlash.power(view_backlash(row.numbers), z[row.state], work)
+        return backlash.power(views.view_backlash(row.numbers), z[row.state], work)
     if row.law == 14:
-        return end_stop.power(view_end_stop(row.numbers), s[row.port])
+        return end_stop.power(views.view_end_stop(row.numbers), s[row.port])
     if row.law == 15:
-        return gas_heat.power(view_gas_heat(row.numbers), s[row.port], z[row.state])
+        return gas_heat.power(views.view_gas_heat(row.numbers), s[row.port], z[row.state])
     if row.law == 16:
-        return gas_leak.power(view_gas_leak(row.numbers), s[row.port], z[row.state])
+        return gas_leak.power(views.view_gas_leak(row.numbers), s[row.port], z[row.state])
     if row.law == 20:
-        return spring.power(view_spring(row.numbers), s[row.port], (s[row.port_2] if row.port_2 >= 0 else 0.0))
+        return spring.power(views.view_spring(row.numbers), s[row.port], (s[row.port_2] if row.port_2 >= 0 else 0.0))
     return -work, 0.0

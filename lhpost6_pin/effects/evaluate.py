@@ -12,8 +12,8 @@ from ..core.compiled import compiled, compiled_inline
 from ..laws.supply import varies
 from .actuator import advance_actuator, advance_modified, fill_rates
 from .dispatch import advance_called, advance_inlined, apply_forces, rates
+from .registry import HYDRAULIC, INLINED
 from .supply import close_supply, open_supply, supply_pressures, supply_rates
-from .views import HYDRAULIC, INLINED
 
 __all__ = ["advance_states", "apply_forces", "state_rates", "wrench_on_platen"]
 

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..laws import gas_heat, gas_leak
-from .registry import parameters_of
-from .views import CODES
+from .registry import CODES, parameters_of
 
 __all__ = ["log_ratio"]
 

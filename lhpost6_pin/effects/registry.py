@@ -1,16 +1,43 @@
-"""The effect table: one row a law on one port, or on two or three; and its parameters by name."""
+"""All laws by name and code; the effect table, one row a law on its ports; and a row's parameters by name."""
 
-from collections.abc import Callable
+import pkgutil
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import laws
 from ..laws.contract import Law, parameter_sizes
-from .views import CODES, HYDRAULIC, LAWS, MOST_NUMBERS
 
-__all__ = ["LAWS", "PORTS", "ROW", "actuator_rows", "columns_of", "law_of", "parameters_of"]
-__all__ += ["shapes_of", "states_of"]
+__all__ = ["CODES", "HYDRAULIC", "INLINED", "LAWS", "PORTS", "ROW", "actuator_rows", "columns_of", "law_of"]
+__all__ += ["parameters_of", "shapes_of", "states_of"]
+
+
+def _all_laws() -> dict[str, Law]:
+    """Laws of every module of `laws/`: those that make forces first, the report's (`inlined`) before the others."""
+    found: dict[str, Law] = {}
+    for name in (m.name for m in pkgutil.iter_modules(laws.__path__)):
+        module = import_module(f"{laws.__name__}.{name}")
+        found |= getattr(module, "LAWS", {}) | ({name: module.LAW} if hasattr(module, "LAW") else {})
+    return dict(sorted(found.items(), key=lambda item: (bool(item[1].modifies), not item[1].inlined)))
+
+
+LAWS: Mapping[str, Law] = _all_laws()
+"""All laws by name."""
+
+CODES: Mapping[str, int] = {name: i for i, name in enumerate(n for n, law in LAWS.items() if not law.modifies)}
+"""Codes of the laws that have rows."""
+
+INLINED = sum(law.inlined for law in LAWS.values())
+"""Codes below it are those of the report's laws."""
+
+HYDRAULIC = CODES["hydraulic"]
+"""Code of the actuators' law."""
+
+MOST_NUMBERS = max(sum(parameter_sizes(LAWS[name]).values()) for name in CODES)
+"""Numbers of the law that has most parameters."""
 
 ROW = np.dtype(
     [

@@ -8,7 +8,8 @@ from ..laws.hydraulic import exchanged_flows
 from ..laws.lines import filter_shares
 from ..laws.supply import pressures
 from .actuator import pressures_of, valve_pressure
-from .views import HYDRAULIC, view_hydraulic
+from .registry import HYDRAULIC
+from .views import view_hydraulic
 
 __all__ = ["close_supply", "flows_exchanged", "open_supply", "shared_states", "steady_supply", "supply_pressures"]
 __all__ += ["supply_rates"]

@@ -12,8 +12,7 @@ from ..core.errors import UnknownNameError
 from ..laws.contract import Law
 from .effect import Effect
 from .modifiers import modify_rows
-from .registry import LAWS, PORTS, ROW, parameters_of
-from .views import CODES
+from .registry import CODES, LAWS, PORTS, ROW, parameters_of
 
 __all__ = ["effect_table", "state_names"]
 

@@ -1,9 +1,4 @@
-"""Laws by name and code, a row's numbers as the parameters of its law; by `scripts/generate_dispatch.py`.
-
-A row's code says its law, its numbers are the law's parameters in order.
-"""
-
-from collections.abc import Mapping
+"""A row's numbers as the parameters of its law: written by `scripts/generate_dispatch.py`, do not edit."""
 
 from ..core.compiled import compiled_inline
 from ..laws import (
@@ -12,11 +7,9 @@ from ..laws import (
     ball,
     bouc_wen_1d,
     bouc_wen_2d,
-    bulk,
     by_memory,
     by_position,
     by_speed,
-    chamber,
     constant,
     dahl_instead,
     drag,
@@ -24,136 +17,17 @@ from ..laws import (
     gas_heat,
     gas_leak,
     hydraulic,
-    leaks,
-    lines,
     load_friction,
     nitrogen_strut,
     oscillator,
-    platen_body,
-    play,
     smooth_ball,
-    spool,
     spring,
     stribeck,
-    supply,
-    valve_path,
     viscous,
     warm_up,
 )
-from ..laws.contract import Law
 
-__all__ = [
-    "CODES",
-    "HYDRAULIC",
-    "INLINED",
-    "LAWS",
-    "MOST_NUMBERS",
-    "view_bouc_wen_1d",
-    "view_bouc_wen_2d",
-    "view_hydraulic",
-    "view_nitrogen_strut",
-    "view_viscous",
-    "view_asymmetric",
-    "view_backlash",
-    "view_ball",
-    "view_by_memory",
-    "view_by_position",
-    "view_by_speed",
-    "view_constant",
-    "view_dahl_instead",
-    "view_drag",
-    "view_end_stop",
-    "view_gas_heat",
-    "view_gas_leak",
-    "view_load_friction",
-    "view_oscillator",
-    "view_smooth_ball",
-    "view_spring",
-    "view_stribeck",
-    "view_warm_up",
-]
-
-CODES: Mapping[str, int] = {
-    "bouc_wen_1d": 0,
-    "bouc_wen_2d": 1,
-    "hydraulic": 2,
-    "nitrogen_strut": 3,
-    "viscous": 4,
-    "asymmetric": 5,
-    "backlash": 6,
-    "ball": 7,
-    "by_memory": 8,
-    "by_position": 9,
-    "by_speed": 10,
-    "constant": 11,
-    "dahl_instead": 12,
-    "drag": 13,
-    "end_stop": 14,
-    "gas_heat": 15,
-    "gas_leak": 16,
-    "load_friction": 17,
-    "oscillator": 18,
-    "smooth_ball": 19,
-    "spring": 20,
-    "stribeck": 21,
-    "warm_up": 22,
-}
-"""Codes of the laws that have rows."""
-
-INLINED = 5
-"""Codes below it are those of the report's laws."""
-
-HYDRAULIC = 2
-"""Code of the actuators' law."""
-
-MOST_NUMBERS = 33
-"""Numbers of the law that has most parameters."""
-
-LAWS: Mapping[str, Law] = {
-    "bouc_wen_1d": bouc_wen_1d.LAW,
-    "bouc_wen_2d": bouc_wen_2d.LAW,
-    "hydraulic": hydraulic.LAW,
-    "nitrogen_strut": nitrogen_strut.LAW,
-    "viscous": viscous.LAW,
-    "asymmetric": asymmetric.LAW,
-    "backlash": backlash.LAW,
-    "ball": ball.LAW,
-    "by_memory": by_memory.LAW,
-    "by_position": by_position.LAW,
-    "by_speed": by_speed.LAW,
-    "constant": constant.LAW,
-    "dahl_instead": dahl_instead.LAW,
-    "drag": drag.LAW,
-    "end_stop": end_stop.LAW,
-    "gas_heat": gas_heat.LAW,
-    "gas_leak": gas_leak.LAW,
-    "load_friction": load_friction.LAW,
-    "oscillator": oscillator.LAW,
-    "smooth_ball": smooth_ball.LAW,
-    "spring": spring.LAW,
-    "stribeck": stribeck.LAW,
-    "warm_up": warm_up.LAW,
-    "entrained_air": bulk.LAWS["entrained_air"],
-    "cavitation": bulk.LAWS["cavitation"],
-    "dead_volume": chamber.LAWS["dead_volume"],
-    "extra_leakage": leaks.LAWS["extra_leakage"],
-    "turbulent_leakage": leaks.LAWS["turbulent_leakage"],
-    "external_leakage": leaks.LAWS["external_leakage"],
-    "null_leakage": leaks.LAWS["null_leakage"],
-    "line": lines.LAWS["line"],
-    "supply_line": lines.LAWS["supply_line"],
-    "thrust_direction": platen_body.LAWS["thrust_direction"],
-    "more_inertia": platen_body.LAWS["more_inertia"],
-    "play": play.LAW,
-    "null_bias": spool.LAWS["null_bias"],
-    "deadband": spool.LAWS["deadband"],
-    "flow_curve": spool.LAWS["flow_curve"],
-    "supply_droop": supply.LAWS["supply_droop"],
-    "back_pressure": supply.LAWS["back_pressure"],
-    "valve_delay": valve_path.LAWS["valve_delay"],
-    "valve_lag": valve_path.LAWS["valve_lag"],
-}
-"""All laws by name."""
+__all__: list[str] = []  # as `views.view_...` alone
 
 
 @compiled_inline

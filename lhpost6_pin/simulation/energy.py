@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 from ..core.compiled import compiled
 from ..effects.actuator import oil_power
 from ..effects.dispatch import power
+from ..effects.registry import HYDRAULIC, LAWS
 from ..effects.supply import supply_pressures
-from ..effects.views import HYDRAULIC, LAWS
 from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
 from .ledger import history_of, number_of
 from .simulate import Run

@@ -24,7 +24,7 @@ from lhpost6_pin.laws import bulk, chamber, hydraulic, leaks, lines, orifice, pl
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import Plant, make_plant
-from lhpost6_pin.mechanics.schemes import spool_windows
+from lhpost6_pin.mechanics.valve_delay import delayed_spools
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate
 
@@ -375,7 +375,7 @@ def test_a_lagging_spool_is_the_mean_of_its_answer_over_each_step() -> None:
     path, window, found = np.array([2.5 / rate, time]), np.zeros((4, 1)), []
     command[:3] = 0.0
     for sample in range(40):
-        spool_windows(command, 0, sample, path, rate, window)
+        delayed_spools(command, 0, sample, path, rate, window)
         found.append(window[:, 0].copy())
     fine = 64  # a step of 1/8192 s
     held = np.repeat(np.r_[np.zeros(3), command[:, 0]], 4 * fine)[2 * fine :][: 160 * fine]  # 2.5 samples late

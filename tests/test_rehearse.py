@@ -15,7 +15,7 @@ from lhpost6_pin.data.signals import rrmse
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
-from lhpost6_pin.mechanics.schemes import spool_windows
+from lhpost6_pin.mechanics.valve_delay import delayed_spools
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.rehearse import rehearse, replay, target_within_limits
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
@@ -176,7 +176,7 @@ def test_replay_of_a_rehearsal_at_a_finer_step_differs_by_what_moves_within_a_sa
     exact = np.zeros((len(run.time) * steps, run.plant.spools))
     for sample in range(len(run.time)):
         window = exact[sample * steps : (sample + 1) * steps]
-        spool_windows(run.command, 0, sample, run.plant.delays, float(SAMPLE_RATE), window)
+        delayed_spools(run.command, 0, sample, run.plant.delays, float(SAMPLE_RATE), window)
     start = find_equilibrium(run.plant).state
     same = simulate(run.plant, OpenLoop(exact, start), samples=len(run.time), engine="fused")
     assert np.array_equal(same.q, run.q) and np.array_equal(same.z, run.z)

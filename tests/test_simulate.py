@@ -19,7 +19,7 @@ from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import PlatenMotion, platen_motion
-from lhpost6_pin.mechanics.schemes import spool_windows
+from lhpost6_pin.mechanics.valve_delay import delayed_spools
 from lhpost6_pin.mechanics.workspace import make_workspace
 from lhpost6_pin.simulation.batch import simulate_many
 from lhpost6_pin.simulation.engine_pinocchio import make_stepper
@@ -200,7 +200,7 @@ def test_spool_is_the_delayed_command_averaged_over_each_step(delay, steps):
     fine = 20_000
     for sample in (0, 3, 25, 39):
         window = np.zeros((steps, 1))
-        spool_windows(command, 0, sample, np.array([delay]), 2048.0, window)
+        delayed_spools(command, 0, sample, np.array([delay]), 2048.0, window)
         for j in range(steps):
             at = (sample + (j + (np.arange(fine) + 0.5) / fine) / steps) / 2048 - delay
             held = command[np.clip(np.floor(at * 2048).astype(int), 0, 39), 0]
@@ -214,7 +214,7 @@ def test_five_milliseconds_are_ten_and_a_quarter_samples():
     seen = np.zeros(20)
     for sample in range(20):
         window = np.zeros((1, 1))
-        spool_windows(command, 0, sample, np.array([5e-3]), 2048.0, window)
+        delayed_spools(command, 0, sample, np.array([5e-3]), 2048.0, window)
         seen[sample] = window[0, 0]
     assert np.all(seen[:15] == 0.0) and np.all(seen[16:] == 1.0)
     assert seen[15] == pytest.approx(1.0 - 0.24, abs=1e-9)

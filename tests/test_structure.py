@@ -15,8 +15,8 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 """The folders: one imports only from those before it. Imports for types alone count."""
 
 PINOCCHIO = {
-    *("mechanics.rigid_body", "mechanics.kinematics", "mechanics.plant", "mechanics.equilibrium"),
-    *("mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
+    *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
+    *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
     *("show.bodies", "show.specimen_bodies", "show.viewer.scene", "show.viewer.live"),
 }

@@ -25,8 +25,9 @@ from ..core.compiled import compiled, compiled_inline, compiled_views
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
 from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
-from ..mechanics.schemes import A, S, V, spool_windows
+from ..mechanics.schemes import A, S, V
 from ..mechanics.tables import unpack_tables
+from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import unpack_workspace
 from .filters import NOTCHES
 
@@ -306,7 +307,7 @@ def control_sample(sample, drive, tables, ws, control, memory, command, window):
     feedback = Feedback(np.empty(n), np.empty(6), np.empty(n))
     sense(tables, ws, feedback)
     clipped = control_step(sample, drive, feedback, tables, control, memory, command[sample])
-    spool_windows(command, 0, sample, tables.delays, float(SAMPLE_RATE), window)
+    delayed_spools(command, 0, sample, tables.delays, float(SAMPLE_RATE), window)
     return clipped
 
 

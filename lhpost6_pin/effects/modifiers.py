@@ -32,7 +32,7 @@ def _acting(effects: Sequence[Effect], kind: str) -> Iterator[tuple[Effect, str,
 
 
 def modify_rows(rows: NDArray[np.void], effects: Sequence[Effect], at: Mapping[str, int], states: int) -> None:
-    """Change the rows of actuators in place as modifiers of their oil say.
+    """Apply the modifiers of oil to the rows of actuators, in place.
 
     at are the rows of actuators by name; `states` hidden states are taken, modifiers have the next ones. Raises
     UnknownNameError for an actuator that does not exist.

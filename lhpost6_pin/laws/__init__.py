@@ -1,1 +1,1 @@
-"""Force laws: scalar kernels that know their equation and nothing of machines, poses or time loops."""
+"""Force laws: scalar kernels, one equation each, independent of machines, poses and time loops."""

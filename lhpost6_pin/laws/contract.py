@@ -1,4 +1,4 @@
-"""The contract of a law: what its module exports, and what the evaluation of a machine must know of it.
+"""The contract of a law: what its module exports, and the attributes that the evaluation of a machine reads.
 
 A module of a law exports LAW and, as compiled scalar functions,
 
@@ -7,7 +7,7 @@ A module of a law exports LAW and, as compiled scalar functions,
     advance(p, ...)    the states after one step, exact wherever the law allows it
     power(p, ...)      dissipated power [W] and stored energy [J]; without it all work is dissipated and nothing stored
 
-p is the law's NamedTuple of parameters. The names of the other arguments say what a function takes: s, s_2, s_3 the
+p is the law's NamedTuple of parameters. The names of the other arguments are their meaning: s, s_2, s_3 the
 coordinates of its ports, v, v_2, v_3 their rates, d, d_2, d_3 their increments over the step dt, the names of its
 states, `load` the force of the actuator on the same leg, `planar` whether there is a second port, `work` the power of
 its forces. Ports that are optional and absent give zeros. `effects.dispatch` is generated from these signatures.

@@ -4,8 +4,8 @@ One law for actuators with a four-way valve and two chambers, and for those with
 area_b is then zero, two ports of the valve are closed (w2 = w4 = 0) and P_B = 0, so that the leak is C_L P_A.
 
 Flow into chamber A: orifices and null leakage of the valve, less the leak across the piston and out of the chamber.
-`modified` says whether any parameter beyond the report's acts; a constant in the calling code, it leaves nothing of
-them in the report's own actuators. high, low [Pa] are supply and return pressure.
+`modified` is true where a parameter beyond the report's acts; it is a constant of the calling code, so that the
+compiler removes those terms from the report's own actuators. high, low [Pa] are supply and return pressure.
 """
 
 import math
@@ -15,7 +15,7 @@ from ..core.compiled import compiled, compiled_inline
 from .bulk import air_modulus, enthalpy_of, void_share
 from .chamber import flow_enthalpy, piston_force, pressure_rises, side_shares
 from .contract import Law
-from .leaks import null_leak, turbulent_leak
+from .leaks import laminar_leak, null_leak, turbulent_leak
 from .orifice import opening, port_flow
 from .play import play_energy, play_slope, play_travel
 from .spool import corrected_opening, dead_zone
@@ -157,7 +157,7 @@ def exchanged_flows(p, spool, pressure_a, pressure_b, high, low):
 @compiled_inline
 def leak_flows(p, modified, pressure_a, pressure_b, low):
     """Leaks [m3/s]: across the piston with its slope [m3/s/Pa], and out of chambers A and B with theirs."""
-    across, slope = p.leakage * (pressure_a - pressure_b), p.leakage
+    across, slope = laminar_leak(pressure_a - pressure_b, p.leakage)
     if not modified:
         return across, slope, 0.0, 0.0, 0.0, 0.0
     if p.turbulent != 0.0:
@@ -207,7 +207,7 @@ def rod_velocity(p, modified, pressure_a, pressure_b, change_a, change_b):
 
 @compiled_inline
 def _shared(p, pressure_a, pressure_b, change_a, change_b, fall_a, fall_b):
-    """Rod's advance [m] where its own stroke is felt: changes but for it, and falls of pressure per unit of it."""
+    """Rod's advance [m] from the changes of pressure without it, and the falls of pressure per unit of it."""
     ahead = rod_velocity(p, True, pressure_a, pressure_b, change_a, change_b)
     return ahead / (1.0 + rod_velocity(p, True, pressure_a, pressure_b, fall_a, fall_b))
 

@@ -1,5 +1,6 @@
-"""Leaks beyond the report's laminar one (Eq. 4-3).
+"""Leakage of an actuator: the report's across the piston (Eq. 4-3), and what the library adds.
 
+across the piston   Q = C_L (P_A - P_B)                                      the report's, laminar
 across the piston   Q = c root(P_A - P_B)                                    a gap worn wide: turbulent
 out of a chamber    Q = c (P - P_R)                                          past the rod, or a fitting
 past a worn spool   Q = g_0 exp(-|x|/w) (root(P_S - P) - root(P - P_R))      into a chamber, near the valve's null
@@ -15,7 +16,8 @@ from ..core.compiled import compiled
 from .contract import Law
 from .orifice import signed_root
 
-__all__ = ["ExternalLeakage", "ExtraLeakage", "LAWS", "NullLeakage", "TurbulentLeakage", "null_leak", "turbulent_leak"]
+__all__ = ["ExternalLeakage", "ExtraLeakage", "LAWS", "NullLeakage", "TurbulentLeakage"]
+__all__ += ["laminar_leak", "null_leak", "turbulent_leak"]
 
 
 class ExtraLeakage(NamedTuple):
@@ -50,6 +52,12 @@ LAWS = {
     "external_leakage": Law(ExternalLeakage, modifies="oil", fields=("external", "external_side")),
     "null_leakage": Law(NullLeakage, modifies="oil", fields=("null_leakage", "null_width")),
 }
+
+
+@compiled
+def laminar_leak(drop: float, coefficient: float) -> tuple[float, float]:
+    """Flow [m3/s] down a drop [Pa] and its slope [m3/s/Pa]; coefficient C_L [m3/s/Pa]."""
+    return coefficient * drop, coefficient
 
 
 @compiled

@@ -2,7 +2,7 @@
 
     delay   x(t) = c(t - tau)             lag   T dx/dt + x = c
 
-Both act on the command path of a valve (`mechanics.schemes.spool_windows`). Stored energy: none.
+Both act on the command path of a valve (`mechanics.valve_delay`). Stored energy: none.
 """
 
 from typing import Annotated, NamedTuple

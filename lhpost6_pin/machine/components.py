@@ -100,7 +100,7 @@ class Strut:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the machine is said to give (Table 2.2), axis order x y z roll pitch yaw."""
+    """Stated limits of the machine (Table 2.2), axis order x y z roll pitch yaw."""
 
     displacement: tuple[float, ...] = quantity_field("m | rad", length=6, bound="nonnegative")
     velocity: tuple[float, ...] = quantity_field("m/s | rad/s", length=6, bound="nonnegative")

@@ -1,4 +1,4 @@
-"""What the model says the machine can give, beside what Table 2.2 says."""
+"""Capacity of the machine by the model, beside Table 2.2."""
 
 from collections.abc import Callable
 from typing import NamedTuple

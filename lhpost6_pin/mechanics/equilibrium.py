@@ -123,7 +123,7 @@ def _rest_of_modified(p: Hydraulic, force: float, supply: Pressures) -> tuple[tu
     least, most = max(low, (low * area_b + force) / area_a), min(high, (high * area_b + force) / area_a)
     if least < most and miss(least) > 0.0 > miss(most):
         a = float(brentq(miss, least, most, xtol=1e-6, rtol=1e-15, maxiter=1000))
-    else:  # no pressures within the supply's: what the report's law has, which says so
+    else:  # no pressures within the supply's: those of the report's law, whose check raises
         a = float(rest_pressures(p, force, supply)[0][0])
     return (a, other(a)), spool_for(a, other(a))
 

@@ -288,7 +288,7 @@ def thrust_direction(machine: "Machine", pose: Array, component: Component) -> A
     """Force (3,) in {s} on the platen per unit of a component's axial force (Eq. 4-23).
 
     The report pushes along the component. A machine with thrust "normal" pushes along the platen normal n instead,
-    by n / n_z, which is what Eq. 3-27 asks for if power is to be conserved.
+    by n / n_z, which Eq. 3-27 requires for conservation of power.
     """
     if is_bearing(component) and machine.thrust == "normal":
         normal = rotation(pose[3:])[:, 2]

@@ -68,7 +68,7 @@ class Plant:
 
     @property
     def command_path(self) -> Array:
-        """Delays of valves (n_actuators,) [s] as `schemes.spool_windows` takes them: with lags behind, if there are."""
+        """Delays of valves (n_actuators,) [s], with lags behind if there are any, as for `valve_delay.delayed_spools`."""
         return np.concatenate([self.delays, self.lags]) if self.lags.any() else self.delays
 
     @property

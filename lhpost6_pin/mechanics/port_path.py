@@ -1,6 +1,6 @@
 """Ports along a motion: where each was, how fast, by how much it moved from sample to sample, and its force's wrench.
 
-All that laws need to know of a motion; what is evaluated many times along one motion turns its poses into ports once.
+All that laws need of a motion; poses are converted to ports once and evaluated many times.
 """
 
 from typing import NamedTuple

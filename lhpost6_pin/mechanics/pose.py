@@ -155,7 +155,7 @@ def pose_jacobian(pose, body, frame, J, out):
     rho = body[0].rho_c
     for i in range(out.shape[0]):
         _set(from_body(frame, J[i]), out[i])
-        # a turn about B moves C: v_B = v_C - omega x rho, so omega sees moment - rho x force
+        # a turn about B moves C: v_B = v_C - omega x rho, so the column of omega is moment - rho x force
         tx, ty, tz = cross(rho, J[i])
         mx, my, mz = J[i, 3] - tx, J[i, 4] - ty, J[i, 5] - tz
         out[i, 3] = mx
@@ -175,7 +175,7 @@ def leg_jacobian(pose, legs, body, s, J, B, frame, out):
 def pose_acceleration(frame, body, axes, v, a, out):
     """Acceleration of C in {s} and of the Euler angles, out (6,), of a platen with velocity v and acceleration a.
 
-    v, a (nv,) as a plant integrates them, frame its pose. What accelerometers on the platen tell its controller;
+    v, a (nv,) as a plant integrates them, frame its pose. What accelerometers on the platen measure;
     `platen_motion` does the same for whole records (Eqs. 3-11, 3-18).
     """
     if axes.size != 6:

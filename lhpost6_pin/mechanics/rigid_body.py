@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ..core.errors import ParameterError
 from ..effects.modifiers import added_inertias
 from ..machine.machine import Machine
-from ..machine.specimen import Specimen
-from ..machine.urdf_numbers import check_urdf
+from .specimen_mount import mount_specimen
 
 __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
 
@@ -53,7 +52,7 @@ def make_model(machine: Machine) -> Any:
     armature = np.zeros(6)
     armature[:3] = platen.directional_mass
     if machine.specimen is not None:
-        model = _mount(model, machine.specimen)
+        model = mount_specimen(model, machine.specimen)
     extra = np.zeros(model.nv)
     axes = free_axes(machine)
     extra[: axes.size] = armature[axes]
@@ -76,30 +75,6 @@ def _with_added(inertia: Any, machine: Machine) -> Any:
         if np.linalg.eigvalsh(inertia.inertia)[0] <= 0.0:
             raise ParameterError(f"{name}: its moments and products leave the platen no inertia")
     return inertia
-
-
-def _mount(model: Any, specimen: Specimen) -> Any:
-    """Bolt the specimen's URDF to the platen's top frame."""
-    if not specimen.urdf.is_file():
-        raise ParameterError(f"{specimen.urdf}: no such URDF file")
-    check_urdf(specimen.urdf)
-    try:
-        body = pin.buildModelFromUrdf(str(specimen.urdf))
-    except Exception as error:  # urdfdom reports malformed files as plain exceptions
-        raise ParameterError(f"{specimen.urdf}: not a URDF that Pinocchio can read: {error}") from error
-    if specimen.locked and body.njoints > 1:
-        body = pin.buildReducedModel(body, list(range(1, body.njoints)), pin.neutral(body))
-    if not np.all(np.isfinite((*specimen.position, *specimen.rpy))):
-        raise ParameterError(f"{specimen.urdf}: position {specimen.position} and rpy {specimen.rpy} must be finite")
-    at = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position))
-    if sum(i.mass for i in body.inertias) <= 0.0:
-        raise ParameterError(f"{specimen.urdf}: the specimen has no mass; give its links <inertial> elements")
-    try:
-        joined = pin.appendModel(model, body, model.getFrameId("platen_top"), at)
-    except ValueError as error:  # a joint or frame named as one of the platen's
-        raise ParameterError(f"{specimen.urdf}: {error}; rename it in the URDF") from error
-    joined.gravity = model.gravity
-    return joined
 
 
 def platen_inertia(model: Any, machine: Machine) -> tuple[Array, Array]:

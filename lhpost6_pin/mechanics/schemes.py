@@ -23,7 +23,7 @@ from ..effects.evaluate import advance_states, apply_forces, state_rates, wrench
 from .ports import evaluate_ports, platen_pose
 
 __all__ = ["DS", "FORCE", "SD", "A", "DQ", "S", "TAU", "V", "V_MID", "V_SEEN"]
-__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "spool_windows", "staggered_stage", "steps_a_sample"]
+__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "staggered_stage", "steps_a_sample"]
 
 V, A, V_MID, V_SEEN, DQ, TAU = range(6)
 """Rows of `motion`: velocity, acceleration, velocity at mid-step and as forces see it, step of the pose, torque."""
@@ -159,43 +159,6 @@ def rates_stage(q, z, tables, ws, spool):
     forces_stage(tables, ws, z)
     state_rates(tables.rows, ws.port[S], ws.port[SD], spool, tables.supply, z, ws.zd)
     return 0
-
-
-@compiled
-def spool_windows(command, first, sample, delays, rate, spool):
-    """Spools over the model steps of one controller sample: the command delayed, averaged over each step.
-
-    command (n, nu) is held over each controller sample; row 0 is controller sample `first`, earlier ones repeat it.
-    delays (nu,) [s], rate [1/s] the controller's; spool (n_steps, nu) is filled. Exact for any delay.
-    delays (2 nu,) hold time constants of lags behind them; spool then comes with what it held a sample before.
-    """
-    steps, nu = spool.shape
-    for i in range(nu):
-        shift = delays[i] * rate
-        lag = delays[nu + i] * rate * steps if delays.size > nu else 0.0
-        last = spool[steps - 1, i]
-        for j in range(steps):
-            value = _held(command, first, i, sample + j / steps - shift, steps)
-            if lag > 0.0:  # means over steps of the answer to a command that is held over each
-                before = _held(command, first, i, sample + (j - 1) / steps - shift, steps)
-                stay = math.exp(-1.0 / lag)
-                mean = (1.0 - stay) * lag
-                value = stay * last + (1.0 - mean) * value + (mean - stay) * before
-                last = value
-            spool[j, i] = value
-
-
-@compiled_inline
-def _held(command, first, i, begin, steps):
-    """Command i averaged over one model step, which begins at `begin` samples."""
-    whole = math.floor(begin)
-    share = min(1.0, max(0.0, (begin + 1.0 / steps - whole - 1.0) * steps))  # of the step, in the next sample
-    at = max(0, int(whole) - first)
-    after = max(0, int(whole) + 1 - first)
-    value = command[at, i]
-    if share > 0.0:
-        value += share * (command[after, i] - value)
-    return value
 
 
 @compiled

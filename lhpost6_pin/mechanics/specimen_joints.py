@@ -1,4 +1,4 @@
-"""A specimen on the table: what speaks against it, the names of its joints, and how far they went."""
+"""A specimen on the table: remarks before a run, names of its joints, and their excursions."""
 
 from typing import NamedTuple
 
@@ -51,7 +51,7 @@ def specimen_positions(plant: Plant, q: Array) -> Array:
 
 
 def specimen_doubts(plant: Plant) -> list[str]:
-    """Return what speaks against a specimen: its weight, its place, and what its URDF has that is not simulated."""
+    """Remarks on a specimen: its weight, its place, and what its URDF has that is not simulated."""
     machine, model = plant.machine, plant.model
     specimen = machine.specimen
     if specimen is None:

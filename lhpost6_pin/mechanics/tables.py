@@ -30,7 +30,7 @@ class Tables(NamedTuple):
     rows: NDArray[np.void]  # registry.ROW
     damping: Array  # (nv,) of joints [N s/m, N m s/rad]
     actuators: NDArray[np.int64]  # (n_actuators,) their rows
-    delays: Array  # command path of the valves (`spool_windows`)
+    delays: Array  # command path of the valves (`valve_delay.delayed_spools`)
     inertia: NDArray[np.void]  # forward_dynamics.INERTIA, one row
     supply: Supply
 

@@ -17,7 +17,8 @@ from ..core.names import SAMPLE_RATE, SCHEMES
 from ..mechanics.derivatives import evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant, State
-from ..mechanics.schemes import V, spool_windows, steps_a_sample
+from ..mechanics.schemes import V, steps_a_sample
+from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import make_workspace
 from .engine_pinocchio import make_stepper
 from .simulate import diagnosis
@@ -96,7 +97,7 @@ class RunningPlant:
             self._history[:-1] = self._history[1:]
             self._history[-1] = np.clip(command, -1.0, 1.0)
         first = self.sample - len(self._history) + 1
-        spool_windows(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
+        delayed_spools(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
         status = self._advance(self._ws, self._window)
         self.sample += 1
         if status:

@@ -23,7 +23,8 @@ from ..control.plug import Feedback, start_plugged, step_plugged, wanted_from
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from ..mechanics.derivatives import evaluate_derivatives
 from ..mechanics.plant import Plant, State
-from ..mechanics.schemes import A, V, spool_windows
+from ..mechanics.schemes import A, V
+from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import Workspace, make_workspace
 from .drives import ClosedLoop, Drive, OpenLoop, PluggedLoop, check_drive, check_options, check_run
 from .engine_fused import Log, Signals, Span, run_fused
@@ -241,7 +242,7 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
         sense_packed(packed, buffer, *sensors)
         asked = step_plugged(users, own, sample, wanted(sample), sensors)
         command[sample], clipped = _clip(asked)
-        spool_windows(command, 0, sample, path, rate, window)
+        delayed_spools(command, 0, sample, path, rate, window)
         return clipped
 
     return plugged

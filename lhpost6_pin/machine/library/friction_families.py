@@ -39,7 +39,9 @@ def _warm_up(machine: Structure, components: Sequence[str], values: Values) -> A
 def _load_dependent(machine: Structure, components: Sequence[str], values: Values) -> Any:
     ports, rows = [], []
     for c in _each(machine, components):
-        slides = c.mount == "bearing"  # under its load the platen slides on the pad; else the piston's seal feels it
+        slides = (
+            c.mount == "bearing"
+        )  # under its load the platen slides on the pad; otherwise it loads the piston's seal
         ports.append(c.name if slides else f"{c.name} -")
         rubs = (c.pad_yield, c.pad_shape) if slides else _seal(c)
         rows.append((values["coefficient"], *rubs, c.area_a, c.area_b or 0.0))

@@ -68,7 +68,7 @@ class Plant:
 
     @property
     def command_path(self) -> Array:
-        """Delays of valves (n_actuators,) [s], with lags behind if there are any, as for `valve_delay.delayed_spools`."""
+        """Delays of valves (n_actuators,) [s], with lags behind if any, as `valve_delay.delayed_spools` takes them."""
         return np.concatenate([self.delays, self.lags]) if self.lags.any() else self.delays
 
     @property

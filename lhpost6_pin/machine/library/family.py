@@ -1,6 +1,7 @@
 """Families: every effect of the library by its name, as `models/library/*.toml` state it."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -48,6 +49,8 @@ class Family:
     named: str  # the family that it is a form of; usually itself
     search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
     confusable: bool  # whether another form of the report's own laws may pass for it
+    law: str  # whose parameters are the family's numbers and the component's; empty where `make` composes it
+    parameters: Mapping[str, str | float]  # of the law: another name in the family or the component, or a constant
 
     def components(self, machine: Structure) -> tuple[str, ...]:
         """Names of all components of a machine that it can act on; also ``platen``, its axes, and ``supply``."""
@@ -111,7 +114,7 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         raise ParameterError(f"{file}: {name} lacks {', '.join(missing)}")
     shapes = []
     for key, entry in table.items():
-        if isinstance(entry, dict):
+        if isinstance(entry, dict) and key != "parameters":
             if missing := [w for w in ("unit", "typical", "low", "high", "source") if w not in entry]:
                 raise ParameterError(f"{file}: {name}.{key} lacks {', '.join(missing)}")
             typical, low, high = (float(entry[w]) for w in ("typical", "low", "high"))
@@ -134,4 +137,6 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         named=table.get("named", name),
         search=table.get("search", "named"),
         confusable=table.get("confusable", False),
+        law=table.get("law", ""),
+        parameters=table.get("parameters", {}),
     )

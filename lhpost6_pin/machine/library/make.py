@@ -1,23 +1,19 @@
 """From a family's name, its components and its numbers to an effect of a machine."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from ...core.errors import ParameterError, instead_of
 from ...effects.effect import Effect
+from ...effects.registry import LAWS
+from ...laws.contract import parameter_units
 from ..parameters import EffectEntry, Quantity, to_unit
 from ..structure import Structure
-from . import friction_families as friction
-from . import motion_families as motion
-from . import oil_families as oil
+from .composed import COMPOSED
 from .family import Family, Shape, find_family
 
 __all__ = ["effect_entry", "make_effect", "make_named_effect"]
 
 Made = tuple[str, Sequence[str], Sequence[tuple[float, ...]]]
-Build = Callable[[Structure, Sequence[str], Mapping[str, float]], Made]
-"""(machine, components, values) -> law, ports, params."""
-
-_BUILD: Mapping[str, Build] = {**friction.BUILD, **motion.BUILD, **oil.BUILD}
 
 
 def make_effect(
@@ -35,7 +31,7 @@ def make_effect(
     and for a number that it does not have or that is out of its bounds.
     """
     known = find_family(family)
-    if family not in _BUILD:
+    if not known.law and family not in COMPOSED:
         raise ParameterError(f"{family} is no part of a machine: state it in the file of the sensors or the controller")
     possible = known.components(machine)
     chosen = tuple(components) or next(iter(known.groups(machine)), ())
@@ -43,8 +39,27 @@ def make_effect(
         raise ParameterError(
             f"{family}: cannot act on {', '.join(wrong)}; it can on {', '.join(possible) or 'nothing'}"
         )
-    law, ports, params = _BUILD[family](machine, chosen, _numbers(known, values or {}))
+    numbers = _numbers(known, values or {})
+    law, ports, params = (
+        _of_law(machine, chosen, numbers, known) if known.law else COMPOSED[family](machine, chosen, numbers)
+    )
     return Effect(name or family, law, tuple(ports), tuple(params), source, family=family)
+
+
+def _of_law(machine: Structure, components: Sequence[str], values: Mapping[str, float], family: Family) -> Made:
+    """The parameters of the family's law by name: its numbers, else the component's; or as `parameters` states."""
+    law, known = LAWS[family.law], {c.name: vars(c) for c in machine.components}
+    stated = [family.parameters.get(name, name) for name, _ in parameter_units(law)]
+    rows = []
+    for component in components:
+        numbers = {**known.get(component, {}), **values}
+        if lacking := [name for name in stated if isinstance(name, str) and name not in numbers]:
+            raise ParameterError(
+                f"{family.name}: {lacking[0]} of law {family.law} is no number of the family or of {component}; "
+                "state it under `parameters` in models/library"
+            )
+        rows.append(tuple(numbers[name] if isinstance(name, str) else name for name in stated))
+    return family.law, [f"{c} -" for c in components] if law.ports == (1, 2) else components, rows
 
 
 def make_named_effect(machine: Structure, name: str, entry: EffectEntry) -> Effect:

@@ -55,7 +55,7 @@ from lhpost6_pin.mechanics.pose import forward_kinematics, leg_displacements, pl
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report import page
 from lhpost6_pin.show.report.plots import ACHIEVED, RECORDED, TARGET, Row, Trace, time_figure
-from lhpost6_pin.show.report.run_motion import axis_scale
+from lhpost6_pin.show.report.scales import axis_scale
 from lhpost6_pin.simulation.rehearse import SimulatedTest, rehearse, target_within_limits
 
 Array = NDArray[np.float64]
@@ -390,7 +390,7 @@ def write_report(
             start=0.0,
             step=STEP,
         )
-        blocks.append(page.figure(drawing))
+        blocks.append(drawing)
         if quantity == "displacement":
             continue
         wanted = pair[0].wanted
@@ -406,7 +406,7 @@ def write_report(
             step=STEP,
             alone=True,
         )
-        blocks.append(page.figure(drawing))
+        blocks.append(drawing)
     worst = {key: [max(p[k].error for (q, _), p in found.items() if q == key) for k in (0, 1)] for key, _ in found}
     tiles = [
         page.Headline(f"{100 * lqg:.2f} %", f"{quantity} RRMSE, worst axis", f"469D: {100 * plain:.2f} %")
@@ -421,7 +421,7 @@ def write_report(
         level="plain",
         headlines=tiles,
         sections=[
-            page.Section("figures", "Figures", [page.table("RRMSE and delay", header, rows)]),
+            page.Section("figures", "Figures", [page.Table("RRMSE and delay", header, rows)]),
             page.Section("axes", "Per axis", blocks),
         ],
         notes=["LQG was designed with the very numbers that this plant runs on; a real table's are known less well."],

@@ -18,8 +18,8 @@ from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.discovery import discover
 from lhpost6_pin.machine.library import find_family
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.show.discovery_table import print_discovery
 from lhpost6_pin.show.report.discover_report import save_discovery
+from lhpost6_pin.show.result_tables import print_discovery
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 

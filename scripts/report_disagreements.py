@@ -20,8 +20,8 @@ from lhpost6_pin.core.errors import UnknownNameError
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.discovery import discover
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.show.discovery_table import print_discovery
 from lhpost6_pin.show.report.discover_report import save_discovery
+from lhpost6_pin.show.result_tables import print_discovery
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 HORIZONTAL = ("H1", "H2", "H3", "H4")

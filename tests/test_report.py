@@ -18,8 +18,9 @@ from scipy.constants import g
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.show.report.page import Page, bar, number, render_page, text
-from lhpost6_pin.show.report.plots import ACHIEVED, SCALES, Row, Trace, envelope, time_figure
+from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, write_run_report
+from lhpost6_pin.show.report.scales import SCALES
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
 ACTUATORS = ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"]

@@ -18,7 +18,7 @@ PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
-    *("show.bodies", "show.specimen_bodies", "show.viewer.scene", "show.viewer.live"),
+    *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }
 """Modules that may import pinocchio."""
 

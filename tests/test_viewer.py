@@ -24,8 +24,7 @@ from tornado.websocket import websocket_connect
 from lhpost6_pin.core.errors import LhpostError, ParameterError, RecordError
 from lhpost6_pin.core.names import AXES
 from lhpost6_pin.data.records import load_record, make_record
-from lhpost6_pin.show.bodies import body_name, body_poses, joint_positions, load_bodies
-from lhpost6_pin.show.specimen_bodies import load_specimen_bodies
+from lhpost6_pin.show.bodies import body_name, body_poses, joint_positions, load_bodies, load_specimen_bodies
 from lhpost6_pin.show.urdf import legs
 from lhpost6_pin.show.viewer import (
     Look,

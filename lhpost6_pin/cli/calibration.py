@@ -43,8 +43,8 @@ def calibrate(
     from ..data.sensors import load_sensors
     from ..identification.calibration import calibrate as calibrate_machine
     from ..identification.calibration.override import save_override
-    from ..show.calibration_table import print_calibration
     from ..show.report import write_calibrate_report
+    from ..show.result_tables import print_calibration
     from ..show.results import calibration_entries
 
     refuse_no_jobs(jobs)

@@ -49,8 +49,8 @@ def tune(
     from dataclasses import replace
 
     from ..control import save_controller
-    from ..show.control_tables import print_tuning
     from ..show.report import write_tune_report
+    from ..show.result_tables import print_tuning
     from ..show.results import tuning_entries
     from ..tuning.tune import tune as tune_controller
 
@@ -95,8 +95,8 @@ def iterate(
 
     from ..control.inverse import save_inverse
     from ..mechanics.plant import make_plant
-    from ..show.control_tables import print_iterations
     from ..show.report import write_iterate_report
+    from ..show.result_tables import print_iterations
     from ..show.results import iteration_entries
     from ..simulation.rehearse import target_within_limits
     from ..tuning.drives import circumstances, save_drive
@@ -137,8 +137,8 @@ def sine(
 ) -> None:
     """Run a sine without and with amplitude-phase control and harmonic cancellation; writes report.html."""
     from ..mechanics.plant import make_plant
-    from ..show.control_tables import print_sine
     from ..show.report import write_sine_report
+    from ..show.result_tables import print_sine
     from ..show.results import sine_entries
     from ..simulation.rehearse import target_within_limits
     from ..tuning.sine import axis_row, sine_target, sine_test

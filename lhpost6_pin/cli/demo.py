@@ -30,8 +30,8 @@ def demo(
     from ..discovery.demonstration import hidden_effect, measured_tests, open_loops, searched
     from ..machine.library import find_family
     from ..machine.machine import load_machine
-    from ..show.discovery_table import print_discovery
     from ..show.report.discover_report import save_discovery
+    from ..show.result_tables import print_discovery
     from ..show.viewer import Look, show_record
 
     refuse_no_jobs(jobs)

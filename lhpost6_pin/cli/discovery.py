@@ -38,8 +38,8 @@ def discover(
     from ..data.sensors import load_sensors
     from ..discovery import discover as search
     from ..discovery import verdict_entries
-    from ..show.discovery_table import print_discovery
     from ..show.report.discover_report import save_discovery
+    from ..show.result_tables import print_discovery
 
     refuse_no_jobs(jobs)
     table = find_machine(machine, model)

@@ -41,8 +41,8 @@ def decompose(
     from ..data.records import load_record
     from ..data.sensors import load_sensors
     from ..identification.decompose import decompose_record, find_agreement, find_work, save_ledger
-    from ..show.decompose_table import print_agreement
     from ..show.report import write_decompose_report
+    from ..show.result_tables import print_agreement
     from ..show.results import agreement_entries
 
     table = find_table(machine, override, 0, specimen, specimen_at, locked)

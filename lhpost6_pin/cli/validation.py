@@ -54,7 +54,7 @@ def validate(
     from ..identification.validation import metrics, save_metrics
     from ..identification.validation import validate as validate_campaign
     from ..show.report.validate_report import write_validate_report
-    from ..show.validation_table import print_validation
+    from ..show.result_tables import print_validation
 
     refuse_no_jobs(jobs, "tests at a time")
     wanted = _phases(phases)

@@ -1,9 +1,10 @@
-"""A machine's URDF in Pinocchio: where its bodies are at a pose of the platen.
+"""URDFs of a machine and of its specimen in Pinocchio: shapes to draw, and where they are.
 
 A leg's joint positions follow from its two ends in closed form, as the tree of the URDF needs them. That extensions
 are those of the compiled ports is tested.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,23 +15,72 @@ from ..machine.machine import Machine
 from ..mechanics.pose import rotation
 from .urdf import legs, urdf_text
 
-__all__ = ["Bodies", "body_name", "body_poses", "joint_positions", "load_bodies", "quaternions"]
+__all__ = [
+    "Bodies",
+    "body_name",
+    "body_poses",
+    "joint_positions",
+    "load_bodies",
+    "load_specimen_bodies",
+    "quaternions",
+    "specimen_poses",
+]
 
 Array = NDArray[np.float64]
 
 
 class Bodies(NamedTuple):
-    """A machine's URDF in Pinocchio: joints, and primitive shapes to draw."""
+    """A URDF in Pinocchio: joints, and primitive shapes to draw."""
 
     model: Any  # pin.Model
-    shapes: Any  # pin.GeometryModel
+    shapes: Sequence[Any]  # pin.GeometryObject: box, cylinder or sphere
+    root: Any = pin.SE3.Identity()  # of a specimen in the platen's {b}
 
 
 def load_bodies(machine: Machine) -> Bodies:
     """Read the machine's URDF with Pinocchio."""
     text = urdf_text(machine)
     model = pin.buildModelFromXML(text)
-    return Bodies(model, pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL))
+    return Bodies(model, _shapes(model, text))
+
+
+def load_specimen_bodies(machine: Machine) -> Bodies | None:
+    """Read the specimen's URDF with Pinocchio; None without one.
+
+    A body is drawn by its boxes, cylinders and spheres; one without any of these as the uniform box that has its mass
+    and inertia.
+    """
+    specimen = machine.specimen
+    if specimen is None:
+        return None
+    model = pin.buildModelFromUrdf(str(specimen.urdf))
+    try:
+        shapes = _shapes(model, specimen.urdf.read_text(encoding="utf-8"))
+    except (ValueError, RuntimeError):  # a mesh that cannot be read
+        shapes = []
+    drawn = {shape.parentJoint for shape in shapes}
+    for joint, inertia in enumerate(model.inertias):
+        if joint not in drawn and inertia.mass > 0.0:
+            shapes.append(_uniform_box(joint, inertia))
+    place = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position))
+    top = pin.SE3(np.eye(3), -np.array(machine.platen.centre_of_gravity))
+    return Bodies(model, shapes, top * place)
+
+
+def _shapes(model: Any, text: str) -> list[Any]:
+    """Boxes, cylinders and spheres of a URDF's visuals."""
+    objects = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL).geometryObjects
+    return [one for one in objects if hasattr(one.geometry, "halfSide") or hasattr(one.geometry, "radius")]
+
+
+def _uniform_box(joint: int, inertia: Any) -> Any:
+    """Uniform box of a mass and inertia: edge a of three with a^2 = 6 (I_b + I_c - I_a) / m."""
+    moments, axes = np.linalg.eigh(inertia.inertia)
+    axes[:, 2] *= np.linalg.det(axes)  # right-handed
+    squares = 6.0 * (moments.sum() - 2.0 * moments) / inertia.mass
+    least = 0.02 * float(np.sqrt(max(squares.max(), 1e-4)))  # a rod or plate is drawn with some thickness
+    edges = np.maximum(np.sqrt(np.maximum(squares, 0.0)), least)
+    return pin.GeometryObject(f"body_{joint}", joint, pin.SE3(axes, inertia.lever), pin.coal.Box(*edges))
 
 
 def joint_positions(machine: Machine, model: Any, displacement: Array) -> Array:
@@ -94,3 +144,23 @@ def body_name(model: Any, joint: int) -> str:
     """Link that moves with a joint; its name in the scene."""
     body = pin.FrameType.BODY
     return str(next(f.name for f in model.frames if f.parentJoint == joint and f.type == body))
+
+
+def specimen_poses(bodies: Bodies, positions: Mapping[str, Array], samples: int) -> Array:
+    """Return poses (n, n_joints, 7) of a specimen's bodies in the platen's {b}: position [m] and quaternion x y z w.
+
+    positions (n,) [m or rad] are those of a record's `specimen_joint_position`, by joint; what is missing stands still.
+    """
+    model = bodies.model
+    q = np.tile(pin.neutral(model), (samples, 1))
+    for joint in range(1, model.njoints):
+        values = positions.get(str(model.names[joint]))
+        if values is not None:
+            turns = model.nqs[joint] == 2
+            columns = [np.cos(values), np.sin(values)] if turns else [values]
+            q[:, model.idx_qs[joint] : model.idx_qs[joint] + len(columns)] = np.column_stack(columns)
+    poses = body_poses(model, q)
+    for moment in poses:
+        for k, pose in enumerate(moment):
+            moment[k] = pin.SE3ToXYZQUAT(bodies.root * pin.XYZQUATToSE3(pose))
+    return poses

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from rich.markup import escape
-from rich.table import Column, Table
+from rich.text import Text
 
-from ..core.console import make_console
 from ..machine.machine import Machine
+from .report.page import Table
+from .report.scales import si_unit
+from .terminal import print_blocks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,33 +73,27 @@ def report_limits(plant: "Plant") -> dict[str, Any]:
 
 def print_machine(machine: Machine) -> None:
     """Print every quantity with unit, evidence and source; assumed ones are marked."""
-    console = make_console()
-    console.print(f"[bold]{escape(machine.name)}[/]: {escape(machine.title)}")
-    console.print(
-        f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
-        f"platen motion {machine.motion}, bearing thrust {machine.thrust}"
-    )
-    table = Table(
-        Column("quantity", no_wrap=True), "value", "unit", "sd (ours)", Column("evidence", no_wrap=True), "source"
-    )
+    rows = []
     for path, q in machine.parameters.quantities.items():
-        evidence = f"[bold yellow]{escape(q.evidence)} *[/]" if q.assumed else escape(q.evidence)
+        evidence = Text(f"{q.evidence} *", style="bold yellow") if q.assumed else q.evidence
         sd = "" if q.sd is None else _text(tuple(dict.fromkeys(q.sd)) if isinstance(q.sd, tuple) else q.sd)
-        table.add_row(escape(path), _text(q.value), escape(q.unit), sd, evidence, escape(q.source))
-    console.print(table)
-    console.print("* assumed: not published; replace it with --override")
-    console.print(_effects_table("Force effects, in ledger order", machine.effects))
-    if machine.modifiers:
-        console.print(_effects_table("Modifiers of oil, valves, supply or inertia", machine.modifiers))
-    if "estimates.platen_alone.mass" in machine.parameters:
-        console.print(_inertia_table(machine))
+        rows.append((path, _text(q.value), q.unit, sd, evidence, q.source))
+    modifiers = _effects_table("Modifiers of oil, valves, supply or inertia", machine.modifiers)
+    print_blocks(
+        f"{machine.name}: {machine.title}",
+        f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
+        f"platen motion {machine.motion}, bearing thrust {machine.thrust}",
+        Table("", ("quantity", "value", "unit", "sd (ours)", "evidence", "source"), rows),
+        "* assumed: not published; replace it with --override",
+        _effects_table("Force effects, in ledger order", machine.effects),
+        *([modifiers] if machine.modifiers else []),
+        *([_inertia_table(machine)] if "estimates.platen_alone.mass" in machine.parameters else []),
+    )
 
 
 def _effects_table(title: str, effects: "Sequence[Effect]") -> Table:
-    table = Table("effect", "law", "acts on", "source", title=title)
-    for effect in effects:
-        table.add_row(*map(escape, (effect.name, effect.law, " ".join(effect.ports), effect.source)))
-    return table
+    rows = [(effect.name, effect.law, " ".join(effect.ports), effect.source) for effect in effects]
+    return Table(title, ("effect", "law", "acts on", "source"), rows)
 
 
 def _inertia_table(machine: Machine) -> Table:
@@ -106,98 +101,102 @@ def _inertia_table(machine: Machine) -> Table:
     from ..mechanics.rigid_body import lumped_inertia
 
     par = machine.parameters
-    parts = lumped_inertia(
-        par.vector("estimates.platen_alone.mass"), par.vector("estimates.platen_alone.inertia"), machine
-    )
-    table = Table("part", *(escape(f"{q} {a} [{u}]") for q, u in (("mass", "t"), ("inertia", "t m2")) for a in "XYZ"))
-    table.title = "Effective inertia about B, composed from the parts (printed in Table 4.1)"
+    mass, inertia = (par.vector(f"estimates.platen_alone.{what}") for what in ("mass", "inertia"))
+    parts = lumped_inertia(mass, inertia, machine)
     printed = {"platen": "platen_alone", **{k: k for k in parts if k != "platen"}}
+    rows = []
     for kind, matrix in (*parts.items(), ("sum, M_eff,1", sum(parts.values()))):
         name = f"estimates.{printed.get(kind, 'first')}"
         values = (*par.vector(f"{name}.mass"), *par.vector(f"{name}.inertia"))
-        computed = np.diag(matrix)
-        table.add_row(kind, *(f"{c / 1e3:.2f} ({v / 1e3:.2f})" for c, v in zip(computed, values, strict=True)))
-    return table
+        pairs = zip(np.diag(matrix), values, strict=True)
+        rows.append((kind, *(f"{computed / 1e3:.2f} ({value / 1e3:.2f})" for computed, value in pairs)))
+    header = (
+        "part",
+        *(f"{what} {axis} [{unit}]" for what, unit in (("mass", "t"), ("inertia", "t m2")) for axis in "XYZ"),
+    )
+    return Table("Effective inertia about B, composed from the parts (printed in Table 4.1)", header, rows)
 
 
 def print_capacity(machine: Machine) -> None:
     """Print the capacity of the model and Table 2.2, with deviations."""
     from ..mechanics.capacity import capacity_table
 
-    table = Table("capacity", "model", "Table 2.2", "unit", "deviation", "how", title="Capacity, all servovalves open")
-    for line in capacity_table(machine):
-        deviation = f"{100 * line.deviation:+.1f} %"
-        table.add_row(line.name, f"{line.model:.4g}", f"{line.printed:.4g}", line.unit, deviation, line.how)
-    make_console().print(table)
+    rows = [
+        (line.name, f"{line.model:.4g}", f"{line.printed:.4g}", line.unit, f"{100 * line.deviation:+.1f} %", line.how)
+        for line in capacity_table(machine)
+    ]
+    header = ("capacity", "model", "Table 2.2", "unit", "deviation", "how")
+    print_blocks(Table("Capacity, all servovalves open", header, rows))
 
 
 def print_modes(machine: Machine) -> None:
     """Print the oil-column modes of the linearised plant, without and with friction and leakage."""
     from ..mechanics.linearize import oil_column_modes
 
-    table = Table(
-        "axis", "undamped [Hz]", "with sticking friction and leakage [Hz]", "damping [%]", title="Oil-column modes"
-    )
-    full = {m.axis: m for m in oil_column_modes(machine, undamped=False)}
-    for mode in oil_column_modes(machine):
-        other = full.get(mode.axis)
-        cells = (f"{other.frequency:.2f}", f"{100 * other.damping:.2f}") if other else ("", "")
-        table.add_row(mode.axis, f"{mode.frequency:.2f}", *cells)
-    make_console().print(table)
+    full = {m.axis: (f"{m.frequency:.2f}", f"{100 * m.damping:.2f}") for m in oil_column_modes(machine, undamped=False)}
+    rows = [(m.axis, f"{m.frequency:.2f}", *full.get(m.axis, ("", ""))) for m in oil_column_modes(machine)]
+    header = ("axis", "undamped [Hz]", "with sticking friction and leakage [Hz]", "damping [%]")
+    print_blocks(Table("Oil-column modes", header, rows))
 
 
 def print_motions(name: str | None = None) -> None:
     """Print all motions by name with what they require; with a name, the options of that one."""
     from ..motions import list_motions, motion_entry, motion_options
 
-    console = make_console()
     if name is None:
-        table = Table(Column("name", no_wrap=True), "kind", "description", Column("requires", no_wrap=True))
+        rows = []
         for m in list_motions():
-            needs = [escape(m.remedy) or "[green]ready[/]"]
+            needs: list[str | Text] = [m.remedy or Text("ready", style="green")]
             needs += [f"or your file: {m.wanted.record}"] if m.wanted and m.kind != "file" else []
-            table.add_row(" ".join((m.name, *m.aliases)), m.kind, m.title, "\n".join(needs))
-        console.print(table)
-        console.print("lhpost6 motions NAME prints the options of one")
+            rows.append((" ".join((m.name, *m.aliases)), m.kind, m.title, Text("\n").join(map(Text.assemble, needs))))
+        motions = Table("", ("name", "kind", "description", "requires"), rows)
+        print_blocks(motions, "lhpost6 motions NAME prints the options of one")
         return
     found = motion_entry(name)
-    console.print(f"[bold]{found.name}[/]: {found.title}")
-    chosen = motion_options(found.name)
-    table = Table("option", "default", "unit", "source", title="Options, each as --set key=value")
-    for option in chosen:
-        table.add_row(*map(escape, option))
-    console.print(table if chosen else "options: none")
-    if found.request or found.remedy:
-        console.print(found.request or f"not installed: {found.remedy}", markup=False, soft_wrap=True)
+    options = Table(
+        "Options, each as --set key=value", ("option", "default", "unit", "source"), motion_options(found.name)
+    )
+    remedy = found.request or (f"not installed: {found.remedy}" if found.remedy else "")
+    print_blocks(f"{found.name}: {found.title}", options if options.rows else "options: none", remedy)
 
 
 def print_findings(file: str, findings: "Sequence[RecordFinding]") -> None:
     """Print the findings on a record."""
-    table = Table("", "channel", "sample", "finding", "remedy", title=escape(file))
-    colour = {"error": "[bold red]error[/]", "warning": "[yellow]warning[/]", "info": "info"}
-    for f in findings:
-        sample = "" if f.sample is None else str(f.sample)
-        table.add_row(colour[f.severity], escape(f.channel), sample, escape(f.message), escape(f.remedy))
-    console = make_console()
-    console.print(table)
+    styles = {"error": "bold red", "warning": "yellow", "info": ""}
+    rows = [
+        (
+            Text(f.severity, style=styles[f.severity]),
+            f.channel,
+            "" if f.sample is None else f.sample,
+            f.message,
+            f.remedy,
+        )
+        for f in findings
+    ]
     counts = {s: sum(f.severity == s for f in findings) for s in ("error", "warning")}
-    console.print(f"{counts['error']} errors, {counts['warning']} warnings")
+    print_blocks(
+        Table(file, ("", "channel", "sample", "finding", "remedy"), rows),
+        f"{counts['error']} errors, {counts['warning']} warnings",
+    )
 
 
 def print_sensor_findings(findings: "Sequence[ConsistencyFinding]") -> None:
     """Print the suspicious comparisons of redundant sensors, and the counts."""
-    suspicious = [f for f in findings if f.verdict == "suspicious"]
+    suspicious = sorted((f for f in findings if f.verdict == "suspicious"), key=lambda one: -abs(one.significance))
     untested = sum(f.verdict == "untested" for f in findings)
-    console = make_console()
     if suspicious:
-        names = ("comparison", "channel", "quantity", "unit", "estimate", "expected", "within", "deviations")
-        table = Table(*names, title="Sensors that disagree")
-        for f in sorted(suspicious, key=lambda one: -abs(one.significance)):
-            numbers = f"{f.estimate:.5g}", f"{f.expected:.5g}", f"{f.tolerance:.2g}", f"{f.significance:+.1f}"
-            table.add_row(f.check, escape(f.channel), f.named, f.unit, *numbers)
-        console.print(table)
-        console.print("A sensor is wrong, or the law or geometry of the comparison is incomplete.")
-    console.print(f"redundant sensors: {len(findings)} comparisons, {len(suspicious)} suspicious, {untested} untested")
+        rows = [
+            (
+                *(f.check, f.channel, f.named, f.unit),
+                *(f"{f.estimate:.5g}", f"{f.expected:.5g}", f"{f.tolerance:.2g}", f"{f.significance:+.1f}"),
+            )
+            for f in suspicious
+        ]
+        header = ("comparison", "channel", "quantity", "unit", "estimate", "expected", "within", "deviations")
+        reason = "A sensor is wrong, or the law or geometry of the comparison is incomplete."
+        print_blocks(Table("Sensors that disagree", header, rows), reason)
+    counts = f"{len(findings)} comparisons, {len(suspicious)} suspicious, {untested} untested"
+    print_blocks(f"redundant sensors: {counts}")
 
 
 _COMPARED = ("platen_displacement", "chamber_pressure_a", "chamber_pressure_b", "actuator_force")
@@ -243,47 +242,32 @@ def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
 
 def print_comparison(compared: Sequence[Compared]) -> None:
     """Print the differences of a replayed test from the recorded one."""
-    table = Table("channel", "peak recorded", "largest difference", "RRMSE", "drift", title="Model against record")
-    for c in compared:
-        rrmse = "" if math.isnan(c.rrmse) else f"{c.rrmse:.3g}"
-        sizes = f"{c.peak_recorded:.4g} {c.unit}", f"{c.largest_difference:.3g} {c.unit}"
-        table.add_row(c.channel, *sizes, rrmse, f"{c.drift:.3g} {c.unit}/s")
-    make_console().print(table)
+    rows = [
+        (
+            *(c.channel, f"{c.peak_recorded:.4g} {c.unit}", f"{c.largest_difference:.3g} {c.unit}"),
+            *("" if math.isnan(c.rrmse) else f"{c.rrmse:.3g}", f"{c.drift:.3g} {c.unit}/s"),
+        )
+        for c in compared
+    ]
+    header = ("channel", "peak recorded", "largest difference", "RRMSE", "drift")
+    print_blocks(Table("Model against record", header, rows))
 
 
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
     """Print the summary of a run, its duration, scheme and rate."""
-    console = make_console()
     if summary is not None:
-        console.print(f"[bold]{escape(summary.verdict)}[/]")
-        delay = escape("delay [ms]")
-        table = Table("axis", "quantity", "peak target", "peak achieved", "RRMSE", delay, "RRMSE, delay removed")
-        for row in summary.tracking:
-            if row.peak_target:
-                table.add_row(*map(escape, tracking_cells(row)))
-        console.print(table)
-        uses = [f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in summary.governing]
-        if uses:
-            console.print(f"demand over capacity, governing limit first: {', '.join(uses)}")
-    console.print(
-        f"{run.time[-1] + 1 / run.rate:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second"
-    )
-
-
-def tracking_cells(row: Any) -> Sequence[str]:
-    """Cells of one tracked axis and quantity."""
-    return (
-        row.axis,
-        f"{row.quantity} [{_unit(row)}]",
-        f"{row.peak_target:.4g}",
-        f"{row.peak_achieved:.4g}",
-        f"{row.rrmse:.3f}",
-        f"{1e3 * row.delay:.1f}",
-        f"{row.rrmse_aligned:.3f}",
-    )
-
-
-def _unit(row: Any) -> str:
-    """SI unit of a tracked quantity of an axis."""
-    per = {"displacement": "", "velocity": "/s", "acceleration": "/s2"}[row.quantity]
-    return ("m" if row.axis in "xyz" else "rad") + per
+        rows = [
+            (
+                *(row.axis, f"{row.quantity} [{si_unit(row.axis, row.quantity)}]"),
+                *(f"{row.peak_target:.4g}", f"{row.peak_achieved:.4g}", f"{row.rrmse:.3f}"),
+                *(f"{1e3 * row.delay:.1f}", f"{row.rrmse_aligned:.3f}"),
+            )
+            for row in summary.tracking
+            if row.peak_target
+        ]
+        header = ("axis", "quantity", "peak target", "peak achieved", "RRMSE", "delay [ms]", "RRMSE, delay removed")
+        uses = ", ".join(f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in summary.governing)
+        limits = f"demand over capacity, governing limit first: {uses}" if uses else ""
+        print_blocks(Text(summary.verdict, style="bold"), Table("", header, rows), limits)
+    seconds = run.time[-1] + 1 / run.rate
+    print_blocks(f"{seconds:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")

@@ -3,8 +3,8 @@
 Links: ``world``, ``platen`` (frame {b}, at B), and for each actuator and strut NAME ``NAME_barrel`` and ``NAME_rod``.
 A leg's links have z along the leg, the barrel's origin at the base point, the rod's at the platen point. A swivel leg
 turns on two revolute joints at its base point; a bearing leg stays vertical and carries ``NAME_plate`` on two revolute
-joints, the surface plate {n_i} (Eqs. 4-13, 4-14). A URDF is a tree: that the legs end at the platen is kinematics'
-business (`viewer.joint_positions`), not the URDF's. All joints are zero in the control zero-position.
+joints, the surface plate {n_i} (Eqs. 4-13, 4-14). A URDF is a tree: that the legs end at the platen is a matter of
+their joint positions (`bodies.joint_positions`). All joints are zero in the control zero-position.
 
 Masses: the platen alone, where the machine file has it (Table 4.1), and all of a leg's moving parts in its rod, a
 point mass where it has the leg's effective mass along and across (so the tree reproduces M_eff,1). Sizes come from
@@ -17,6 +17,9 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..core.files import models_folder
 from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
@@ -24,7 +27,8 @@ from ..machine.parameters import Parameters, load_parameters
 
 __all__ = ["drawing_colour", "drawing_rgb", "drawing_size", "drawing_sizes", "legs", "urdf_text"]
 
-Vec = Sequence[float]
+Array = NDArray[np.float64]
+Vec = Sequence[float] | Array
 ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -62,8 +66,8 @@ class _Leg(NamedTuple):
 
     name: str
     kind: str
-    base: Vec
-    platen_point: Vec
+    base: Array
+    platen_point: Array
     length: float  # in the control zero-position
     travel: float  # half stroke
     bore: float  # radius
@@ -75,7 +79,7 @@ class _Leg(NamedTuple):
     @property
     def tilt(self) -> Vec:
         """Roll, pitch, yaw [rad] that bring z to the leg's direction in the control zero-position."""
-        x, y, z = (p - a for p, a in zip(self.platen_point, self.base, strict=True))
+        x, y, z = self.platen_point - self.base
         return 0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)
 
     @property
@@ -105,7 +109,7 @@ def _leg(machine: Machine, component: Actuator | Strut) -> _Leg:
         effort = area * machine.hydraulics.supply_pressure
         speed = component.valves * component.flow / area
     bore = math.sqrt(area / math.pi)
-    ends = component.base_point, component.platen_point
+    ends = np.array(component.base_point), np.array(component.platen_point)
     return _Leg(component.name, kind, *ends, length, travel, bore, rod, masses, effort, speed)
 
 
@@ -114,8 +118,10 @@ def urdf_text(machine: Machine) -> str:
     robot = ET.Element("robot", name=machine.name)
     measures = [_leg(machine, component) for component in legs(machine)]
     for kind in ("platen", "swivel", "bearing", "strut", "rod", "plate", "reaction_mass"):
-        _material(robot, kind)
-    _reaction_mass(_link(robot, "world"), machine, measures)
+        opacity = drawing_size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
+        rgba = [*(round(c, 4) for c in drawing_rgb(kind)), opacity]
+        _add(_add(robot, "material", name=kind), "color", rgba=rgba)
+    _reaction_mass(_add(robot, "link", name="world"), machine, measures)
     _platen(robot, machine, measures)
     for leg in measures:
         _add_leg(robot, leg)
@@ -123,7 +129,7 @@ def urdf_text(machine: Machine) -> str:
     note = (
         f"{machine.title}: bodies to look at. Made by scripts/make_urdf.py from {machine.parameters.origin} "
         "and drawing/sizes.toml; do not edit.\n"
-        "     A tree: the legs end at the platen only if their joints are set as kinematics says.\n"
+        "     A tree: the legs end at the platen only if inverse kinematics sets their joints.\n"
         "     Swivels and plates turn freely: the zero effort and velocity of their limits mean nothing."
     ).replace("--", "-")
     return f'<?xml version="1.0"?>\n<!-- {note} -->\n{ET.tostring(robot, encoding="unicode")}\n'
@@ -131,32 +137,28 @@ def urdf_text(machine: Machine) -> str:
 
 def _platen(robot: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> None:
     """Platen as a box from its top face to the bearing plane, with lugs to swivels outside it."""
-    centre = machine.platen.centre_of_gravity
-    depth = -machine.platen.bearing_plane[2]
-    size = (*machine.platen.size, depth)
-    link = _link(robot, "platen")
+    centre = np.array(machine.platen.centre_of_gravity)
+    size = np.array([*machine.platen.size, -machine.platen.bearing_plane[2]])
+    middle = [0.0, 0.0, -0.5 * size[2]] - centre
+    link = _add(robot, "link", name="platen")
     _inertial(link, *_platen_inertia(machine))
-    middle = _minus((0.0, 0.0, -0.5 * depth), centre)
-    _visual(link, "platen", middle, box=size)
+    _visual(link, "platen", middle, "box", size=size)
     for leg in measures:
         if leg.kind == "bearing":
             continue
-        point = _minus(leg.platen_point, centre)
+        point = leg.platen_point - centre
         width = 2.0 * drawing_size("swivel.radius") * leg.rod
-        low, high = [], []
-        for x, m, s in zip(point, middle, size, strict=True):
-            inside = min(max(x, m - 0.5 * (s - width)), m + 0.5 * (s - width))
-            low.append(min(x, inside) - 0.25 * width * (x == inside))
-            high.append(max(x, inside) + 0.25 * width * (x == inside))
-        lug = [b - a for a, b in zip(low, high, strict=True)]
-        _visual(link, "platen", [0.5 * (a + b) for a, b in zip(low, high, strict=True)], box=lug)
+        inside = np.clip(point, middle - 0.5 * (size - width), middle + 0.5 * (size - width))
+        thick = 0.25 * width * (point == inside)
+        low, high = np.minimum(point, inside) - thick, np.maximum(point, inside) + thick
+        _visual(link, "platen", 0.5 * (low + high), "box", size=high - low)
+    ends = ("world", "platen")
     if machine.motion == "free":
-        _joint(robot, "platen_motion", "floating", ("world", "platen"), centre)
+        _joint(robot, "platen_motion", "floating", ends, centre)
         return
-    axis = [float(machine.motion == x) for x in "xyz"]
     k = "xyz".index(machine.motion)
-    travel, speed = machine.limits.displacement[k], machine.limits.velocity[k]
-    _joint(robot, "platen_motion", "prismatic", ("world", "platen"), centre, axis=axis, limit=(travel, 0.0, speed))
+    limit = machine.limits.displacement[k], 0.0, machine.limits.velocity[k]
+    _joint(robot, "platen_motion", "prismatic", ends, centre, axis=np.eye(3)[k], limit=limit)
 
 
 def _platen_inertia(machine: Machine) -> tuple[float, Vec, Vec]:
@@ -164,17 +166,16 @@ def _platen_inertia(machine: Machine) -> tuple[float, Vec, Vec]:
     known = machine.parameters
     if "estimates.platen_alone.mass" not in known:
         return machine.platen.isotropic_mass, ORIGIN, machine.platen.inertia
-    mass, moments = known["estimates.platen_alone.mass"].value, known["estimates.platen_alone.inertia"].value
-    assert isinstance(mass, tuple) and isinstance(moments, tuple)
+    mass, moments = (known.vector(f"estimates.platen_alone.{what}") for what in ("mass", "inertia"))
     return mass[0], ORIGIN, moments
 
 
 def _add_leg(robot: ET.Element, leg: _Leg) -> None:
     """Barrel, rod and, for a bearing leg, surface plate."""
     name = leg.name
-    barrel, rod = _link(robot, f"{name}_barrel"), _link(robot, f"{name}_rod")
+    barrel, rod = (_add(robot, "link", name=f"{name}_{part}") for part in ("barrel", "rod"))
     half, radius = 0.5 * leg.barrel_length, drawing_size("barrel.radius") * leg.bore
-    _visual(barrel, leg.kind, (0.0, 0.0, half), cylinder=(radius, 2.0 * half))
+    _visual(barrel, leg.kind, (0.0, 0.0, half), "cylinder", radius=radius, length=2.0 * half)
     bearing = leg.kind == "bearing"
     edge = drawing_size("plate.edge") * leg.bore
     thickness = drawing_size("plate.thickness") * edge if bearing else 0.0
@@ -183,29 +184,28 @@ def _add_leg(robot: ET.Element, leg: _Leg) -> None:
         place = 0.5 if bearing else math.sqrt(across / along)  # the rod's point mass, from the base
         _inertial(rod, along, (0.0, 0.0, (place - 1.0) * leg.length), ORIGIN)
     bottom, top = -leg.rod_length, -thickness
-    _visual(rod, "rod", (0.0, 0.0, 0.5 * (bottom + top)), cylinder=(leg.rod, top - bottom))
+    _visual(rod, "rod", (0.0, 0.0, 0.5 * (bottom + top)), "cylinder", radius=leg.rod, length=top - bottom)
     if bearing:
         _joint(robot, f"{name}_base", "fixed", ("world", f"{name}_barrel"), leg.base)
     else:
         ball = drawing_size("swivel.radius") * leg.rod
-        _visual(barrel, leg.kind, ORIGIN, sphere=ball)
-        _visual(rod, "rod", ORIGIN, sphere=ball)
+        _visual(barrel, leg.kind, ORIGIN, "sphere", radius=ball)
+        _visual(rod, "rod", ORIGIN, "sphere", radius=ball)
         _universal(robot, name, "swivel", "xy", ("world", f"{name}_barrel"), leg.base, leg.tilt)
     ends, tip = (f"{name}_barrel", f"{name}_rod"), (0.0, 0.0, leg.length)
     limit = leg.travel, leg.effort, leg.speed
     _joint(robot, f"{name}_extension", "prismatic", ends, tip, axis=(0.0, 0.0, 1.0), limit=limit)
     if bearing:
-        plate = _link(robot, f"{name}_plate")
-        _visual(plate, "plate", (0.0, 0.0, -0.5 * thickness), box=(edge, edge, thickness))
+        plate = _add(robot, "link", name=f"{name}_plate")
+        _visual(plate, "plate", (0.0, 0.0, -0.5 * thickness), "box", size=(edge, edge, thickness))
         _universal(robot, name, "plate", "yx", (f"{name}_rod", f"{name}_plate"), ORIGIN, ORIGIN)
 
 
 def _universal(robot: ET.Element, name: str, what: str, axes: str, ends: tuple[str, str], xyz: Vec, rpy: Vec) -> None:
     """Two revolute joints through one point, first about axes[0], then about axes[1]."""
-    between = f"{name}_{what}_cross"
-    _link(robot, between)
-    free = math.pi, 0.0, 0.0
-    first, second = ([float(a == x) for x in "xyz"] for a in axes)
+    between, free = f"{name}_{what}_cross", (math.pi, 0.0, 0.0)
+    _add(robot, "link", name=between)
+    first, second = (np.eye(3)["xyz".index(a)] for a in axes)
     _joint(robot, f"{name}_{what}_{axes[0]}", "revolute", (ends[0], between), xyz, rpy, first, free)
     _joint(robot, f"{name}_{what}_{axes[1]}", "revolute", (between, ends[1]), ORIGIN, ORIGIN, second, free)
 
@@ -218,68 +218,40 @@ def _reaction_mass(world: ET.Element, machine: Machine, measures: Sequence[_Leg]
     under_platen = machine.platen.bearing_plane[2] - 0.5 * margin
     actuators = [z for z, leg in zip(stand, measures, strict=True) if leg.kind != "strut"]
     top, bottom = min(*actuators, under_platen), min(*stand, under_platen) - margin
-    low, high = [], []
-    for k, size in enumerate(machine.platen.size):
-        ends = [leg.base[k] for leg in measures] + [leg.platen_point[k] for leg in measures]
-        low.append(min(*ends, -0.5 * size) - margin)
-        high.append(max(*ends, 0.5 * size) + margin)
-    low, high = [*low, bottom], [*high, top]
-    middle = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
-    _visual(world, "reaction_mass", middle, box=_minus(high, low))
+    half = 0.5 * np.array([machine.platen.size])
+    ends = np.vstack([leg.base[:2] for leg in measures] + [leg.platen_point[:2] for leg in measures] + [half, -half])
+    low, high = np.array([*(ends.min(axis=0) - margin), bottom]), np.array([*(ends.max(axis=0) + margin), top])
+    _visual(world, "reaction_mass", 0.5 * (low + high), "box", size=high - low)
     for leg, z in zip(measures, stand, strict=True):
         if z > top:
             edge = 3.0 * width * leg.bore
-            _visual(world, "reaction_mass", (*leg.base[:2], 0.5 * (z + top)), box=(edge, edge, z - top))
+            _visual(world, "reaction_mass", (*leg.base[:2], 0.5 * (z + top)), "box", size=(edge, edge, z - top))
 
 
 # ------------------------------------------------------------------------------------------------ XML
-def _text(values: Vec) -> str:
-    return " ".join(f"{v + 0.0:.15g}" for v in values)
-
-
-def _minus(a: Vec, b: Vec) -> Vec:
-    return [x - y for x, y in zip(a, b, strict=True)]
-
-
-def _material(robot: ET.Element, kind: str) -> None:
-    opacity = drawing_size("reaction_mass.opacity") if kind == "reaction_mass" else 1.0
-    rgba = _text([*(round(c, 4) for c in drawing_rgb(kind)), opacity])
-    ET.SubElement(ET.SubElement(robot, "material", name=kind), "color", rgba=rgba)
-
-
-def _link(robot: ET.Element, name: str) -> ET.Element:
-    return ET.SubElement(robot, "link", name=name)
+def _add(parent: ET.Element, tag: str, **attributes: str | float | Vec) -> ET.Element:
+    """Add an element; numbers are written with 15 digits, without a negative zero."""
+    texts = {
+        name: value if isinstance(value, str) else " ".join(f"{v + 0.0:.15g}" for v in np.atleast_1d(value))
+        for name, value in attributes.items()
+    }
+    return ET.SubElement(parent, tag, texts)
 
 
 def _inertial(link: ET.Element, mass: float, centre: Vec, moments: Vec) -> None:
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "origin", xyz=_text(centre))
-    ET.SubElement(inertial, "mass", value=_text([mass]))
-    names = ("ixx", "iyy", "izz")
-    values = dict(zip(names, (_text([m]) for m in moments), strict=True))
-    ET.SubElement(inertial, "inertia", values | {"ixy": "0", "ixz": "0", "iyz": "0"})
+    inertial = _add(link, "inertial")
+    _add(inertial, "origin", xyz=centre)
+    _add(inertial, "mass", value=mass)
+    x, y, z = moments
+    _add(inertial, "inertia", ixx=x, iyy=y, izz=z, ixy="0", ixz="0", iyz="0")
 
 
-def _visual(
-    link: ET.Element,
-    material: str,
-    xyz: Vec,
-    *,
-    box: Vec | None = None,
-    cylinder: tuple[float, float] | None = None,
-    sphere: float | None = None,
-) -> None:
-    """Add a box of edges, a cylinder of (radius, length) along z, or a sphere of a radius [m]."""
-    visual = ET.SubElement(link, "visual")
-    ET.SubElement(visual, "origin", xyz=_text(xyz))
-    geometry = ET.SubElement(visual, "geometry")
-    if box is not None:
-        ET.SubElement(geometry, "box", size=_text(box))
-    if cylinder is not None:
-        ET.SubElement(geometry, "cylinder", radius=_text(cylinder[:1]), length=_text(cylinder[1:]))
-    if sphere is not None:
-        ET.SubElement(geometry, "sphere", radius=_text([sphere]))
-    ET.SubElement(visual, "material", name=material)
+def _visual(link: ET.Element, material: str, xyz: Vec, shape: str, **sizes: float | Vec) -> None:
+    """Add a box, a cylinder along z or a sphere [m]."""
+    visual = _add(link, "visual")
+    _add(visual, "origin", xyz=xyz)
+    _add(_add(visual, "geometry"), shape, **sizes)
+    _add(visual, "material", name=material)
 
 
 def _joint(
@@ -293,12 +265,12 @@ def _joint(
     limit: tuple[float, float, float] | None = None,
 ) -> None:
     """Add a joint from ends[0] to ends[1]; limit is largest |position|, effort and speed."""
-    joint = ET.SubElement(robot, "joint", name=name, type=kind)
-    ET.SubElement(joint, "parent", link=ends[0])
-    ET.SubElement(joint, "child", link=ends[1])
-    ET.SubElement(joint, "origin", xyz=_text(xyz), rpy=_text(rpy))
+    joint = _add(robot, "joint", name=name, type=kind)
+    _add(joint, "parent", link=ends[0])
+    _add(joint, "child", link=ends[1])
+    _add(joint, "origin", xyz=xyz, rpy=rpy)
     if axis is not None:
-        ET.SubElement(joint, "axis", xyz=_text(axis))
+        _add(joint, "axis", xyz=axis)
     if limit is not None:
-        most, effort, speed = (_text([value]) for value in limit)
-        ET.SubElement(joint, "limit", lower=f"-{most}", upper=most, effort=effort, velocity=speed)
+        most, effort, speed = limit
+        _add(joint, "limit", lower=-most, upper=most, effort=effort, velocity=speed)

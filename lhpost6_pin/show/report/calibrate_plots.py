@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ...identification.calibration import Calibration
 from ...identification.calibration.verdicts import changed_parameters, contradictions
-from .layout import stacked_layout, time_band
-from .page import Figure, Markup, figure, number, paragraph, shaded, table
+from .layout import band_on, stacked_layout
+from .page import Block, Figure, Markup, Table, number, shaded
 from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION
 
-__all__ = ["INTERVAL", "PROBABILITY", "forest_block", "half_interval", "information_blocks", "subset_block"]
+__all__ = ["INTERVAL", "PROBABILITY", "forest_figure", "half_interval", "information_blocks", "subset_block"]
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def _drawn(calibration: Calibration) -> str:
     return "of the last round (not converged), without intervals"
 
 
-def forest_block(calibration: Calibration) -> Markup:
+def forest_figure(calibration: Calibration) -> Figure:
     """Return every parameter's estimate with its interval beside its prior."""
     count = len(calibration.parameters)
     changed, informed = changed_parameters(calibration), calibration.informed
@@ -77,16 +77,16 @@ def forest_block(calibration: Calibration) -> Markup:
         f"Estimates {_drawn(calibration)}, in standard deviations of their priors from nominal; the band is "
         f"the {INTERVAL} of the prior, before the campaign."
     )
-    return figure(_forest("forest", "Parameters and priors", words, names, dots, ROW))
+    return _forest("forest", "Parameters and priors", words, names, dots, ROW)
 
 
-def subset_block(calibration: Calibration) -> Markup:
+def subset_block(calibration: Calibration) -> Block:
     """Return the estimate of each group of residuals for each parameter alone, and the joint estimate."""
     count, prior, limit = len(calibration.parameters), calibration.prior, calibration.numbers.number("report.informed")
     own = calibration.numbers.number("simulation.deviations")
     groups = [s for s in calibration.subsets if np.any(s.sd[:count] < limit * prior[:count])]
     if not groups:
-        return paragraph("No group identifies a parameter by itself.")
+        return "No group identifies a parameter by itself."
     identifies = {s.name: [i for i in range(count) if s.sd[i] < limit * prior[i]] for s in groups}
     identified = sorted({i for chosen in identifies.values() for i in chosen})
     estimators = {i: [TOGETHER, *(name for name, chosen in identifies.items() if i in chosen)] for i in identified}
@@ -122,10 +122,10 @@ def subset_block(calibration: Calibration) -> Markup:
         "Drag to zoom; a double click shows all."
     )
     shown = [names[i] for i in identified]
-    return figure(_forest("subsets", "Estimates by group of residuals", words, shown, series, SUBSET_ROW))
+    return _forest("subsets", "Estimates by group of residuals", words, shown, series, SUBSET_ROW)
 
 
-def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> list[Markup]:
+def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> list[Block]:
     """Return, for some unknowns, the predicted deviation from each test alone over the prior, as a shaded table."""
     informed = calibration.numbers.number("report.informed")
     edges = (0.2 * informed, 0.5 * informed, informed)
@@ -141,7 +141,7 @@ def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> lis
     ]
     header = ("Unknown", "All tests", *calibration.tests)
     caption = "Predicted deviation from a test alone, over that of the prior"
-    return [paragraph(Markup(key)), table(caption, header, rows)]
+    return [Markup(f"<p>{key}</p>"), Table(caption, header, rows)]
 
 
 def _forest(
@@ -159,11 +159,12 @@ def _forest(
         "zeroline": False,
     }
     layout["xaxis"] |= {"zeroline": True, "zerolinecolor": BLACK, "zerolinewidth": 1}
-    layout["shapes"].append(time_band(-half_interval(1.0), half_interval(1.0), 0, GREY))
+    layout["shapes"].append(band_on(0, GREY, x=(-half_interval(1.0), half_interval(1.0))))
     return Figure(name, title, words, [_trace(dots) for dots in series], layout, layout["height"])
 
 
 def _trace(dots: Dots) -> dict[str, Any]:
+    marker = {"color": dots.color, "symbol": dots.symbol, "size": dots.size}
     return {
         "type": "scatter",
         "mode": "markers",
@@ -173,11 +174,6 @@ def _trace(dots: Dots) -> dict[str, Any]:
         "text": [html.escape(label) for label in dots.labels],
         "customdata": list(dots.half),
         "hovertemplate": "%{text}: %{x:.3f}" + " ± %{customdata:.3f}" * any(dots.half),
-        "marker": {
-            "color": dots.color,
-            "symbol": dots.symbol,
-            "size": dots.size,
-            "line": {"width": 1.6, "color": dots.color},
-        },
+        "marker": marker | {"line": {"width": 1.6, "color": dots.color}},
         "error_x": {"type": "data", "array": list(dots.half), "color": dots.color, "thickness": 1.6, "width": 3},
     }

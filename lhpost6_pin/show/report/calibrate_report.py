@@ -17,7 +17,7 @@ from .calibrate_sections import (
     test_blocks,
 )
 from .control_blocks import load_of, numbers_used
-from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page
+from .page import Block, Headline, Level, Page, Section, bullet_list, number, save_page
 
 __all__ = ["write_calibrate_report"]
 
@@ -26,7 +26,7 @@ NAMED = 3  # parameters that the verdict names
 
 def write_calibrate_report(calibration: Calibration, path: Path | str, command: str = "") -> Path:
     """Write the self-contained HTML report of a calibration to `path` and return the path."""
-    verdict, level = _judge(calibration)
+    verdict, level = _verdict(calibration)
     count, tests = len(calibration.parameters), len(calibration.tests)
     page = Page(
         kind="Calibration",
@@ -52,11 +52,11 @@ def write_calibrate_report(calibration: Calibration, path: Path | str, command: 
     return save_page(page, path)
 
 
-def _judge(calibration: Calibration) -> tuple[str, Level]:
+def _verdict(calibration: Calibration) -> tuple[str, Level]:
     count, changed = len(calibration.parameters), changed_parameters(calibration)
     informed = int(np.sum(calibration.informed[:count]))
     rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
-    said = [
+    sentences = [
         f"The fit converged after {rounds}."
         if calibration.converged
         else f"The fit did not converge in {rounds}: estimates are those of the last round, without intervals.",
@@ -66,27 +66,29 @@ def _judge(calibration: Calibration) -> tuple[str, Level]:
         most = ", ".join(f"{calibration.names[i]} ({change_of(calibration, i)})" for i in changed[:NAMED])
         more = f"{'most significantly ' * (len(changed) > NAMED)}{most}"
         differ = "differs" if len(changed) == 1 else "differ"
-        said.append(f"{len(changed)} {differ} from nominal: {more}.")
+        sentences.append(f"{len(changed)} {differ} from nominal: {more}.")
     else:
-        said.append("No parameter differs from nominal.")
+        sentences.append("No parameter differs from nominal.")
     before, after = (float(np.nanmax(m)) for m in (calibration.misfit_before, calibration.misfit_after))
     level: Level = "good"
     bounded, wrong = _bounded(calibration), out_of_range(calibration)
     if after > calibration.noise_alone:
         level = "attention"
-        said.append(
+        sentences.append(
             f"The largest misfit changed from {number(before)} to {number(after)}, above sensor noise: an effect is "
             "missing, a sensor is wrong, or the stated noise is too small."
         )
     else:
-        said.append(f"The largest misfit changed from {number(before)} to {number(after)}, the level of sensor noise.")
+        sentences.append(
+            f"The largest misfit changed from {number(before)} to {number(after)}, the level of sensor noise."
+        )
     if wrong:
         level = "attention"
-        said.append(f"Sensor errors {range_summary(calibration)}.")
+        sentences.append(f"Sensor errors {range_summary(calibration)}.")
     if bounded:
         level = "attention"
-        said.append(f"At the bound of the fit, which indicates another cause: {', '.join(bounded)}.")
-    return " ".join(said), level if calibration.converged else "bad"
+        sentences.append(f"At the bound of the fit, which indicates another cause: {', '.join(bounded)}.")
+    return " ".join(sentences), level if calibration.converged else "bad"
 
 
 def _headlines(calibration: Calibration) -> list[Headline]:
@@ -120,7 +122,7 @@ def _bounded(calibration: Calibration) -> list[str]:
     return [name for i, name in enumerate(calibration.names) if verdict_on(calibration, i) == "at its bound"]
 
 
-def _assumptions(calibration: Calibration) -> list[Markup]:
+def _assumptions(calibration: Calibration) -> list[Block]:
     lines = [
         "Priors are the standard deviations stated in the machine file (models/lhpost6.toml for the shipped table); "
         "most are assumed, and an estimate that is not informative is no better than its prior.",

@@ -13,17 +13,27 @@ from ...identification.calibration.calibration_summary import (
 )
 from ...identification.calibration.verdicts import beyond, contradictions, far, stated_range, verdict_on
 from ...identification.residuals import RESIDUALS
-from .calibrate_plots import INTERVAL, PROBABILITY, forest_block, half_interval, information_blocks, subset_block
-from .page import Markup, details, number, paragraph, table
-from .run_motion import percent
+from .calibrate_plots import (
+    INTERVAL,
+    PROBABILITY,
+    forest_figure,
+    half_interval,
+    information_blocks,
+    subset_block,
+)
+from .page import Block, Table, details, number
+from .scales import percent, signed
 
 __all__ = [
-    "correlation_blocks",
     "change_of",
+    "correlation_blocks",
     "group_blocks",
-    "parameter_blocks",
     "misfit_blocks",
+    "misfit_table",
+    "parameter_blocks",
+    "parameter_table",
     "sensor_blocks",
+    "sensor_table",
     "test_blocks",
 ]
 
@@ -32,10 +42,9 @@ KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force":
 
 
 # ---------------------------------------------------------------------------------------- parameters and sensors
-def parameter_blocks(calibration: Calibration) -> list[Markup]:
-    """Return estimates and priors of all parameters as figure and table."""
-    outside = far(calibration)
-    informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
+def parameter_table(calibration: Calibration) -> Table:
+    """Return estimates and priors of all parameters."""
+    deviations, ratio = far(calibration), calibration.sd / calibration.prior
     rows = []
     for i, parameter in enumerate(calibration.parameters):
         low, high = calibration.interval(i, PROBABILITY)
@@ -47,102 +56,108 @@ def parameter_blocks(calibration: Calibration) -> list[Markup]:
                 _plain(parameter.at(float(calibration.estimate[i]))),
                 parameter.unit,
                 change_of(calibration, i),
-                number(float(outside[i]), 2),
-                number(float(calibration.sd[i] / calibration.prior[i]), 2),
+                number(float(deviations[i]), 2),
+                number(float(ratio[i]), 2),
                 f"{_plain(low)} to {_plain(high)}" if calibration.converged else "none",
             )
         )
+    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "Deviations")
+    return Table("All parameters", (*header, "Predicted over prior", INTERVAL), rows)
+
+
+def parameter_blocks(calibration: Calibration) -> list[Block]:
+    """Return estimates and priors of all parameters as figure and table."""
+    informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
     how = (
         "At its bound: the limit of the fit, from its prior or from an unbuildable machine. "
         f"Changed: more than {calibration.limit:g} predicted deviations and {material:g} prior deviations from "
         f"nominal. Unchanged: less, and identifiable (predicted deviation below {informed:g} of the prior's). Not "
         "informed: mostly the prior. A height is the mean over the components of its kind, which move together."
     )
-    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "Deviations")
-    heads = (*header, "Predicted over prior", INTERVAL)
-    cut = map(paragraph, cut_strokes(calibration))
-    return [forest_block(calibration), paragraph(how), table("All parameters", heads, rows), *cut]
+    return [forest_figure(calibration), how, parameter_table(calibration), *cut_strokes(calibration)]
 
 
-def sensor_blocks(calibration: Calibration) -> list[Markup]:
+def sensor_table(calibration: Calibration, *, significant: bool = True) -> Table:
+    """Return the significant errors of the sensors, or the others, the most significant first."""
+    first, deviations, outside = len(calibration.parameters), far(calibration), beyond(calibration)
+    ranges, half = stated_range(calibration), half_interval(1.0) * calibration.sd
+    rows = []
+    for i in sorted(range(first, len(calibration.prior)), key=lambda i: -abs(deviations[i])):
+        if outside[i] != significant:
+            continue
+        unknown, value = calibration.unknowns[i - first], float(calibration.estimate[i])
+        scale, unit = {"gain": (100.0, "%"), "delay": (1e3, "ms")}.get(unknown.kind, (1.0, unknown.unit))
+        interval = number(scale * float(half[i]), 2) if calibration.converged else "none"
+        share, ratio = percent(abs(value) / float(ranges[i])), float(calibration.sd[i] / calibration.prior[i])
+        numbers = number(float(deviations[i]), 2), number(ratio, 2)
+        rows.append((unknown.name, number(scale * value), interval, unit, share, *numbers))
+    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "Deviations", "Predicted over prior")
+    return Table("Significant errors" if significant else "Other errors", header, rows)
+
+
+def sensor_blocks(calibration: Calibration) -> list[Block]:
     """Return the errors of the sensors, the most significant first."""
-    first, outside = len(calibration.parameters), beyond(calibration)
-    order = sorted(range(first, len(calibration.prior)), key=lambda i: -abs(far(calibration)[i]))
-    rows = [_sensor_row(calibration, i) for i in order]
-    differ = sum(bool(outside[i]) for i in order)
-    how = paragraph(
+    off, others = (sensor_table(calibration, significant=which) for which in (True, False))
+    how = (
         "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
         "parameters are corrected for these errors, which the override file does not contain. "
-        f"{differ} of {len(order)} errors are significant (beyond {calibration.limit:g} predicted deviations), "
-        f"{range_summary(calibration)}."
+        f"{len(off.rows)} of {len(calibration.unknowns)} errors are significant (beyond {calibration.limit:g} "
+        f"predicted deviations), {range_summary(calibration)}."
     )
-    header = ("Error", "Estimate", f"Half {INTERVAL}", "Unit", "Of its range", "Deviations", "Predicted over prior")
-    caption = "Significant errors"
-    blocks = [how]
-    if differ:
-        blocks.append(table(caption, header, rows[:differ]))
-    if differ < len(rows):
-        blocks.append(details(f"The other {len(rows) - differ}", table("Other errors", header, rows[differ:])))
-    return blocks
-
-
-def _sensor_row(calibration: Calibration, i: int) -> tuple[str, ...]:
-    unknown = calibration.unknowns[i - len(calibration.parameters)]
-    scale, unit = {"gain": (100.0, "%"), "delay": (1e3, "ms")}.get(unknown.kind, (1.0, unknown.unit))
-    return (
-        unknown.name,
-        number(scale * float(calibration.estimate[i])),
-        number(scale * half_interval(float(calibration.sd[i])), 2) if calibration.converged else "none",
-        unit,
-        percent(abs(float(calibration.estimate[i])) / float(stated_range(calibration)[i])),
-        number(float(far(calibration)[i]), 2),
-        number(float(calibration.sd[i] / calibration.prior[i]), 2),
-    )
+    rest = [details(f"The other {len(others.rows)}", others)] if others.rows else []
+    return [how, *([off] if off.rows else []), *rest]
 
 
 # ------------------------------------------------------------------------------------------- residuals and tests
-def misfit_blocks(calibration: Calibration) -> list[Markup]:
+def misfit_table(calibration: Calibration) -> Table:
     """Return the misfit of every test before and after."""
     before, after = calibration.misfit_before, calibration.misfit_after
-    kinds = [k for k in range(after.shape[1]) if np.isfinite(after[:, k]).any()]
+    kinds = np.flatnonzero(np.isfinite(after).any(axis=0))
     rows = [
-        (test, *(f"{number(float(before[t, k]))} → {_judged(calibration, float(after[t, k]))}" for k in kinds))
-        for t, test in enumerate(calibration.tests)
+        (test, *(f"{number(float(old[k]))} → {_judged(calibration, float(new[k]))}" for k in kinds))
+        for test, old, new in zip(calibration.tests, before, after, strict=True)
     ]
+    return Table("Misfit before → after", ("Test", *(KINDS[RESIDUALS[k]] for k in kinds)), rows)
+
+
+def misfit_blocks(calibration: Calibration) -> list[Block]:
+    """Return the misfit of every test before and after."""
     how = (
         "Mean square of the residuals relative to sensor noise (1), with machine and sensors as given and as "
         "calibrated. Wrench: inertia, weight and friction against forces of actuators and struts. Oil flow: continuity "
         "of every chamber. Gas law: strut pressures against lengths. Force: load cells against chamber pressures. "
         f"! marks values above {calibration.noise_alone:g}."
     )
-    header = ("Test", *(KINDS[RESIDUALS[k]] for k in kinds))
-    return [paragraph(how), table("Misfit before → after", header, rows)]
+    return [how, misfit_table(calibration)]
 
 
-def test_blocks(calibration: Calibration) -> list[Markup]:
+def test_blocks(calibration: Calibration) -> list[Block]:
     """Return the information of each test alone."""
     count, p = len(calibration.parameters), len(calibration.prior)
-    how = paragraph(
+    how = (
         "Predicted deviation from a single test over that of the prior: 1 is no information, 0.1 a tenfold reduction. "
         "Sensor errors are estimated simultaneously."
     )
-    blocks = [how, *information_blocks(calibration, range(count))]
+    blocks: list[Block] = [how, *information_blocks(calibration, range(count))]
     if p > count:
         blocks.append(details("Errors of the sensors", *information_blocks(calibration, range(count, p))))
     return blocks
 
 
-def group_blocks(calibration: Calibration) -> list[Markup]:
+def group_blocks(calibration: Calibration) -> list[Block]:
     """Return the estimates by groups of residuals, contradictions first."""
     found = contradictions(calibration)
     rows = []
     for one in found:
         i = one.unknown
         subset = next(s for s in calibration.subsets if s.name == one.subset)
-        unit = calibration.parameters[i].unit if i < len(calibration.parameters) else _unit(calibration, i)
-        alone, together = (_plain(_value(calibration, i, float(x[i]))) for x in (subset.estimate, calibration.estimate))
-        rows.append((calibration.names[i], one.subset, alone, together, unit, number(one.deviations, 2)))
-    how = paragraph(
+        values, name = [float(x[i]) for x in (subset.estimate, calibration.estimate)], calibration.names[i]
+        if i < len(calibration.parameters):
+            values, unit = list(map(calibration.parameters[i].at, values)), calibration.parameters[i].unit
+        else:
+            unit = calibration.unknowns[i - len(calibration.parameters)].unit
+        rows.append((name, one.subset, *map(_plain, values), unit, number(one.deviations, 2)))
+    how = (
         f"{contradiction_summary(calibration)} Many more than expected by chance indicate an incomplete equation. "
         "Noise shared by residuals is removed in the order wrench, flow, gas law, force: later groups contain a "
         "little of the earlier ones. Simulation drives the plant open loop by the recorded spools and compares platen "
@@ -150,20 +165,20 @@ def group_blocks(calibration: Calibration) -> list[Markup]:
         "biases it beyond its predicted deviations, so its limit is wider."
     )
     header = ("Unknown", "Group", "Group alone", "Joint", "Unit", "Deviations")
-    blocks = [how]
+    blocks: list[Block] = [how]
     if rows:
         blocks += _folded("Groups that contradict the joint estimate", header, rows)
     return [*blocks, subset_block(calibration)]
 
 
-def correlation_blocks(calibration: Calibration) -> list[Markup]:
+def correlation_blocks(calibration: Calibration) -> list[Block]:
     """Return the strongly correlated pairs of unknowns."""
     pairs = calibration.alike()
     limit = calibration.numbers.number("report.alike")
     if not pairs:
-        return [paragraph(f"No two unknowns are correlated by {limit:g} or more.")]
+        return [f"No two unknowns are correlated by {limit:g} or more."]
     own = {parameter.name for parameter in calibration.parameters}
-    how = paragraph(
+    how = (
         f"{correlation_summary(calibration)} Pairs correlated by {limit:g} or more: their sum (negative correlation) "
         "or difference (positive), in prior deviations, is determined much better than either alone."
     )
@@ -172,21 +187,19 @@ def correlation_blocks(calibration: Calibration) -> list[Markup]:
         ("Between a parameter and a sensor", [(a, b, *r) for a, b, *r in pairs if (a in own) != (b in own)], LISTED),
         ("Between sensors", [(a, b, *r) for a, b, *r in pairs if a not in own and b not in own], 0),  # all collapsed
     )
-    blocks = [how]
+    blocks: list[Block] = [how]
     for caption, found, listed in groups:
-        rows = [(a, b, f"{r:+.4f}".replace("-", "−")) for a, b, r in found]
+        rows = [(a, b, signed(float(r), 4)) for a, b, r in found]
         blocks += _folded(caption, ("One", "Other", "Correlation"), rows, listed) if rows else []
     return blocks
 
 
-def _folded(
-    caption: str, header: Sequence[str], rows: Sequence[Sequence[object]], listed: int = LISTED
-) -> list[Markup]:
+def _folded(caption: str, header: Sequence[str], rows: Sequence[Sequence[object]], listed: int = LISTED) -> list[Block]:
     """A table; rows after the first `listed` are collapsed."""
-    blocks = [table(caption, header, rows[:listed])] if listed else []
+    blocks: list[Block] = [Table(caption, header, rows[:listed])] if listed else []
     if len(rows) > listed:
         more = f"{len(rows) - listed} more" if listed else f"{caption}: {len(rows)} pairs"
-        blocks.append(details(more, table(f"{caption}, {more}" if listed else caption, header, rows[listed:])))
+        blocks.append(details(more, Table(f"{caption}, {more}" if listed else caption, header, rows[listed:])))
     return blocks
 
 
@@ -205,14 +218,6 @@ def _plain(value: float) -> str:
     mantissa, _, power = f"{value:.4e}".partition("e")
     plain = f"{float(f'{value:.5g}'):,.10g}" if -4 <= int(power) < 8 else f"{float(mantissa):g}e{int(power)}"
     return plain.replace("-", "−")
-
-
-def _value(calibration: Calibration, i: int, coordinate: float) -> float:
-    return calibration.parameters[i].at(coordinate) if i < len(calibration.parameters) else coordinate
-
-
-def _unit(calibration: Calibration, i: int) -> str:
-    return calibration.unknowns[i - len(calibration.parameters)].unit
 
 
 def change_of(calibration: Calibration, i: int) -> str:

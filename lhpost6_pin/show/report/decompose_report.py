@@ -1,6 +1,5 @@
 """The report of a force decomposition: inverse dynamics against measured forces (report, Section 6.1)."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,21 +8,26 @@ from ...core.names import AXES
 from ...identification.decompose import Decomposed, Match, Work, WrenchAgreement, decompose_numbers
 from ...identification.decompose.agreement import Explanation
 from .control_blocks import DEFAULTS, assumed_in, load_of, numbers_used
-from .decompose_plots import component_blocks, effect_blocks, force_scale, moved_axes, six_row_blocks, work_blocks
-from .page import Headline, Level, Markup, Page, Section, bullet_list, number, paragraph, save_page, table
-from .run_motion import percent, shown_as
+from .decompose_plots import component_figure, effect_blocks, moved_axes, six_row_blocks, work_figure
+from .page import Block, Headline, Level, Page, Section, Table, bullet_list, number, save_page
+from .scales import force_scale, percent, shown_as
 
-__all__ = ["write_decompose_report"]
+__all__ = ["match_tables", "residual_tables", "write_decompose_report"]
 
 EXACT = 1e-3  # fraction of the measured force below which the residual of a noise-free record counts as small
-SUFFICES: dict[Explanation, str] = {
-    "none needed": "–",
-    "noise": "noise",
-    "sensors": "calibration of sensors",
-    "parameters": "uncertain parameters",
-    "nothing": "none known",
+EXPLANATIONS: dict[Explanation, tuple[str, str]] = {  # sufficient explanation, and the residual by it
+    "none needed": ("–", ""),
+    "noise": ("noise", "at noise level"),
+    "sensors": ("calibration of sensors", "above noise and within the calibration uncertainty of the sensors"),
+    "parameters": (
+        "uncertain parameters",
+        "beyond noise and sensor uncertainty but within that of the parameters: calibrate",
+    ),
+    "nothing": (
+        "none known",
+        "beyond noise, sensor and parameter uncertainty: an effect is missing, or a sensor is wrong",
+    ),
 }
-ORDER: Sequence[Explanation] = ("none needed", "noise", "sensors", "parameters", "nothing")
 
 
 def write_decompose_report(
@@ -31,7 +35,7 @@ def write_decompose_report(
 ) -> Path:
     """Write the self-contained HTML report of a decomposed record to `path` and return the path."""
     record, machine = found.record, found.plant.machine
-    verdict, level = _judge(found, agreement)
+    verdict, level = _verdict(found, agreement)
     span = f"{number(float(found.time[-1] - found.time[0]))} s at {1 / found.dt:.6g} samples a second"
     page = Page(
         kind=f"Inverse dynamics · {record.attrs.get('kind', 'test')}",
@@ -48,8 +52,8 @@ def write_decompose_report(
             Section("agreement", "Agreement by axis", _match_blocks(found, agreement)),
             Section("six-rows", "Modelled and measured forces", six_row_blocks(found)),
             Section("effects", "Forces by effect", effect_blocks(found, agreement)),
-            Section("components", "Measured forces of the components", component_blocks(found)),
-            Section("work", "Energy and power", [_work_table(work), *work_blocks(work, found.dt)]),
+            Section("components", "Measured forces of the components", [component_figure(found)]),
+            Section("work", "Energy and power", [_work_table(work), work_figure(found, work)]),
             Section("assumptions", "Assumptions and sources", _assumptions(found)),
         ],
         command=command,
@@ -57,39 +61,28 @@ def write_decompose_report(
     return save_page(page, path)
 
 
-def _judge(found: Decomposed, agreement: WrenchAgreement) -> tuple[str, Level]:
+def _verdict(found: Decomposed, agreement: WrenchAgreement) -> tuple[str, Level]:
     axes = found.plant.axes
     if found.sensors is None:
-        left = np.abs(found.forces.residual).max(axis=0)[axes]
-        share = float(np.max(left / np.maximum(np.abs(found.forces.measured).max(axis=0)[axes], 1.0)))
+        residual = np.abs(found.forces.residual).max(axis=0)[axes]
+        share = float(np.max(residual / np.maximum(np.abs(found.forces.measured).max(axis=0)[axes], 1.0)))
         words = f"Noise-free record: the residual is at most {share:.1e} of the largest measured force of its axis."
         return words, "good" if share < EXACT else "bad"
     varying, offset = agreement.varying_explained, agreement.offset_explained
-    by: dict[Explanation, list[str]] = {}
-    for k in axes:
-        by.setdefault(varying[k], []).append(AXES[k])
-    said = {
-        "noise": "at noise level",
-        "sensors": "above noise and within the calibration uncertainty of the sensors",
-        "parameters": "beyond noise and sensor uncertainty but within that of the parameters: calibrate",
-        "nothing": "beyond noise, sensor and parameter uncertainty: an effect is missing, or a sensor is wrong",
-    }
-    words = "; ".join(f"in {', '.join(by[kind])} {said[kind]}" for kind in ORDER if kind in by)
+    by = {kind: ", ".join(AXES[k] for k in axes if varying[k] == kind) for kind in EXPLANATIONS}
+    words = "; ".join(f"in {names} {EXPLANATIONS[kind][1]}" for kind, names in by.items() if names)
     worst = max(axes, key=lambda k: agreement.noise_ratio[k] if np.isfinite(agreement.noise_ratio[k]) else 0.0)
+    means = [AXES[k] for k in axes if offset[k] in ("parameters", "nothing")]
     sentences = [
         f"The residual is at most {number(float(agreement.noise_ratio[worst]))} times the expected noise "
-        f"({AXES[worst]}): {words}."
+        f"({AXES[worst]}): {words}.",
+        f"Its mean in {', '.join(means)} exceeds the offset uncertainty of the sensors."
+        if means
+        else "Its mean is within the offset uncertainty of the sensors in every axis.",
     ]
-    means = [k for k in axes if offset[k] in ("parameters", "nothing")]
-    if means:
-        sentences.append(
-            f"Its mean in {', '.join(AXES[k] for k in means)} exceeds the offset uncertainty of the sensors."
-        )
-    else:
-        sentences.append("Its mean is within the offset uncertainty of the sensors in every axis.")
-    order = max(ORDER.index(x[k]) for k in axes for x in (varying, offset))
-    levels: dict[Explanation, Level] = {"parameters": "attention", "nothing": "bad"}
-    return " ".join(sentences), levels.get(ORDER[order], "good")
+    needed = {x[k] for k in axes for x in (varying, offset)}
+    level: Level = "bad" if "nothing" in needed else "attention" if "parameters" in needed else "good"
+    return " ".join(sentences), level
 
 
 def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
@@ -98,9 +91,8 @@ def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
         worst = max(moved, key=lambda k: float(match.rrmse_varying[k]))
         note = f"{AXES[worst]}; {percent(float(match.rrmse[worst]))} including the mean"
-        tiles.append(
-            Headline(percent(float(match.rrmse_varying[worst])), f"Worst RRMSE of the {what}, mean removed", note)
-        )
+        label = f"Worst RRMSE of the {what}, mean removed"
+        tiles.append(Headline(percent(float(match.rrmse_varying[worst])), label, note))
     if found.sensors is not None:
         ratio = agreement.noise_ratio
         worst = max(found.plant.axes, key=lambda k: float(np.nan_to_num(ratio[k])))
@@ -111,86 +103,95 @@ def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     return tiles
 
 
-def _residual_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]:
+def residual_tables(found: Decomposed, agreement: WrenchAgreement) -> list[Table]:
+    """Return the residual of every axis with its expected size, varying part and mean; without noise its largest."""
     if found.sensors is None:
-        rows = []
-        for k in found.plant.axes:
-            scale = force_scale(AXES[k])
-            most = float(np.abs(found.forces.residual[:, k]).max())
-            largest = float(np.abs(found.forces.measured[:, k]).max())
-            rows.append((AXES[k], shown_as(most, scale), shown_as(largest, scale)))
-        return [table("Residual of a record without noise", ("Axis", "Largest residual", "Largest measured"), rows)]
+        both = found.forces.residual, found.forces.measured
+        rows = [
+            (AXES[k], *(shown_as(float(np.abs(x[:, k]).max()), force_scale(AXES[k])) for x in both))
+            for k in found.plant.axes
+        ]
+        return [Table("Residual of a record without noise", ("Axis", "Largest residual", "Largest measured"), rows)]
     varying, means = [], []
+    levels = agreement.residual, agreement.sensors, agreement.parameters
     for k in found.plant.axes:
-        scale = force_scale(AXES[k])
-        levels = (agreement.residual, agreement.sensors, agreement.parameters)
-        left, sensors, parameters = (shown_as(float(x.varying[k]), scale) for x in levels)
-        ratio = number(float(agreement.noise_ratio[k]))
+        scale, ratio = force_scale(AXES[k]), number(float(agreement.noise_ratio[k]))
         noise = shown_as(float(agreement.noise[k]), scale)
-        varying.append((AXES[k], left, noise, ratio, sensors, parameters, SUFFICES[agreement.varying_explained[k]]))
-        left, sensors, parameters = (shown_as(float(x.offset[k]), scale) for x in levels)
-        means.append((AXES[k], left, sensors, parameters, SUFFICES[agreement.offset_explained[k]]))
-    coverage = number(agreement.coverage, 1)
-    how = paragraph(
+        residual, *expected = (shown_as(float(x.varying[k]), scale) for x in levels)
+        by, mean_by = (EXPLANATIONS[x[k]][0] for x in (agreement.varying_explained, agreement.offset_explained))
+        varying.append((AXES[k], residual, noise, ratio, *expected, by))
+        means.append((AXES[k], *(shown_as(float(x.offset[k]), scale) for x in levels), mean_by))
+    tail = ("Sensors", "Parameters", "Sufficient explanation")
+    return [
+        Table(
+            "Varying part of the residual: standard deviations over time",
+            ("Axis", "Residual", "Noise", "Ratio", *tail),
+            varying,
+        ),
+        Table("Mean of the residual", ("Axis", "Residual", *tail), means),
+    ]
+
+
+def _residual_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Block]:
+    tables = residual_tables(found, agreement)
+    if found.sensors is None:
+        return [*tables]
+    how = (
         "The residual is the required less the measured actuator wrench at the centre of the platen's top (C), platen "
         "axes. Noise: a further draw of sensor noise added to the record and decomposed again. Sensors: one standard "
         "deviation of every gain and offset of the forces, of the skew between forces and motion and of the gain of "
         "each axis's motion. Parameters: one standard deviation of every number of the platen and of the kinds of "
-        "components that states one; geometry is left out. Both are propagated linearly, one by one, and added in "
+        "components that states one; geometry is omitted. Both are propagated linearly, one by one, and added in "
         f"squares. Sufficient explanation: the first of noise (and {percent(agreement.noise_range)} of it), sensors "
-        f"and parameters ({coverage} standard deviations) that covers the residual."
+        f"and parameters ({number(agreement.coverage, 1)} standard deviations) that covers the residual."
     )
-    header = ("Axis", "Residual", "Noise", "Ratio", "Sensors", "Parameters", "Sufficient explanation")
-    return [
-        how,
-        table("Varying part: standard deviations over time", header, varying),
-        table("Mean", ("Axis", "Residual", "Sensors", "Parameters", "Sufficient explanation"), means),
-    ]
+    return [how, *tables]
 
 
-def _match_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Markup]:
-    blocks = [
-        paragraph(
-            "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured "
-            "force, given where their correlation is high enough to determine it."
-        )
-    ]
-    matches = (
-        ("Total actuator force", agreement.actuators),
-        ("Strut force", agreement.struts),
-        ("Dissipative force", agreement.dissipative),
-    )
-    for what, match in matches:
+def match_tables(found: Decomposed, agreement: WrenchAgreement) -> list[Block]:
+    """Return the agreement of modelled with measured forces, axis by axis."""
+    blocks: list[Block] = []
+    header = ("Axis", "RRMSE", "RRMSE, mean removed", "Peak ratio", "Correlation", "Delay")
+    matches = {"Total actuator": agreement.actuators, "Strut": agreement.struts, "Dissipative": agreement.dissipative}
+    for what, match in matches.items():
         if match is None:
-            blocks.append(paragraph(f"{what}: the record has no strut pressures to compare with."))
-            continue
-        header = ("Axis", "RRMSE", "RRMSE, mean removed", "Peak ratio", "Correlation", "Delay")
-        blocks.append(table(f"{what}, modelled against measured", header, [_row(match, k) for k in found.plant.axes]))
+            blocks.append(f"{what} force: the record has no strut pressures to compare with.")
+        else:
+            rows = [_match_row(match, k) for k in found.plant.axes]
+            blocks.append(Table(f"{what} force, modelled against measured", header, rows))
     return blocks
 
 
-def _row(match: Match, k: int) -> tuple[str, ...]:
+def _match_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Block]:
+    how = (
+        "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured "
+        "force, given where their correlation is high enough to determine it."
+    )
+    return [how, *match_tables(found, agreement)]
+
+
+def _match_row(match: Match, k: int) -> tuple[str, ...]:
     late = f"{1e3 * match.delay[k]:.3f} ± {1e3 * match.delay_error[k]:.3f} ms" if np.isfinite(match.delay[k]) else "–"
     shares = percent(float(match.rrmse[k])), percent(float(match.rrmse_varying[k]))
     return AXES[k], *shares, number(float(match.peak_ratio[k])), f"{match.correlation[k]:.4f}", late.replace("-", "−")
 
 
-def _work_table(work: Work) -> Markup:
+def _work_table(work: Work) -> Table:
+    def shown(value: float, unit: str = "kJ") -> str:
+        return f"{number(float(value) / 1e3)} {unit}"
+
+    power = np.abs(work.power).max(axis=0)
     rows = [
-        (
-            name.replace("_", " "),
-            f"{number(float(work.energy[-1, i]) / 1e3)} kJ",
-            f"{number(float(np.abs(work.power[:, i]).max()) / 1e3)} kW",
-        )
+        (name.replace("_", " "), shown(work.energy[-1, i]), shown(power[i], "kW"))
         for i, name in enumerate(work.effects)
     ]
-    rows.append(("sum: work of inertia", f"{number(float(work.inertia[-1]) / 1e3)} kJ", ""))
-    rows.append(("change of kinetic energy", f"{number(float(work.kinetic[-1]) / 1e3)} kJ", ""))
-    rows.append(("largest imbalance", f"{number(float(np.abs(work.unbalanced).max()) / 1e3)} kJ", ""))
-    return table("Work on the platen over the whole test", ("Effect", "Energy", "Largest power"), rows)
+    rows.append(("sum: work of inertia", shown(work.inertia[-1]), ""))
+    rows.append(("change of kinetic energy", shown(work.kinetic[-1]), ""))
+    rows.append(("largest imbalance", shown(np.abs(work.unbalanced).max()), ""))
+    return Table("Work on the platen over the whole test", ("Effect", "Energy", "Largest power"), rows)
 
 
-def _assumptions(found: Decomposed) -> list[Markup]:
+def _assumptions(found: Decomposed) -> list[Block]:
     band = found.comparison.band
     lines = [
         *found.notes,

@@ -13,8 +13,8 @@ from ...discovery.localise import gap_map
 from ...discovery.residual_function import ResidualFunction
 from ...discovery.search_state import Round
 from ...discovery.verdict_summary import where
-from .layout import log_ticks, stacked_layout
-from .page import Figure, Markup, paragraph, shaded, table, text
+from .layout import line_on, log_ticks, stacked_layout
+from .page import Block, Figure, Markup, Table, shaded, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
 
 __all__ = ["gain_figure", "gap_figure", "residual_function_figure", "map_blocks"]
@@ -35,15 +35,13 @@ _KINDS = {
 }
 
 
-def map_blocks(found: Discovery) -> list[Markup]:
+def map_blocks(found: Discovery) -> list[Block]:
     """Return, for each kind of residual, the misfit of every column in every band, before and after."""
     problem = found.search.problem
     before, after = (gap_map(problem, rest) for rest in (found.search.refit.normal.residual, found.search.residual))
-    blocks = [
-        paragraph(
-            "Mean square of the whitened residuals, known parameters and sensor errors refitted: 1 is sensor noise "
-            "alone. Each cell: without effects → with the identified effects."
-        )
+    blocks: list[Block] = [
+        "Mean square of the whitened residuals, known parameters and sensor errors refitted: 1 is sensor noise alone. "
+        "Each cell: without effects → with the identified effects."
     ]
     for kind, words in _KINDS.items():
         pairs = [(old, new) for old, new in zip(before, after, strict=True) if old[0].kind == kind]
@@ -53,7 +51,7 @@ def map_blocks(found: Discovery) -> list[Markup]:
                 (old[0].label, *(_cell(a.misfit, b.misfit) for a, b in zip(old, new, strict=True)))
                 for old, new in pairs
             ]
-            blocks.append(table(words, ("", *heads), rows))
+            blocks.append(Table(words, ("", *heads), rows))
     return blocks
 
 
@@ -94,15 +92,15 @@ def gap_figure(found: Discovery) -> Figure:
     assert found.proof is not None
     gaps = found.proof.gaps
     names = [f"{gap.phase}, {gap.test}" for gap in gaps]
-    traces = []
     series = (
         ("as delivered", "delivered", GREY),
         ("refitted", "refitted", VERMILLION),
         ("with the effects", "after", BLUE),
     )
-    for words, key, color in series:
-        sizes = [getattr(gap, key) for gap in gaps]
-        traces.append(_bar(words, color, sizes, range(len(gaps)), "%{x:.3g} × noise"))
+    traces = [
+        _bar(words, color, [getattr(gap, key) for gap in gaps], range(len(gaps)), "%{x:.3g} × noise")
+        for words, key, color in series
+    ]
     most = max(max(gap.delivered, gap.refitted, gap.after) for gap in gaps)
     layout = _bars(names, "Normalised RMS error (1: sensor noise)", 74, FLOOR, most) | {"barmode": "group"}
     words = "Root mean square error of all moving channels over sensor noise; the dashed line is noise alone."
@@ -114,27 +112,12 @@ def residual_function_figure(function: ResidualFunction) -> Figure:
     title = "Rate of elongation [m/s]" if function.state == "velocity" else f"Elongation: {function.description} [m]"
     layout = stacked_layout([f"Force along {where(function.components)} [kN]"], title, row_height=240)
     nodes, value, sd = function.nodes.tolist(), function.value / 1e3, function.sd / 1e3
-    band = [*(value + 2 * sd).tolist(), *(value - 2 * sd)[::-1].tolist()]
+    band = {"x": [*nodes, *nodes[::-1]], "y": [*(value + 2 * sd).tolist(), *(value - 2 * sd)[::-1].tolist()]}
+    shade = {"fill": "toself", "line": {"width": 0}, "fillcolor": "rgba(0,114,178,0.2)", "hoverinfo": "skip"}
     traces = [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "x": [*nodes, *nodes[::-1]],
-            "y": band,
-            "fill": "toself",
-            "line": {"width": 0},
-            "fillcolor": "rgba(0,114,178,0.2)",
-            "name": "± 2 sigma",
-            "hoverinfo": "skip",
-        },
-        {
-            "type": "scatter",
-            "mode": "lines+markers",
-            "x": nodes,
-            "y": value.tolist(),
-            "line": {"color": BLUE},
-            "name": "force",
-        },
+        {"type": "scatter", "mode": "lines", "name": "± 2 sigma"} | band | shade,
+        {"type": "scatter", "mode": "lines+markers", "name": "force"}
+        | {"x": nodes, "y": value.tolist(), "line": {"color": BLUE}},
     ]
     place = where(function.components)
     words = f"Force along {place} as a nonparametric function of {function.description}, fitted to the residual."
@@ -154,25 +137,14 @@ def _bar(name: str, color: str, sizes: Sequence[float], rows: Sequence[int], hov
 def _bars(names: Sequence[str], x_title: str, height: int, mark: float, most: float) -> dict[str, Any]:
     """Layout of rows of bars, `height` [CSS px] each, over a logarithmic axis to `most`; a line at `mark`."""
     layout = stacked_layout([""], x_title, row_height=height * max(len(names), 1))
-    layout["yaxis"] |= {
-        "range": [len(names) - 0.5, -0.5],
-        "showticklabels": False,
-        "showgrid": False,
-        "zeroline": False,
-    }
-    layout["yaxis"] |= {"ticks": "", "fixedrange": True}
+    bare = {"showticklabels": False, "showgrid": False, "zeroline": False, "ticks": "", "fixedrange": True}
+    layout["yaxis"] |= {"range": [len(names) - 0.5, -0.5]} | bare
     layout["xaxis"] |= {"type": "log"} | log_ticks(1.0, most)
     layout["margin"]["l"] = 14
     layout["hovermode"], layout["bargap"] = "closest", 0.45
     for k, name in enumerate(names):
         place = {"x": 0, "xref": "paper", "xanchor": "left", "y": k - 0.48, "yref": "y", "yanchor": "top"}
-        words = {
-            "text": html.escape(name),
-            "showarrow": False,
-            "font": {"size": 11},
-            "bgcolor": "rgba(255,255,255,0.7)",
-        }
-        layout["annotations"].append(place | words)
-    line = {"type": "line", "xref": "x", "x0": mark, "x1": mark, "yref": "paper", "y0": 0, "y1": 1}
-    layout["shapes"].append(line | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}})
+        words = {"text": html.escape(name), "showarrow": False, "font": {"size": 11}}
+        layout["annotations"].append(place | words | {"bgcolor": "rgba(255,255,255,0.7)"})
+    layout["shapes"].append(line_on(0, x=mark) | {"line": {"color": BLACK, "width": 1.2, "dash": "dash"}})
     return layout

@@ -1,33 +1,31 @@
 """The report of a discovery: identified effects, held-out errors, misfit map, candidates considered."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from ...discovery import Discovery, save_verdict
+from ...discovery.held_out import Proof
+from ...discovery.verdict import EffectFinding, Estimate, SensorFinding, Word
 from ...discovery.verdict_file import advice
 from ...discovery.verdict_summary import summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .control_blocks import load_of, numbers_used
 from .discover_plots import gain_figure, gap_figure, map_blocks, residual_function_figure
-from .page import (
-    Headline,
-    Level,
-    Markup,
-    Page,
-    Section,
-    bullet_list,
-    details,
-    figure,
-    number,
-    paragraph,
-    save_page,
-    table,
-)
+from .page import Block, Headline, Level, Page, Section, Table, bullet_list, details, number, save_page
 
-__all__ = ["save_discovery", "write_discover_report"]
+__all__ = ["discovery_tables", "save_discovery", "verdict_sentence", "write_discover_report"]
 
-_LEVELS: dict[str, Level] = {"none": "good", "parameters_only": "good", "named": "good", "unexplained": "bad"}
+_VERDICTS: dict[Word, tuple[str, Level]] = {
+    "none": ("no missing effect", "good"),
+    "parameters_only": ("parameters differ", "good"),
+    "sensor": ("sensor fault", "attention"),
+    "named": ("effect identified", "good"),
+    "ambiguous": ("effects not distinguished", "attention"),
+    "unexplained": ("unexplained residual", "bad"),
+    "not_testable": ("not testable", "attention"),
+}
 
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
@@ -41,15 +39,14 @@ def save_discovery(found: Discovery, folder: Path, title: str, command: str = ""
 
 def write_discover_report(found: Discovery, path: Path | str, command: str = "") -> Path:
     """Write the self-contained HTML report of a search to `path` and return the path."""
-    verdict = found.verdict
     tests = f"{len(found.used)} test{'s' * (len(found.used) != 1)}: {', '.join(found.used)}"
     held = f"; {', '.join(found.held_out)} held out" if found.held_out else ""
     page = Page(
         kind="Discovery",
         title=f"Effects missing from {found.machine.name}, by {found.campaign}",
         asked=f"Identify effects missing from the model of {load_of(found.machine)}, from {tests}{held}.",
-        verdict=f"{verdict.word}: {summary(found)}",
-        level=_LEVELS.get(verdict.word, "attention"),
+        verdict=verdict_sentence(found),
+        level=_VERDICTS[found.verdict.word][1],
         headlines=_headlines(found),
         sections=[
             Section("effects", "Identified effects", _effect_blocks(found)),
@@ -64,6 +61,53 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
     return save_page(page, path)
 
 
+def verdict_sentence(found: Discovery) -> str:
+    """Return the verdict in words, and what was identified."""
+    text = summary(found)
+    if text.startswith("no missing effect"):
+        return text[0].upper() + text[1:]
+    return f"{_VERDICTS[found.verdict.word][0].capitalize()}: {text}"
+
+
+def discovery_tables(found: Discovery) -> list[Table]:
+    """Return the tables of a verdict: effects, recalibrated parameters, sensors, errors on held-out tests."""
+    verdict = found.verdict
+    changed = [_estimates("Recalibrated parameters", "Parameter", verdict.changed)] if verdict.changed else []
+    sensors = [_sensor_table(verdict.sensors)] if verdict.sensors else []
+    proof = [_proof_table(found.proof)] if found.proof else []
+    return [*map(_effect_table, verdict.effects), *changed, *sensors, *proof]
+
+
+def _sensor_table(sensors: Sequence[SensorFinding]) -> Table:
+    rows = [(s.name, f"{s.estimate.value:.4g} {s.estimate.unit}", f"{s.stated:.3g}", s.family) for s in sensors]
+    return Table("Sensors outside their stated range", ("Error", "Value", "Stated", "Family"), rows)
+
+
+def _effect_table(one: EffectFinding) -> Table:
+    return _estimates(
+        f"{find_family(one.form or one.family).title}, on {where(one.components)}", "Number", one.parameters
+    )
+
+
+def _estimates(caption: str, what: str, estimates: dict[str, Estimate]) -> Table:
+    rows = [(n, f"{e.value:.5g}", f"{e.low:.5g} to {e.high:.5g}", e.unit) for n, e in estimates.items()]
+    return Table(caption, (what, "Value", "90 % interval", "Unit"), rows)
+
+
+def _proof_table(proof: Proof) -> Table:
+    rows = [
+        (
+            f"{gap.phase}, {gap.test}",
+            *(number(error) for error in (gap.delivered, gap.refitted, gap.after)),
+            "1",
+            "–" if math.isnan(gap.closure) else f"{100 * gap.closure:.0f} %",
+        )
+        for gap in proof.gaps
+    ]
+    header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
+    return Table("Normalised RMS error on held-out tests (1: sensor noise)", header, rows)
+
+
 def _p_value(p: float) -> str:
     return "less than 1e-300" if p < 1e-300 else f"{p:.1g}"
 
@@ -71,7 +115,7 @@ def _p_value(p: float) -> str:
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
-    shown = [Headline(verdict.word.replace("_", " "), "Verdict"), Headline(named, "Effects")]
+    shown = [Headline(_VERDICTS[verdict.word][0], "Verdict"), Headline(named, "Effects")]
     if found.proof and found.proof.gaps:
         widest = max(found.proof.gaps, key=lambda gap: gap.refitted)
         shown.append(
@@ -84,93 +128,64 @@ def _headlines(found: Discovery) -> list[Headline]:
     return shown
 
 
-def _effect_blocks(found: Discovery) -> list[Markup]:
+def _effect_blocks(found: Discovery) -> list[Block]:
     verdict = found.verdict
     if not verdict.effects and verdict.word != "unexplained":
-        return [paragraph("No effect is missing.")]
-    blocks: list[Markup] = []
+        return ["No effect is missing."]
+    blocks: list[Block] = []
     for one in verdict.effects:
         family = find_family(one.form or one.family)
-        rows = [
-            (name, f"{value.value:.4g}", f"{value.low:.4g} to {value.high:.4g}", value.unit)
-            for name, value in one.parameters.items()
-        ]
-        header = ("Number", "Value", "90 % interval", "Unit")
-        blocks.append(table(f"{family.title}, on {where(one.components)}", header, rows))
         confused = ", ".join(map(title_of, family.confused_with))
-        blocks.append(
-            paragraph(
-                f"{family.equation}. Gain of log-likelihood {number(one.gain)}; p-value, corrected for the number of "
-                f"candidates: {_p_value(one.p_value)}. Often confused with: {confused}."
-            )
-        )
-    if lines := advice(found):
         blocks += [
-            paragraph("The campaign does not distinguish the candidates. Tests that would:"),
-            bullet_list(lines),
+            _effect_table(one),
+            f"{family.equation}. Gain of log-likelihood {number(one.gain)}; p-value, corrected for the number of "
+            f"candidates: {_p_value(one.p_value)}. Often confused with: {confused}.",
         ]
-    if found.next_tests:
-        blocks.append(_next_tests(found))
+    if lines := advice(found):
+        blocks += ["The campaign does not distinguish the candidates. Tests that would:", bullet_list(lines)]
+    if found.next_tests:  # simulated with one effect and fitted with the other
+        rows = [
+            (
+                one.test,
+                " or ".join(map(title_of, one.families)),
+                _margin(one.margin),
+                "yes" if one.informative else "no",
+            )
+            for one in found.next_tests
+        ]
+        header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood difference", "Distinguishes")
+        blocks.append(Table("Next tests, simulated", header, rows))
     if verdict.residual_function is not None:
-        blocks.append(figure(residual_function_figure(verdict.residual_function)))
+        blocks.append(residual_function_figure(verdict.residual_function))
     elif verdict.word == "unexplained":
-        words = "The residual exceeds noise and is not a function of an actuator's or strut's position or velocity."
-        blocks.append(paragraph(words))
+        blocks.append(
+            "The residual exceeds noise and is not a function of an actuator's or strut's position or velocity."
+        )
     if verdict.where:
-        blocks.append(paragraph(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}."))
+        blocks.append(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}.")
     if verdict.nearest:
         near = " and ".join(map(title_of, verdict.nearest))
-        blocks.append(
-            paragraph(
-                f"The closest library family is {near}, which leaves a significant residual; model.toml contains it."
-            )
-        )
+        words = "which leaves a significant residual; model.toml contains it."
+        blocks.append(f"The closest library family is {near}, {words}")
     return blocks
-
-
-def _next_tests(found: Discovery) -> Markup:
-    """Tests simulated with one effect and fitted with the other."""
-    rows = [
-        (one.test, " or ".join(map(title_of, one.families)), _margin(one.margin), "yes" if one.informative else "no")
-        for one in found.next_tests
-    ]
-    header = ("Test of models/procedures/next_test.toml", "Effects", "Log-likelihood difference", "Distinguishes")
-    return table("Next tests, simulated", header, rows)
 
 
 def _margin(value: float) -> str:
     return "not feasible" if math.isnan(value) else number(value)
 
 
-def _proof_blocks(found: Discovery) -> list[Markup]:
+def _proof_blocks(found: Discovery) -> list[Block]:
     if found.proof is None:
-        return [paragraph("No test was held out; name one with --hold-out.")]
-    rows = [
-        (
-            f"{gap.phase}, {gap.test}",
-            number(gap.delivered),
-            number(gap.refitted),
-            number(gap.after),
-            "1",
-            "–" if math.isnan(gap.closure) else f"{100 * gap.closure:.0f} %",
-        )
-        for gap in found.proof.gaps
-    ]
-    header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
-    return [
-        figure(gap_figure(found)),
-        table("Normalised RMS error (1: sensor noise)", header, rows),
-        paragraph(
-            "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
-        ),
-    ]
+        return ["No test was held out; name one with --hold-out."]
+    closure = "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
+    return [gap_figure(found), _proof_table(found.proof), closure]
 
 
-def _considered(found: Discovery) -> list[Markup]:
+def _considered(found: Discovery) -> list[Block]:
     gates = [found.numbers.number(f"accept.{gate}") for gate in ("gain", "confusable")]
-    blocks: list[Markup] = []
+    blocks: list[Block] = []
     for k, one in enumerate(found.search.rounds, start=1):
-        blocks.append(figure(gain_figure(one, k, *gates)))
+        blocks.append(gain_figure(one, k, *gates))
         rows = [
             (
                 s.candidate.family.name,
@@ -183,32 +198,22 @@ def _considered(found: Discovery) -> list[Markup]:
             for s in one.best.values()
         ]
         header = ("Family", "On", "Gain", "Cross-validated gain", "Closure", "Accepted")
-        blocks.append(details(f"Round {k}: all families", table("Best candidate of each family", header, rows)))
+        blocks.append(details(f"Round {k}: all families", Table("Best candidate of each family", header, rows)))
         for contest in (a.contest for a in found.search.added if a.round == k - 1):
             tried = [(c.candidate.family.name, where(c.candidate.components), number(c.behind)) for c in contest]
-            blocks.append(table("Full fits: log-likelihood below the best", ("Family", "On", "Difference"), tried))
+            blocks.append(Table("Full fits: log-likelihood below the best", ("Family", "On", "Difference"), tried))
     return blocks
 
 
-def _parameter_blocks(found: Discovery) -> list[Markup]:
-    verdict = found.verdict
-    rows = [
-        (name, f"{value.value:.5g}", f"{value.low:.5g} to {value.high:.5g}", value.unit)
-        for name, value in verdict.changed.items()
+def _parameter_blocks(found: Discovery) -> list[Block]:
+    changed, sensors = found.verdict.changed, found.verdict.sensors
+    return [
+        _estimates("Recalibrated parameters", "Parameter", changed) if changed else "No parameter differs.",
+        _sensor_table(sensors) if sensors else "All sensors are within their stated ranges.",
     ]
-    header = ("Parameter", "Value", "90 % interval", "Unit")
-    blocks = [table("Recalibrated parameters", header, rows) if rows else paragraph("No parameter differs.")]
-    if verdict.sensors:
-        sensors = [
-            (s.name, f"{s.estimate.value:.4g} {s.estimate.unit}", f"{s.stated:.3g}", s.family) for s in verdict.sensors
-        ]
-        blocks.append(table("Sensors outside their stated range", ("Error", "Value", "Stated", "Family"), sensors))
-    else:
-        blocks.append(paragraph("All sensors are within their stated ranges."))
-    return blocks
 
 
-def _assumptions(found: Discovery) -> list[Markup]:
+def _assumptions(found: Discovery) -> list[Block]:
     lines = [
         "Priors of parameters and ranges of sensor errors are from the machine's and the sensors' files; most are "
         "assumed. Noise is simulated from the sensors' file, not estimated from the residual.",

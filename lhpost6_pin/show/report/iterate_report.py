@@ -1,35 +1,20 @@
 """The report of a drive iteration: the error of every iteration, and the best drive."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.names import AXES
 from ...tuning.identify import tuning_numbers
 from ...tuning.iterate import Iterated, Iteration
 from .charts import Curve, Panel, XAxis, chart_figure
 from .control_blocks import AXIS_LINES, assumption_blocks, load_of
-from .iterate_plots import AxisIteration, compare, drive_blocks, motion_blocks, spectrum_blocks, table_blocks
-from .page import (
-    Figure,
-    Headline,
-    Level,
-    Markup,
-    Page,
-    Section,
-    details,
-    figure,
-    number,
-    paragraph,
-    save_page,
-    table,
-)
-from .plots import SCALES
-from .run_motion import percent, shown_as
+from .iterate_plots import compare, drive_blocks, motion_blocks, spectrum_blocks, table_blocks
+from .page import Block, Figure, Headline, Level, Page, Section, Table, details, number, save_page
+from .scales import milliseconds, percent
 
-__all__ = ["write_iterate_report"]
+__all__ = ["iteration_tables", "write_iterate_report"]
 
 # Judgement, not physics: largest acceleration RRMSE of an axis, and its share of the error before iterating.
 REACHED = 0.05
@@ -40,21 +25,31 @@ NUMBERS = ("noise.rms", "noise.rotation_radius", "noise.low", "noise.high", "noi
 
 def write_iterate_report(result: Iterated, path: Path | str, command: str = "") -> Path:
     """Write the self-contained HTML report of an iteration to `path` and return the path."""
-    verdict, level = _judge(result)
-    reference, plant = result.target.reference, result.first_run.plant
+    verdict, level = _verdict(result)
+    reference, machine = result.target.reference, result.first_run.plant.machine
     high = tuning_numbers().number("iteration.high")
+    found = compare(result, high)
+    acceleration, delays, displacement = iteration_tables(result)
+    tables: list[Block] = [acceleration, delays, details("Displacement RRMSE", displacement)]
     page = Page(
         kind="Iteration report · simulated",
         title=f"{reference.motion}, iterated",
         asked=(
-            f"Find the drive with which {load_of(plant.machine)}, under “{result.settings.name}”, reproduces "
+            f"Find the drive with which {load_of(machine)}, under “{result.settings.name}”, reproduces "
             f"{reference.motion} at scale {number(reference.scale)} on {', '.join(_moved(result))}: "
             f"{number(float(result.target.time[-1]))} s, judged from 0 to {high:g} Hz with the delay removed."
         ),
         verdict=verdict,
         level=level,
         headlines=_headlines(result),
-        sections=_sections(result, compare(result, high)),
+        sections=[
+            Section("errors", "Error per iteration", [_errors(result), _stop(result), *tables]),
+            Section("motion", "Target and achieved", motion_blocks(found)),
+            Section("spectra", "Spectra of the error", spectrum_blocks(found)),
+            Section("drive", "Drive and reference", drive_blocks(result, found)),
+            Section("table", "Transfer function of the table", table_blocks(result.table)),
+            Section("assumptions", "Assumptions and sources", assumption_blocks(machine, NUMBERS)),
+        ],
         command=command,
     )
     return save_page(page, path)
@@ -65,45 +60,43 @@ def _moved(result: Iterated) -> list[str]:
     return [axis for axis, error in zip(AXES, result.history[0].acceleration, strict=True) if not np.isnan(error)]
 
 
-def _judge(result: Iterated) -> tuple[str, Level]:
-    first, best = result.history[0], result.history[result.best]
-    level: Level = "good"
-    words = []
+def _by_axis(result: Iterated, iteration: Iteration, quantity: str = "acceleration") -> dict[str, float]:
+    """A quantity of an iteration on the axes that the target moves."""
+    return {axis: float(getattr(iteration, quantity)[AXES.index(axis)]) for axis in _moved(result)}
+
+
+def _verdict(result: Iterated) -> tuple[str, Level]:
+    best = result.history[result.best]
+    errors, before = _by_axis(result, best), _by_axis(result, result.history[0])
+    large = [axis for axis, error in errors.items() if not error <= REACHED]
+    little = [axis for axis, error in errors.items() if not error <= REMAINING * before[axis]]
+    listed = ", ".join(f"{axis} {percent(errors[axis])}" for axis in large or errors)
+    bound = f"{100 * REACHED:g} % after iterating: {listed}."
+    words = [
+        f"Acceleration RRMSE above {bound}" if large else f"Acceleration RRMSE of every axis is at most {bound}",
+        f"More than half of the initial error remains in {', '.join(little)}."
+        if little
+        else "At most half of the initial error remains in every axis.",
+    ]
     if result.best == 0:
-        words.append("No iteration improved on the reference as drive.")
-        level = "attention"
-    errors = dict(zip(AXES, best.acceleration, strict=True))
-    large = [axis for axis in _moved(result) if not errors[axis] <= REACHED]
-    said = ", ".join(f"{axis} {percent(errors[axis])}" for axis in large or _moved(result))
-    if large:
-        words.append(f"Acceleration RRMSE above {100 * REACHED:g} % after iterating: {said}.")
-        level = "attention"
-    else:
-        words.append(f"Acceleration RRMSE of every axis is at most {100 * REACHED:g} % after iterating: {said}.")
-    before = dict(zip(AXES, first.acceleration, strict=True))
-    little = [axis for axis in _moved(result) if not errors[axis] <= REMAINING * before[axis]]
-    if little:
-        words.append(f"More than half of the initial error remains in {', '.join(little)}.")
-        level = "attention"
-    else:
-        words.append("At most half of the initial error remains in every axis.")
+        words.insert(0, "No iteration improved on the reference as drive.")
     if best.clipped:
         words.append(f"{best.clipped} spool commands of the best drive were clipped at their limit.")
-        level = "bad"
-    return " ".join(words), level
+        return " ".join(words), "bad"
+    return " ".join(words), "attention" if large or little or result.best == 0 else "good"
 
 
 def _headlines(result: Iterated) -> list[Headline]:
-    first, best = result.history[0], result.history[result.best]
-    moved = _moved(result)
-    worst = max(moved, key=lambda axis: best.acceleration[AXES.index(axis)])
-    errors = best.acceleration[AXES.index(worst)], first.acceleration[AXES.index(worst)]
+    best = result.history[result.best]
+    errors = _by_axis(result, best)
+    worst = max(errors, key=errors.__getitem__)
+    before = _by_axis(result, result.history[0])[worst]
     return [
         Headline(
-            percent(errors[0]),
+            percent(errors[worst]),
             "Worst acceleration RRMSE after iterating",
-            f"axis {worst}; initially {percent(errors[1])}",
-            "good" if errors[0] <= min(REACHED, REMAINING * errors[1]) else "attention",
+            f"axis {worst}; initially {percent(before)}",
+            "good" if errors[worst] <= min(REACHED, REMAINING * before) else "attention",
         ),
         Headline(
             f"{result.best} of {result.history[-1].number}",
@@ -120,24 +113,13 @@ def _headlines(result: Iterated) -> list[Headline]:
     ]
 
 
-def _sections(result: Iterated, found: Sequence[AxisIteration]) -> list[Section]:
-    machine = result.first_run.plant.machine
-    return [
-        Section("errors", "Error per iteration", [figure(_errors(result)), _why(result), *_history(result)]),
-        Section("motion", "Target and achieved", motion_blocks(found)),
-        Section("spectra", "Spectra of the error", spectrum_blocks(found)),
-        Section("drive", "Drive and reference", drive_blocks(result, found)),
-        Section("table", "Transfer function of the table", table_blocks(result.table)),
-        Section("assumptions", "Assumptions and sources", assumption_blocks(machine, NUMBERS)),
-    ]
-
-
 def _errors(result: Iterated) -> Figure:
     numbers = [i.number for i in result.history]
     panels = []
     for quantity in ("acceleration", "displacement"):
+        history = [_by_axis(result, i, quantity) for i in result.history]
         curves = [
-            Curve(axis, numbers, 100.0 * _of(result.history, quantity, axis), AXIS_LINES[axis], "lines+markers")
+            Curve(axis, numbers, [100.0 * errors[axis] for errors in history], AXIS_LINES[axis], "lines+markers")
             for axis in _moved(result)
         ]
         lines = {f"{100 * REACHED:g} % (criterion)": 100.0 * REACHED} if quantity == "acceleration" else {}
@@ -146,44 +128,30 @@ def _errors(result: Iterated) -> Figure:
         "Iteration 0 uses the reference as drive, 1 the reference through the inverse; later ones correct the drive "
         f"by the remaining error. The dotted line marks the best, {result.best}."
     )
-    over = XAxis("Iteration", span=(-0.2, numbers[-1] + 0.2), ticks=numbers)
-    return chart_figure(
-        "errors", "Error per iteration and axis", words, panels, over, row_height=210, marks=[result.best]
-    )
+    over, title = XAxis("Iteration", span=(-0.2, numbers[-1] + 0.2), ticks=numbers), "Error per iteration and axis"
+    return chart_figure("errors", title, words, panels, over, row_height=210, marks=[result.best])
 
 
-def _of(history: Sequence[Iteration], quantity: str, axis: str) -> NDArray[np.float64]:
-    return np.array([getattr(i, quantity)[AXES.index(axis)] for i in history])
-
-
-def _history(result: Iterated) -> list[Markup]:
-    """Return tables of the errors, the delays removed, and the use of the valves."""
-    moved = _moved(result)
+def iteration_tables(result: Iterated) -> list[Table]:
+    """Return the acceleration errors with the use of the valves, the delays removed, and the displacement errors."""
     names = [f"{i.number}{' (best)' if i.number == result.best else ''}" for i in result.history]
-    rows = [
-        (name, *_shares(i.acceleration, moved), percent(i.peak_spool), i.clipped)
-        for name, i in zip(names, result.history, strict=True)
-    ]
-    header = ("Iteration", *moved, "Largest spool command", "Commands clipped")
-    shifts = [
-        (name, *(shown_as(i.delay[AXES.index(axis)], SCALES["time"]) for axis in moved))
-        for name, i in zip(names, result.history, strict=True)
-    ]
-    displaced = [(name, *_shares(i.displacement, moved)) for name, i in zip(names, result.history, strict=True)]
+
+    def rows(quantity: str, shown: Callable[[float], str]) -> list[tuple[str, ...]]:
+        values = [_by_axis(result, i, quantity).values() for i in result.history]
+        return [(name, *map(shown, own)) for name, own in zip(names, values, strict=True)]
+
+    spools = [(percent(i.peak_spool), i.clipped) for i in result.history]
+    errors = [(*row, *use) for row, use in zip(rows("acceleration", percent), spools, strict=True)]
+    header = ("Iteration", *_moved(result))
     return [
-        table("Acceleration RRMSE, delay removed", header, rows),
-        table("Delay removed, of the acceleration", header[: len(moved) + 1], shifts),
-        details("Displacement RRMSE", table("Displacement RRMSE, delay removed", header[: len(moved) + 1], displaced)),
+        Table("Acceleration RRMSE, delay removed", (*header, "Largest spool command", "Commands clipped"), errors),
+        Table("Delay removed, of the acceleration", header, rows("delay", milliseconds)),
+        Table("Displacement RRMSE, delay removed", header, rows("displacement", percent)),
     ]
 
 
-def _shares(errors: NDArray[np.float64], axes: Sequence[str]) -> list[str]:
-    return [percent(errors[AXES.index(axis)]) for axis in axes]
-
-
-def _why(result: Iterated) -> Markup:
-    last = result.history[-1].number
-    return paragraph(
-        f"Stopped after iteration {last}: {result.reason}. The objective, the mean square of the acceleration errors "
-        f"of all axes, is least in iteration {result.best}, whose drive is the result."
+def _stop(result: Iterated) -> Block:
+    return (
+        f"Stopped after iteration {result.history[-1].number}: {result.reason}. The objective, the mean square of the "
+        f"acceleration errors of all axes, is least in iteration {result.best}, whose drive is the result."
     )

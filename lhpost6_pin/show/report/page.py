@@ -1,5 +1,7 @@
 """The page of every report: summary, sections, versions and the command that repeats it.
 
+A section is a sequence of blocks: a string is a paragraph, a `Table` and a `Figure` are data, `Markup` is made here.
+
 A report is one HTML file that loads nothing from elsewhere: style, script and the plotting library (packed,
 once) are inside it, and its content security policy forbids the rest. All text is escaped here; only a
 `Markup` made by this module passes unchanged.
@@ -9,7 +11,9 @@ import base64
 import functools
 import html
 import json
+import math
 import platform
+import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,24 +25,26 @@ from ... import __version__
 from ...core.files import write_whole
 
 __all__ = [
+    "Block",
     "Figure",
     "Headline",
     "Level",
     "Markup",
     "Page",
     "Section",
+    "Table",
     "bar",
     "bullet_list",
     "details",
-    "figure",
     "grid",
+    "markup",
     "missing",
     "number",
     "paragraph",
+    "plain_text",
     "render_page",
     "save_page",
     "shaded",
-    "table",
     "text",
     "versions",
 ]
@@ -65,6 +71,18 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Table:
+    """A table, for a report or a terminal; the first column heads its rows. Cells are text or `Markup`."""
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[object]]
+
+
+Block = str | Figure | Table
+
+
+@dataclass(frozen=True)
 class Headline:
     """A key figure: its value, label and reference for comparison."""
 
@@ -80,7 +98,7 @@ class Section:
 
     name: str
     title: str
-    blocks: Sequence[Markup]
+    blocks: Sequence[Block]
 
 
 @dataclass(frozen=True)
@@ -106,7 +124,7 @@ def text(value: object) -> Markup:
 
 def number(value: float, digits: int = 3) -> str:
     """`value` with `digits` significant digits for reading; an en dash where it is not finite."""
-    if value != value or value in (float("inf"), float("-inf")):
+    if not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
@@ -115,6 +133,20 @@ def number(value: float, digits: int = 3) -> str:
     if abs(value) >= 10 ** (digits - 1):
         return f"{value:,.0f}".replace("-", "−")
     return f"{value:#.{digits}g}".rstrip(".").replace("-", "−")
+
+
+def plain_text(cell: object) -> str:
+    """Return a cell of a table as text without markup."""
+    return html.unescape(re.sub(r"<[^>]*>", "", cell)) if isinstance(cell, Markup) else str(cell)
+
+
+def markup(block: Block) -> Markup:
+    """Return a block of a section as HTML."""
+    if isinstance(block, Figure):
+        return _figure(block)
+    if isinstance(block, Table):
+        return _table(block)
+    return block if isinstance(block, Markup) else paragraph(block)
 
 
 def paragraph(*parts: object) -> Markup:
@@ -133,14 +165,14 @@ def bullet_list(items: Iterable[object]) -> Markup:
     return Markup("<ul>" + "".join(f"<li>{text(item)}</li>" for item in items) + "</ul>")
 
 
-def details(summary: str, *blocks: Markup) -> Markup:
+def details(summary: str, *blocks: Block) -> Markup:
     """Return blocks that are collapsed on screen and open in print."""
-    return Markup(f"<details><summary>{text(summary)}</summary>{''.join(blocks)}</details>")
+    return Markup(f"<details><summary>{text(summary)}</summary>{''.join(map(markup, blocks))}</details>")
 
 
-def grid(*blocks: Markup, pairs: bool = False) -> Markup:
+def grid(*blocks: Block, pairs: bool = False) -> Markup:
     """Return blocks side by side on wide screens; with `pairs`, at most two."""
-    return Markup(f'<div class="{"grid pairs" if pairs else "grid"}">{"".join(blocks)}</div>')
+    return Markup(f'<div class="{"grid pairs" if pairs else "grid"}">{"".join(map(markup, blocks))}</div>')
 
 
 UNSEEN = 1e-6  # fraction of a limit that is shown as zero
@@ -168,21 +200,21 @@ def shaded(words: str, shade: int) -> Markup:
     return Markup(f'<span class="shade shade{shade}">{text(words)}</span>')
 
 
-def table(caption: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> Markup:
-    """Return a table whose first column heads its rows; it scrolls sideways inside its own box."""
-    head = "".join(f'<th scope="col">{text(name)}</th>' for name in header)
+def _table(table: Table) -> Markup:
+    """A table that scrolls sideways inside its own box."""
+    head, caption = "".join(f'<th scope="col">{text(name)}</th>' for name in table.header), text(table.caption)
     body = "".join(
         f'<tr><th scope="row">{text(row[0])}</th>' + "".join(f"<td>{text(cell)}</td>" for cell in row[1:]) + "</tr>"
-        for row in rows
+        for row in table.rows
     )
     return Markup(
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{text(caption)}"><table>'
-        f"<caption><span>{text(caption)}</span></caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{caption}"><table>'
+        f"<caption><span>{caption}</span></caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 
 
-def figure(drawing: Figure) -> Markup:
-    """Return the element of a figure with its data; the page's script draws it when it scrolls into view."""
+def _figure(drawing: Figure) -> Markup:
+    """The element of a figure with its data; the page's script draws it when it scrolls into view."""
     data = json.dumps({"traces": drawing.traces, "layout": drawing.layout}, separators=(",", ":"))
     data = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     name = text(drawing.name)
@@ -232,7 +264,7 @@ def render_page(page: Page) -> str:
     links = "".join(f'<li><a href="#{text(s.name)}">{text(s.title)}</a></li>' for s in sections)
     body = "".join(
         f'<section id="{text(s.name)}" aria-labelledby="{text(s.name)}-title">'
-        f'<h2 id="{text(s.name)}-title">{text(s.title)}</h2>{"".join(s.blocks)}</section>'
+        f'<h2 id="{text(s.name)}-title">{text(s.title)}</h2>{"".join(map(markup, s.blocks))}</section>'
         for s in sections
     )
     return (
@@ -277,11 +309,9 @@ def _summary(page: Page) -> str:
     )
 
 
-def _repeat(page: Page) -> list[Markup]:
-    blocks = []
-    if page.command:
-        blocks.append(
-            Markup(f"<pre tabindex='0' aria-label='Command to repeat'><code>{text(page.command)}</code></pre>")
-        )
-    blocks.append(table("Versions", ("Software", "Version"), page.versions.items()))
-    return blocks
+def _repeat(page: Page) -> list[Block]:
+    versions = Table("Versions", ("Software", "Version"), list(page.versions.items()))
+    if not page.command:
+        return [versions]
+    code = f"<pre tabindex='0' aria-label='Command to repeat'><code>{text(page.command)}</code></pre>"
+    return [Markup(code), versions]

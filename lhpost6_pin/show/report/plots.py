@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.constants import g
 
-from .layout import ROW, axis_suffix, level_label, level_line, on_row, stacked_layout, time_band
+from .layout import ROW, axis_suffix, band_on, label_on, line_on, on_row, stacked_layout
 from .page import Figure
+from .scales import Scale
 
 __all__ = [
     "ACHIEVED",
@@ -24,32 +24,22 @@ __all__ = [
     "BEFORE",
     "BUCKETS",
     "RECORDED",
-    "SCALES",
     "SUPPLY",
     "TARGET",
     "Row",
-    "Scale",
     "Trace",
     "envelope",
     "packed",
     "palette",
-    "spectrum_figure",
+    "palette_traces",
     "time_figure",
 ]
 
 BUCKETS = 1500  # stretches a channel is divided into; about one per pixel of a wide screen
-PERIOD_TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)  # [s]
 
-# Okabe and Ito's colours, told apart with any colour vision; their yellow is left out, too pale on white.
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILLION, PURPLE = (
-    "#000000",
-    "#e69f00",
-    "#56b4e9",
-    "#009e73",
-    "#0072b2",
-    "#d55e00",
-    "#cc79a7",
-)
+# Okabe and Ito's colours, distinct in any colour vision; without their yellow, too pale on white.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#e69f00", "#56b4e9", "#009e73"
+BLUE, VERMILLION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
 CYCLE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 GREY = "#a8aeb4"  # the target, a broad band under what was achieved
 DASHES = ("solid", "dash", "dot", "dashdot")
@@ -59,28 +49,6 @@ RECORDED: dict[str, Any] = {"color": VERMILLION, "width": 1.2, "dash": "dot"}
 BEFORE: dict[str, Any] = {"color": ORANGE, "width": 1.4}
 AFTER: dict[str, Any] = {"color": BLUE, "width": 1.4}
 SUPPLY: dict[str, Any] = {"color": BLACK, "width": 1.2, "dash": "dash"}
-
-
-@dataclass(frozen=True)
-class Scale:
-    """How an SI quantity is shown to people: shown value = SI value times `factor`, in `unit`."""
-
-    factor: float
-    unit: str
-
-
-SCALES: dict[str, Scale] = {
-    "displacement": Scale(1e3, "mm"),
-    "velocity": Scale(1.0, "m/s"),
-    "acceleration": Scale(1.0 / g, "g"),
-    "rotation": Scale(180.0 / np.pi, "deg"),
-    "rotation velocity": Scale(180.0 / np.pi, "deg/s"),
-    "rotation acceleration": Scale(180.0 / np.pi, "deg/s²"),
-    "force": Scale(1e-6, "MN"),
-    "pressure": Scale(1e-6, "MPa"),
-    "time": Scale(1e3, "ms"),
-    "ratio": Scale(1.0, "1"),
-}
 
 
 @dataclass(frozen=True)
@@ -102,7 +70,7 @@ class Row:
     scale: Scale
     lines: Mapping[str, float] = field(default_factory=dict)  # label: level of a horizontal line, SI
     span: tuple[float, float] | None = None  # limits of the value axis, SI
-    note: str = ""  # said after the title and its unit
+    note: str = ""  # after the title and its unit
 
 
 def envelope(values: NDArray[np.float64], buckets: int = BUCKETS) -> NDArray[np.int64]:
@@ -130,6 +98,11 @@ def palette(count: int) -> list[dict[str, Any]]:
     return [{"color": CYCLE[k % n], "dash": DASHES[k // n % len(DASHES)], "width": 1.2} for k in range(count)]
 
 
+def palette_traces(names: Sequence[str], values: NDArray[np.float64]) -> list[Trace]:
+    """Return a trace of every column of `values` (n, len(names)), each in a style of its own."""
+    return [Trace(*one) for one in zip(names, values.T, palette(len(names)), strict=True)]
+
+
 def time_figure(
     name: str,
     title: str,
@@ -139,6 +112,7 @@ def time_figure(
     start: float,
     step: float,
     buckets: int = BUCKETS,
+    window: tuple[int, int] | None = None,
     bands: Sequence[tuple[float, float]] = (),
     band_color: str = SKY,
     alone: bool = False,
@@ -146,75 +120,45 @@ def time_figure(
 ) -> Figure:
     """Return a figure of `rows` over one time axis, zoomed with all others of the page unless `alone`.
 
-    `start` and `step` are the first sample's time and the sample interval [s]; `bands` shades stretches of
-    time, for instance the one a close-up shows, in `band_color`. Names are escaped: plotly reads HTML in its labels.
+    `start` and `step` are the first sample's time and the sample interval [s]. With `window`, first and last sample of
+    a stretch, every sample of that stretch is drawn, on a time axis of its own. `bands` shades stretches of time, for
+    instance the one a close-up shows, in `band_color`. Names are escaped: plotly reads HTML in its labels.
     """
-    titles = [_titled(row.title, row.scale) + row.note for row in rows]
+    first, last = window or (0, None)
+    if window:
+        buckets, alone = window[1] - window[0], True
+    titles = [(row.title if row.scale.unit == "1" else f"{row.title} [{row.scale.unit}]") + row.note for row in rows]
     layout = stacked_layout(titles, "Time [s]", row_height=row_height, linked=not alone)
     traces: list[dict[str, Any]] = []
     for k, row in enumerate(rows):
+        factor = row.scale.factor
         if row.span:
-            layout[f"yaxis{axis_suffix(k)}"]["range"] = [level * row.scale.factor for level in row.span]
-        traces += [lines | on_row(k) for lines in _time_traces(row, start, step, buckets)]
+            layout[f"yaxis{axis_suffix(k)}"]["range"] = [level * factor for level in row.span]
+        heads = {trace.folded: trace for trace in reversed(row.traces)}  # the first of each folded group
+        for trace in row.traces:
+            lines = _curve(trace, trace.values[first:last], factor, start + first * step, step, buckets) | on_row(k)
+            if trace.folded:
+                lines |= {"name": html.escape(trace.folded), "visible": "legendonly", "legendgroup": trace.folded}
+                lines |= {"showlegend": heads[trace.folded] is trace}
+                lines |= {"hovertemplate": f"%{{y:.4~g}}<extra>{html.escape(trace.name)}</extra>"}
+            traces.append(lines)
         for label, level in row.lines.items():
-            layout["shapes"].append(level_line(level * row.scale.factor, k))
-            layout["annotations"].append(level_label(label, level * row.scale.factor, k))
-        for begin, end in bands:
-            layout["shapes"].append(time_band(begin, end, k, band_color))
+            layout["shapes"].append(line_on(k, y=level * factor))
+            layout["annotations"].append(label_on(k, label, level * factor))
+        layout["shapes"] += [band_on(k, band_color, x=ends) for ends in bands]
     return Figure(name, title, description, traces, layout, layout["height"])
 
 
-def spectrum_figure(
-    name: str,
-    title: str,
-    description: str,
-    periods: NDArray[np.float64],
-    curves: Mapping[str, tuple[NDArray[np.float64], Mapping[str, Any]]],
-    scale: Scale,
-) -> Figure:
-    """Return response spectra, `curves` of label: (spectral values SI (n,), line), over `periods` [s]."""
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "name": html.escape(label),
-            "x": packed(periods),
-            "y": packed(values * scale.factor),
-            "line": dict(line),
-        }
-        for label, (values, line) in curves.items()
-    ]
-    layout = stacked_layout([_titled("PSA", scale)], "Period [s]", row_height=230)
-    layout["xaxis"] |= {"type": "log", "tickvals": PERIOD_TICKS}
-    layout["yaxis"] |= {"rangemode": "tozero"}
-    return Figure(name, title, description, traces, layout, layout["height"])
-
-
-def _time_traces(row: Row, start: float, step: float, buckets: int) -> list[dict[str, Any]]:
-    drawn = []
-    heads = {trace.folded: trace for trace in reversed(row.traces)}  # the first of each folded group
-    for trace in row.traces:
-        lines = _time_trace(trace, row.scale, start, step, buckets)
-        if trace.folded:
-            lines |= {"name": html.escape(trace.folded), "visible": "legendonly", "legendgroup": trace.folded}
-            lines |= {"showlegend": heads[trace.folded] is trace}
-            lines |= {"hovertemplate": f"%{{y:.4~g}}<extra>{html.escape(trace.name)}</extra>"}
-        drawn.append(lines)
-    return drawn
-
-
-def _time_trace(trace: Trace, scale: Scale, start: float, step: float, buckets: int) -> dict[str, Any]:
-    kept = envelope(trace.values, buckets)
+def _curve(
+    trace: Trace, values: NDArray[np.float64], factor: float, start: float, step: float, buckets: int
+) -> dict[str, Any]:
+    """Plotly's trace of the samples `values` of a channel."""
+    kept = envelope(values, buckets)
     jumps = np.diff(kept, prepend=0)
     dtype = next(code for code in ("u1", "u2", "u4") if jumps.max() <= np.iinfo(code).max)
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": html.escape(trace.name),
-        "x": {"start": start, "step": step, "dtype": dtype, "bdata": _base64(jumps.astype(f"<{dtype}"))},
-        "y": packed(trace.values[kept] * scale.factor),
-        "line": dict(trace.line),
-    }
+    times = {"start": start, "step": step, "dtype": dtype, "bdata": _base64(jumps.astype(f"<{dtype}"))}
+    line = {"type": "scatter", "mode": "lines", "name": html.escape(trace.name), "line": dict(trace.line)}
+    return line | {"x": times, "y": packed(values[kept] * factor)}
 
 
 def packed(values: NDArray[np.float64]) -> dict[str, str]:
@@ -224,7 +168,3 @@ def packed(values: NDArray[np.float64]) -> dict[str, str]:
 
 def _base64(values: NDArray[Any]) -> str:
     return base64.b64encode(values.tobytes()).decode()
-
-
-def _titled(words: str, scale: Scale) -> str:
-    return words if scale.unit == "1" else f"{words} [{scale.unit}]"

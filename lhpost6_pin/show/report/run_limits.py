@@ -1,27 +1,25 @@
 """Demand over capacity of every limit, and the governing one."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .page import Markup, bar, number, paragraph, table
-from .plots import SCALES, Scale
-from .run_components import TOLERANCE, Limits, force_use, share_of_limit, shares_of_limit
-from .run_metrics import SpoolUse, Tracking, channel, peaks, sampling
-from .run_motion import axis_scale, shown_as
+from .page import Block, Table, bar, number
+from .run_metrics import SpoolUse, Tracking, channel, labels, peaks, sampling
+from .scales import SCALES, axis_scale, shown_as
 
-__all__ = ["LimitUse", "limit_blocks", "limit_uses", "governing_limits", "of_limit"]
+__all__ = ["TOLERANCE", "ForceUse", "LimitUse", "Limits", "force_use", "governing_limits", "limit_blocks", "limit_uses"]
+__all__ += ["of_limit", "share_of_limit", "shares_of_limit"]
 
-SHOWN = {
-    "actuator stroke": "displacement",
-    "actuator velocity": "velocity",
-    "push": "force",
-    "pull": "force",
-    "force": "force",
-}
+Array = NDArray[np.float64]
+Limits = Mapping[str, Array]
+
+TOLERANCE = 1e-3  # relative excess of a sampled peak over its limit that still counts as within
+SHOWN = {"actuator stroke": "displacement", "actuator velocity": "velocity"}
+SHOWN |= {"push": "force", "pull": "force", "force": "force"}
 
 
 class LimitUse(NamedTuple):
@@ -33,6 +31,41 @@ class LimitUse(NamedTuple):
     share: float  # demand over capacity; infinity for a capacity of zero
 
 
+class ForceUse(NamedTuple):
+    """Peak forces of the actuators in one direction, and demand over capacity."""
+
+    words: str  # "push", "pull", or "force" for both
+    peak: Array  # (n_act,) magnitude [N]
+    share: Array  # (n_act,) not-a-number without a limit, infinity for a pull without capacity
+
+
+def share_of_limit(peak: float, limits: Limits, name: str, k: int) -> float:
+    """Return peak over limit; not-a-number where no limit was given."""
+    bounds = limits.get(name, np.array([]))
+    return float(peak / bounds[k]) if k < len(bounds) else float("nan")
+
+
+def shares_of_limit(peak: Array, limits: Limits, name: str) -> Array:
+    """Return the peaks (n,) over the limits of as many axes or actuators."""
+    return np.array([share_of_limit(value, limits, name, k) for k, value in enumerate(peak)])
+
+
+def force_use(record: xr.Dataset, limits: Limits) -> list[ForceUse]:
+    """Return demand over capacity of actuator forces: push and pull where `actuator_pull` is given, else magnitude."""
+    if "actuator_force" not in record:
+        return []
+    force = channel(record, "actuator_force")
+    if "actuator_pull" not in limits:
+        return [ForceUse("force", peaks(force), shares_of_limit(peaks(force), limits, "actuator_force"))]
+    push, pull = peaks(np.maximum(force, 0.0)), peaks(np.maximum(-force, 0.0))
+    allowed = np.pad(limits["actuator_pull"], (0, len(pull)), constant_values=np.nan)[: len(pull)]
+    known = np.nan_to_num(np.pad(limits.get("actuator_force", np.array([])), (0, len(pull)))[: len(pull)])
+    # without pull capacity, the tolerance of the push applies
+    none = np.where(pull > TOLERANCE * known, np.inf, np.where(np.isnan(pull), np.nan, 0.0))
+    share = np.where(allowed == 0.0, none, pull / np.where(allowed == 0.0, np.nan, allowed))
+    return [ForceUse("push", push, shares_of_limit(push, limits, "actuator_force")), ForceUse("pull", pull, share)]
+
+
 def limit_uses(
     record: xr.Dataset, found: Sequence[Tracking], spools: Sequence[SpoolUse], limits: Limits
 ) -> list[LimitUse]:
@@ -41,11 +74,26 @@ def limit_uses(
         LimitUse(r.quantity, r.axis, r.peak_achieved, share_of_limit(r.peak_achieved, limits, r.quantity, r.place))
         for r in found
     ]
-    uses += [
-        *_actuators(record, limits),
-        *(LimitUse("spool", spool.actuator, spool.peak, spool.peak) for spool in spools),
-    ]
+    for quantity, peak, share in _of_actuators(record, limits):
+        actuators = zip(labels(record, "actuator"), peak.tolist(), share.tolist(), strict=True)
+        uses += [LimitUse(quantity, *one) for one in actuators]
+    uses += [LimitUse("spool", spool.actuator, spool.peak, spool.peak) for spool in spools]
     return [use for use in uses if not np.isnan(use.share)]
+
+
+def _of_actuators(record: xr.Dataset, limits: Limits) -> Iterator[tuple[str, Array, Array]]:
+    """Quantities of the actuators, their peaks and demand over capacity."""
+    if "actuator_displacement" in record:
+        moved = channel(record, "actuator_displacement")
+        stroke = peaks(moved)
+        yield "actuator stroke", stroke, shares_of_limit(stroke, limits, "actuator_stroke")
+        velocity = np.gradient(moved, sampling(record)[1], axis=0)
+        out, back = peaks(np.maximum(velocity, 0.0)), peaks(np.maximum(-velocity, 0.0))
+        extending = shares_of_limit(out, limits, "actuator_extending")
+        retracting = shares_of_limit(back, limits, "actuator_retracting")
+        peak = np.where(extending >= retracting, out, back)
+        yield "actuator velocity", peak, np.maximum(extending, retracting)
+    yield from force_use(record, limits)
 
 
 def governing_limits(uses: Iterable[LimitUse]) -> list[LimitUse]:
@@ -62,46 +110,20 @@ def of_limit(share: float) -> str:
     return f"{number(100 * share, 4)}\N{NO-BREAK SPACE}% of its limit" if np.isfinite(share) else "no capacity"
 
 
-def limit_blocks(uses: Sequence[LimitUse]) -> list[Markup]:
+def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
     """Return the table of demand over capacity, the governing limit first."""
     if not uses:
-        return [paragraph("Neither limits of the machine nor spools are available.")]
-    rows = [
-        (use.quantity.capitalize(), use.name, _shown(use), bar(use.share, TOLERANCE)) for use in governing_limits(uses)
-    ]
+        return ["Neither limits of the machine nor spools are available."]
+    rows = [(u.quantity.capitalize(), u.name, _peak(u), bar(u.share, TOLERANCE)) for u in governing_limits(uses)]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
         "velocity is that of the unloaded piston at full spool. All axes and actuators are in the other sections."
     )
-    return [paragraph(words), table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)]
+    return [words, Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)]
 
 
-def _actuators(record: xr.Dataset, limits: Limits) -> Iterator[LimitUse]:
-    if "actuator" not in record.coords:
-        return
-    names = [str(name) for name in record["actuator"].values]
-
-    def each(quantity: str, peak: NDArray[np.float64], share: NDArray[np.float64]) -> Iterator[LimitUse]:
-        return (LimitUse(quantity, n, float(p), float(s)) for n, p, s in zip(names, peak, share, strict=True))
-
-    if "actuator_displacement" in record:
-        moved = channel(record, "actuator_displacement", "actuator")
-        stroke = peaks(moved)
-        yield from each("actuator stroke", stroke, shares_of_limit(stroke, limits, "actuator_stroke"))
-        velocity = np.gradient(moved, sampling(record)[1], axis=0)
-        out, back = peaks(np.maximum(velocity, 0.0)), peaks(np.maximum(-velocity, 0.0))
-        extending = shares_of_limit(out, limits, "actuator_extending")
-        retracting = shares_of_limit(back, limits, "actuator_retracting")
-        peak = np.where(extending >= retracting, out, back)
-        yield from each("actuator velocity", peak, np.maximum(extending, retracting))
-    for words, peak, share in force_use(record, limits):
-        yield from each(words, peak, share)
-
-
-def _shown(use: LimitUse) -> str:
-    return "–" if use.quantity == "spool" else shown_as(use.peak, _scale(use))
-
-
-def _scale(use: LimitUse) -> Scale:
+def _peak(use: LimitUse) -> str:
+    if use.quantity == "spool":
+        return "–"
     shown = SHOWN.get(use.quantity)
-    return SCALES[shown] if shown else axis_scale(use.name, use.quantity)
+    return shown_as(use.peak, SCALES[shown] if shown else axis_scale(use.name, use.quantity))

@@ -4,7 +4,10 @@ Everything is computed from a record alone (dimensions `time`, `axis`, `actuator
 give not-a-number. Axis order x y z roll pitch yaw; SI.
 """
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import xarray as xr
@@ -20,6 +23,8 @@ __all__ = [
     "Tracking",
     "commanded_axes",
     "channel",
+    "kinds",
+    "labels",
     "drift",
     "peak_window",
     "peaks",
@@ -72,9 +77,20 @@ class Drift:
     residual: NDArray[np.float64]  # (n_axes,) mean unfiltered error over the end of the record
 
 
-def channel(record: xr.Dataset, name: str, dim: str) -> NDArray[np.float64]:
-    """Return the variable as float64 of shape (n, n_dim)."""
-    return np.asarray(record[name].transpose("time", dim).values, dtype=np.float64)
+def channel(record: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Return the variable as float64 of shape (n,) or (n, n_axes), (n, n_act), ...."""
+    return np.asarray(record[name].transpose("time", ...).values, dtype=np.float64)
+
+
+def labels(record: xr.Dataset, dim: str) -> list[str]:
+    """Return the names of the axes, actuators or other components of a record."""
+    return [str(label) for label in record[dim].values]
+
+
+def kinds(names: Sequence[str]) -> list[list[int]]:
+    """Return the places of the components of each kind, by their names less the number: H1 to H4, V1 to V6."""
+    places = groupby(range(len(names)), key=lambda k: re.sub(r"\d+$", "", names[k]))
+    return [list(own) for _, own in places]
 
 
 def sampling(record: xr.Dataset) -> tuple[float, float]:
@@ -97,9 +113,9 @@ def commanded_axes(record: xr.Dataset) -> list[str]:
     name = "reference_displacement" if "reference_displacement" in record else "platen_displacement"
     if name not in record:
         return []
-    motion = channel(record, name, "axis")
+    motion = channel(record, name)
     size = np.nan_to_num(peaks(motion - motion[0]))
-    return [str(axis) for axis, peak in zip(record["axis"].values, size, strict=True) if peak > COMMANDED * size.max()]
+    return [axis for axis, peak in zip(labels(record, "axis"), size, strict=True) if peak > COMMANDED * size.max()]
 
 
 def track(record: xr.Dataset, quantity: str) -> list[Tracking]:
@@ -107,13 +123,13 @@ def track(record: xr.Dataset, quantity: str) -> list[Tracking]:
     if f"platen_{quantity}" not in record:
         return []
     _, step = sampling(record)
-    achieved = channel(record, f"platen_{quantity}", "axis")
+    achieved = channel(record, f"platen_{quantity}")
     known = f"reference_{quantity}" in record
-    target = channel(record, f"reference_{quantity}", "axis") if known else np.full_like(achieved, np.nan)
+    target = channel(record, f"reference_{quantity}") if known else np.full_like(achieved, np.nan)
     commanded = commanded_axes(record) if known and len(achieved) >= FEWEST else []
     longest = min(LONGEST_DELAY, len(achieved) * step / 8.0)
     found = []
-    for k, axis in enumerate(map(str, record["axis"].values)):
+    for k, axis in enumerate(labels(record, "axis")):
         whole, late, without, shifted = np.nan, np.nan, np.nan, None
         if axis in commanded and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
             whole = float(rrmse(target[:, k], achieved[:, k]))
@@ -130,12 +146,10 @@ def spool_use(record: xr.Dataset) -> list[SpoolUse]:
     name = next((name for name in ("spool_position", "spool_command") if name in record), None)
     if name is None:
         return []
-    x = channel(record, name, "actuator")
+    x = channel(record, name)
     x = np.where(np.isfinite(x), x, 0.0)
     columns = peaks(x), np.sqrt(np.mean(x**2, axis=0)), np.mean(np.abs(x) >= 1.0, axis=0)
-    return [
-        SpoolUse(str(name), *map(float, row)) for name, *row in zip(record["actuator"].values, *columns, strict=True)
-    ]
+    return [SpoolUse(*one) for one in zip(labels(record, "actuator"), *(c.tolist() for c in columns), strict=True)]
 
 
 def drift(record: xr.Dataset) -> Drift | None:
@@ -143,7 +157,7 @@ def drift(record: xr.Dataset) -> Drift | None:
     if not {"reference_displacement", "platen_displacement"} <= set(record.variables):
         return None
     _, step = sampling(record)
-    error = channel(record, "platen_displacement", "axis") - channel(record, "reference_displacement", "axis")
+    error = channel(record, "platen_displacement") - channel(record, "reference_displacement")
     if not np.isfinite(error).all():
         return None
     cutoff = min(max(DRIFT_BAND, 2.0 / (len(error) * step)), 0.4 / step)  # two periods at least fit in the record

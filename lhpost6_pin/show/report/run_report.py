@@ -10,13 +10,14 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...core.errors import UnknownNameError
-from .page import Headline, Level, Page, number, save_page
-from .run_components import Limits
-from .run_limits import LimitUse, governing_limits, limit_uses
+from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
+from .run_components import force_blocks, pressure_blocks, specimen_blocks, strut_blocks
+from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses, share_of_limit
 from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
-from .run_motion import axis_scale, shown_as
-from .run_sections import run_sections
-from .run_verdict import headlines, judge
+from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
+from .run_spools import spool_blocks
+from .run_verdict import headlines, verdict_of_run
+from .scales import axis_scale, milliseconds, percent, shown_as
 
 __all__ = ["LIMIT_NAMES", "RunSummary", "write_run_report"]
 
@@ -31,6 +32,17 @@ LIMIT_NAMES = (
     "actuator_retracting",  # (n_act,) the other way [m/s]
     "supply_pressure",  # [Pa]
     "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
+)
+EXPECTED = (
+    *(f"platen_{q}" for q in QUANTITIES),
+    *(f"reference_{q}" for q in QUANTITIES),
+    "actuator_displacement",
+    "actuator_force",
+    "chamber_pressure_a",
+    "chamber_pressure_b",
+    "strut_pressure",
+    "spool_command",
+    "spool_position",
 )
 
 
@@ -53,19 +65,6 @@ class RunSummary:
         return governing_limits(self.limits)
 
 
-EXPECTED = (
-    *(f"platen_{q}" for q in QUANTITIES),
-    *(f"reference_{q}" for q in QUANTITIES),
-    "actuator_displacement",
-    "actuator_force",
-    "chamber_pressure_a",
-    "chamber_pressure_b",
-    "strut_pressure",
-    "spool_command",
-    "spool_position",
-)
-
-
 def write_run_report(
     record: xr.Dataset,
     path: Path | str,
@@ -78,9 +77,8 @@ def write_run_report(
     """Write the self-contained HTML report of a test to `path` and return its summary.
 
     `limits` maps names of `LIMIT_NAMES` to capacities (SI; not-a-number means no limit, as does 0
-    except for `actuator_pull`),
-    `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name, value, unit,
-    source, assumed). Missing channels are named in their sections.
+    except for `actuator_pull`), `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name,
+    value, unit, source, assumed). Missing channels are named in their sections.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
     limit.
     """
@@ -90,21 +88,36 @@ def write_run_report(
     spools = spool_use(record)
     notes = [*(notes or ()), *_gaps(record)]
     uses = limit_uses(record, found, spools, bounds)
-    verdict, level = judge(record, found, spools, uses, notes)
+    verdict, level = verdict_of_run(record, found, spools, uses, notes)
+    joints = "specimen_joint_position" in record
+    sections = [
+        Section("tracking", "Target and achieved", tracking_blocks(record, found)),
+        Section("spectra", "Response spectra", spectrum_blocks(record)),
+        Section("forces", "Actuator forces", force_blocks(record, bounds)),
+        Section("pressures", "Chamber pressures", pressure_blocks(record, bounds)),
+        Section("spools", "Servovalve spools", spool_blocks(record, spools)),
+        Section("struts", "Hold-down struts", strut_blocks(record, bounds)),
+        *([Section("specimen", "Specimen", specimen_blocks(record))] if joints else []),
+        Section("drift", "Drift", drift_blocks(record)),
+        Section("limits", "Demand over capacity", limit_blocks(uses)),
+        Section("metrics", "Table of metrics", [_metrics(found, bounds)]),
+        Section("assumptions", "Assumptions and sources", _assumptions(list(machine_table or ()))),
+        Section("record", "The record", _contents(record)),
+    ]
     page = Page(
         kind=f"Run report · {record.attrs.get('kind', 'test')}",
         title=str(record.attrs.get("title") or record.attrs.get("test") or "Test on the shake table"),
-        asked=_asked(record, found),
+        asked=_purpose(record, found),
         verdict=verdict,
         level=level,
         headlines=headlines(found, uses),
-        sections=run_sections(record, found, spools, bounds, uses, list(machine_table or ())),
+        sections=sections,
         notes=notes,
         command=command,
     )
     absent = tuple(name for name in EXPECTED if name not in record)
-    said = (verdict, level, tuple(page.headlines))
-    return RunSummary(save_page(page, path), *said, tuple(found), tuple(spools), tuple(uses), absent)
+    lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), absent
+    return RunSummary(save_page(page, path), verdict, level, *lists)
 
 
 def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
@@ -130,15 +143,62 @@ def _gaps(record: xr.Dataset) -> list[str]:
     return found
 
 
-def _asked(record: xr.Dataset, found: Sequence[Tracking]) -> str:
+def _purpose(record: xr.Dataset, found: Sequence[Tracking]) -> str:
     _, step = sampling(record)
     length = f"{number(record.sizes['time'] * step)} s at {1.0 / step:.6g} samples a second"
-    commanded = commanded_axes(record)
-    peaks = [row for row in found if row.quantity == "displacement" and row.axis in commanded]
     if "reference_displacement" not in record:
         return f"{length}; the record has no target."
+    commanded = commanded_axes(record)
+    peaks = [row for row in found if row.quantity == "displacement" and row.axis in commanded]
     words = ", ".join(f"{row.axis} {shown_as(row.peak_target, axis_scale(row.axis, 'displacement'))}" for row in peaks)
     specimen = str(record.attrs.get("specimen", "none"))
     load = "bare table" if specimen == "none" else f"specimen {specimen}"
     count = f"{len(commanded)} of {record.sizes['axis']} axes"
     return f"Track a motion on {count} (peak target displacement {words}), {length}, {load}."
+
+
+def _metrics(found: Sequence[Tracking], limits: Limits) -> Block:
+    if not found:
+        return missing([f"platen_{quantity}" for quantity in QUANTITIES], "Peaks and tracking are not tabulated.")
+    rows = []
+    for row in found:
+        scale = axis_scale(row.axis, row.quantity)
+        used = share_of_limit(row.peak_achieved, limits, row.quantity, row.place)
+        peaks = (number(peak * scale.factor) for peak in (row.peak_target, row.peak_achieved))
+        late = milliseconds(row.delay) if np.isfinite(row.delay) else "–"
+        errors = percent(row.rrmse), late, percent(row.rrmse_aligned)
+        rows.append((f"{row.axis} {row.quantity}", scale.unit, *peaks, bar(used, TOLERANCE), *errors))
+    header = ("Motion", "Unit", "Peak target", "Peak achieved", "Demand / capacity")
+    return Table("Peaks and tracking of every axis", (*header, "RRMSE", "Delay", "RRMSE, delay removed"), rows)
+
+
+def _assumptions(rows: Sequence[Sequence[Any]]) -> list[Block]:
+    if not rows:
+        return ["The numbers of the machine are not available."]
+    header = ("Quantity", "Value", "Unit", "Source")
+    assumed, known = (
+        [(name, _value(value), unit, source) for name, value, unit, source, guess in rows if bool(guess) == wanted]
+        for wanted in (True, False)
+    )
+    blocks: list[Block] = [f"{len(assumed)} of the {len(rows)} numbers of this machine are assumed, not published."]
+    if assumed:
+        blocks.append(Table("Assumed", header, assumed))
+    if known:
+        blocks.append(details(f"Published or estimated ({len(known)})", Table("Published or estimated", header, known)))
+    return blocks
+
+
+def _contents(record: xr.Dataset) -> list[Block]:
+    variables = [
+        (name, " × ".join(map(str, v.dims)), v.attrs.get("units", "–"), v.attrs.get("long_name", "–"))
+        for name, v in record.data_vars.items()
+    ]
+    header = ("Variable", "Dimensions", "Unit", "Meaning")
+    return [
+        Table("Attributes", ("Attribute", "Value"), list(record.attrs.items())),
+        details(f"Variables ({len(variables)})", Table("Variables", header, variables)),
+    ]
+
+
+def _value(value: Any) -> str:
+    return value if isinstance(value, str) else ", ".join(f"{float(v):.6g}" for v in np.atleast_1d(value))

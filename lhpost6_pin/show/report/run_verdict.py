@@ -6,20 +6,18 @@ import numpy as np
 import xarray as xr
 
 from .page import Headline, Level
-from .plots import SCALES
-from .run_components import TOLERANCE
-from .run_limits import LimitUse, governing_limits, of_limit
-from .run_metrics import SpoolUse, Tracking, channel
-from .run_motion import axis_scale, percent, shown_as
+from .run_limits import TOLERANCE, LimitUse, governing_limits, of_limit
+from .run_metrics import SpoolUse, Tracking, channel, labels
+from .scales import SCALES, axis_scale, milliseconds, percent, shown_as
 
-__all__ = ["FOLLOWED", "NEAR", "headlines", "judge"]
+__all__ = ["headlines", "verdict_of_run"]
 
 # Judgement, not physics: largest RRMSE, delay removed, with which a target counts as tracked.
 FOLLOWED = {"displacement": 0.10, "acceleration": 0.40}
 NEAR = 0.8  # demand over capacity that calls for attention
 
 
-def judge(
+def verdict_of_run(
     record: xr.Dataset,
     found: Sequence[Tracking],
     spools: Sequence[SpoolUse],
@@ -28,20 +26,18 @@ def judge(
 ) -> tuple[str, Level]:
     """Return the verdict and its level: clipped spools, tracking, limits, notes."""
     stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
+    clipped = _clipped(record, spools)
     if stopped != "none":  # the part before the stop does not represent the test
-        clipped = _clipped(record, spools)
-        said = [f"The run {stopped}: tracking is not judged.", clipped, "See the notes."]
-        return " ".join(filter(None, said)), "bad"
-    sentences, level = _followed(record, found)
-    clipped, beyond = _clipped(record, spools), _beyond(uses)
-    if clipped:
-        sentences.insert(0, clipped)
+        sentences = [f"The run {stopped}: tracking is not judged.", clipped, "See the notes."]
+        return " ".join(filter(None, sentences)), "bad"
+    tracked, level = _followed(record, found)
+    beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
+    sentences = [clipped, tracked]
     if beyond:
-        sentences.append(f"Limits exceeded: {', '.join(beyond)}.")
+        named = ", ".join(f"{use.name} {use.quantity} ({of_limit(use.share)})" for use in beyond)
+        sentences.append(f"Limits exceeded: {named}.")
     elif any(use.quantity != "spool" for use in uses):
-        sentences.append(
-            "All other demands are within the given limits." if clipped else "All demands are within the given limits."
-        )
+        sentences.append(f"All {'other ' * bool(clipped)}demands are within the given limits.")
     elif spools and not clipped:
         sentences.append("No spool reached its limit.")
     if clipped or beyond:
@@ -49,7 +45,7 @@ def judge(
     if notes:
         level = "attention" if level in ("good", "plain") else level
         sentences.append("See the notes.")
-    return " ".join(sentences), level
+    return " ".join(filter(None, sentences)), level
 
 
 def headlines(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headline]:
@@ -57,30 +53,31 @@ def headlines(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headl
     return [_worst_rrmse(found), _peak_displacement(found), _governing_limit(uses)]
 
 
-def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[list[str], Level]:
-    words, good = [], True
-    for quantity, allowed in FOLLOWED.items():
-        worst = _worst(found, quantity)
-        if worst:
-            good &= worst.rrmse_aligned <= allowed
-            words.append(f"{quantity} {percent(worst.rrmse_aligned)} ({worst.axis}, criterion {100 * allowed:.0f} %)")
-    if not words:
+def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[str, Level]:
+    worst = {quantity: _worst(found, quantity) for quantity in FOLLOWED}
+    tracked = [(row, FOLLOWED[quantity]) for quantity, row in worst.items() if row]
+    if not tracked:
         lacking = [n for n in ("platen_displacement", "reference_displacement") if n not in record]
         why = f"the record has no {' and no '.join(lacking)}" if lacking else "the target is at rest"
-        return [f"Tracking cannot be judged: {why}."], "plain"
+        return f"Tracking cannot be judged: {why}.", "plain"
+    good = all(row.rrmse_aligned <= allowed for row, allowed in tracked)
     start = "The table tracked its target" if good else "The table did not track its target closely enough"
-    return [f"{start}: worst RRMSE, delay removed, {' and '.join(words)}."], "good" if good else "attention"
+    words = " and ".join(
+        f"{row.quantity} {percent(row.rrmse_aligned)} ({row.axis}, criterion {100 * allowed:.0f} %)"
+        for row, allowed in tracked
+    )
+    return f"{start}: worst RRMSE, delay removed, {words}.", "good" if good else "attention"
 
 
 def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
-    """Return the sentence on spools at full stroke and commands clipped to it; empty where there were none."""
+    """The sentence on spools at full stroke and commands clipped to it; empty where there were none."""
     count = record.attrs.get("spool_values_clipped", 0)
     count = int(count) if isinstance(count, int | np.integer) else 0
     shares = {spool.actuator: spool.saturated for spool in spools}
     if "spool_command" in record:
-        command = np.mean(np.abs(channel(record, "spool_command", "actuator")) >= 1.0, axis=0)
-        for actuator, share in zip(map(str, record["actuator"].values), command, strict=True):
-            shares[actuator] = max(shares.get(actuator, 0.0), float(share))
+        command = np.mean(np.abs(channel(record, "spool_command")) >= 1.0, axis=0)
+        for actuator, share in zip(labels(record, "actuator"), command.tolist(), strict=True):
+            shares[actuator] = max(shares.get(actuator, 0.0), share)
     full = [f"spool {actuator} {percent(share)} of the time" for actuator, share in shares.items() if share]
     if not (count or full):
         return ""
@@ -88,46 +85,36 @@ def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
     return f"{start}: {', '.join(full)}." if full else f"{start}."
 
 
-def _beyond(uses: Sequence[LimitUse]) -> list[str]:
-    """Names of limits exceeded by more than the tolerance, without spools."""
-    beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
-    return [f"{use.name} {use.quantity} ({of_limit(use.share)})" for use in beyond]
-
-
 def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
     for quantity in ("acceleration", "velocity", "displacement"):
         worst = _worst(found, quantity)
         if worst:
-            late = shown_as(worst.delay, SCALES["time"])
-            note = f"axis {worst.axis}; {percent(worst.rrmse)} as recorded, delay {late}"
+            note = f"axis {worst.axis}; {percent(worst.rrmse)} as recorded, delay {milliseconds(worst.delay)}"
             level: Level = "attention" if worst.rrmse_aligned > FOLLOWED.get(quantity, np.inf) else "good"
             return Headline(percent(worst.rrmse_aligned), f"Worst {quantity} RRMSE, delay removed", note, level)
     return Headline("–", "Worst acceleration RRMSE", "no target and achieved motion in the record")
 
 
 def _peak_displacement(found: Sequence[Tracking]) -> Headline:
-    """Return the largest translation, or rotation where nothing else is known."""
+    """The largest translation, or rotation where nothing else is known."""
     rows = [row for row in found if row.quantity == "displacement" and np.isfinite(row.peak_achieved)]
     straight = [row for row in rows if axis_scale(row.axis, "displacement") is SCALES["displacement"]]
     if not rows:
         return Headline("–", "Peak displacement", "no platen_displacement in the record")
     row = max(straight or rows, key=lambda row: row.peak_achieved)
-    return Headline(
-        shown_as(row.peak_achieved, axis_scale(row.axis, "displacement")), "Peak displacement", f"axis {row.axis}"
-    )
+    peak = shown_as(row.peak_achieved, axis_scale(row.axis, "displacement"))
+    return Headline(peak, "Peak displacement", f"axis {row.axis}")
 
 
 def _governing_limit(uses: Sequence[LimitUse]) -> Headline:
+    label = "Governing limit: demand / capacity"
     if not uses:
-        return Headline(
-            "–", "Governing limit: demand / capacity", "neither limits of the machine nor spools are available"
-        )
+        return Headline("–", label, "neither limits of the machine nor spools are available")
     use = governing_limits(uses)[0]
-    level: Level = "bad" if use.share > 1.0 + TOLERANCE else "attention" if use.share >= NEAR else "good"
-    if use.quantity == "spool" and use.share >= 1.0:
-        level = "bad"
-    said = percent(use.share) if np.isfinite(use.share) else "no capacity"
-    return Headline(said, "Governing limit: demand / capacity", f"{use.name}, {use.quantity}", level)
+    over = use.share >= 1.0 if use.quantity == "spool" else use.share > 1.0 + TOLERANCE
+    level: Level = "bad" if over else "attention" if use.share >= NEAR else "good"
+    share = percent(use.share) if np.isfinite(use.share) else "no capacity"
+    return Headline(share, label, f"{use.name}, {use.quantity}", level)
 
 
 def _worst(found: Sequence[Tracking], quantity: str) -> Tracking | None:

@@ -8,50 +8,48 @@ from numpy.typing import NDArray
 from ...data.transfer import Transfer
 from ...tuning.identify import tuning_numbers
 from ...tuning.tune import Tuning
-from .charts import FREQUENCY_TICKS, Curve, Panel, XAxis, chart_figure
-from .control_blocks import AXIS_LINES, axis_title
-from .page import Markup, figure
+from .charts import Curve, Panel, chart_figure, frequency_axis
+from .control_blocks import AXIS_LINES
+from .page import Figure
 from .plots import AFTER, BEFORE, BLACK
+from .scales import axis_title
 
 __all__ = ["bode_figure", "overview_figure"]
 
-FREQUENCIES = XAxis("Frequency [Hz]", log=True, span=(0.1, 40.0), ticks=FREQUENCY_TICKS)
+BAND = (0.1, 40.0)  # [Hz] drawn
 MODEL = {"color": BLACK, "width": 1.0, "dash": "dash"}
 MODEL_POINTS = 500  # of the linear model's response that are drawn, at most
 GAINS = (-12.0, 9.0)  # [dB] drawn
 ROW = 130  # [CSS px]
 
+Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def bode_figure(tuning: Tuning, a: int) -> Markup:
+def bode_figure(tuning: Tuning, a: int) -> Figure:
     """Return magnitude, phase without the common delay and as measured, and coherence of axis `a`."""
     axis = tuning.axes[a]
-    shown, coherent = [], []
+    curves, coherent = [], []
     for name, transfer, line in (("before", axis.before, BEFORE), ("after", axis.after, AFTER)):
         f, part = _drawn(transfer.frequency)
-        shown.append(_response(name, line, f, transfer.response[part, 0, 0], tuning.delay))
+        curves.append(_response(name, line, f, transfer.response[part, 0, 0], tuning.delay))
         coherent.append(Curve(name, f, transfer.coherence[part, 0], line))
     f, part = _drawn(tuning.model.frequency)
     few = slice(None, None, -(-len(f) // MODEL_POINTS))
-    shown.append(_response("linear model", MODEL, f[few], tuning.expected[part, a, a][few], tuning.delay))
-    size, left, raw = zip(*shown, strict=True)
+    curves.append(_response("linear model", MODEL, f[few], tuning.expected[part, a, a][few], tuning.delay))
+    size, undelayed, measured = zip(*curves, strict=True)
     band = (-tuning.tolerance, tuning.tolerance)
     panels = [
         Panel("Magnitude [dB]", size, span=GAINS, band=band),
-        Panel("Phase, common delay removed [deg]", left, span=(-90.0, 90.0)),
-        Panel("Phase as measured [deg]", raw),
+        Panel("Phase, common delay removed [deg]", undelayed, span=(-90.0, 90.0)),
+        Panel("Phase as measured [deg]", measured),
         Panel("Coherence", coherent, span=(0.0, 1.05), lines={f"{tuning.coherence:g}": tuning.coherence}),
     ]
     words = f"Band to {axis.band_after[1]:.3g} Hz." if np.isfinite(axis.band_after[1]) else "No band."
-    return figure(
-        chart_figure(
-            f"bode-{axis.axis}", axis_title(axis.axis), words, panels, FREQUENCIES, row_height=ROW, marks=[_band_end()]
-        )
-    )
+    return _over_frequency(f"bode-{axis.axis}", axis_title(axis.axis), words, panels, row_height=ROW)
 
 
-def overview_figure(tuning: Tuning) -> Markup:
+def overview_figure(tuning: Tuning) -> Figure:
     """Return the magnitudes of all axes before and after tuning."""
     panels = []
     for name in ("before", "after"):
@@ -63,32 +61,28 @@ def overview_figure(tuning: Tuning) -> Markup:
         band = (-tuning.tolerance, tuning.tolerance)
         panels.append(Panel(f"Magnitude {name} [dB]", curves, span=GAINS, band=band))
     words = f"Reference to achieved acceleration of each axis; the shaded band is ±{tuning.tolerance:g} dB."
-    return figure(
-        chart_figure("overview", "All axes before and after", words, panels, FREQUENCIES, marks=[_band_end()])
-    )
+    return _over_frequency("overview", "All axes before and after", words, panels)
 
 
-def _response(
-    name: str, line: dict[str, Any], f: NDArray[np.float64], response: Complex, delay: float
-) -> tuple[Curve, Curve, Curve]:
+def _over_frequency(name: str, title: str, words: str, panels: list[Panel], **size: int) -> Figure:
+    """Panels with the end of the operational band marked."""
+    end = tuning_numbers().number("feedforward_targets.high")
+    return chart_figure(name, title, words, panels, frequency_axis(*BAND), marks=[end], **size)
+
+
+def _response(name: str, line: dict[str, Any], f: Array, response: Complex, delay: float) -> tuple[Curve, Curve, Curve]:
     """Magnitude, phase after removing a delay [s], and phase of a response (m,)."""
     turn = 360.0 * f * delay
-    left = np.degrees(np.angle(response * np.exp(1j * np.radians(turn))))
-    left[1:][np.abs(np.diff(left)) > 180.0] = np.nan  # no line across a phase wrap
-    return Curve(name, f, _decibels(response), line), Curve(name, f, left, line), Curve(name, f, left - turn, line)
+    phase = np.degrees(np.angle(response * np.exp(1j * np.radians(turn))))
+    phase[1:][np.abs(np.diff(phase)) > 180.0] = np.nan  # no line across a phase wrap
+    return Curve(name, f, _decibels(response), line), Curve(name, f, phase, line), Curve(name, f, phase - turn, line)
 
 
-def _band_end() -> float:
-    """End of the operational band [Hz]."""
-    return tuning_numbers().number("feedforward_targets.high")
-
-
-def _drawn(frequency: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _drawn(frequency: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Frequencies that are drawn, and where they are."""
-    assert FREQUENCIES.span
-    inside = (frequency >= FREQUENCIES.span[0]) & (frequency <= FREQUENCIES.span[1])
+    inside = (frequency >= BAND[0]) & (frequency <= BAND[1])
     return frequency[inside], inside
 
 
-def _decibels(response: Complex) -> NDArray[np.float64]:
+def _decibels(response: Complex) -> Array:
     return 20.0 * np.log10(np.maximum(np.abs(response), np.finfo(float).tiny))

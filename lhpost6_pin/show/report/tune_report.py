@@ -5,25 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from ...tuning.tune import AxisTuning, Tuning
-from .control_blocks import assumption_blocks, decibels, degrees, gain_table, load_of
-from .page import (
-    Headline,
-    Level,
-    Markup,
-    Page,
-    Section,
-    bullet_list,
-    grid,
-    number,
-    paragraph,
-    save_page,
-    table,
-)
-from .plots import SCALES
-from .run_motion import shown_as
+from .control_blocks import assumption_blocks, gain_table, load_of
+from .page import Block, Headline, Level, Page, Section, Table, bullet_list, grid, number, save_page
+from .scales import decibels, degrees, milliseconds
 from .tune_plots import bode_figure, overview_figure
 
-__all__ = ["write_tune_report"]
+__all__ = ["tuning_tables", "write_tune_report"]
 
 # Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
 FOLLOWED = (0.1, 20.0)  # [Hz]
@@ -32,7 +19,9 @@ GAIN_MARGIN = 6.0  # [dB]
 
 def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Path:
     """Write the self-contained HTML report of a tuning to `path` and return the path."""
-    verdict, level = _judge(tuning)
+    verdict, level = _verdict(tuning)
+    names = [axis.axis for axis in tuning.axes]
+    numbers = ("noise", "feedback_targets", "feedforward_targets")
     page = Page(
         kind="Tuning report · simulated",
         title=f"Tuning of {tuning.machine.name}",
@@ -44,7 +33,14 @@ def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Pa
         verdict=verdict,
         level=level,
         headlines=_headlines(tuning),
-        sections=_sections(tuning),
+        sections=[
+            Section("bands", "Bands and margins", [*tuning_tables(tuning), overview_figure(tuning)]),
+            Section("limits", "Bandwidth limitation, 20 to 33 Hz", _limits(tuning)),
+            Section("bode", "Bode plots before and after", _bode(tuning)),
+            Section("gains", "Chosen settings", gain_table(tuning.before, tuning.after, names)),
+            Section("steps", "Tuning steps", _steps(tuning)),
+            Section("assumptions", "Assumptions and sources", assumption_blocks(tuning.machine, numbers)),
+        ],
         command=command,
     )
     return save_page(page, path)
@@ -57,32 +53,23 @@ def _follows(axis: AxisTuning) -> bool:
     return bool(inside.size and axis.band_after[0] <= inside[0] and axis.band_after[1] >= inside[-1])
 
 
-def _judge(tuning: Tuning) -> tuple[str, Level]:
-    words: list[str] = []
-    level: Level = "good"
+def _verdict(tuning: Tuning) -> tuple[str, Level]:
     band = f"from {FOLLOWED[0]:g} to {FOLLOWED[1]:g} Hz"
-    short = [axis for axis in tuning.axes if not _follows(axis)]
-    if short:
-        found = ", ".join(f"{axis.axis} {_band(axis.band_after)}" for axis in short)
-        words.append(f"Not all axes are within {tuning.tolerance:g} dB and coherent {band}: {found}.")
-        level = "attention"
-    else:
-        words.append(f"Every axis is within {tuning.tolerance:g} dB of its reference and coherent {band}.")
-    low = [axis for axis in tuning.axes if not 20.0 * np.log10(axis.margin_after.gain) >= GAIN_MARGIN]
-    if low:
-        found = ", ".join(f"{axis.axis} {decibels(axis.margin_after.gain)}" for axis in low)
-        words.append(f"Gain margin below {GAIN_MARGIN:g} dB: {found}.")
-        level = "attention"
-    else:
-        words.append(f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.")
-    if tuning.doubled:
-        words.append("The loop is stable with all master gains doubled.")
-    else:
-        words.append("The loop is unstable with all master gains doubled.")
-        level = "attention"
+    short = [f"{axis.axis} {_band(axis.band_after)}" for axis in tuning.axes if not _follows(axis)]
+    low = [a for a in tuning.axes if not 20.0 * np.log10(a.margin_after.gain) >= GAIN_MARGIN]
+    margins = ", ".join(f"{axis.axis} {decibels(axis.margin_after.gain)}" for axis in low)
+    words = [
+        f"Not all axes are within {tuning.tolerance:g} dB and coherent {band}: {', '.join(short)}."
+        if short
+        else f"Every axis is within {tuning.tolerance:g} dB of its reference and coherent {band}.",
+        f"Gain margin below {GAIN_MARGIN:g} dB: {margins}."
+        if low
+        else f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.",
+        f"The loop is {'stable' if tuning.doubled else 'unstable'} with all master gains doubled.",
+    ]
     if any(np.isnan(axis.band_after[0]) for axis in tuning.axes):
-        level = "bad"
-    return " ".join(words), level
+        return " ".join(words), "bad"
+    return " ".join(words), "attention" if short or low or not tuning.doubled else "good"
 
 
 def _headlines(tuning: Tuning) -> list[Headline]:
@@ -104,48 +91,44 @@ def _headlines(tuning: Tuning) -> list[Headline]:
             "good" if 20.0 * np.log10(close.margin_after.gain) >= GAIN_MARGIN else "attention",
         ),
         Headline(
-            shown_as(tuning.delay, SCALES["time"]),
+            milliseconds(tuning.delay),
             "Common target delay",
-            f"measured {number(1e3 * min(late))} to {shown_as(max(late), SCALES['time'])}",
+            f"measured {number(1e3 * min(late))} to {milliseconds(max(late))}",
         ),
     ]
 
 
-def _sections(tuning: Tuning) -> list[Section]:
-    names = [axis.axis for axis in tuning.axes]
+def tuning_tables(tuning: Tuning) -> list[Block]:
+    """Return the tables of bands and margins before and after."""
+    bands: list[tuple[str, ...]] = []
+    margins: list[list[str]] = []
+    for axis in tuning.axes:
+        delays = milliseconds(axis.delay_before), milliseconds(axis.delay_after)
+        spread = _extremes(axis, after=False), _extremes(axis, after=True)
+        bands.append((axis.axis, _band(axis.band_before), _band(axis.band_after), *delays, *spread))
+        margins.append([axis.axis])
+        for margin in (axis.margin_before, axis.margin_after):
+            margins[-1].append(f"{decibels(margin.gain)} {_at(margin.gain_frequency)}")
+            margins[-1].append(f"{degrees(margin.phase)} {_at(margin.phase_frequency)}")
+    what = f"Unbroken band around 1 Hz within {tuning.tolerance:g} dB, coherence at least {tuning.coherence:g}"
+    size = f"|T| {FOLLOWED[0]:g} to {FOLLOWED[1]:g} Hz"
+    band_header = (
+        "Axis",
+        "Band before",
+        "Band after",
+        "Delay before",
+        "Delay after",
+        f"{size} before",
+        f"{size} after",
+    )
+    margin_header = ("Axis", "Gain before", "Phase before", "Gain after", "Phase after")
     return [
-        Section("bands", "Bands and margins", [_band_table(tuning), _margin_table(tuning), overview_figure(tuning)]),
-        Section("limits", "Bandwidth limitation, 20 to 33 Hz", _limits(tuning)),
-        Section("bode", "Bode plots before and after", _bode(tuning)),
-        Section("gains", "Chosen settings", gain_table(tuning.before, tuning.after, names)),
-        Section("steps", "Tuning steps", _steps(tuning)),
-        Section(
-            "assumptions",
-            "Assumptions and sources",
-            assumption_blocks(tuning.machine, ("noise", "feedback_targets", "feedforward_targets")),
-        ),
+        Table(what, band_header, bands),
+        Table("Margins of the linear model without dry friction, the other axes closed", margin_header, margins),
     ]
 
 
-def _band_table(tuning: Tuning) -> Markup:
-    rows = [
-        (
-            axis.axis,
-            _band(axis.band_before),
-            _band(axis.band_after),
-            shown_as(axis.delay_before, SCALES["time"]),
-            shown_as(axis.delay_after, SCALES["time"]),
-            *(_extremes(axis, after) for after in (False, True)),
-        )
-        for axis in tuning.axes
-    ]
-    spread = f"|T| {FOLLOWED[0]:g} to {FOLLOWED[1]:g} Hz"
-    header = ("Axis", "Band before", "Band after", "Delay before", "Delay after", f"{spread} before", f"{spread} after")
-    said = f"Unbroken band around 1 Hz within {tuning.tolerance:g} dB, coherence at least {tuning.coherence:g}"
-    return table(said, header, rows)
-
-
-def _extremes(axis: AxisTuning, after: bool) -> str:
+def _extremes(axis: AxisTuning, *, after: bool) -> str:
     """Least and largest gain in the band that must be followed."""
     measured = axis.after if after else axis.before
     f = measured.frequency
@@ -153,43 +136,28 @@ def _extremes(axis: AxisTuning, after: bool) -> str:
     return f"{decibels(size.min(), sign=True)} to {decibels(size.max(), sign=True)}" if size.size else "–"
 
 
-def _margin_table(tuning: Tuning) -> Markup:
-    rows = []
-    for axis in tuning.axes:
-        cells = [axis.axis]
-        for margin in (axis.margin_before, axis.margin_after):
-            cells.append(f"{decibels(margin.gain)} {_at(margin.gain_frequency)}")
-            cells.append(f"{degrees(margin.phase)} {_at(margin.phase_frequency)}")
-        rows.append(cells)
-    header = ("Axis", "Gain before", "Phase before", "Gain after", "Phase after")
-    return table("Margins of the linear model without dry friction, the other axes closed", header, rows)
-
-
-def _limits(tuning: Tuning) -> list[Markup]:
-    said = paragraph(
+def _limits(tuning: Tuning) -> list[Block]:
+    how = (
         "Within its band each axis meets the tolerance. The band is limited, according to the response measured at "
         "the next frequency, by:"
     )
-    reasons = [
-        f"{axis.axis}, {_band(axis.band_after)}: {axis.limited_by or 'no cause identified'}" for axis in tuning.axes
-    ]
-    return [said, bullet_list(reasons)]
+    reasons = (f"{a.axis}, {_band(a.band_after)}: {a.limited_by or 'no cause identified'}" for a in tuning.axes)
+    return [how, bullet_list(reasons)]
 
 
-def _bode(tuning: Tuning) -> list[Markup]:
+def _bode(tuning: Tuning) -> list[Block]:
     how = (
         "Response from reference to achieved acceleration under white noise on that axis alone, with another seed "
-        f"than that of the fit. The shaded band is ±{tuning.tolerance:g} dB. Phase is shown after "
-        f"removing the common delay of {shown_as(tuning.delay, SCALES['time'])}, and as measured. The dashed line is "
-        "the response of the linear model without dry friction with these settings; the dotted line marks the end of "
-        "the operational band."
+        f"than that of the fit. The shaded band is ±{tuning.tolerance:g} dB. Phase is shown after removing the common "
+        f"delay of {milliseconds(tuning.delay)}, and as measured. The dashed line is the response of the linear model "
+        "without dry friction with these settings; the dotted line marks the end of the operational band."
     )
-    return [paragraph(how), grid(*(bode_figure(tuning, a) for a in range(len(tuning.axes))), pairs=True)]
+    return [how, grid(*(bode_figure(tuning, a) for a in range(len(tuning.axes))), pairs=True)]
 
 
-def _steps(tuning: Tuning) -> list[Markup]:
+def _steps(tuning: Tuning) -> list[Block]:
     if not tuning.steps:
-        return [paragraph("No steps recorded.")]
+        return ["No steps recorded."]
     rows = [
         (f"{n}. {step.stage}", step.axis, number(step.before), number(step.after), step.reason)
         for n, step in enumerate(tuning.steps, 1)
@@ -199,7 +167,7 @@ def _steps(tuning: Tuning) -> list[Markup]:
         "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured. The expected error of a fit is "
         "the relative deviation of the response from a pure delay over the fitted band."
     )
-    return [paragraph(how), table("Decisions, SI", ("Step", "Axis", "Before", "After", "Reason"), rows)]
+    return [how, Table("Decisions, SI", ("Step", "Axis", "Before", "After", "Reason"), rows)]
 
 
 def _band(band: tuple[float, float]) -> str:

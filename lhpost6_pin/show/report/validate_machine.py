@@ -4,21 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.names import AXES
 from ...identification.validation import PHASES, Phase, Validation, Valves
-from .page import Markup, details, number, paragraph, table
-from .run_motion import percent, shown_as
-from .validate_plots import scale_of, valve_block
+from .page import Block, Table, details, number
+from .scales import ROTATIONS, percent, shown_as
+from .validate_plots import scale_of, valve_figures
 from .validate_sections import why_not
 
 __all__ = ["drift_blocks", "lag_blocks", "resonance_blocks", "valve_blocks"]
 
 
-def drift_blocks(found: Validation) -> list[Markup]:
+def drift_blocks(found: Validation) -> list[Block]:
     """Return the drift rate of every test's open loop."""
     phases = [p for p in found.phases if p.number == 2 and not p.reason]
     if not phases:
-        return [paragraph(f"Not available: {why_not(found, 2)}.")]
+        return [f"Not available: {why_not(found, 2)}."]
     axes = [a.column for a in phases[0].of("displacement")]
     rows = [
         (p.test, *(number(1e6 * a.drift) for a in p.of("displacement")), f"{number(float(p.time[-1]))} s")
@@ -29,12 +28,12 @@ def drift_blocks(found: Validation) -> list[Markup]:
         "pressures, spools, flow and leakage; a closed loop has no such drift. Rate times duration approximates the "
         "final displacement error."
     )
-    header = ("Test", *(f"{axis} [{'µrad/s' if axis in AXES[3:] else 'µm/s'}]" for axis in axes), "Over")
+    header = ("Test", *(f"{axis} [{'µrad/s' if axis in ROTATIONS else 'µm/s'}]" for axis in axes), "Over")
     worst = [
-        _furthest(phases, [k for k, axis in enumerate(axes) if (axis in AXES[3:]) == turns]) for turns in (False, True)
+        _furthest(phases, [k for k, axis in enumerate(axes) if (axis in ROTATIONS) == turns]) for turns in (False, True)
     ]
-    said = paragraph(f"Largest drift: {'; '.join(words for words in worst if words)}.")
-    return [paragraph(how), table("Drift rate", header, rows), said]
+    said = f"Largest drift: {'; '.join(words for words in worst if words)}."
+    return [how, Table("Drift rate", header, rows), said]
 
 
 def _furthest(phases: Sequence[Phase], columns: Sequence[int]) -> str:
@@ -52,7 +51,7 @@ def _furthest(phases: Sequence[Phase], columns: Sequence[int]) -> str:
     return f"{one.column} in {phase.test}, {off} after {number(seconds)} s ({moved})"
 
 
-def lag_blocks(found: Validation) -> list[Markup]:
+def lag_blocks(found: Validation) -> list[Block]:
     """Return the delays of test and simulated closed loop behind the reference."""
     rows = [
         (p.test, lag.column, *(number(1e3 * value) for value in (lag.measured, lag.model, lag.model - lag.measured)))
@@ -60,20 +59,20 @@ def lag_blocks(found: Validation) -> list[Markup]:
         for lag in p.lags
     ]
     if not rows:
-        return [paragraph(f"Not available: {why_not(found, 3)}.")]
+        return [f"Not available: {why_not(found, 3)}."]
     how = (
         "Delay of the platen velocity behind the reference velocity, for axes that moved. “Delay removed” refers to "
         "the difference of the two."
     )
     header = ("Test", "Axis", "Measured [ms]", "Model [ms]", "Model less measured [ms]")
-    return [paragraph(how), table("Delay behind the reference", header, rows)]
+    return [how, Table("Delay behind the reference", header, rows)]
 
 
-def valve_blocks(found: Validation) -> list[Markup]:
+def valve_blocks(found: Validation) -> list[Block]:
     """Return spools against their commands: delays and transfer functions."""
     valves = found.valves
     if valves is None:
-        return [paragraph("Not available: no test has both spool_command and spool_position.")]
+        return ["Not available: no test has both spool_command and spool_position."]
     how = (
         "Delay of each spool behind its command, from the slope of the transfer function's phase over all tests. The "
         "model has a pure delay; a command held over the controller's samples adds half of one (0.244 ms at 2048 Hz), "
@@ -85,11 +84,11 @@ def valve_blocks(found: Validation) -> list[Markup]:
         for c, d, e, m in columns
     ]
     header = ("Actuator", "Measured [ms]", "Standard error [ms]", "Model [ms]", "Model less measured [ms]")
-    blocks = [valve_block(valves), details("Every delay", table("Servovalve delays", header, rows))]
-    return [paragraph(how, f" Measured: {_delays_of(valves)}."), *blocks]
+    blocks = [valve_figures(valves), details("Every delay", Table("Servovalve delays", header, rows))]
+    return [f"{how} Measured: {_delays_of(valves)}.", *blocks]
 
 
-def resonance_blocks(found: Validation) -> list[Markup]:
+def resonance_blocks(found: Validation) -> list[Block]:
     """Return the oil-column resonances of tests and model."""
     rows = [
         (
@@ -110,9 +109,9 @@ def resonance_blocks(found: Validation) -> list[Markup]:
         "test and model, are omitted."
     )
     if not rows:
-        return [paragraph(how), paragraph("No oil-column resonance was found.")]
+        return [how, "No oil-column resonance was found."]
     header = ("Test", "Axis", "Linear model [Hz]", "Measured [Hz]", "Model [Hz]", "Sharpness, measured", "and model")
-    return [paragraph(how), table("Oil columns", header, rows)]
+    return [how, Table("Oil columns", header, rows)]
 
 
 def _delays_of(valves: Valves) -> str:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from ...identification.validation import PHASES, Validation
 from .control_blocks import assumed_in, load_of, numbers_used
-from .page import Headline, Level, Markup, Page, Section, bullet_list, number, save_page
-from .run_motion import percent
+from .page import Block, Headline, Level, Page, Section, bullet_list, number, save_page
+from .scales import percent
 from .validate_machine import drift_blocks, lag_blocks, resonance_blocks, valve_blocks
 from .validate_sections import ROMAN, named, summary_blocks, test_blocks, why_not, worst_of
 
@@ -16,25 +16,29 @@ FOLLOWED = 0.10  # judgement, not physics: RRMSE, delay removed, up to which the
 
 def write_validate_report(found: Validation, path: Path | str, *, command: str = "") -> Path:
     """Write the self-contained HTML report of a validation to `path` and return the path."""
-    verdict, level = _judge(found)
-    asked = " and ".join(", ".join(PHASES[n] for n in _done(found)).rsplit(", ", 1))
+    verdict, level = _verdict(found)
+    phases = _requested(found)
+    listed = " and ".join(", ".join(PHASES[n] for n in phases).rsplit(", ", 1))
     count = f"{len(found.tests)} test{'s' * (len(found.tests) > 1)}"
+    over_all = {
+        "drift": ("Drift of the open loop", drift_blocks, 2 in phases),
+        "lag": ("Delay of the closed loop", lag_blocks, 3 in phases),
+        "resonance": ("Oil columns", resonance_blocks, 2 in phases or 3 in phases),
+        "valves": ("Servovalves", valve_blocks, 2 in phases or 3 in phases),
+    }
     page = Page(
         kind="Validation report",
         title=f"Validation on {found.campaign}",
         asked=(
-            f"Compare {count} with {load_of(found.machine)} by {asked}, up to {number(found.numbers.band.high)} Hz."
+            f"Compare {count} with {load_of(found.machine)} by {listed}, up to {number(found.numbers.band.high)} Hz."
         ),
         verdict=verdict,
         level=level,
-        headlines=[_headline(found, n) for n in _done(found)],
+        headlines=[_headline(found, n) for n in phases],
         sections=[
             Section("summary", "Agreement by phase, test and axis", summary_blocks(found)),
-            *_machine_sections(found),
-            *(
-                Section(f"test-{k}", f"Test {test}", test_blocks(found, test))
-                for k, test in enumerate(found.tests, start=1)
-            ),
+            *(Section(name, title, blocks(found)) for name, (title, blocks, due) in over_all.items() if due),
+            *(Section(f"test-{k}", f"Test {t}", test_blocks(found, t)) for k, t in enumerate(found.tests, start=1)),
             Section("assumptions", "Assumptions and sources", _assumptions(found)),
         ],
         notes=_notes(found),
@@ -43,29 +47,15 @@ def write_validate_report(found: Validation, path: Path | str, *, command: str =
     return save_page(page, path)
 
 
-def _machine_sections(found: Validation) -> list[Section]:
-    """Sections on all tests together, for the requested phases."""
-    done = _done(found)
-    sections = []
-    if 2 in done:
-        sections.append(Section("drift", "Drift of the open loop", drift_blocks(found)))
-    if 3 in done:
-        sections.append(Section("lag", "Delay of the closed loop", lag_blocks(found)))
-    if 2 in done or 3 in done:
-        sections.append(Section("resonance", "Oil columns", resonance_blocks(found)))
-        sections.append(Section("valves", "Servovalves", valve_blocks(found)))
-    return sections
-
-
-def _done(found: Validation) -> list[int]:
-    """Numbers of the phases that were asked for."""
+def _requested(found: Validation) -> list[int]:
+    """Numbers of the requested phases."""
     return sorted({p.number for p in found.phases})
 
 
-def _judge(found: Validation) -> tuple[str, Level]:
+def _verdict(found: Validation) -> tuple[str, Level]:
     sentences: list[str] = []
     level: Level = "good"
-    for n in _done(found):
+    for n in _requested(found):
         worst = worst_of(found, n)
         if worst is None:
             sentences.append(f"{PHASES[n].capitalize()}: {why_not(found, n)}.")
@@ -99,20 +89,18 @@ def _headline(found: Validation, n: int) -> Headline:
 
 def _notes(found: Validation) -> list[str]:
     """Missing phases and events; tests with the same note share it."""
-    said: dict[str, list[str]] = {}
+    tests: dict[str, dict[str, None]] = {}
     for phase in found.phases:
-        if phase.reason:
-            said.setdefault(f"no {PHASES[phase.number]}: {phase.reason}", []).append(phase.test)
-        for words in phase.notes * (phase.number > 1):
-            said.setdefault(words, []).append(phase.test)
-    tests = {words: list(dict.fromkeys(names)) for words, names in said.items()}
+        missing = [f"no {PHASES[phase.number]}: {phase.reason}"] if phase.reason else []
+        for words in (*missing, *phase.notes * (phase.number > 1)):
+            tests.setdefault(words, {})[phase.test] = None
     return [
         f"{'All tests' if len(names) == len(found.tests) > 1 else ', '.join(names)}: {words}"
         for words, names in tests.items()
     ]
 
 
-def _assumptions(found: Validation) -> list[Markup]:
+def _assumptions(found: Validation) -> list[Block]:
     sensors, band = found.sensors, found.numbers.band
     guessed = sum(q.assumed for q in sensors.parameters.values())
     made = [p.notes for p in found.phases if p.number == 1 and not p.reason]

@@ -6,18 +6,11 @@ import numpy as np
 
 from ...core.names import AXES
 from ...identification.validation import PHASES, ColumnAgreement, Phase, Validation
-from .page import Markup, details, number, paragraph, shaded, table, text
-from .run_motion import percent, shown_as
-from .validate_plots import actuator_blocks, force_blocks, motion_blocks, scale_of, spectrum_block
+from .page import Block, Markup, Table, details, number, paragraph, shaded, text
+from .scales import ROTATIONS, percent, shown_as
+from .validate_plots import actuator_blocks, force_figure, motion_blocks, scale_of, spectrum_blocks
 
-__all__ = [
-    "ROMAN",
-    "named",
-    "summary_blocks",
-    "test_blocks",
-    "why_not",
-    "worst_of",
-]
+__all__ = ["ROMAN", "named", "summary_blocks", "test_blocks", "why_not", "worst_of"]
 
 ROMAN = {1: "I", 2: "II", 3: "III"}
 SUMMED = {1: ("wrench",), 2: ("displacement", "acceleration", "wrench"), 3: ("displacement", "acceleration")}
@@ -63,7 +56,7 @@ def _judged(phase: Phase) -> list[ColumnAgreement]:
 
 
 # --------------------------------------------------------------------------------------------- over all tests
-def summary_blocks(found: Validation) -> list[Markup]:
+def summary_blocks(found: Validation) -> list[Block]:
     """Return the error of every phase, test and axis as a shaded table."""
     tops = [f"up to {100 * top:g} %" for top in _SHADES[:-1]] + [f"above {100 * _SHADES[-2]:g} %"]
     key = " ".join(shaded(words, k) for k, words in enumerate(tops))
@@ -80,44 +73,54 @@ def summary_blocks(found: Validation) -> list[Markup]:
         for p in (p for p in found.phases if p.number == phase and not p.reason):
             cells = {a.column: _cell(a, bool(worst and worst[1] is a)) for a in p.of(quantity)}
             rows.append((f"{ROMAN[phase]} · {named(quantity)}", p.test, *(cells.get(axis, "") for axis in axes)))
+    requested = {n: [p.reason for p in found.phases if p.number == n] for n in PHASES}
     skipped = [
-        paragraph(f"Phase {ROMAN[n]}, {PHASES[n]}: {why_not(found, n)}.")
-        for n in PHASES
-        if all(p.reason for p in found.phases if p.number == n) and any(p.number == n for p in found.phases)
+        f"Phase {ROMAN[n]}, {PHASES[n]}: {why_not(found, n)}."
+        for n, reasons in requested.items()
+        if reasons and all(reasons)
     ]
-    heat = table("RRMSE, delay removed", ("Phase and quantity", "Test", *axes), rows)
-    after = [*_spool_blocks(found), *_noise_blocks(found), *_mean_blocks(found)]
-    return [paragraph(how), paragraph(Markup(key)), heat, *skipped, *after]
+    heat = Table("RRMSE, delay removed", ("Phase and quantity", "Test", *axes), rows)
+    return [how, Markup(f"<p>{key}</p>"), heat, *skipped, *_spool_blocks(found), *_residual_blocks(found)]
 
 
-def _spool_blocks(found: Validation) -> list[Markup]:
-    """Return the largest RRMSE of the spool commands of the closed loop."""
+def _spool_blocks(found: Validation) -> list[Block]:
+    """The largest RRMSE of the spool commands of the closed loop."""
     rows = [(p.test, a) for p in found.phases for a in p.of("spool_command") if a.moves]
     if not rows:
         return []
     test, worst = max(rows, key=lambda row: row[1].rrmse_aligned)
-    words = f"Spool commands of the closed loop: largest RRMSE {percent(worst.rrmse_aligned)} ({test}, {worst.column})."
-    return [paragraph(words)]
+    where = f"({test}, {worst.column})"
+    return [f"Spool commands of the closed loop: largest RRMSE {percent(worst.rrmse_aligned)} {where}."]
 
 
-def _noise_blocks(found: Validation) -> list[Markup]:
-    """Return the residual of inverse dynamics over the noise predicted for it, axis by axis."""
-    phases = [p for p in found.phases if p.number == 1 and not p.reason]
-    if not phases:
+def _residual_blocks(found: Validation) -> list[Block]:
+    """Residual of inverse dynamics: over the noise predicted, and its mean against calibration uncertainty."""
+    tests = {p.test: p.of("wrench") for p in found.phases if p.number == 1 and not p.reason}
+    if not tests:
         return []
-    rows: list[tuple[str, ...]] = []
-    for p in phases:
-        ratios = [a.error_to_noise for a in p.of("wrench")]
-        rows.append((p.test, *(f"{'! ' * (not 1 / NOISE < r < NOISE)}{number(r, 3)}" for r in ratios)))
-    rows.append(("noise predicted", *(_span(same) for same in zip(*(p.of("wrench") for p in phases), strict=True))))
-    how = (
+    columns = [a.column for a in next(iter(tests.values()))]
+    ratios: list[tuple[str, ...]] = [(test, *map(_ratio_cell, own)) for test, own in tests.items()]
+    ratios.append(("noise predicted", *map(_span, zip(*tests.values(), strict=True))))
+    means: list[tuple[str, ...]] = [(test, *map(_mean_cell, own)) for test, own in tests.items()]
+    sd = [a.offset_expected * scale_of("wrench", a.column).factor for a in next(iter(tests.values()))]
+    means.append(("calibration, one sd", *(number(one, 2) for one in sd)))
+    units = [f"{column} [{scale_of('wrench', column).unit}]" for column in columns]
+    return [
         "Residual of inverse dynamics (required less measured actuator force, mean and delay removed) over its "
         f"predicted sensor noise. 1 is noise alone; ! marks more than {NOISE:g} (incomplete model) and less than "
         f"{1 / NOISE:g} (stated noise too large). The last row is that noise, one standard deviation. Gain errors of "
-        "sensors add to the residual of moving axes."
-    )
-    header = ("Test", *(a.column for a in phases[0].of("wrench")))
-    return [paragraph(how), table("Residual of inverse dynamics over the noise predicted", header, rows)]
+        "sensors add to the residual of moving axes.",
+        Table("Residual of inverse dynamics over the noise predicted", ("Test", *columns), ratios),
+        "Mean of required less measured force by inverse dynamics. The last row is its uncertainty from gains and "
+        f"offsets of the force sensors, one standard deviation; ! marks more than {SENSED:g} of them: a weight, a "
+        "pressure or a sensor is wrong.",
+        Table("Mean error of the total actuator force", ("Test", *units), means),
+    ]
+
+
+def _ratio_cell(one: ColumnAgreement) -> str:
+    ratio = one.error_to_noise
+    return f"{'! ' * (not 1 / NOISE < ratio < NOISE)}{number(ratio, 3)}"
 
 
 def _span(tests: Sequence[ColumnAgreement]) -> str:
@@ -125,23 +128,6 @@ def _span(tests: Sequence[ColumnAgreement]) -> str:
     scale = scale_of(tests[0].quantity, tests[0].column)
     low, high = (number(end(a.noise for a in tests) * scale.factor, 2) for end in (min, max))
     return f"{low if low == high else f'{low} to {high}'} {scale.unit}"
-
-
-def _mean_blocks(found: Validation) -> list[Markup]:
-    """Return the mean error of the total actuator force by inverse dynamics, against calibration uncertainty."""
-    phases = [p for p in found.phases if p.number == 1 and not p.reason]
-    if not phases:
-        return []
-    first = phases[0].of("wrench")
-    rows = [(p.test, *(_mean_cell(a) for a in p.of("wrench"))) for p in phases]
-    due = ("calibration, one sd", *(number(a.offset_expected * scale_of("wrench", a.column).factor, 2) for a in first))
-    how = (
-        "Mean of required less measured force by inverse dynamics. The last row is its uncertainty from gains and "
-        f"offsets of the force sensors, one standard deviation; ! marks more than {SENSED:g} of them: a weight, a "
-        "pressure or a sensor is wrong."
-    )
-    header = ("Test", *(f"{a.column} [{scale_of('wrench', a.column).unit}]" for a in first))
-    return [paragraph(how), table("Mean error of the total actuator force", header, [*rows, due])]
 
 
 def _mean_cell(one: ColumnAgreement) -> str:
@@ -154,16 +140,16 @@ def _cell(one: ColumnAgreement, worst: bool) -> Markup:
         shade = next(k for k, top in enumerate(_SHADES) if not one.rrmse_aligned > top)
         return shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", shade)
     if one.quantity == "displacement":
-        return text(f"{number(1e6 * one.error, 2)}\N{NO-BREAK SPACE}{'µrad' if one.column in AXES[3:] else 'µm'}")
+        return text(f"{number(1e6 * one.error, 2)}\N{NO-BREAK SPACE}{'µrad' if one.column in ROTATIONS else 'µm'}")
     if not np.isfinite(one.error_to_noise):
         return text("almost at rest")
     return text(f"{'! ' * (one.error_to_noise > NOISE)}{number(one.error_to_noise, 2)} × noise")
 
 
 # ---------------------------------------------------------------------------------------------- test by test
-def test_blocks(found: Validation, test: str) -> list[Markup]:
+def test_blocks(found: Validation, test: str) -> list[Block]:
     """Return every phase of a test, collapsed: numbers, figures, spectra."""
-    blocks = []
+    blocks: list[Block] = []
     phases = [p for p in found.phases if p.test == test]
     motion = next((p for p in phases if p.pair("displacement")), None)
     for phase in phases:
@@ -172,12 +158,13 @@ def test_blocks(found: Validation, test: str) -> list[Markup]:
             blocks.append(paragraph(Markup(f"<strong>{title}</strong>"), f" omitted: {phase.reason}."))
             continue
         axes = _shown_axes(motion or phase)
-        figures = force_blocks(phase, motion, axes) if phase.number == 1 else motion_blocks(phase, axes)
+        figures: list[Block] = []
+        figures += [force_figure(phase, motion, axes)] if phase.number == 1 else motion_blocks(phase, axes)
         figures += actuator_blocks(phase, "spool_command")
         for quantity in ACTUATORS:
             drawn = actuator_blocks(phase, quantity)
             figures += [details(f"Every actuator: {named(quantity)}", *drawn)] if drawn else []
-        spectra = details("Spectra", *spectrum_block(phase, axes, found.numbers.bands))
+        spectra = details("Spectra", *spectrum_blocks(phase, axes, found.numbers.bands))
         blocks.append(details(f"{title}{_short(phase)}", _metrics(phase), *figures, spectra))
     return blocks
 
@@ -211,5 +198,4 @@ def _metrics(phase: Phase) -> Markup:
         "Delay: of the model behind the measurement. Correlation and RMS error: delay removed. A dash: almost at rest. "
         "Values with and without delay: metrics.json."
     )
-    numbers = table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows)
-    return details("All numbers", paragraph(how), numbers)
+    return details("All numbers", how, Table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows))

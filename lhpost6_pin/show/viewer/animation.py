@@ -8,8 +8,15 @@ from numpy.typing import NDArray
 
 from ...machine.machine import Machine
 from ...mechanics.pose import rotation
-from ..bodies import Bodies, body_name, body_poses, joint_positions, quaternions
-from ..specimen_bodies import load_specimen_bodies, specimen_poses
+from ..bodies import (
+    Bodies,
+    body_name,
+    body_poses,
+    joint_positions,
+    load_specimen_bodies,
+    quaternions,
+    specimen_poses,
+)
 from ..urdf import legs
 from .arrows import arrow_colours, arrow_sizes, largest_force
 from .frames import Frames
@@ -23,13 +30,13 @@ log = logging.getLogger(__name__)
 Array = NDArray[np.float64]
 
 LOOP_FOR_EVER = 1_000_000_000  # repetitions
-UNSEEN = 1e-9  # [m, 1] changes that nobody sees
+UNSEEN = 1e-9  # [m, 1] invisible change
 
 _POSE = (("position", "vector3", slice(0, 3)), ("quaternion", "quaternion", slice(3, 7)))
 
 
 def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Frames) -> None:
-    """Send the frames as one animation that loops; bodies that stand still are left out."""
+    """Send the frames as one animation that loops; bodies at rest are omitted."""
     q = joint_positions(machine, bodies.model, frames.displacement)
     _warn_of_strokes(machine, bodies.model, q)
     poses = body_poses(bodies.model, q)
@@ -42,9 +49,8 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
     for name, pose in moving.items():
         tracks = [_track(key, kind, pose[:, part]) for key, kind, part in _POSE if _seen(pose[:, part])]
         clips.append(_clip(frames, name, tracks))
-    forces = leg_forces(machine, frames)
     largest = largest_force(frames.force) if frames.force is not None else 1.0
-    for name, force in forces.items():
+    for name, force in leg_forces(machine, frames).items():
         arrow = f"{name}_rod/force"
         clips.append(_clip(frames, arrow, [_track("scale", "vector", arrow_sizes(machine, force, largest))]))
         colours = _track("material.color", "color", arrow_colours(force, largest))
@@ -53,7 +59,7 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
 
 
 def leg_forces(machine: Machine, frames: Frames) -> dict[str, Array]:
-    """Forces (n,) [N] of the legs of which frames know them, by name."""
+    """Forces (n,) [N] of the legs whose forces are recorded, by name."""
     if frames.force is None:
         return {}
     named = zip(legs(machine), frames.force.T, strict=True)
@@ -68,11 +74,13 @@ def _outline_poses(machine: Machine, displacement: Array) -> Array:
 
 
 def _warn_of_strokes(machine: Machine, model: Any, q: Array) -> None:
-    """Log which actuators are drawn longer or shorter than they can be."""
+    """Log which actuators are drawn beyond their stroke."""
     extension = [np.abs(q[:, model.idx_qs[model.getJointId(f"{a.name}_extension")]]).max() for a in machine.actuators]
     beyond = [a.name for a, most in zip(machine.actuators, extension, strict=True) if most > a.stroke]
     if beyond:
-        log.warning("drawn beyond the stroke: %s; amplify less to see it as it can be", ", ".join(beyond))
+        log.warning(
+            "drawn beyond the stroke: %s; reduce --amplify to draw positions within the stroke", ", ".join(beyond)
+        )
 
 
 class _Animation:

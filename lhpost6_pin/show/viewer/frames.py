@@ -20,22 +20,22 @@ __all__ = ["AS_IT_IS", "Frames", "Ghost", "Look", "make_frames", "record_frames"
 Array = NDArray[np.float64]
 
 OTHERS = ("first_other", "second_other")
-"""Names, and so colours, of records over another."""
+"""Names, which give the colours, of records overlaid."""
 
 MOST_FRAMES = 36_000
-"""Frames that a browser still plays: 20 minutes at 30 a second, a page of some 100 MB."""
+"""Largest number of frames: 20 minutes at 30 a second, a page of some 100 MB."""
 
 MOST_TURN = 0.5 * math.pi
 """Roll or pitch [rad] that is refused: Euler angles end at a pitch of this size."""
 
 
 class Look(NamedTuple):
-    """How a record is shown. Raises ParameterError, by `refuse`, for a number that makes no sense."""
+    """How a record is shown."""
 
     rate: float = 30.0  # frames a second
     amplify: float = 1.0  # factor on all motion
-    gap: float = 1.0  # factor on what outlines differ by, besides
-    change: bool = False  # forces less what they are in the first frame: weight and preload
+    gap: float = 1.0  # further factor on the differences of the outlines
+    change: bool = False  # of forces from the first frame, without weight and preload
 
     def refuse(self) -> None:
         """Raise ParameterError naming what is not a positive number."""
@@ -51,7 +51,7 @@ class Look(NamedTuple):
 
 
 AS_IT_IS = Look()
-"""Motion to scale, forces whole."""
+"""Motion to scale, total forces."""
 
 
 class Ghost(NamedTuple):
@@ -84,8 +84,8 @@ def make_frames(
 ) -> Frames:
     """Sample a platen motion (n, 6), ghosts, and forces (n, n_legs) over time (n,) [s] as `look` says.
 
-    Only the time that all have is kept. Raises RecordError for a motion that cannot be drawn, ParameterError for a look
-    that makes no sense.
+    Only the common time is kept. Raises RecordError for a motion that cannot be drawn, ParameterError for a number of
+    the look that is not positive.
     """
     look.refuse()
     time, amplify, gap = np.asarray(time, float), look.amplify, look.gap
@@ -125,7 +125,7 @@ def record_frames(
 
 
 def record_title(record: xr.Dataset) -> str:
-    """What a record calls itself."""
+    """Title of a record, else its test."""
     return str(record.attrs.get("title", record.attrs.get("test", "record")))
 
 
@@ -138,7 +138,7 @@ def _moments(times: Sequence[Array], rate: float) -> Array:
     if frames > MOST_FRAMES:
         raise ParameterError(
             f"{last - first:g} s at {rate:g} frames a second are {frames}, more than {MOST_FRAMES}: cut the record, or "
-            "ask for fewer frames a second"
+            "reduce --fps"
         )
     return np.asarray(first + np.arange(frames) / rate)
 
@@ -148,7 +148,7 @@ def _sampled(moments: Array, time: Array, motion: Array, name: str, factor: floa
     if motion.shape != (time.size, 6) or not np.isfinite(motion).all():
         raise RecordError(f"{name} must be {time.size} samples of six finite numbers; it is {motion.shape}")
     if np.abs(motion).max(initial=0.0) > math.pi * 1e6 / factor:
-        raise ParameterError(f"amplified {factor:g} times {name} leaves every picture; amplify less")
+        raise ParameterError(f"amplified {factor:g} times {name} leaves the picture; amplify less")
     return _columns(moments, time, motion)
 
 
@@ -168,7 +168,7 @@ def _joints(record: xr.Dataset, frames: Frames) -> dict[str, Array]:
         return {}
     joints = record["specimen_joint_position"]
     if joints.dims != ("time", "specimen_joint") or joints.dtype.kind != "f" or not np.isfinite(joints.values).all():
-        raise RecordError("specimen_joint_position must be finite numbers by time and joint; leave it out, or mend it")
+        raise RecordError("specimen_joint_position must be finite numbers by time and joint; correct or omit it")
     drawn = _columns(frames.time, record["time"].values, joints.values)
     names = map(str, record["specimen_joint"].values)
     return dict(zip(names, frames.look.amplify * drawn.T, strict=True))

@@ -1,14 +1,18 @@
-"""A table watched while it moves: a simulation, or the plant behind the UDP link."""
+"""A live view of a moving table: a simulation, or the plant behind the UDP link."""
 
+import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from types import TracebackType
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from ...machine.machine import Machine
-from ...simulation.snapshot import Snapshot
+from ...simulation.snapshot import Snapshot, Watch
 from ..bodies import body_name, body_poses, joint_positions, load_bodies
 from ..urdf import legs
 from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
@@ -18,19 +22,19 @@ from .show import machine_legend
 from .viewer_page import Caption, render_page
 from .window import LoopbackWindow
 
-__all__ = ["LiveView"]
+__all__ = ["LiveView", "view_apart"]
 
-Array = NDArray[np.float64]
+MOST_UNSEEN = 8  # snapshots sent and not yet drawn, from which on further ones are dropped
 
 
 class LiveView:
     """A page on this computer that shows a plant as it moves, while used in a ``with`` block.
 
-    Arrows are scaled by what holds the table at the start: the largest of those forces is drawn half as long as can be.
+    Arrows are scaled by the forces at the start: the largest of them is drawn at half the longest length.
     """
 
     def __init__(self, machine: Machine, title: str, look: Look = AS_IT_IS, *, real_time: bool = True) -> None:
-        """Prepare the page; in `real_time` motion is no faster than it is. Raises ParameterError as `Look.refuse`."""
+        """Prepare the page; with `real_time` motion is no faster than real. Raises ParameterError as `Look.refuse`."""
         look.refuse()
         self._machine, self._look, self._real_time = machine, look, real_time
         self._bodies = load_bodies(machine)
@@ -40,7 +44,7 @@ class LiveView:
         draw_machine(self._window, machine, self._bodies)
         draw_arrows(self._window, self._names)
         draw_names(self._window, machine)
-        shaped = {shape.parentJoint for shape in self._bodies.shapes.geometryObjects}
+        shaped = {shape.parentJoint for shape in self._bodies.shapes}
         self._table = table_of(self._window)
         self._moving = {j: body_name(self._bodies.model, j) for j in shaped if j > 0}  # by joint
         self._begin: float | None = None  # by the clock [s], of the plant's time zero
@@ -64,11 +68,11 @@ class LiveView:
         self._window.__exit__(kind, error, trace)
 
     def wait(self, seconds: float) -> bool:
-        """Wait until somebody looks, at most so long [s]; whether somebody does."""
+        """Wait until a browser is connected, at most so long [s]; True if one is."""
         return self._window.wait(seconds)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Draw one snapshot; returns at once, or in real time when its moment has come."""
+        """Draw one snapshot; returns at once, or in real time when it is due."""
         if self._begin is None:
             self._begin, self._largest = time.monotonic() - snapshot.time, 2.0 * largest_force(snapshot.force)
             self._still = snapshot.force if self._look.change else self._still
@@ -85,3 +89,45 @@ class LiveView:
             arrow.set_property("scale", size.tolist())
             arrow.set_property("color", [*colour.tolist(), OPACITY])
         self._window.say(f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
+
+
+@contextmanager
+def view_apart(machine: Machine, title: str, look: Look = AS_IT_IS) -> Iterator[tuple[str, Watch]]:
+    """Yield the address of a page that shows a plant, and a function that takes its snapshots and never waits.
+
+    The view runs in a process of its own, so that drawing cannot delay a plant in real time. A view that fell behind,
+    or was ended, misses snapshots. Raises ParameterError as `Look.refuse`.
+    """
+    look.refuse()
+    spawn = get_context("spawn")  # a copy of a process with threads may hang
+    here, there = spawn.Pipe()
+    process = spawn.Process(target=_draw, args=(there, machine, title, look), daemon=True)
+    process.start()
+    there.close()
+    unseen = 0
+
+    def show(snapshot: Snapshot) -> None:
+        nonlocal unseen
+        with suppress(OSError, EOFError):  # the view has ended
+            while here.poll():
+                here.recv()
+                unseen -= 1
+            if unseen < MOST_UNSEEN:
+                here.send(snapshot)
+                unseen += 1
+
+    try:
+        yield here.recv(), show
+    finally:
+        here.close()
+        process.join()
+
+
+def _draw(plant: Connection, machine: Machine, title: str, look: Look) -> None:
+    """Draw the snapshots of the plant until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the plant, which ends this
+    with LiveView(machine, title, look, real_time=False) as view, suppress(OSError, EOFError):
+        plant.send(view.url)
+        while True:
+            view.show(plant.recv())
+            plant.send(None)

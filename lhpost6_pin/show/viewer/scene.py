@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from ...machine.machine import Machine
-from ..bodies import Bodies, body_name, body_poses, joint_positions
-from ..specimen_bodies import SpecimenBodies, load_specimen_bodies, specimen_poses
+from ..bodies import Bodies, body_name, body_poses, joint_positions, load_specimen_bodies, specimen_poses
 from ..urdf import drawing_colour, legs
 from .arrows import OPACITY, arrow_solid
 from .frames import Frames
@@ -38,11 +38,7 @@ LIGHTS = (
     ("AmbientLight", "intensity", 0.5),
 )
 HIDDEN = ("/Grid", "/Axes", "/Lights/PointLightNegativeX", "/Lights/PointLightPositiveX")
-FACES = {
-    "radialSegments": 18,
-    "widthSegments": 14,
-    "heightSegments": 8,
-}  # of round bodies: fewer than usual
+FACES = {"radialSegments": 18, "widthSegments": 14, "heightSegments": 8}  # of round bodies: fewer than usual
 NAMES = "names"
 NAME = 0.12  # edge of the square that a leg's name is written in, over the platen's length
 FINE = 0.004  # [m] between points of a path: a pixel where the whole table is seen
@@ -53,20 +49,19 @@ def draw_machine(window: Window, machine: Machine, bodies: Bodies) -> None:
     """Send the machine in its control zero-position, the camera and the light."""
     from meshcat import geometry
 
-    vis = _visualizer(window)
     poses = body_poses(bodies.model, joint_positions(machine, bodies.model, np.zeros((1, 6))))[0]
-    table = vis[ROOT]
-    for shape in bodies.shapes.geometryObjects:
-        body = table[body_name(bodies.model, shape.parentJoint)]
-        body.set_transform(pin.XYZQUATToSE3(poses[shape.parentJoint]).homogeneous)
-        red, green, blue, opacity = (float(c) for c in shape.meshColor)
-        colour = sum(round(255.0 * c) << s for c, s in ((red, 16), (green, 8), (blue, 0)))
+    table, specimen = table_of(window), load_specimen_bodies(machine)
+    for shape in bodies.shapes:
+        *rgb, opacity = (float(c) for c in shape.meshColor)
+        colour = sum(round(255.0 * c) << s for c, s in zip(rgb, (16, 8, 0), strict=True))
         material = geometry.MeshLambertMaterial(color=colour, opacity=opacity, depthWrite=opacity == 1.0)
-        _draw(body[shape.name], shape, material)
-    specimen = load_specimen_bodies(machine)
+        _draw(table[body_name(bodies.model, shape.parentJoint)], shape, poses, material)
     if specimen is not None:
-        _draw_specimen(table, specimen)
-    _set_stage(vis, machine, specimen)
+        poses = specimen_poses(specimen, {}, 1)[0]
+        for shape in specimen.shapes:
+            material = geometry.MeshLambertMaterial(color=_number("specimen"))
+            _draw(table[specimen_body(shape.parentJoint)], shape, poses, material)
+    _set_stage(window, machine, specimen)
 
 
 def names_layer() -> list[str]:
@@ -122,56 +117,41 @@ def draw_arrows(window: Window, names: Sequence[str]) -> None:
         table[f"{name}_rod"]["force"].set_object(solid, material)
 
 
-def _draw_specimen(table: Any, specimen: SpecimenBodies) -> None:
-    from meshcat import geometry
-
-    poses = specimen_poses(specimen, {}, 1)[0]
-    for shape in specimen.shapes:
-        body = table[specimen_body(shape.joint)]
-        body.set_transform(pin.XYZQUATToSE3(poses[shape.joint]).homogeneous)
-        _draw(body[shape.name], shape, geometry.MeshLambertMaterial(color=_number("specimen")))
-
-
-def _draw(node: Any, shape: Any, material: Any) -> None:
-    """Send a primitive to its place on its body."""
+def _draw(body: Any, shape: Any, poses: Array, material: Any) -> None:
+    """Send a body to its pose, and a primitive to its place on the body."""
+    body.set_transform(pin.XYZQUATToSE3(poses[shape.parentJoint]).homogeneous)
     primitive, upright = _primitive(shape.geometry)
-    node.set_object(primitive, material)
-    node.set_transform(shape.placement.homogeneous @ upright)
+    body[shape.name].set_object(primitive, material)
+    body[shape.name].set_transform(shape.placement.homogeneous @ upright)
 
 
 def _number(kind: str) -> int:
-    """Colour of a kind of body, as meshcat wants it."""
+    """Colour of a kind of body, as a number for meshcat."""
     return int(drawing_colour(kind).lstrip("#"), 16)
 
 
 def table_of(window: Window) -> Any:
     """Meshcat's handle on all that belongs to the table, by path."""
-    return _visualizer(window)[ROOT]
-
-
-def _visualizer(window: Window) -> Any:
     import meshcat
 
-    return meshcat.Visualizer(window=window)
+    return meshcat.Visualizer(window=window)[ROOT]
 
 
 def _lines(points: Array, colour: str, seen_through: bool = False) -> Any:
     """Line segments between points (2 n, 3), two by two."""
     from meshcat import geometry
 
-    material = geometry.LineBasicMaterial(
-        color=_number(colour),
-        linewidth=2.0,
-        transparent=seen_through,
-        depthTest=not seen_through,
-    )
+    shown = {"transparent": seen_through, "depthTest": not seen_through}
+    material = geometry.LineBasicMaterial(color=_number(colour), linewidth=2.0, **shown)
     return geometry.LineSegments(geometry.PointsGeometry(points.T.astype(np.float32)), material)
 
 
-def _set_stage(vis: Any, machine: Machine, specimen: SpecimenBodies | None) -> None:
-    """Camera from -Y, +X to the right, that sees the table and what stands on it; light from above; no grid."""
+def _set_stage(window: Window, machine: Machine, specimen: Bodies | None) -> None:
+    """Camera from -Y, +X to the right, on the table and what stands on it; light from above; no grid."""
+    import meshcat
     from meshcat import geometry
 
+    vis = meshcat.Visualizer(window=window)
     points = np.array([p for leg in legs(machine) for p in (leg.base_point, leg.platen_point)])
     points = np.vstack([points, 0.5 * np.array([[*machine.platen.size, 0.0]]) * [[1, 1, 1], [-1, -1, 1]]])
     if specimen is not None:
@@ -189,11 +169,11 @@ def _set_stage(vis: Any, machine: Machine, specimen: SpecimenBodies | None) -> N
         vis[thing].set_property("visible", False)
 
 
-def _reach(specimen: SpecimenBodies) -> Array:
+def _reach(specimen: Bodies) -> Array:
     """Corners (n, 3) in the platen's {b} of boxes along it around a specimen's shapes."""
     poses, corners = specimen_poses(specimen, {}, 1)[0], []
     for shape in specimen.shapes:
-        at = pin.XYZQUATToSE3(poses[shape.joint]) * shape.placement
+        at = pin.XYZQUATToSE3(poses[shape.parentJoint]) * shape.placement
         round_body = getattr(shape.geometry, "radius", 0.0) * np.ones(3)
         round_body[2] += getattr(shape.geometry, "halfLength", 0.0)
         size = np.abs(at.rotation) @ getattr(shape.geometry, "halfSide", round_body)
@@ -232,6 +212,6 @@ def _thinned(path: Array) -> Array:
 
 def _box_edges(size: Array) -> Array:
     """Ends (24, 3) of the twelve edges of a box around the origin."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    pairs = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(signs[a] - signs[b]).sum() == 2]
-    return np.array([0.5 * size * signs[k] for pair in pairs for k in pair])
+    corners = np.array(list(product((-1, 1), repeat=3)))
+    edges = [pair for pair in combinations(corners, 2) if np.abs(pair[0] - pair[1]).sum() == 2]
+    return 0.5 * size * np.array(edges).reshape(-1, 3)

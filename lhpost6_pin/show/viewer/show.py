@@ -1,4 +1,4 @@
-"""A record shown: in one HTML file, in a notebook, or in a browser on this computer."""
+"""Show a record in one HTML file, in a notebook, or in a browser on this computer."""
 
 from collections.abc import Sequence
 
@@ -33,7 +33,7 @@ def show_record(
 def live_animation(
     machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset] = (), look: Look = AS_IT_IS
 ) -> LoopbackWindow:
-    """Return a window that shows a record at its `url` while used in a ``with`` block; only this computer can look.
+    """Return a window that shows a record at its `url` while used in a ``with`` block, to this computer only.
 
     Raises RecordError or ParameterError as `record_frames`.
     """
@@ -44,7 +44,7 @@ def live_animation(
 
 
 def machine_legend(machine: Machine) -> dict[str, str]:
-    """Words and colours of what a machine is drawn with."""
+    """Names and colours of the kinds of bodies of a machine."""
     kinds = {"platen": "platen"} | {a.mount: f"{a.kind} actuators" for a in machine.actuators}
     kinds |= {"strut": f"{machine.struts[0].kind} struts"} if machine.struts else {}
     kinds |= {"specimen": "specimen"} if machine.specimen else {}
@@ -67,7 +67,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     note = f"{machine.name}, {kind}, {seconds:.1f} s at {look.rate:g} frames/s, {look.size}; +X to the right"
     carried = str(record.attrs.get("specimen", "none"))
     if carried != "none" and machine.specimen is None:
-        note += f"; specimen {carried} not drawn: it was not named"
+        note += f"; specimen {carried} not drawn: give --specimen"
     legend = machine_legend(machine) | {"path of C": drawing_colour("trace")}
     legend |= {f"{g.label} (outline)": drawing_colour(g.name) for g in frames.ghosts}
     layers = {"names": names_layer(), "path of C": [f"meshcat/{ROOT}/trace"]}

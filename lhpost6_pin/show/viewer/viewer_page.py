@@ -15,7 +15,7 @@ __all__ = ["Caption", "Picture", "render_page"]
 
 @dataclass(frozen=True)
 class Caption:
-    """What a page says of its scene, and which layers of it can be switched off."""
+    """Text of a page, and the layers of its scene that can be switched off."""
 
     title: str
     note: str = ""
@@ -44,7 +44,7 @@ class Picture:
 
 
 def render_page(caption: Caption, commands: Sequence[bytes] = (), *, live: bool = False) -> str:
-    """Return a page that draws `commands` and loads nothing; a live one then asks its own server for more."""
+    """Return a page that draws `commands` and loads nothing; a live one then connects to its own server."""
     import meshcat
 
     library = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"

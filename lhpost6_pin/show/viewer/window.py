@@ -1,8 +1,8 @@
-"""Where meshcat's commands go: into a page that plays off line, or to browsers that look from this computer.
+"""Where meshcat's commands go: into a page that plays off line, or to browsers on this computer.
 
 meshcat draws into any "window" with a `send`. Its own server listens on all network interfaces and starts a second
-process; neither of the two here does. `Recorder` keeps the commands for `page`; `LoopbackWindow` serves a page on
-127.0.0.1 and hands it the commands as they come, those sent before included.
+process; neither of the two here does. `Recorder` keeps the commands for a page; `LoopbackWindow` serves a page on
+127.0.0.1 and sends it the commands as they come, those sent before included.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ __all__ = ["LoopbackWindow", "Recorder", "Window", "pack_command", "packed_array
 
 FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
 LOOPBACK = "127.0.0.1"
-HOSTS = r"(127\.0\.0\.1|localhost)"  # a page of another site that points its name here is refused
+HOSTS = r"(127\.0\.0\.1|localhost)"  # requests by the name of another site are refused
 
 
 def pack_command(command: Any) -> bytes:
@@ -59,16 +59,16 @@ class Recorder:
 class LoopbackWindow:
     """A meshcat window served on 127.0.0.1 and nowhere else, while used in a ``with`` block.
 
-    A browser that comes late gets the last command of each kind to each object. `send` may be called from any thread.
+    A late browser gets the last command of each kind to each object. `send` may be called from any thread.
     """
 
     def __init__(self, page: str) -> None:
-        """Prepare to serve a live `page` on a port that the system chooses."""
+        """Prepare to serve a live `page` on a free port."""
         self._page = page
         self._commands: dict[tuple[str, str, str], bytes] = {}
         self._browsers: set[Any] = set()
         self._lock = threading.Lock()
-        self._ready, self._looked_at = threading.Event(), threading.Event()
+        self._ready, self._connected = threading.Event(), threading.Event()
 
     @property
     def url(self) -> str:
@@ -76,17 +76,17 @@ class LoopbackWindow:
         return f"http://{LOOPBACK}:{self._port}/"
 
     def wait(self, seconds: float) -> bool:
-        """Wait until a browser looks, at most so long [s]; whether one does."""
-        return self._looked_at.wait(seconds)
+        """Wait until a browser is connected, at most so long [s]; True if one is."""
+        return self._connected.wait(seconds)
 
     def say(self, words: str) -> None:
-        """Show words in the status of the browsers that look."""
+        """Show words in the status of the connected browsers."""
         with self._lock:
             if self._ready.is_set():
                 self._loop.call_soon_threadsafe(self._hand_out, words)
 
     def send(self, command: Any) -> None:
-        """Keep one command for browsers to come and hand it to those that look."""
+        """Keep one command for later browsers and send it to those connected."""
         fields = command.lower()
         packed = pack_command(command)
         with self._lock:
@@ -137,11 +137,11 @@ class LoopbackWindow:
             commands = list(self._commands.values())
         for packed in commands:
             _write(browser, packed)
-        self._looked_at.set()
+        self._connected.set()
 
 
 def _write(browser: Any, message: bytes | str) -> None:
-    """Hand a browser one message, unless it is just leaving: tornado says so at once, or when it has tried."""
+    """Send a browser one message, unless it is closing: tornado raises at once, or in the future that it returns."""
     from tornado.websocket import WebSocketClosedError
 
     with suppress(WebSocketClosedError):
@@ -164,7 +164,7 @@ def _application(window: LoopbackWindow) -> Any:
             window._welcome(self)
 
         def on_message(self, message: str | bytes) -> None:
-            """Nothing a browser says is heard."""
+            """Ignore messages of a browser."""
 
         def on_close(self) -> None:
             window._browsers.discard(self)

@@ -1,0 +1,112 @@
+"""How quantities are shown: units, scales, and numbers as text."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.constants import g
+
+from .page import number
+
+__all__ = [
+    "ROTATIONS",
+    "SCALES",
+    "Scale",
+    "axis_scale",
+    "axis_title",
+    "decibels",
+    "degrees",
+    "force_scale",
+    "milliseconds",
+    "percent",
+    "shown_as",
+    "si_unit",
+    "signed",
+]
+
+DIRECTIONS = {"x": "longitudinal", "y": "transverse", "z": "vertical"}
+ROTATIONS = ("roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How an SI quantity is shown: shown value = SI value times `factor`, in `unit`."""
+
+    factor: float
+    unit: str
+
+
+SCALES: dict[str, Scale] = {
+    "displacement": Scale(1e3, "mm"),
+    "velocity": Scale(1.0, "m/s"),
+    "acceleration": Scale(1.0 / g, "g"),
+    "rotation": Scale(180.0 / np.pi, "deg"),
+    "rotation velocity": Scale(180.0 / np.pi, "deg/s"),
+    "rotation acceleration": Scale(180.0 / np.pi, "deg/s²"),
+    "force": Scale(1e-6, "MN"),
+    "pressure": Scale(1e-6, "MPa"),
+    "ratio": Scale(1.0, "1"),
+}
+
+
+def axis_scale(axis: str, quantity: str) -> Scale:
+    """Return how a quantity of the motion of an axis is shown."""
+    if axis not in ROTATIONS:
+        return SCALES[quantity]
+    return SCALES["rotation" if quantity == "displacement" else f"rotation {quantity}"]
+
+
+def force_scale(axis: str) -> Scale:
+    """Return how the force, or moment, of an axis is shown."""
+    return Scale(1e-3, "kN m" if axis in ROTATIONS else "kN")
+
+
+def si_unit(axis: str, quantity: str = "displacement") -> str:
+    """Return the SI unit of a quantity of the motion of an axis."""
+    per = {"displacement": "", "velocity": "/s", "acceleration": "/s2"}[quantity]
+    return ("rad" if axis in ROTATIONS else "m") + per
+
+
+def axis_title(axis: str) -> str:
+    """Return the heading of an axis."""
+    return f"Axis {axis} ({DIRECTIONS[axis]})" if axis in DIRECTIONS else f"Axis {axis}"
+
+
+def percent(fraction: float) -> str:
+    """Return a share in per cent; an en dash where it is not finite."""
+    return f"{number(100 * fraction)}\N{NO-BREAK SPACE}%" if np.isfinite(fraction) else "–"
+
+
+def shown_as(value: float, scale: Scale) -> str:
+    """Return an SI value in the unit it is shown in."""
+    return f"{number(value * scale.factor)}\N{NO-BREAK SPACE}{scale.unit}"
+
+
+def milliseconds(seconds: float) -> str:
+    """Return a time [s] in milliseconds."""
+    return shown_as(seconds, Scale(1e3, "ms"))
+
+
+def signed(value: float, digits: int) -> str:
+    """Return a number with its sign, none on a rounded zero; an en dash where it is not finite."""
+    if not np.isfinite(value):
+        return "–"
+    value = round(value, digits) + 0.0  # no negative zero
+    return f"{value:{'+' if value else ''}.{digits}f}".replace("-", "−")
+
+
+def decibels(factor: float, *, sign: bool = False) -> str:
+    """Return a factor in dB; "∞" for infinity, an en dash for not-a-number."""
+    if np.isposinf(factor):
+        return "∞"
+    value = 20.0 * np.log10(factor) if factor > 0.0 else np.nan
+    if not np.isfinite(value):
+        return "–"
+    value = round(value, 1) + 0.0  # no negative zero
+    return f"{value:{'+' if sign else ''}.1f}\N{NO-BREAK SPACE}dB".replace("-", "−")
+
+
+def degrees(angle: float) -> str:
+    """Return an angle [rad] in degrees; "∞" for infinity, an en dash for not-a-number."""
+    if np.isposinf(angle):
+        return "∞"
+    return f"{number(float(np.degrees(angle)))}°" if np.isfinite(angle) else "–"

@@ -7,4 +7,4 @@ __all__ = ["make_console"]
 
 def make_console() -> Console:
     """Console as wide as the terminal, and wide enough for tables where the output is a file or a pipe."""
-    return Console() if Console().is_terminal else Console(width=140)
+    return Console() if Console().is_terminal else Console(width=160)

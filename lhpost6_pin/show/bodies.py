@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..machine.machine import Machine
 from ..mechanics.pose import rotation
 from .urdf import legs, urdf_text
@@ -25,8 +25,6 @@ __all__ = [
     "quaternions",
     "specimen_poses",
 ]
-
-Array = NDArray[np.float64]
 
 
 class Bodies(NamedTuple):

@@ -9,7 +9,7 @@ from ..identification.calibration.calibration_summary import (
     range_summary,
 )
 from ..identification.decompose import Decomposed, WrenchAgreement
-from ..identification.validation import PHASES, Phase, Validation
+from ..identification.validation import Validation
 from ..tuning.iterate import Iterated
 from ..tuning.sine import SineTest
 from ..tuning.tune import Tuning
@@ -19,9 +19,11 @@ from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
 from .report.iterate_report import iteration_tables
 from .report.page import Table
-from .report.scales import percent, si_unit
 from .report.sine_report import sine_table
 from .report.tune_report import tuning_tables
+from .report.validate_machine import drift_blocks
+from .report.validate_report import validation_notes, validation_verdict
+from .report.validate_sections import summary_blocks
 from .terminal import print_blocks
 
 __all__ = [
@@ -51,11 +53,9 @@ def print_iterations(result: Iterated) -> None:
 
 def print_sine(test: SineTest) -> None:
     """Print amplitude, phase and distortion without and with cancellers."""
-    print_blocks(
-        f"{test.amplitude:g} {si_unit(test.axis)} at {test.frequency:g} Hz in {test.axis}; distortion over all "
-        "harmonics to 33 Hz",
-        sine_table(test),
-    )
+    amplitude = f"{test.amplitude:g} {'m' if test.axis in 'xyz' else 'rad'}"
+    what = f"{amplitude} at {test.frequency:g} Hz in {test.axis}; distortion over all harmonics to 33 Hz"
+    print_blocks(what, sine_table(test))
 
 
 def print_calibration(calibration: Calibration) -> None:
@@ -86,27 +86,7 @@ def print_discovery(found: Discovery) -> None:
 
 
 def print_validation(found: Validation) -> None:
-    """Print the largest RRMSE of every quantity, by test and phase, with its column."""
-    quantities = ("wrench", "displacement", "velocity", "acceleration", "spool_command")
-    heads = ("test", "phase", "force", *(q.replace("_", " ") for q in quantities[1:]))
-    judged = [p for p in found.phases if not p.reason]
-    rows = [(p.test, PHASES[p.number], *(_largest(p, quantity) for quantity in quantities)) for p in judged]
-    words = []
-    if (spread := found.residual_over_noise) is not None:
-        words.append(f"Residual of inverse dynamics: {spread[0]:.2g} to {spread[1]:.2g} times the sensors' noise")
-    open_loops = [p for p in found.phases if p.number == 2]
-    drifts = [(abs(a.drift), p.test, a.column) for p in open_loops for a in p.of("displacement") if a.unit == "m"]
-    if drifts:
-        rate, test, column = max(drifts)
-        words.append(f"Drift of the open loop: at most {1e3 * rate:.3g} mm/s ({test}, {column})")
-    skipped: dict[str, list[str]] = {}
-    for phase in found.phases:
-        if phase.reason:
-            skipped.setdefault(f"no {PHASES[phase.number]}: {phase.reason}", []).append(phase.test)
-    words += [f"{', '.join(tests)}: {reason}" for reason, tests in skipped.items()]
-    print_blocks(Table("Largest RRMSE of columns that move, delay removed", heads, rows), *words)
-
-
-def _largest(phase: Phase, quantity: str) -> str:
-    worst = max((a for a in phase.of(quantity) if a.moves), key=lambda a: a.rrmse_aligned, default=None)
-    return "-" if worst is None else f"{percent(worst.rrmse_aligned)} ({worst.column})"
+    """Print the verdict, errors by phase, test and axis, the drift of the open loop, and why phases are missing."""
+    blocks = (*summary_blocks(found), *drift_blocks(found))
+    tables = (block for block in blocks if isinstance(block, Table))
+    print_blocks(validation_verdict(found)[0], *tables, *validation_notes(found))

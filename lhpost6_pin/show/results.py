@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..core.names import AXES
 from ..data.layout_faults import RecordFinding
 from ..identification.calibration import Calibration
@@ -15,7 +16,7 @@ from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..simulation.simulate import Run
 from ..tuning.iterate import Iterated
-from ..tuning.sine import SineResult, SineTest
+from ..tuning.sine import SineTest
 from ..tuning.tune import Tuning
 
 if TYPE_CHECKING:
@@ -37,20 +38,20 @@ __all__ = [
 Entries = dict[str, Any]
 
 
+def _picked(source: Any, *names: str) -> Entries:
+    """Attributes of an object by name."""
+    return {name: getattr(source, name) for name in names}
+
+
 def machine_entries(machine: Machine) -> Entries:
     """Every quantity of a machine with unit, deviation, evidence and source, and its effects."""
-    every = (*machine.effects, *machine.modifiers)
+    quantities = machine.parameters.quantities.items()
     return {
-        "name": machine.name,
-        "title": machine.title,
-        "motion": machine.motion,
+        **_picked(machine, "name", "title", "motion"),
         "actuators": machine.actuator_names,
         "struts": machine.strut_names,
-        "quantities": {
-            path: {n: getattr(q, n) for n in ("value", "unit", "sd", "evidence", "assumed", "source")}
-            for path, q in machine.parameters.quantities.items()
-        },
-        "effects": [{n: getattr(e, n) for n in ("name", "law", "ports", "source")} for e in every],
+        "quantities": {p: _picked(q, "value", "unit", "sd", "evidence", "assumed", "source") for p, q in quantities},
+        "effects": [_picked(e, "name", "law", "ports", "source") for e in (*machine.effects, *machine.modifiers)],
     }
 
 
@@ -90,63 +91,51 @@ def finding_entries(found: Mapping[str, Sequence[RecordFinding]]) -> Entries:
 
 def run_entries(run: Run, summary: "RunSummary | None") -> Entries:
     """Outcome of a run and, with a summary, its tracking and demand over capacity."""
-    entries: Entries = {
+    entries = {
         "seconds": run.time[-1] + 1 / run.rate,
-        "scheme": run.scheme,
-        "steps_per_second": run.steps_per_second,
-        "engine": run.engine,
+        **_picked(run, "scheme", "steps_per_second", "engine"),
         "spool_values_clipped": run.clipped,
         "trouble": run.trouble,
     }
-    if summary is not None:
-        names = ("axis", "quantity", "peak_target", "peak_achieved", "rrmse", "delay", "rrmse_aligned")
-        entries |= {
-            "verdict": summary.verdict,
-            "level": summary.level,
-            "tracking": [{n: getattr(row, n) for n in names} for row in summary.tracking if row.peak_target],
-            "spools": [{n: getattr(s, n) for n in ("actuator", "peak", "rms")} for s in summary.spools],
-            "limits": [use._asdict() for use in summary.limits],
-            "channels_missing": summary.missing,
-        }
-    return entries
+    if summary is None:
+        return entries
+    names = ("axis", "quantity", "peak_target", "peak_achieved", "rrmse", "delay", "rrmse_aligned")
+    return entries | {
+        **_picked(summary, "verdict", "level"),
+        "tracking": [_picked(row, *names) for row in summary.tracking if row.peak_target],
+        "spools": [_picked(spool, "actuator", "peak", "rms") for spool in summary.spools],
+        "limits": [use._asdict() for use in summary.limits],
+        "channels_missing": summary.missing,
+    }
 
 
 def tuning_entries(found: Tuning) -> Entries:
     """Bands, delays, margins and gains of every axis before and after."""
     gains = ("displacement_gain", "force_damping", *(f"{n}_feedforward" for n in ("velocity", "acceleration", "jerk")))
 
-    def axis(one: Any) -> Entries:
-        names = [f"{what}_{when}" for what in ("band", "delay", "margin") for when in ("before", "after")]
-        place = AXES.index(one.axis)
-        return {
-            **{name: getattr(one, name) for name in names},
-            "limited_by": one.limited_by,
-            "gains": {name: getattr(found.after, name)[place] for name in gains},
-        }
-
+    names = [f"{what}_{when}" for what in ("band", "delay", "margin") for when in ("before", "after")]
+    axes = {}
+    for one in found.axes:
+        chosen = {name: values[AXES.index(one.axis)] for name, values in _picked(found.after, *gains).items()}
+        axes[one.axis] = {**_picked(one, *names, "limited_by"), "gains": chosen}
     return {
         "tolerance_db": found.tolerance,
         "coherence": found.coherence,
         "stable_with_gains_doubled": found.doubled,
-        "axes": {one.axis: axis(one) for one in found.axes},
+        "axes": axes,
     }
 
 
 def iteration_entries(found: Iterated) -> Entries:
     """Errors of every iteration by axis, the best iteration, and the stopping criterion."""
-
-    def by_axis(values: Any) -> Entries:
-        return {a: v for a, v in zip(AXES, values, strict=True) if not math.isnan(v)}
-
-    history = [
-        {
-            "number": one.number,
-            **{name: by_axis(getattr(one, name)) for name in ("acceleration", "displacement", "delay")},
-            "peak_spool": one.peak_spool,
-            "clipped": one.clipped,
+    history = []
+    for one in found.history:
+        errors = _picked(one, "acceleration", "displacement", "delay")
+        by_axis = {
+            name: {axis: v for axis, v in zip(AXES, values, strict=True) if not math.isnan(v)}
+            for name, values in errors.items()
         }
-        for one in found.history
-    ]
+        history.append(_picked(one, "number") | by_axis | _picked(one, "peak_spool", "clipped"))
     return {"iterations": history, "best": found.best, "stopped": found.reason}
 
 
@@ -154,37 +143,32 @@ def sine_entries(found: SineTest) -> Entries:
     """Amplitude, phase and distortion without and with the cancellers."""
     names = ("amplitude_error", "phase_error", "distortion", "distortion_displacement", "peak_spool")
 
-    def result(one: SineResult) -> Entries:
-        return {**{name: getattr(one, name) for name in names}, "clipped": one.run.clipped}
-
-    asked = {name: getattr(found, name) for name in ("axis", "amplitude", "frequency")}
-    return {**asked, "alone": result(found.before), "with_cancellers": result(found.after)}
+    results = {"alone": found.before, "with_cancellers": found.after}
+    both = {when: {**_picked(one, *names), "clipped": one.run.clipped} for when, one in results.items()}
+    return _picked(found, "axis", "amplitude", "frequency") | both
 
 
 def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
     """Modelled against measured forces, and the residual with its expected levels, by axis."""
-    matches = {name: getattr(agreement, name) for name in ("actuators", "struts", "dissipative")}
-
-    def axis(k: int) -> Entries:
+    matches = _picked(agreement, "actuators", "struts", "dissipative")
+    residual: dict[str, Sequence[Any] | Array] = {
+        "mean": agreement.residual.offset,
+        "sd": agreement.residual.varying,
+        "noise_sd": agreement.noise,
+        "sensors_sd": agreement.sensors.varying,
+        "parameters_sd": agreement.parameters.varying,
+        "sd_explained_by": agreement.varying_explained,
+        "mean_explained_by": agreement.offset_explained,
+    }
+    axes = {}
+    for k in found.plant.axes:
         forces = {
             name: None if one is None else {"rrmse": one.rrmse[k], "rrmse_mean_off": one.rrmse_varying[k]}
             for name, one in matches.items()
         }
-        residual = {
-            "mean": agreement.residual.offset[k],
-            "sd": agreement.residual.varying[k],
-            "noise_sd": agreement.noise[k],
-            "sensors_sd": agreement.sensors.varying[k],
-            "parameters_sd": agreement.parameters.varying[k],
-            "sd_explained_by": agreement.varying_explained[k],
-            "mean_explained_by": agreement.offset_explained[k],
-        }
-        return {**forces, "delay": agreement.actuators.delay[k], "residual": residual}
-
-    return {
-        "compared_up_to_hz": found.comparison.band.high,
-        "axes": {AXES[k]: axis(int(k)) for k in found.plant.axes},
-    }
+        own = {name: values[k] for name, values in residual.items()}
+        axes[AXES[k]] = forces | {"delay": agreement.actuators.delay[k], "residual": own}
+    return {"compared_up_to_hz": found.comparison.band.high, "axes": axes}
 
 
 def calibration_entries(found: Calibration) -> Entries:
@@ -217,9 +201,7 @@ def calibration_entries(found: Calibration) -> Entries:
         for test, before, after in zip(found.tests, found.misfit_before, found.misfit_after, strict=True)
     }
     return {
-        "campaign": found.campaign,
-        "converged": found.converged,
-        "rounds": found.rounds,
+        **_picked(found, "campaign", "converged", "rounds"),
         "parameters": parameters,
         "sensors": sensors,
         "misfit": misfits,

@@ -9,7 +9,6 @@ from rich.text import Text
 
 from ..machine.machine import Machine
 from .report.page import Table
-from .report.scales import si_unit
 from .terminal import print_blocks
 
 if TYPE_CHECKING:
@@ -256,18 +255,11 @@ def print_comparison(compared: Sequence[Compared]) -> None:
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
     """Print the summary of a run, its duration, scheme and rate."""
     if summary is not None:
-        rows = [
-            (
-                *(row.axis, f"{row.quantity} [{si_unit(row.axis, row.quantity)}]"),
-                *(f"{row.peak_target:.4g}", f"{row.peak_achieved:.4g}", f"{row.rrmse:.3f}"),
-                *(f"{1e3 * row.delay:.1f}", f"{row.rrmse_aligned:.3f}"),
-            )
-            for row in summary.tracking
-            if row.peak_target
-        ]
-        header = ("axis", "quantity", "peak target", "peak achieved", "RRMSE", "delay [ms]", "RRMSE, delay removed")
-        uses = ", ".join(f"{use.quantity} {100 * use.share:.0f} % ({use.name})" for use in summary.governing)
-        limits = f"demand over capacity, governing limit first: {uses}" if uses else ""
-        print_blocks(Text(summary.verdict, style="bold"), Table("", header, rows), limits)
+        from .report.run_limits import limit_table
+        from .report.run_report import metrics_table
+
+        moved = [row for row in summary.tracking if row.peak_target]
+        tables = metrics_table(moved, summary.limits), limit_table(summary.limits)
+        print_blocks(Text(summary.verdict, style="bold"), *(table for table in tables if table.rows))
     seconds = run.time[-1] + 1 / run.rate
     print_blocks(f"{seconds:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")

@@ -11,7 +11,7 @@ from .report.page import Figure, Markup, Table, plain_text
 
 __all__ = ["print_blocks"]
 
-_NUMBER = re.compile(r"^$|[<~!+±−–-]|\d")
+_NUMBER = re.compile(r"^$|[<~!▲+±−–-]|\d")
 
 
 def print_blocks(*blocks: str | Text | Table | Figure) -> None:
@@ -30,8 +30,10 @@ def _rich(table: Table) -> RichTable:
     made = RichTable(title=escape(table.caption) or None, title_justify="left")
     cells = [[cell if isinstance(cell, Text) else escape(plain_text(cell)) for cell in row] for row in table.rows]
     for n, heading in enumerate(table.header):
-        right = n > 0 and all(_NUMBER.match(str(row[n])) for row in cells)
-        made.add_column(escape(heading), justify="right" if right else "left", no_wrap=n == 0)
+        texts = [str(row[n]) for row in cells]
+        right = n > 0 and all(map(_NUMBER.match, texts))
+        width = max(map(len, texts), default=0) if right else None  # headings wrap, numbers do not
+        made.add_column(escape(heading), justify="right" if right else "left", no_wrap=n == 0, min_width=width)
     for row in cells:
         made.add_row(*row)
     return made

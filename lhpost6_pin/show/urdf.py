@@ -18,8 +18,8 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.files import models_folder
 from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
@@ -27,7 +27,6 @@ from ..machine.parameters import Parameters, load_parameters
 
 __all__ = ["drawing_colour", "drawing_rgb", "drawing_size", "drawing_sizes", "legs", "urdf_text"]
 
-Array = NDArray[np.float64]
 Vec = Sequence[float] | Array
 ORIGIN = (0.0, 0.0, 0.0)
 

@@ -6,8 +6,8 @@ from statistics import NormalDist
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...identification.calibration import Calibration
 from ...identification.calibration.verdicts import changed_parameters, contradictions
 from .layout import band_on, stacked_layout
@@ -16,7 +16,6 @@ from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION
 
 __all__ = ["INTERVAL", "PROBABILITY", "forest_figure", "half_interval", "information_blocks", "subset_block"]
 
-Array = NDArray[np.float64]
 
 PROBABILITY = 0.9  # of every interval that is drawn or printed
 INTERVAL = f"{100 * PROBABILITY:g}\N{NO-BREAK SPACE}% interval"

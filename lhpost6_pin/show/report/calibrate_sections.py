@@ -38,6 +38,7 @@ __all__ = [
 ]
 
 LISTED = 15  # rows of a table before the rest is folded away
+MARKS = {"at its bound": "! at its bound", "changed": "◆ changed"}
 KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force": "force against pressure"}
 
 
@@ -51,7 +52,7 @@ def parameter_table(calibration: Calibration) -> Table:
         rows.append(
             (
                 parameter.name,
-                _marked(calibration, i),
+                MARKS.get(verdict_on(calibration, i), verdict_on(calibration, i)),
                 _plain(parameter.value),
                 _plain(parameter.at(float(calibration.estimate[i]))),
                 parameter.unit,
@@ -182,14 +183,11 @@ def correlation_blocks(calibration: Calibration) -> list[Block]:
         f"{correlation_summary(calibration)} Pairs correlated by {limit:g} or more: their sum (negative correlation) "
         "or difference (positive), in prior deviations, is determined much better than either alone."
     )
-    groups = (
-        ("Between parameters", [(a, b, *r) for a, b, *r in pairs if a in own and b in own], LISTED),
-        ("Between a parameter and a sensor", [(a, b, *r) for a, b, *r in pairs if (a in own) != (b in own)], LISTED),
-        ("Between sensors", [(a, b, *r) for a, b, *r in pairs if a not in own and b not in own], 0),  # all collapsed
-    )
     blocks: list[Block] = [how]
-    for caption, found, listed in groups:
-        rows = [(a, b, signed(float(r), 4)) for a, b, r in found]
+    captions = {2: "Between parameters", 1: "Between a parameter and a sensor", 0: "Between sensors"}
+    for count, caption in captions.items():
+        rows = [(a, b, signed(r, 4)) for a, b, r in pairs if (a in own) + (b in own) == count]
+        listed = LISTED if count else 0  # pairs of sensors are all collapsed
         blocks += _folded(caption, ("One", "Other", "Correlation"), rows, listed) if rows else []
     return blocks
 
@@ -206,11 +204,6 @@ def _folded(caption: str, header: Sequence[str], rows: Sequence[Sequence[object]
 # --------------------------------------------------------------------------------------------------------- words
 def _judged(calibration: Calibration, misfit: float) -> str:
     return f"{number(misfit)}{' !' * (misfit > calibration.noise_alone)}"
-
-
-def _marked(calibration: Calibration, i: int) -> str:
-    verdict = verdict_on(calibration, i)
-    return {"at its bound": "! at its bound", "changed": "◆ changed"}.get(verdict, verdict)
 
 
 def _plain(value: float) -> str:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...core.arrays import Array
 from .layout import ROW, axis_suffix, band_on, heading, label_on, line_on, log_ticks, on_row, stacked_layout
 from .page import Figure
 from .plots import packed
@@ -112,8 +113,8 @@ def spectra_figure(
     name: str,
     title: str,
     description: str,
-    spectra: Sequence[tuple[str, NDArray[np.float64], Mapping[str, Any]]],
-    frequency: NDArray[np.float64],
+    spectra: Sequence[tuple[str, Array, Mapping[str, Any]]],
+    frequency: Array,
     scale: Scale,
     shown: tuple[float, float],
     *,
@@ -140,8 +141,8 @@ def matrix_figure(
     title: str,
     description: str,
     labels: Sequence[str],
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
+    x: Array,
+    y: Array,
     style: Mapping[str, Any],
     span: tuple[float, float],
 ) -> Figure:

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.names import AXES
 from ...identification.decompose import Decomposed, Work, WrenchAgreement
 from ...identification.decompose.work import delivered_by
@@ -16,7 +16,6 @@ from .scales import ROTATIONS, SCALES, Scale, force_scale
 
 __all__ = ["component_figure", "effect_blocks", "moved_axes", "six_row_blocks", "work_figure"]
 
-Array = NDArray[np.float64]
 
 ENERGY, POWER = Scale(1e-3, "kJ"), Scale(1e-3, "kW")
 RESIDUAL: dict[str, Any] = {"color": VERMILLION, "width": 1.0}

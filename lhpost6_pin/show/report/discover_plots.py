@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...discovery import Discovery
 from ...discovery.held_out import FLOOR
@@ -19,7 +18,6 @@ from .plots import BLACK, BLUE, GREY, VERMILLION
 
 __all__ = ["gain_figure", "gap_figure", "residual_function_figure", "map_blocks"]
 
-Array = NDArray[np.float64]
 
 SHOWN = 10  # families in a figure
 _SHADES = {0: 1.3, 2: 3.0, 3: 10.0, 4: np.inf}

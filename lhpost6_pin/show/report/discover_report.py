@@ -108,10 +108,6 @@ def _proof_table(proof: Proof) -> Table:
     return Table("Normalised RMS error on held-out tests (1: sensor noise)", header, rows)
 
 
-def _p_value(p: float) -> str:
-    return "less than 1e-300" if p < 1e-300 else f"{p:.1g}"
-
-
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
@@ -135,11 +131,12 @@ def _effect_blocks(found: Discovery) -> list[Block]:
     blocks: list[Block] = []
     for one in verdict.effects:
         family = find_family(one.form or one.family)
+        p_value = "less than 1e-300" if one.p_value < 1e-300 else f"{one.p_value:.1g}"
         confused = ", ".join(map(title_of, family.confused_with))
         blocks += [
             _effect_table(one),
             f"{family.equation}. Gain of log-likelihood {number(one.gain)}; p-value, corrected for the number of "
-            f"candidates: {_p_value(one.p_value)}. Often confused with: {confused}.",
+            f"candidates: {p_value}. Often confused with: {confused}.",
         ]
     if lines := advice(found):
         blocks += ["The campaign does not distinguish the candidates. Tests that would:", bullet_list(lines)]

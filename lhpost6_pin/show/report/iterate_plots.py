@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.names import AXES, SAMPLE_RATE
 from ...data.signals import align, lowpass_zero_phase
 from ...mechanics.pose import platen_motion
@@ -26,8 +26,6 @@ CLOSE_UP = 1.0  # [s] drawn at full rate around the strongest
 SEGMENT = 8.0  # [s] of the segments of the spectra; half of a shorter record
 SHOWN = (0.2, 100.0)  # [Hz] of the error's spectrum
 MATRIX = (0.5, 40.0)  # [Hz]
-
-Array = NDArray[np.float64]
 
 
 class AxisIteration(NamedTuple):

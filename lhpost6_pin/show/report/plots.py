@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from .layout import ROW, axis_suffix, band_on, label_on, line_on, on_row, stacked_layout
 from .page import Figure
 from .scales import Scale
@@ -56,7 +57,7 @@ class Trace:
     """One channel to draw: SI values (n,), a name and a plotly line style."""
 
     name: str
-    values: NDArray[np.float64]
+    values: Array
     line: Mapping[str, Any]
     folded: str = ""  # not drawn until this entry of the legend, shared by all of the row with the same, is switched on
 
@@ -73,7 +74,7 @@ class Row:
     note: str = ""  # after the title and its unit
 
 
-def envelope(values: NDArray[np.float64], buckets: int = BUCKETS) -> NDArray[np.int64]:
+def envelope(values: Array, buckets: int = BUCKETS) -> NDArray[np.int64]:
     """Return the indices of the samples to draw: extremes of each bucket, and both ends of the record.
 
     `values` has shape (n,). Not-a-number samples never hide a peak beside them.
@@ -98,7 +99,7 @@ def palette(count: int) -> list[dict[str, Any]]:
     return [{"color": CYCLE[k % n], "dash": DASHES[k // n % len(DASHES)], "width": 1.2} for k in range(count)]
 
 
-def palette_traces(names: Sequence[str], values: NDArray[np.float64]) -> list[Trace]:
+def palette_traces(names: Sequence[str], values: Array) -> list[Trace]:
     """Return a trace of every column of `values` (n, len(names)), each in a style of its own."""
     return [Trace(*one) for one in zip(names, values.T, palette(len(names)), strict=True)]
 
@@ -149,9 +150,7 @@ def time_figure(
     return Figure(name, title, description, traces, layout, layout["height"])
 
 
-def _curve(
-    trace: Trace, values: NDArray[np.float64], factor: float, start: float, step: float, buckets: int
-) -> dict[str, Any]:
+def _curve(trace: Trace, values: Array, factor: float, start: float, step: float, buckets: int) -> dict[str, Any]:
     """Plotly's trace of the samples `values` of a channel."""
     kept = envelope(values, buckets)
     jumps = np.diff(kept, prepend=0)
@@ -161,7 +160,7 @@ def _curve(
     return line | {"x": times, "y": packed(values[kept] * factor)}
 
 
-def packed(values: NDArray[np.float64]) -> dict[str, str]:
+def packed(values: Array) -> dict[str, str]:
     """Return values as plotly reads them from base64: float32, little-endian."""
     return {"dtype": "f4", "bdata": _base64(values.astype("<f4"))}
 

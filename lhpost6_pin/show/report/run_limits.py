@@ -5,21 +5,29 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from .page import Block, Table, bar, number
+from ...core.arrays import Array
+from .page import Block, Table, bar
 from .run_metrics import SpoolUse, Tracking, channel, labels, peaks, sampling
 from .scales import SCALES, axis_scale, shown_as
 
-__all__ = ["TOLERANCE", "ForceUse", "LimitUse", "Limits", "force_use", "governing_limits", "limit_blocks", "limit_uses"]
-__all__ += ["of_limit", "share_of_limit", "shares_of_limit"]
+__all__ = [
+    "TOLERANCE",
+    "ForceUse",
+    "LimitUse",
+    "Limits",
+    "force_use",
+    "governing_limits",
+    "limit_blocks",
+    "limit_table",
+]
+__all__ += ["limit_uses", "share_of_limit", "shares_of_limit"]
 
-Array = NDArray[np.float64]
 Limits = Mapping[str, Array]
 
 TOLERANCE = 1e-3  # relative excess of a sampled peak over its limit that still counts as within
 SHOWN = {"actuator stroke": "displacement", "actuator velocity": "velocity"}
-SHOWN |= {"push": "force", "pull": "force", "force": "force"}
+SHOWN |= {"push": "force", "pull": "force", "force": "force", "spool": "ratio"}
 
 
 class LimitUse(NamedTuple):
@@ -105,25 +113,22 @@ def governing_limits(uses: Iterable[LimitUse]) -> list[LimitUse]:
     return sorted(most.values(), key=lambda use: -use.share)
 
 
-def of_limit(share: float) -> str:
-    """Return demand over capacity with four digits, to distinguish 100.2 % from 100 %."""
-    return f"{number(100 * share, 4)}\N{NO-BREAK SPACE}% of its limit" if np.isfinite(share) else "no capacity"
-
-
 def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
     """Return the table of demand over capacity, the governing limit first."""
     if not uses:
         return ["Neither limits of the machine nor spools are available."]
-    rows = [(u.quantity.capitalize(), u.name, _peak(u), bar(u.share, TOLERANCE)) for u in governing_limits(uses)]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
         "velocity is that of the unloaded piston at full spool. All axes and actuators are in the other sections."
     )
-    return [words, Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)]
+    return [words, limit_table(uses)]
 
 
-def _peak(use: LimitUse) -> str:
-    if use.quantity == "spool":
-        return "–"
-    shown = SHOWN.get(use.quantity)
-    return shown_as(use.peak, SCALES[shown] if shown else axis_scale(use.name, use.quantity))
+def limit_table(uses: Sequence[LimitUse]) -> Table:
+    """Return the largest demand over capacity of each quantity, the governing limit first."""
+    rows = []
+    for use in governing_limits(uses):
+        scale = SCALES[SHOWN[use.quantity]] if use.quantity in SHOWN else axis_scale(use.name, use.quantity)
+        peak = "–" if use.quantity == "spool" else shown_as(use.peak, scale)
+        rows.append((use.quantity.capitalize(), use.name, peak, bar(use.share, TOLERANCE)))
+    return Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)

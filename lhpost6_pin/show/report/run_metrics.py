@@ -11,8 +11,8 @@ from itertools import groupby
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import RecordError
 from ...data.signals import align, delay, lowpass_zero_phase, rrmse
 
@@ -54,7 +54,7 @@ class Tracking:
     rrmse: float  # as recorded
     delay: float  # [s], positive when the table is late
     rrmse_aligned: float  # after removing the delay
-    aligned: NDArray[np.float64] | None  # (n,) achieved motion with the delay removed, SI
+    aligned: Array | None  # (n,) achieved motion with the delay removed, SI
 
 
 @dataclass(frozen=True)
@@ -71,13 +71,13 @@ class SpoolUse:
 class Drift:
     """Slow part of the displacement error, achieved minus target."""
 
-    error: NDArray[np.float64]  # (n, n_axes), low-passed, SI
+    error: Array  # (n, n_axes), low-passed, SI
     cutoff: float  # [Hz]
-    largest: NDArray[np.float64]  # (n_axes,) greatest |error|
-    residual: NDArray[np.float64]  # (n_axes,) mean unfiltered error over the end of the record
+    largest: Array  # (n_axes,) greatest |error|
+    residual: Array  # (n_axes,) mean unfiltered error over the end of the record
 
 
-def channel(record: xr.Dataset, name: str) -> NDArray[np.float64]:
+def channel(record: xr.Dataset, name: str) -> Array:
     """Return the variable as float64 of shape (n,) or (n, n_axes), (n, n_act), ...."""
     return np.asarray(record[name].transpose("time", ...).values, dtype=np.float64)
 
@@ -166,13 +166,13 @@ def drift(record: xr.Dataset) -> Drift | None:
     return Drift(slow, cutoff, peaks(slow), end.mean(axis=0))
 
 
-def peaks(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def peaks(values: Array) -> Array:
     """Greatest finite |value| of each column (n, ...) -> (...); not-a-number for a column without any."""
     size = np.where(np.isfinite(values), np.abs(values), -np.inf).max(axis=0)
     return np.where(size >= 0.0, size, np.nan)
 
 
-def peak_window(values: NDArray[np.float64], step: float, duration: float) -> tuple[int, int] | None:
+def peak_window(values: Array, step: float, duration: float) -> tuple[int, int] | None:
     """First and last sample of the `duration` [s] around the peak of (n,); nothing if the record is hardly longer."""
     n, length = len(values), int(duration / step)
     if n <= 2 * length:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...motions.response_spectra import response_spectrum
 from .charts import Curve, Panel, XAxis, chart_figure
 from .page import Block, Figure, Table, details, grid, missing, number
@@ -147,7 +147,7 @@ def _traces(record: xr.Dataset, row: Tracking | None, axis: str, quantity: str, 
     return traces
 
 
-def _of_axis(record: xr.Dataset, name: str, axis: str) -> NDArray[np.float64]:
+def _of_axis(record: xr.Dataset, name: str, axis: str) -> Array:
     return channel(record, name)[:, labels(record, "axis").index(axis)]
 
 

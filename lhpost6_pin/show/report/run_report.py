@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 from ...core.errors import UnknownNameError
 from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
 from .run_components import force_blocks, pressure_blocks, specimen_blocks, strut_blocks
-from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses, share_of_limit
+from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses
 from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
 from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
 from .run_spools import spool_blocks
 from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
 
-__all__ = ["LIMIT_NAMES", "RunSummary", "write_run_report"]
+__all__ = ["LIMIT_NAMES", "RunSummary", "metrics_table", "write_run_report"]
 
 LIMIT_NAMES = (
     "displacement",  # (n_axes,) [m, rad]
@@ -89,6 +89,7 @@ def write_run_report(
     notes = [*(notes or ()), *_gaps(record)]
     uses = limit_uses(record, found, spools, bounds)
     verdict, level = verdict_of_run(record, found, spools, uses, notes)
+    motion = [f"platen_{quantity}" for quantity in QUANTITIES]
     joints = "specimen_joint_position" in record
     sections = [
         Section("tracking", "Target and achieved", tracking_blocks(record, found)),
@@ -100,7 +101,11 @@ def write_run_report(
         *([Section("specimen", "Specimen", specimen_blocks(record))] if joints else []),
         Section("drift", "Drift", drift_blocks(record)),
         Section("limits", "Demand over capacity", limit_blocks(uses)),
-        Section("metrics", "Table of metrics", [_metrics(found, bounds)]),
+        Section(
+            "metrics",
+            "Table of metrics",
+            [metrics_table(found, uses) if found else missing(motion, "Peaks and tracking are not tabulated.")],
+        ),
         Section("assumptions", "Assumptions and sources", _assumptions(list(machine_table or ()))),
         Section("record", "The record", _contents(record)),
     ]
@@ -157,13 +162,11 @@ def _purpose(record: xr.Dataset, found: Sequence[Tracking]) -> str:
     return f"Track a motion on {count} (peak target displacement {words}), {length}, {load}."
 
 
-def _metrics(found: Sequence[Tracking], limits: Limits) -> Block:
-    if not found:
-        return missing([f"platen_{quantity}" for quantity in QUANTITIES], "Peaks and tracking are not tabulated.")
-    rows = []
+def metrics_table(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> Table:
+    """Return peaks, tracking and demand over capacity of every quantity and axis."""
+    shares, rows = {(use.quantity, use.name): use.share for use in uses}, []
     for row in found:
-        scale = axis_scale(row.axis, row.quantity)
-        used = share_of_limit(row.peak_achieved, limits, row.quantity, row.place)
+        scale, used = axis_scale(row.axis, row.quantity), shares.get((row.quantity, row.axis), np.nan)
         peaks = (number(peak * scale.factor) for peak in (row.peak_target, row.peak_achieved))
         late = milliseconds(row.delay) if np.isfinite(row.delay) else "–"
         errors = percent(row.rrmse), late, percent(row.rrmse_aligned)

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Mask
 from ...data.signals import delay
 from .page import Block, Figure, Table, bar, grid, missing
 from .plots import ACHIEVED, ROW, TARGET, VERMILLION, Row, Trace, time_figure
@@ -59,7 +59,7 @@ def spool_figure(
     actuator: str,
     words: str,
     traces: Sequence[Trace],
-    full: NDArray[np.bool_],
+    full: Mask,
     *,
     start: float,
     step: float,
@@ -87,7 +87,7 @@ def spool_figure(
 
 
 def _close_up(
-    spool: Mapping[str, NDArray[np.float64]], actuators: Sequence[str], own: Sequence[int], start: float, step: float
+    spool: Mapping[str, Array], actuators: Sequence[str], own: Sequence[int], start: float, step: float
 ) -> Figure | None:
     """Every sample around the largest command among the actuators `own`, on a scale of its own."""
     values = next(iter(spool.values()))
@@ -106,11 +106,11 @@ def _close_up(
     return time_figure(f"close-spool-{k + 1}", title, words, rows, start=start, step=step, window=window)
 
 
-def _traces(spool: Mapping[str, NDArray[np.float64]], k: int) -> list[Trace]:
+def _traces(spool: Mapping[str, Array], k: int) -> list[Trace]:
     return [Trace(who, values[:, k], LINES[who]) for who, values in spool.items()]
 
 
-def _stretches(marked: NDArray[np.bool_], start: float, step: float, size: int) -> list[tuple[float, float]]:
+def _stretches(marked: Mask, start: float, step: float, size: int) -> list[tuple[float, float]]:
     """Times of the stretches of `size` samples that hold marked ones, neighbours joined."""
     held = np.pad(marked, (0, -len(marked) % size)).reshape(-1, size).any(axis=1)
     edges = np.flatnonzero(np.diff(held, prepend=False, append=False)) * size

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from .page import Headline, Level
-from .run_limits import TOLERANCE, LimitUse, governing_limits, of_limit
+from .page import Headline, Level, number
+from .run_limits import TOLERANCE, LimitUse, governing_limits
 from .run_metrics import SpoolUse, Tracking, channel, labels
 from .scales import SCALES, axis_scale, milliseconds, percent, shown_as
 
@@ -34,8 +34,9 @@ def verdict_of_run(
     beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
     sentences = [clipped, tracked]
     if beyond:
-        named = ", ".join(f"{use.name} {use.quantity} ({of_limit(use.share)})" for use in beyond)
-        sentences.append(f"Limits exceeded: {named}.")
+        shares = {use: f"{number(100 * use.share, 4)}\N{NO-BREAK SPACE}% of its limit" for use in beyond}
+        named = (f"{u.name} {u.quantity} ({shares[u] if np.isfinite(u.share) else 'no capacity'})" for u in beyond)
+        sentences.append(f"Limits exceeded: {', '.join(named)}.")
     elif any(use.quantity != "spool" for use in uses):
         sentences.append(f"All {'other ' * bool(clipped)}demands are within the given limits.")
     elif spools and not clipped:

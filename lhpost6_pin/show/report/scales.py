@@ -19,7 +19,6 @@ __all__ = [
     "milliseconds",
     "percent",
     "shown_as",
-    "si_unit",
     "signed",
 ]
 
@@ -58,12 +57,6 @@ def axis_scale(axis: str, quantity: str) -> Scale:
 def force_scale(axis: str) -> Scale:
     """Return how the force, or moment, of an axis is shown."""
     return Scale(1e-3, "kN m" if axis in ROTATIONS else "kN")
-
-
-def si_unit(axis: str, quantity: str = "displacement") -> str:
-    """Return the SI unit of a quantity of the motion of an axis."""
-    per = {"displacement": "", "velocity": "/s", "acceleration": "/s2"}[quantity]
-    return ("rad" if axis in ROTATIONS else "m") + per
 
 
 def axis_title(axis: str) -> str:

@@ -3,8 +3,8 @@
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.names import AXES, SAMPLE_RATE
 from ...data.distortion import Harmonics
 from ...mechanics.pose import platen_motion
@@ -29,8 +29,6 @@ STEP = 1.0 / SAMPLE_RATE
 FLOOR = 1e-4  # [%] of the fundamental below which harmonics are not drawn
 QUIET = 0.02  # share of the stroke below which a spool counts as quiet
 CYCLES = 2  # that are drawn
-
-Array = NDArray[np.float64]
 
 
 def _results(test: SineTest) -> tuple[tuple[str, SineResult, dict[str, object]], ...]:

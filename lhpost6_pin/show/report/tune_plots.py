@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array, Complex, Mask
 from ...data.transfer import Transfer
 from ...tuning.identify import tuning_numbers
 from ...tuning.tune import Tuning
@@ -21,9 +21,6 @@ MODEL = {"color": BLACK, "width": 1.0, "dash": "dash"}
 MODEL_POINTS = 500  # of the linear model's response that are drawn, at most
 GAINS = (-12.0, 9.0)  # [dB] drawn
 ROW = 130  # [CSS px]
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def bode_figure(tuning: Tuning, a: int) -> Figure:
@@ -78,7 +75,7 @@ def _response(name: str, line: dict[str, Any], f: Array, response: Complex, dela
     return Curve(name, f, _decibels(response), line), Curve(name, f, phase, line), Curve(name, f, phase - turn, line)
 
 
-def _drawn(frequency: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _drawn(frequency: Array) -> tuple[Array, Mask]:
     """Frequencies that are drawn, and where they are."""
     inside = (frequency >= BAND[0]) & (frequency <= BAND[1])
     return frequency[inside], inside

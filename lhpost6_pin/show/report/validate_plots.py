@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...identification.validation import ComparedQuantity, Phase, Valves
 from ...identification.validation.phase_agreement import MOTIONS
 from .charts import Curve, Panel, XAxis, chart_figure, spectra_figure
@@ -16,7 +16,6 @@ from .scales import SCALES, Scale, axis_scale, axis_title, force_scale, percent
 
 __all__ = ["actuator_blocks", "force_figure", "motion_blocks", "scale_of", "spectrum_blocks", "valve_figures"]
 
-Array = NDArray[np.float64]
 
 BUCKETS = 320  # stretches of a channel over time, each drawn by its least and greatest sample
 FEW = 160  # the same where many actuators share a figure

@@ -9,14 +9,14 @@ from .scales import percent
 from .validate_machine import drift_blocks, lag_blocks, resonance_blocks, valve_blocks
 from .validate_sections import ROMAN, named, summary_blocks, test_blocks, why_not, worst_of
 
-__all__ = ["write_validate_report"]
+__all__ = ["validation_notes", "validation_verdict", "write_validate_report"]
 
 FOLLOWED = 0.10  # judgement, not physics: RRMSE, delay removed, up to which the model counts as valid for a test
 
 
 def write_validate_report(found: Validation, path: Path | str, *, command: str = "") -> Path:
     """Write the self-contained HTML report of a validation to `path` and return the path."""
-    verdict, level = _verdict(found)
+    verdict, level = validation_verdict(found)
     phases = _requested(found)
     listed = " and ".join(", ".join(PHASES[n] for n in phases).rsplit(", ", 1))
     count = f"{len(found.tests)} test{'s' * (len(found.tests) > 1)}"
@@ -41,7 +41,7 @@ def write_validate_report(found: Validation, path: Path | str, *, command: str =
             *(Section(f"test-{k}", f"Test {t}", test_blocks(found, t)) for k, t in enumerate(found.tests, start=1)),
             Section("assumptions", "Assumptions and sources", _assumptions(found)),
         ],
-        notes=_notes(found),
+        notes=validation_notes(found),
         command=command,
     )
     return save_page(page, path)
@@ -52,7 +52,8 @@ def _requested(found: Validation) -> list[int]:
     return sorted({p.number for p in found.phases})
 
 
-def _verdict(found: Validation) -> tuple[str, Level]:
+def validation_verdict(found: Validation) -> tuple[str, Level]:
+    """Return the verdict and its level."""
     sentences: list[str] = []
     level: Level = "good"
     for n in _requested(found):
@@ -87,8 +88,8 @@ def _headline(found: Validation, n: int) -> Headline:
     return Headline(percent(one.rrmse_aligned), label, note, "good" if one.rrmse_aligned <= FOLLOWED else "attention")
 
 
-def _notes(found: Validation) -> list[str]:
-    """Missing phases and events; tests with the same note share it."""
+def validation_notes(found: Validation) -> list[str]:
+    """Return missing phases and events; tests with the same note share it."""
     tests: dict[str, dict[str, None]] = {}
     for phase in found.phases:
         missing = [f"no {PHASES[phase.number]}: {phase.reason}"] if phase.reason else []

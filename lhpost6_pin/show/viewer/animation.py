@@ -4,8 +4,8 @@ import logging
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...machine.machine import Machine
 from ...mechanics.pose import rotation
 from ..bodies import (
@@ -27,7 +27,6 @@ __all__ = ["draw_animation", "leg_forces"]
 
 log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 
 LOOP_FOR_EVER = 1_000_000_000  # repetitions
 UNSEEN = 1e-9  # [m, 1] invisible change

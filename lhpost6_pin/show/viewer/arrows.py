@@ -8,14 +8,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...machine.machine import Machine
 from ..urdf import drawing_rgb, drawing_size
 
 __all__ = ["OPACITY", "arrow_colours", "arrow_sizes", "arrow_solid", "largest_force"]
 
-Array = NDArray[np.float64]
 
 CORNERS = 20
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import ParameterError, RecordError
 from ...data.records import require
 from ...machine.machine import Machine
@@ -17,7 +17,6 @@ from ...mechanics.pose import forward_kinematics
 
 __all__ = ["AS_IT_IS", "Frames", "Ghost", "Look", "make_frames", "record_frames", "record_title"]
 
-Array = NDArray[np.float64]
 
 OTHERS = ("first_other", "second_other")
 """Names, which give the colours, of records overlaid."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...machine.machine import Machine
 from ..bodies import Bodies, body_name, body_poses, joint_positions, load_specimen_bodies, specimen_poses
 from ..urdf import drawing_colour, legs
@@ -27,7 +27,6 @@ __all__ = [
     "table_of",
 ]
 
-Array = NDArray[np.float64]
 
 ROOT = "table"
 FIELD_OF_VIEW = 36.0  # [deg]

@@ -32,7 +32,8 @@ def _rich(table: Table) -> RichTable:
     for n, heading in enumerate(table.header):
         texts = [str(row[n]) for row in cells]
         right = n > 0 and all(map(_NUMBER.match, texts))
-        width = max(map(len, texts), default=0) if right else None  # headings wrap, numbers do not
+        whole = right or any(isinstance(row[n], Text) for row in cells)
+        width = max(map(len, texts), default=0) if whole else None  # headings wrap, numbers and styled words do not
         made.add_column(escape(heading), justify="right" if right else "left", no_wrap=n == 0, min_width=width)
     for row in cells:
         made.add_row(*row)

@@ -98,67 +98,38 @@ def _forces(plant: Plant) -> list[Capacity]:
     area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
     push, pull = high * area_a - low * area_b, low * area_a - high * area_b
     hold_down = sum(s.pressure * s.area for s in machine.struts)
-    printed = par.vector("table_2_2.force_actuators")
-    lines = []
+    printed, accelerations = (par.vector(f"table_2_2.{x}_actuators") for x in ("force", "acceleration"))
+    rows = []
     for k, name in enumerate("XY"):
         force = float(np.sum(np.maximum(jacobian[:, k] * push, jacobian[:, k] * pull)))
-        lines.append(Capacity(f"peak force {name}", force, printed[k], "N", "supply against return in all actuators"))
+        rows.append((f"peak force {name}", force, printed[k], "N", "supply against return in all actuators"))
     up = float(jacobian[:, 2] @ np.where(jacobian[:, 2] > 0.0, push, pull)) - hold_down
-    lines.append(Capacity("peak force Z up", up, printed[2], "N", "supply in all chambers, less hold-down"))
+    rows.append(("peak force Z up", up, printed[2], "N", "supply in all chambers, less hold-down"))
     left = par.number("table_2_2.chamber_pressure_down")
-    down = hold_down - float(jacobian[:, 2] @ (left * area_a))
-    lines.append(
-        Capacity(
-            "peak force Z down",
-            down,
-            par.number("table_2_2.force_down"),
-            "N",
-            f"hold-down less {left / 1e6:.3g} MPa in the chambers",
-        )
-    )
+    down, most = hold_down - float(jacobian[:, 2] @ (left * area_a)), par.number("table_2_2.force_down")
+    rows.append(("peak force Z down", down, most, "N", f"hold-down less {left / 1e6:.3g} MPa in the chambers"))
     _, mass = platen_inertia(plant.model, machine)
-    accelerations = par.vector("table_2_2.acceleration_actuators")
-    for k, name in enumerate(("X", "Y", "Z up")):
-        weight = mass[2, 2] * machine.platen.gravity if k == 2 else 0.0
-        value = (lines[k].model - weight) / mass[k, k]
-        lines.append(
-            Capacity(f"peak acceleration {name}", value, accelerations[k], "m/s2", "peak force over effective mass")
-        )
     weight = mass[2, 2] * machine.platen.gravity
-    value = (down + weight) / mass[2, 2]
-    lines.append(
-        Capacity(
-            "peak acceleration Z down",
-            value,
-            machine.limits.acceleration[2],
-            "m/s2",
-            "peak force and weight over effective mass",
-        )
-    )
-    return lines
+    for k, name in enumerate(("X", "Y", "Z up")):
+        value = (rows[k][1] - (weight if k == 2 else 0.0)) / mass[k, k]
+        rows.append((f"peak acceleration {name}", value, accelerations[k], "m/s2", "peak force over effective mass"))
+    value, most = (down + weight) / mass[2, 2], machine.limits.acceleration[2]
+    rows.append(("peak acceleration Z down", value, most, "m/s2", "peak force and weight over effective mass"))
+    return [Capacity(*row) for row in rows]
 
 
 def _speeds(machine: Machine) -> list[Capacity]:
-    both = machine.with_params({f"{a.kind}.valves": 2 for a in machine.actuators if a.area_b is not None})
-    plant = make_plant(both)
+    plant = make_plant(machine.with_valves(2))
     jacobian, speeds = _zero_jacobian(plant), actuator_speeds(plant)
     lines = []
     for k, axis in enumerate(AXES):
-        for sign, word in ((1.0, "up"), (-1.0, "down")) if axis == "z" else ((1.0, ""),):
+        for sign, word in ((1.0, " up"), (-1.0, " down")) if axis == "z" else ((1.0, ""),):
             rate = sign * jacobian[:, k]
             moving = np.abs(rate) > 1e-9
             slowest = np.min(np.where(rate > 0.0, speeds[:, 0], speeds[:, 1])[moving] / np.abs(rate[moving]))
-            unit = "m/s" if k < 3 else "rad/s"
-            name = f"peak velocity {axis} {word}".strip()
-            lines.append(
-                Capacity(
-                    name,
-                    float(slowest),
-                    machine.limits.velocity[k],
-                    unit,
-                    "slowest actuator, unloaded, full spool",
-                )
-            )
+            unit, how = "m/s" if k < 3 else "rad/s", "slowest actuator, unloaded, full spool"
+            name, printed = f"peak velocity {axis}{word}", machine.limits.velocity[k]
+            lines.append(Capacity(name, float(slowest), printed, unit, how))
     return lines
 
 

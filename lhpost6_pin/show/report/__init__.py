@@ -1,10 +1,9 @@
 """Self-contained HTML reports: one page design for every command that reports something.
 
-`page` knows how a report looks; `plots` turns channels into light interactive figures and `charts` draws over
-frequencies, iterations and harmonics. The `run_*` modules say what one test is judged by, `tune_*`, `iterate_*` and
-`sine_*` what the tools of the controller found, `decompose_*` what forces are behind a test,
-`calibrate_*` what a campaign says of a machine's numbers. A report of another kind is another set of sections on the
-same `Page`.
+`page` renders a page from blocks: text, tables and figures as data. `plots` draws channels over time and `charts` over
+frequencies, iterations and harmonics, in the units of `scales`. The other modules make the sections of one report each:
+a run, the tools of the controller (`tune_*`, `iterate_*`, `sine_*`), a force decomposition, a validation, a calibration
+and a discovery.
 """
 
 from .calibrate_report import write_calibrate_report

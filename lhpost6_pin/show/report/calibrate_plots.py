@@ -1,9 +1,9 @@
 """Figures of a calibration: estimates and priors, subset and joint estimates, information per test."""
 
 import html
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import NormalDist
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -26,19 +26,6 @@ _SHADES = (4, 3, 2, 0)
 """From much to little information."""
 
 
-class Dots(NamedTuple):
-    """Estimates with intervals: place (m,) up the figure, value and half interval (m,) in prior deviations."""
-
-    name: str
-    place: Sequence[float]
-    value: Sequence[float]
-    half: Sequence[float]
-    labels: Sequence[str]
-    color: str
-    symbol: str
-    size: int = 8  # [CSS px]
-
-
 def half_interval(sd: float) -> float:
     """Half of the interval of an estimate with standard deviation `sd`."""
     return NormalDist().inv_cdf(0.5 + 0.5 * PROBABILITY) * sd
@@ -58,18 +45,18 @@ def _drawn(calibration: Calibration) -> str:
 
 def forest_figure(calibration: Calibration) -> Figure:
     """Return every parameter's estimate with its interval beside its prior."""
-    count = len(calibration.parameters)
     changed, informed = changed_parameters(calibration), calibration.informed
+    others = [i for i in range(len(calibration.parameters)) if i not in changed]
     groups = {
-        "differs from nominal": (changed, VERMILLION, "diamond"),
-        "does not differ": ([i for i in range(count) if informed[i] and i not in changed], BLUE, "circle"),
-        "not informed": ([i for i in range(count) if not informed[i] and i not in changed], "#6e7781", "circle-open"),
+        "differs from nominal": (changed, {"color": VERMILLION, "symbol": "diamond"}),
+        "does not differ": ([i for i in others if informed[i]], {"color": BLUE, "symbol": "circle"}),
+        "not informed": ([i for i in others if not informed[i]], {"color": "#6e7781", "symbol": "circle-open"}),
     }
     where, reach = calibration.estimate / calibration.prior, _reach(calibration) * calibration.sd / calibration.prior
     names = [parameter.name for parameter in calibration.parameters]
     dots = [
-        Dots(name, rows, where[rows].tolist(), reach[rows].tolist(), [names[i] for i in rows], color, symbol)
-        for name, (rows, color, symbol) in groups.items()
+        _dots(name, rows, where[rows].tolist(), reach[rows].tolist(), [names[i] for i in rows], marker)
+        for name, (rows, marker) in groups.items()
         if rows
     ]
     words = (
@@ -96,23 +83,22 @@ def subset_block(calibration: Calibration) -> Block:
         own_names = estimators[i]
         return identified.index(i) + 0.8 * ((own_names.index(name) + 0.5) / len(own_names) - 0.5)
 
-    def dots_of(name: str, chosen: Sequence[int], estimate: Array, sd: Array, color: str, symbol: str) -> Dots:
+    def dots_of(name: str, chosen: Sequence[int], estimate: Array, sd: Array, **marker: str) -> dict[str, Any]:
         places, labels = [place(name, i) for i in chosen], [names[i] for i in chosen]
         where, half = ([float(x[i] / prior[i]) for i in chosen] for x in (estimate, _reach(calibration) * sd))
-        return Dots(name, places, where, half, labels, color, symbol)
+        return _dots(name, places, where, half, labels, marker)
 
-    series = [dots_of(TOGETHER, identified, calibration.estimate, calibration.sd, BLACK, "line-ns-open")]
+    series = [dots_of(TOGETHER, identified, calibration.estimate, calibration.sd, color=BLACK, symbol="line-ns-open")]
     for k, s in enumerate(groups):  # the last colour is black: the joint estimate
         color, symbol = CYCLE[k % (len(CYCLE) - 1)], SYMBOLS[k % len(SYMBOLS)]
-        series.append(dots_of(s.name, identifies[s.name], s.estimate, s.sd, color, symbol))
+        series.append(dots_of(s.name, identifies[s.name], s.estimate, s.sd, color=color, symbol=symbol))
     alone = {s.name: s.estimate for s in groups}
     marked = [(name, i) for name, i, _ in contradictions(calibration) if i in identifies.get(name, ())]
     if marked:
         places, where = [place(*one) for one in marked], [float(alone[name][i] / prior[i]) for name, i in marked]
         labels, half = [f"{names[i]}, {name}" for name, i in marked], [0.0] * len(marked)
-        series.append(
-            Dots("contradicts the joint estimate", places, where, half, labels, VERMILLION, "circle-open", 17)
-        )
+        ring = {"color": VERMILLION, "symbol": "circle-open", "size": 17}
+        series.append(_dots("contradicts the joint estimate", places, where, half, labels, ring))
     words = (
         f"Estimates {_drawn(calibration)}: of each group of residuals alone, and of open-loop simulation from the "
         "recorded spools, with the same priors; a group is omitted where its predicted deviation is "
@@ -128,8 +114,8 @@ def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> lis
     """Return, for some unknowns, the predicted deviation from each test alone over the prior, as a shaded table."""
     informed = calibration.numbers.number("report.informed")
     edges = (0.2 * informed, 0.5 * informed, informed)
-    said = [f"up to {edge:g}" for edge in edges] + [f"above {informed:g}: almost no information"]
-    key = " ".join(map(shaded, said, _SHADES))
+    ranges = [f"up to {edge:g}" for edge in edges] + [f"above {informed:g}: almost no information"]
+    key = " ".join(map(shaded, ranges, _SHADES))
     ratios = np.vstack([calibration.sd, calibration.alone])[:, unknowns] / calibration.prior[unknowns]
     rows = [
         (
@@ -144,7 +130,7 @@ def information_blocks(calibration: Calibration, unknowns: Sequence[int]) -> lis
 
 
 def _forest(
-    name: str, title: str, words: str, labels: Sequence[str], series: Sequence[Dots], row_height: int
+    name: str, title: str, words: str, labels: Sequence[str], series: Sequence[dict[str, Any]], row_height: int
 ) -> Figure:
     """Rows of estimates over one axis, the first on top."""
     axis = "Prior standard deviations from nominal"
@@ -159,20 +145,27 @@ def _forest(
     }
     layout["xaxis"] |= {"zeroline": True, "zerolinecolor": BLACK, "zerolinewidth": 1}
     layout["shapes"].append(band_on(0, GREY, x=(-half_interval(1.0), half_interval(1.0))))
-    return Figure(name, title, words, [_trace(dots) for dots in series], layout, layout["height"])
+    return Figure(name, title, words, series, layout, layout["height"])
 
 
-def _trace(dots: Dots) -> dict[str, Any]:
-    marker = {"color": dots.color, "symbol": dots.symbol, "size": dots.size}
+def _dots(
+    name: str,
+    place: Sequence[float],
+    value: Sequence[float],
+    half: Sequence[float],
+    labels: Sequence[str],
+    marker: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Estimates with intervals: place (m,) up the figure, value and half interval (m,) in prior deviations."""
     return {
         "type": "scatter",
         "mode": "markers",
-        "name": html.escape(dots.name),
-        "x": list(dots.value),
-        "y": list(dots.place),
-        "text": [html.escape(label) for label in dots.labels],
-        "customdata": list(dots.half),
-        "hovertemplate": "%{text}: %{x:.3f}" + " ± %{customdata:.3f}" * any(dots.half),
-        "marker": marker | {"line": {"width": 1.6, "color": dots.color}},
-        "error_x": {"type": "data", "array": list(dots.half), "color": dots.color, "thickness": 1.6, "width": 3},
+        "name": html.escape(name),
+        "x": list(value),
+        "y": list(place),
+        "text": [html.escape(label) for label in labels],
+        "customdata": list(half),
+        "hovertemplate": "%{text}: %{x:.3f}" + " ± %{customdata:.3f}" * any(half),
+        "marker": {"size": 8, "line": {"width": 1.6, "color": marker["color"]}, **marker},
+        "error_x": {"type": "data", "array": list(half), "color": marker["color"], "thickness": 1.6, "width": 3},
     }

@@ -74,9 +74,9 @@ def gain_figure(one: Round, number: int, least: float, confusable: float) -> Fig
     for words, color, keep in (("accepted", BLUE, True), ("rejected", "#6e7781", False)):
         some = [i for i, s in enumerate(shown) if (not s.refused) == keep]
         if some:
-            said = [shown[i].refused or "passes" for i in some]
+            reasons = [shown[i].refused or "passes" for i in some]
             bar = _bar(words, color, [max(shown[i].gain, 1.0) for i in some], some, "%{x:.4g}: %{text}")
-            traces.append(bar | {"text": [html.escape(s) for s in said], "textposition": "none"})
+            traces.append(bar | {"text": list(map(html.escape, reasons)), "textposition": "none"})
     layout = _bars(names, "Gain of log-likelihood", 38, least, max(s.gain for s in shown))
     words = (
         "The best candidate of each family, with all known unknowns refitted. Dashed: the least gain, "

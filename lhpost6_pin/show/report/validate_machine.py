@@ -32,8 +32,8 @@ def drift_blocks(found: Validation) -> list[Block]:
     worst = [
         _furthest(phases, [k for k, axis in enumerate(axes) if (axis in ROTATIONS) == turns]) for turns in (False, True)
     ]
-    said = f"Largest drift: {'; '.join(words for words in worst if words)}."
-    return [how, Table("Drift rate", header, rows), said]
+    largest = f"Largest drift: {'; '.join(words for words in worst if words)}."
+    return [how, Table("Drift rate", header, rows), largest]
 
 
 def _furthest(phases: Sequence[Phase], columns: Sequence[int]) -> str:

@@ -81,7 +81,7 @@ def make_frames(
     force: Array | None = None,
     look: Look = AS_IT_IS,
 ) -> Frames:
-    """Sample a platen motion (n, 6), ghosts, and forces (n, n_legs) over time (n,) [s] as `look` says.
+    """Sample a platen motion (n, 6), ghosts, and forces (n, n_legs) over time (n,) [s] as `look` states.
 
     Only the common time is kept. Raises RecordError for a motion that cannot be drawn, ParameterError for a number of
     the look that is not positive.

@@ -88,7 +88,7 @@ class LiveView:
             arrow = self._table[f"{name}_rod"]["force"]
             arrow.set_property("scale", size.tolist())
             arrow.set_property("color", [*colour.tolist(), OPACITY])
-        self._window.say(f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
+        self._window.show_status(f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
 
 
 @contextmanager

@@ -79,7 +79,7 @@ class LoopbackWindow:
         """Wait until a browser is connected, at most so long [s]; True if one is."""
         return self._connected.wait(seconds)
 
-    def say(self, words: str) -> None:
+    def show_status(self, words: str) -> None:
         """Show words in the status of the connected browsers."""
         with self._lock:
             if self._ready.is_set():

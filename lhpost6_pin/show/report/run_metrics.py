@@ -18,7 +18,6 @@ from ...data.signals import align, delay, lowpass_zero_phase, rrmse
 
 __all__ = [
     "QUANTITIES",
-    "Drift",
     "SpoolUse",
     "Tracking",
     "commanded_axes",
@@ -65,16 +64,6 @@ class SpoolUse:
     peak: float  # largest |x|, 1 is the full stroke
     rms: float
     saturated: float  # share of the time at the limit or beyond
-
-
-@dataclass(frozen=True)
-class Drift:
-    """Slow part of the displacement error, achieved minus target."""
-
-    error: Array  # (n, n_axes), low-passed, SI
-    cutoff: float  # [Hz]
-    largest: Array  # (n_axes,) greatest |error|
-    residual: Array  # (n_axes,) mean unfiltered error over the end of the record
 
 
 def channel(record: xr.Dataset, name: str) -> Array:
@@ -152,18 +141,19 @@ def spool_use(record: xr.Dataset) -> list[SpoolUse]:
     return [SpoolUse(*one) for one in zip(labels(record, "actuator"), *(c.tolist() for c in columns), strict=True)]
 
 
-def drift(record: xr.Dataset) -> Drift | None:
-    """Return the slow part of the displacement error, or nothing where target or motion is missing."""
-    if not {"reference_displacement", "platen_displacement"} <= set(record.variables):
-        return None
+def drift(record: xr.Dataset) -> tuple[Array, float, Array] | None:
+    """Return the slow part of the displacement error, achieved minus target, or nothing where it is not finite.
+
+    The error (n, n_axes) low-passed, SI; the frequency below which it is slow [Hz]; and the mean unfiltered error
+    (n_axes,) over the end of the record.
+    """
     _, step = sampling(record)
     error = channel(record, "platen_displacement") - channel(record, "reference_displacement")
     if not np.isfinite(error).all():
         return None
     cutoff = min(max(DRIFT_BAND, 2.0 / (len(error) * step)), 0.4 / step)  # two periods at least fit in the record
-    slow = lowpass_zero_phase(error, step, cutoff, order=4)
-    end = error[-max(int(END / step), 1) :]
-    return Drift(slow, cutoff, peaks(slow), end.mean(axis=0))
+    offset = error[-max(int(END / step), 1) :].mean(axis=0)
+    return lowpass_zero_phase(error, step, cutoff, order=4), cutoff, offset
 
 
 def peaks(values: Array) -> Array:

@@ -11,7 +11,7 @@ from .charts import Curve, Panel, XAxis, chart_figure
 from .page import Block, Figure, Table, details, grid, missing, number
 from .plots import ACHIEVED, RECORDED, TARGET, Row, Trace, palette_traces, time_figure
 from .run_components import draw_over_time
-from .run_metrics import QUANTITIES, Tracking, channel, commanded_axes, drift, labels, peak_window, sampling
+from .run_metrics import QUANTITIES, Tracking, channel, commanded_axes, drift, labels, peak_window, peaks, sampling
 from .scales import SCALES, axis_scale, axis_title, milliseconds, percent
 
 __all__ = ["drift_blocks", "spectrum_blocks", "tracking_blocks"]
@@ -80,19 +80,20 @@ def drift_blocks(record: xr.Dataset) -> list[Block]:
     absent = [name for name in ("platen_displacement", "reference_displacement") if name not in record]
     if absent:
         return [missing(absent, "Drift, the slow part of achieved minus target, is not drawn.")]
-    slow = drift(record)
-    if slow is None:
+    found = drift(record)
+    if found is None:
         return ["Drift is not shown: the displacement has non-finite samples."]
+    slow, cutoff, offset = found
     axes = labels(record, "axis")
     scales = [axis_scale(axis, "displacement") for axis in axes]
     rows = []
     for kind, title in (("displacement", "Slow error"), ("rotation", "Slow rotation error")):
         own = [k for k, scale in enumerate(scales) if scale is SCALES[kind]]
-        rows += [Row(title, palette_traces([axes[k] for k in own], slow.error[:, own]), SCALES[kind])] if own else []
-    words = f"Achieved minus target displacement below {number(slow.cutoff, 2)} Hz (zero-phase low-pass)."
+        rows += [Row(title, palette_traces([axes[k] for k in own], slow[:, own]), SCALES[kind])] if own else []
+    words = f"Achieved minus target displacement below {number(cutoff, 2)} Hz (zero-phase low-pass)."
     summary = [
-        (axis, scale.unit, number(largest * scale.factor), number(left * scale.factor))
-        for axis, scale, largest, left in zip(axes, scales, slow.largest, slow.residual, strict=True)
+        (axis, scale.unit, number(largest * scale.factor), number(last * scale.factor))
+        for axis, scale, largest, last in zip(axes, scales, peaks(slow), offset, strict=True)
     ]
     header = ("Axis", "Unit", "Largest slow error", "Offset at the end")
     drawing = draw_over_time(record, "drift", "Drift of the platen", words, rows)

@@ -210,7 +210,7 @@ def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lh
     record = sound(tmp_path / "here")
     assert everything(tmp_path) == ["here/record.nc", "here/report.html"]
     assert record.attrs["steps_per_second"] == 8192 and record.attrs["scheme"] == "semi_implicit"
-    words = ("RRMSE", "delay [ms]", "x displacement [m] 0.02", "demand over capacity")
+    words = ("RRMSE", "Delay", "x displacement mm 20.0", "Demand over capacity")
     for phrase in ("wrote here/record.nc", "wrote here/report.html", *words):
         assert phrase in ended.words
     page = (tmp_path / "here" / "report.html").read_text()

@@ -193,7 +193,7 @@ def test_the_ledger_is_written_with_names_and_units(practice: tuple[Decomposed, 
 def test_the_command_leaves_ledger_and_report_and_says_what_is_left(lhpost6, tmp_path) -> None:
     ended = lhpost6("decompose", PRACTICE["TX"], "--out", tmp_path, "--cutoff", "20", "--no-align")
     assert ended.code == 0, ended
-    assert "up to 20 Hz" in ended.words and "sd/noise" in ended.words
+    assert "up to 20 Hz" in ended.words and "Sufficient explanation" in ended.words
     page = (tmp_path / "report.html").read_text()
     assert "at noise level" in page and "Dissipative force" in page
     assert open_record(tmp_path / "ledger.nc").attrs["cutoff_hz"] == 20.0

@@ -77,7 +77,8 @@ def print_calibration(calibration: Calibration) -> None:
 
 def print_agreement(found: Decomposed, agreement: WrenchAgreement) -> None:
     """Print the residual with its expected size, and errors of the modelled forces, axis by axis."""
-    print_blocks(*residual_tables(found, agreement), *match_tables(found, agreement))
+    how = f"Modelled against measured forces up to {found.comparison.band.high:g} Hz"
+    print_blocks(how, *residual_tables(found, agreement), *match_tables(found, agreement))
 
 
 def print_discovery(found: Discovery) -> None:

@@ -416,7 +416,7 @@ def write_report(
     report = page.Page(
         kind="Controllers compared",
         title=title,
-        asked="The same motion on the same plant with two controllers.",
+        purpose="The same motion on the same plant with two controllers.",
         verdict=f"LQG follows more closely than the 469D in {better} of {len(found)} quantities.",
         level="plain",
         headlines=tiles,

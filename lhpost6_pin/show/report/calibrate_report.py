@@ -31,7 +31,7 @@ def write_calibrate_report(calibration: Calibration, path: Path | str, command: 
     page = Page(
         kind="Calibration",
         title=f"{calibration.machine.name} calibrated by {calibration.campaign}",
-        asked=(
+        purpose=(
             f"Find {count} parameters of {load_of(calibration.machine)}, and {len(calibration.unknowns)} errors of its "
             f"sensors, from {tests} test{'s' * (tests != 1)}: {', '.join(calibration.tests)}."
         ),

@@ -15,6 +15,10 @@ from .scales import force_scale, percent, shown_as
 __all__ = ["match_tables", "residual_tables", "write_decompose_report"]
 
 EXACT = 1e-3  # fraction of the measured force below which the residual of a noise-free record counts as small
+MATCH = (
+    "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured force, "
+    "given where their correlation is high enough to determine it."
+)
 EXPLANATIONS: dict[Explanation, tuple[str, str]] = {  # sufficient explanation, and the residual by it
     "none needed": ("–", ""),
     "noise": ("noise", "at noise level"),
@@ -40,7 +44,7 @@ def write_decompose_report(
     page = Page(
         kind=f"Inverse dynamics · {record.attrs.get('kind', 'test')}",
         title=f"Forces behind {record.attrs.get('title') or record.attrs.get('test') or 'a test'}",
-        asked=(
+        purpose=(
             f"Decompose the measured forces with the equations of {load_of(machine)}, {span}, compared up to "
             f"{number(found.comparison.band.high)} Hz."
         ),
@@ -49,7 +53,7 @@ def write_decompose_report(
         headlines=_headlines(found, agreement),
         sections=[
             Section("residual", "Residual", _residual_blocks(found, agreement)),
-            Section("agreement", "Agreement by axis", _match_blocks(found, agreement)),
+            Section("agreement", "Agreement by axis", [MATCH, *match_tables(found, agreement)]),
             Section("six-rows", "Modelled and measured forces", six_row_blocks(found)),
             Section("effects", "Forces by effect", effect_blocks(found, agreement)),
             Section("components", "Measured forces of the components", [component_figure(found)]),
@@ -160,14 +164,6 @@ def match_tables(found: Decomposed, agreement: WrenchAgreement) -> list[Block]:
             rows = [_match_row(match, k) for k in found.plant.axes]
             blocks.append(Table(f"{what} force, modelled against measured", header, rows))
     return blocks
-
-
-def _match_blocks(found: Decomposed, agreement: WrenchAgreement) -> list[Block]:
-    how = (
-        "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured "
-        "force, given where their correlation is high enough to determine it."
-    )
-    return [how, *match_tables(found, agreement)]
 
 
 def _match_row(match: Match, k: int) -> tuple[str, ...]:

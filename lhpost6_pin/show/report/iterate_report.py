@@ -34,7 +34,7 @@ def write_iterate_report(result: Iterated, path: Path | str, command: str = "") 
     page = Page(
         kind="Iteration report · simulated",
         title=f"{reference.motion}, iterated",
-        asked=(
+        purpose=(
             f"Find the drive with which {load_of(machine)}, under “{result.settings.name}”, reproduces "
             f"{reference.motion} at scale {number(reference.scale)} on {', '.join(_moved(result))}: "
             f"{number(float(result.target.time[-1]))} s, judged from 0 to {high:g} Hz with the delay removed."

@@ -107,7 +107,7 @@ class Page:
 
     kind: str
     title: str
-    asked: str
+    purpose: str  # of the test or command, in a sentence
     verdict: str
     level: Level
     headlines: Sequence[Headline]
@@ -301,7 +301,7 @@ def _summary(page: Page) -> str:
     notes = f"<h2>Notes from the run</h2>{bullet_list(page.notes)}" if page.notes else ""
     return (
         f'<header><p class="kind">{text(page.kind)}</p><h1>{text(page.title)}</h1>'
-        f'<p class="asked">{text(page.asked)}</p>'
+        f'<p class="purpose">{text(page.purpose)}</p>'
         f'<p class="verdict {page.level}"><span class="sign" aria-hidden="true">{SIGNS[page.level]}</span>'
         f'<span>{text(page.verdict)}</span></p><dl class="tiles">{tiles}</dl>{notes}</header>'
         "<noscript><p class='missing'>Plots need JavaScript; the numbers are also in tables.</p></noscript>"

@@ -112,7 +112,7 @@ def write_run_report(
     page = Page(
         kind=f"Run report · {record.attrs.get('kind', 'test')}",
         title=str(record.attrs.get("title") or record.attrs.get("test") or "Test on the shake table"),
-        asked=_purpose(record, found),
+        purpose=_purpose(record, found),
         verdict=verdict,
         level=level,
         headlines=headlines(found, uses),

@@ -39,7 +39,7 @@ def write_sine_report(test: SineTest, path: Path | str, command: str = "") -> Pa
     page = Page(
         kind="Sine report · simulated",
         title=f"Sine of {amplitude} at {number(test.frequency)} Hz in {test.axis}",
-        asked=(
+        purpose=(
             f"Reproduce a sine of {amplitude} at {number(test.frequency)} Hz in {test.axis} on {load_of(machine)}, "
             f"with “{test.settings.name}”, alone and with amplitude-phase control and adaptive harmonic cancellation; "
             f"judged over the {cycles} cycles from {number(float(time[0]))} to {number(float(time[-1]))} s."

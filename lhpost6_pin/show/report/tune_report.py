@@ -25,7 +25,7 @@ def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Pa
     page = Page(
         kind="Tuning report · simulated",
         title=f"Tuning of {tuning.machine.name}",
-        asked=(
+        purpose=(
             f"Tune the three-variable control of {load_of(tuning.machine)}, starting from “{tuning.before.name}”, so "
             f"that every axis follows its reference within {tuning.tolerance:g} dB and coherently (coherence at "
             f"least {tuning.coherence:g})."

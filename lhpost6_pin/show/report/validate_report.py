@@ -29,7 +29,7 @@ def write_validate_report(found: Validation, path: Path | str, *, command: str =
     page = Page(
         kind="Validation report",
         title=f"Validation on {found.campaign}",
-        asked=(
+        purpose=(
             f"Compare {count} with {load_of(found.machine)} by {listed}, up to {number(found.numbers.band.high)} Hz."
         ),
         verdict=verdict,

@@ -99,7 +99,10 @@ def _residual_blocks(found: Validation) -> list[Block]:
     if not tests:
         return []
     columns = [a.column for a in next(iter(tests.values()))]
-    ratios: list[tuple[str, ...]] = [(test, *map(_ratio_cell, own)) for test, own in tests.items()]
+    ratios: list[tuple[str, ...]] = [
+        (test, *(f"{'! ' * (not 1 / NOISE < a.error_to_noise < NOISE)}{number(a.error_to_noise)}" for a in own))
+        for test, own in tests.items()
+    ]
     ratios.append(("noise predicted", *map(_span, zip(*tests.values(), strict=True))))
     means: list[tuple[str, ...]] = [(test, *map(_mean_cell, own)) for test, own in tests.items()]
     sd = [a.offset_expected * scale_of("wrench", a.column).factor for a in next(iter(tests.values()))]
@@ -116,11 +119,6 @@ def _residual_blocks(found: Validation) -> list[Block]:
         "pressure or a sensor is wrong.",
         Table("Mean error of the total actuator force", ("Test", *units), means),
     ]
-
-
-def _ratio_cell(one: ColumnAgreement) -> str:
-    ratio = one.error_to_noise
-    return f"{'! ' * (not 1 / NOISE < ratio < NOISE)}{number(ratio, 3)}"
 
 
 def _span(tests: Sequence[ColumnAgreement]) -> str:

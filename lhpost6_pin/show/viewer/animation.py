@@ -46,7 +46,8 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
     moving |= {g.name: _outline_poses(machine, g.displacement) for g in frames.ghosts}
     clips = []
     for name, pose in moving.items():
-        tracks = [_track(key, kind, pose[:, part]) for key, kind, part in _POSE if _seen(pose[:, part])]
+        moves = [one for one in _POSE if np.ptp(pose[:, one[2]], axis=0).max() > UNSEEN]
+        tracks = [_track(key, kind, pose[:, part]) for key, kind, part in moves]
         clips.append(_clip(frames, name, tracks))
     largest = largest_force(frames.force) if frames.force is not None else 1.0
     for name, force in leg_forces(machine, frames).items():
@@ -96,10 +97,6 @@ class _Animation:
 def _track(key: str, kind: str, values: Array) -> dict[str, Any]:
     times = packed_array(np.arange(len(values)))
     return {"name": f".{key}", "type": kind, "times": times, "values": packed_array(values)}
-
-
-def _seen(values: Array) -> bool:
-    return bool(np.ptp(values, axis=0).max() > UNSEEN)
 
 
 def _clip(frames: Frames, name: str, tracks: list[dict[str, Any]]) -> dict[str, Any]:

@@ -138,7 +138,7 @@ def test_rods_extend_as_the_compiled_kinematics_says(machine, bodies, poses):
 
 
 def test_rods_stay_in_their_barrels_within_the_stroke(machine, bodies):
-    shapes = {g.name: g for g in bodies.shapes.geometryObjects}
+    shapes = {g.name: g for g in bodies.shapes}
     for actuator in machine.actuators:
         barrel, rod = shapes[f"{actuator.name}_barrel_0"], shapes[f"{actuator.name}_rod_0"]
         length = np.linalg.norm(np.subtract(actuator.platen_point, actuator.base_point))

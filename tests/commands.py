@@ -1,6 +1,7 @@
 """What the tests of commands share: what a command leaves on the terminal, and a motion that is short to run."""
 
 import re
+from pathlib import Path
 from typing import NamedTuple
 
 SHORT = ("sine", "--set", "amplitude=0.02", "--set", "cycles=0.5", "--set", "ramp_cycles=0.5", "--engine", "fused")
@@ -27,3 +28,10 @@ def refused(ended: Ended, *phrases: str) -> bool:
     for phrase in phrases:
         assert phrase in ended.words, (phrase, ended.words)
     return True
+
+
+def own_controller(path: Path, init: str = "return rest.spool", step: str = "return memory") -> str:
+    """Write a user's own controller and return what `--controller` takes."""
+    methods = f"    def init(self, plant, rest): {init}\n    def step(self, memory, wanted, sensors): {step}\n"
+    path.write_text(f"class Mine:\n{methods}")
+    return f"{path}:Mine"

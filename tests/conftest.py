@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from commands import Ended
 from hypothesis import settings
+from sensor_cases import measured
 
 from lhpost6_pin import cli
-from lhpost6_pin.data.sensors import SensorSet, load_sensors
+from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
@@ -89,3 +91,15 @@ def poses():
     """Two hundred poses (n, 6) of C and Euler angles [m, rad] within most of Table 2.2, legs within their lengths."""
     travel = np.array([0.6, 0.38, 0.127, 0.038, 0.025, 0.066])
     return np.random.default_rng(6).uniform(-travel, travel, (200, 6))
+
+
+@pytest.fixture(scope="session")
+def redundant(plant, sensors):
+    """Two records of all sensors with noise and nothing wrong."""
+    return [add_noise(measured(plant, seed)[0], sensors, np.random.default_rng(seed)) for seed in (0, 10)]
+
+
+@pytest.fixture(scope="session")
+def controller(plant, rest):
+    """The shipped 469D for it."""
+    return make_controller(plant, rest, load_controller("lhpost6"))

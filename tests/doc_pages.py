@@ -33,7 +33,6 @@ class Links(HTMLParser):
     """Ids of a built page, where it links to, and what it loads when it is opened."""
 
     def __init__(self, page: Path) -> None:
-        """Read a page."""
         super().__init__()
         self.ids: set[str] = set()
         self.links: list[str] = []
@@ -41,7 +40,6 @@ class Links(HTMLParser):
         self.feed(page.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note ids, links and sources."""
         given = {key: value or "" for key, value in attrs}
         self.ids |= {given[key] for key in ("id", "name") if key in given}
         if tag == "a" and "href" in given:

@@ -95,19 +95,20 @@ def damaged_lines(seed: bytes) -> st.SearchStrategy[bytes]:
             if not lines:
                 break
             at, other = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+            line, words = lines[at], list(_WORD.finditer(lines[at]))
             action = draw(st.sampled_from(["word", "word", "word", "drop", "double", "swap", "cut"]))
             if action == "drop":
                 del lines[at]
             elif action == "double":
-                lines.insert(other, lines[at])
+                lines.insert(other, line)
             elif action == "swap":
-                lines[at], lines[other] = lines[other], lines[at]
+                lines[at], lines[other] = lines[other], line
             elif action == "cut":
-                lines[at] = lines[at][: draw(st.integers(0, len(lines[at])))]
-            elif words := list(_WORD.finditer(lines[at])):
+                lines[at] = line[: draw(st.integers(0, len(line)))]
+            elif words:
                 word = draw(st.sampled_from(words))
                 new = draw(st.sampled_from(TOKENS) | st.text(max_size=4))
-                lines[at] = lines[at][: word.start()] + new + lines[at][word.end() :]
+                lines[at] = line[: word.start()] + new + line[word.end() :]
         return "\n".join([*lines, ""]).encode("utf-8", "replace")
 
     return damaged()
@@ -116,13 +117,9 @@ def damaged_lines(seed: bytes) -> st.SearchStrategy[bytes]:
 # ------------------------------------------------------------------------------------------------- TOML
 _VALUES = st.one_of(
     st.sampled_from([-1, 0, 0.5, 1e308, -1e308, 1e30, 5e-324, math.nan, math.inf, 10**400, 10**5000, True, "", "x"]),
-    st.integers(-(10**6), 10**6),
-    st.floats(),
-    st.text(st.characters(codec="ascii"), max_size=4),
+    st.integers(-(10**6), 10**6) | st.floats() | st.text(st.characters(codec="ascii"), max_size=4),
     st.lists(st.floats(-10, 10), max_size=7),
-    st.just([[1.0], [2.0]]),
-    st.just({}),
-    st.just({"value": 1.0, "unit": "m"}),
+    st.sampled_from([[[1.0], [2.0]], {}, {"value": 1.0, "unit": "m"}]),
 )
 
 
@@ -184,11 +181,8 @@ def _toml(value: object) -> str:
 
 # ------------------------------------------------------------------------------------------------- netCDF and HDF5
 _ATTRIBUTES = st.one_of(
-    st.sampled_from(
-        ["", "nan", "m", "mm, rad", "x" * 300, "a\0b", "../up", "é", "m, rad", -1, 0, 3, 0.5, 1e308, math.nan]
-    ),
-    st.integers(-(2**31), 2**31),
-    st.floats(),
+    st.sampled_from(["", "nan", "m", "mm, rad", "x" * 300, "a\0b", "../up", "é", "m, rad", -1, 0, 3, 0.5, 1e308]),
+    st.integers(-(2**31), 2**31) | st.floats(),
     st.lists(st.integers(-9, 9), max_size=3).map(np.array),
 )
 _KEYS = ("units", "sample_rate_hz", "layout_version", "valves_per_horizontal_actuator", "kind", "test", "specimen")
@@ -281,24 +275,7 @@ def outside_heaps(content: bytes) -> list[int]:
     return [k for k in range(len(content)) if not any(k in span for span in spans)]
 
 
-_NAMES = st.sampled_from(
-    [
-        "time",
-        "t",
-        "dt",
-        "fs",
-        "rate",
-        "x_m",
-        "Long Displ fbk [in]",
-        "a",
-        "b",
-        "names",
-        "columns",
-        "units",
-        "unit",
-        "desc",
-    ]
-)
+_NAMES = st.sampled_from(["Long Displ fbk [in]", *"time t dt fs rate x_m a b names columns units unit desc".split()])
 
 
 def _array(shape: list[int], kind: str, scale: float) -> np.ndarray:

@@ -65,12 +65,10 @@ class Case:
     name: str = ""
 
     def __str__(self) -> str:
-        """Name in the list of tests."""
         return self.name or f"{self.law}-{self.port}"
 
     @property
     def attributes(self) -> Law:
-        """Attributes of its law."""
         return LAWS[self.law]
 
     @cached_property
@@ -87,7 +85,6 @@ class Case:
 
     @property
     def supply(self) -> Supply:
-        """Supply of its machine."""
         return supply_of(self.effects, state_names(self.effects), *SUPPLY)
 
     @cached_property
@@ -97,12 +94,10 @@ class Case:
 
     @cached_property
     def spool(self) -> np.ndarray:
-        """Spools (1,) [1]."""
         return np.array([(0.0, -0.03, 0.02)[self.pressures]])
 
     @cached_property
     def z(self) -> np.ndarray:
-        """States at the start."""
         z, pressures = np.zeros(len(state_names(self.effects))), ((), (12e6,), (6e6, 9e6))[self.pressures]
         start = (*pressures, *self.z_start)
         z[: len(start)] = start
@@ -139,7 +134,6 @@ class Case:
 
 
 def effect_of(law: str, p: Any, port: str = "leg", name: str = "more") -> Effect:
-    """An effect of a law's parameters."""
     numbers = np.hstack(p)[: len(parameter_units(LAWS[law]))]
     return Effect(name, law, (port,), (tuple(numbers.tolist()),), "test")
 
@@ -229,7 +223,6 @@ def takes(function: Any) -> list[str]:
 
 
 def module_of(law: str) -> Any:
-    """The module of a law that makes forces."""
     return import_module(f"lhpost6_pin.laws.{law}")
 
 
@@ -237,12 +230,9 @@ BY_PATH = tuple(c for c in EXACT if "dt" not in takes(module_of(c.law).advance))
 """Cases whose states know the path and not the time."""
 
 # ------------------------------------------------------------------------------------------------ arguments by name
-KERNELS = {
-    f"{m.name}.{name}": function
-    for m in pkgutil.iter_modules(laws.__path__)
-    for name, function in vars(import_module(f"lhpost6_pin.laws.{m.name}")).items()
-    if name in import_module(f"lhpost6_pin.laws.{m.name}").__all__ and hasattr(function, "py_func")
-}
+_MODULES = {m.name: import_module(f"lhpost6_pin.laws.{m.name}") for m in pkgutil.iter_modules(laws.__path__)}
+_EXPORTS = {f"{m}.{name}": getattr(module, name) for m, module in _MODULES.items() for name in module.__all__}
+KERNELS = {name: function for name, function in _EXPORTS.items() if hasattr(function, "py_func")}
 """Every compiled function of `laws/`."""
 
 _ALL = [effect_of(law, p, name=law) for law, p in MODIFIERS.items() if LAWS[law].modifies == "oil"]
@@ -288,7 +278,6 @@ PAIRS = {
 
 
 def drawn(kernel: str, rng: np.random.Generator) -> list[Any]:
-    """Arguments of a kernel."""
     module = kernel.split(".")[0]
     parameters = {c.law: c.p for c in OWN} | {"hydraulic": FULL, "supply": Supply(*SUPPLY, 6e6, 0.02, 3e7, 0.03)}
     special = {

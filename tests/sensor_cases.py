@@ -1,5 +1,7 @@
 """What the tests of sensors share: a smooth motion, as every sensor of the machine would measure it without noise."""
 
+from collections.abc import Callable
+
 import numpy as np
 import xarray as xr
 
@@ -50,3 +52,18 @@ def measured(plant: Plant, seed: int = 0, duration: float = 20.0) -> tuple[xr.Da
     }
     labels = {"actuator": machine.actuator_names, "horizontal": machine.double_acting, "strut": machine.strut_names}
     return make_record(t, channels, labels, {"kind": "simulated"}), motion
+
+
+def with_change(records: list[xr.Dataset], name: str, change: Callable) -> list[xr.Dataset]:
+    """Records with one channel's values (n, k) changed."""
+    return [r.assign({name: r[name].copy(data=change(r[name].values.copy()))}) for r in records]
+
+
+def scaled(column: int, factor: float, offset: float = 0.0) -> Callable:
+    """A change of one column by a factor and an offset."""
+
+    def change(values: np.ndarray) -> np.ndarray:
+        values[:, column] = factor * values[:, column] + offset
+        return values
+
+    return change

@@ -11,13 +11,8 @@ from lhpost6_pin.data.signals import align, differentiate
 
 DT = 1 / RATE
 T = np.arange(round(20 * RATE)) * DT
-SKEWS = {
-    "platen_velocity": 3e-4,
-    "platen_acceleration": -3e-4,
-    "actuator_displacement": 1.5e-4,
-    "chamber_pressure": -2e-4,
-    "strut_pressure": 3e-4,
-}
+SKEWS = {"platen_velocity": 3e-4, "platen_acceleration": -3e-4, "actuator_displacement": 1.5e-4}
+SKEWS |= {"chamber_pressure": -2e-4, "strut_pressure": 3e-4}
 
 
 def skewed(plant, seed: int):
@@ -30,14 +25,14 @@ def skewed(plant, seed: int):
 
 
 @pytest.mark.parametrize("tau", [3e-4, -2.3e-3, 0.031])
-def test_a_delay_is_the_slope_of_the_phase_whatever_gain_and_offset(tau: float) -> None:
+def test_a_delay_is_the_slope_of_the_phase_whatever_gain_and_offset(tau: float):
     x, late = (waves(t, np.ones(3), 0)[1] for t in (T, T - tau))
     found, _ = phase_delay(x, 0.7 * late + 3.0, DT)
     # a window of 2 s spreads each line over 1 Hz, all at the line's phase: short by (0.3 Hz / f)^2, 2 % at 2 Hz
     np.testing.assert_allclose(found, tau, rtol=0.02)
 
 
-def test_a_slow_signal_s_delay_is_found_by_regression() -> None:
+def test_a_slow_signal_s_delay_is_found_by_regression():
     x, late = (waves(t, np.ones(3), 0, highest=1.0)[0] for t in (T, T - 2e-4))
     found, error = slow_delay(x, 0.7 * late + 3.0, DT)
     np.testing.assert_allclose(found, 2e-4, rtol=0.02)  # second-order term, and ends that do not rest
@@ -47,7 +42,7 @@ def test_a_slow_signal_s_delay_is_found_by_regression() -> None:
     assert np.isinf(slow_delay(x, 0 * x, DT)[1]).all()
 
 
-def test_the_standard_error_is_that_of_repeated_noise() -> None:
+def test_the_standard_error_is_that_of_repeated_noise():
     x = waves(T, np.ones(1), 0)[1]
     rng = np.random.default_rng(0)
     spread = 0.3 * x.std()
@@ -58,20 +53,20 @@ def test_the_standard_error_is_that_of_repeated_noise() -> None:
     assert abs(tau.mean()) < 5 * tau.std() / np.sqrt(40)
 
 
-def test_a_silent_channel_has_no_delay_and_an_infinite_error() -> None:
+def test_a_silent_channel_has_no_delay_and_an_infinite_error():
     found, error = phase_delay(waves(T, np.ones(1), 0)[0], np.zeros((len(T), 1)), DT)
     assert np.isinf(error[0])
     assert np.isfinite(found[0])
     assert combine_delays(found, error) == (0.0, float("inf"))
 
 
-def test_delays_are_averaged_by_their_errors_and_widened_by_their_scatter() -> None:
+def test_delays_are_averaged_by_their_errors_and_widened_by_their_scatter():
     assert combine_delays([1.0, 4.0], [1.0, 2.0]) == pytest.approx((1.6, np.sqrt(1 / 1.25 * 1.8)))
     assert combine_delays([1.0, 1.0, 99.0], [1.0, 1.0, 11.0]) == pytest.approx((1.0, np.sqrt(0.5)))
 
 
 @pytest.mark.long
-def test_skews_of_a_noisy_campaign_are_found_within_a_tenth_of_a_millisecond(plant) -> None:
+def test_skews_of_a_noisy_campaign_are_found_within_a_tenth_of_a_millisecond(plant):
     delays = group_delays(plant, [skewed(plant, seed) for seed in (0, 1)])
     assert set(delays) == set(SKEWS)
     for group, tau in SKEWS.items():
@@ -81,27 +76,20 @@ def test_skews_of_a_noisy_campaign_are_found_within_a_tenth_of_a_millisecond(pla
             assert delays[group].delay == pytest.approx(tau, abs=2e-5), group
 
 
-def test_aligned_records_have_no_skew_left_and_say_what_was_done(plant) -> None:
+def test_aligned_records_have_no_skew_left_and_say_what_was_done(plant):
     record = skewed(plant, 2)
     delays = group_delays(plant, [record])
     aligned = align_record(record, delays)
     for group, left in group_delays(plant, [aligned]).items():
         assert abs(left.delay) < 2 * delays[group].standard_error + 5e-6, group  # end effects: some samples of 10^4
-    assert (
-        f"actuator_displacement advanced by {1e3 * delays['actuator_displacement'].delay:.4g} ms"
-        in aligned.attrs["aligned"]
-    )
-    assert "behind platen_displacement" in aligned.attrs["aligned"]
+    moved = f"actuator_displacement advanced by {1e3 * delays['actuator_displacement'].delay:.4g} ms"
+    assert moved in aligned.attrs["aligned"] and "behind platen_displacement" in aligned.attrs["aligned"]
     np.testing.assert_array_equal(aligned["platen_displacement"], record["platen_displacement"])
 
 
-def test_groups_without_a_twin_are_left_out(plant) -> None:
-    record, _ = measured(plant, duration=4.0)
-    assert set(group_delays(plant, [record[["platen_displacement", "spool_position", "actuator_force"]]])) == set()
-
-
-def test_a_delay_can_be_given_by_hand(plant) -> None:
+def test_groups_without_a_twin_are_left_out_and_a_delay_can_be_given_by_hand(plant):
     record, motion = measured(plant, duration=4.0)
+    assert not group_delays(plant, [record[["platen_displacement", "spool_position", "actuator_force"]]])  # no twins
     aligned = align_record(record, {"platen_velocity": 1e-3, "platen_acceleration": Delay("by hand", 0.0, 0.0, 0)})
     shifted = motion.velocity + 1e-3 * motion.acceleration
     inside = slice(50, -50)

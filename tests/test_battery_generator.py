@@ -17,13 +17,9 @@ def nominal() -> tuple[np.ndarray, np.ndarray]:
 
 
 def rates_of(y: np.ndarray, spool: np.ndarray, legs: np.ndarray, platen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    dy, shown = np.zeros(rates.STATES), np.zeros(rates.SHOWN)
-    rates.rates(1.0, y, spool, 2e5 * float(platen[0]["surge"] != 0), legs, platen, inverse(platen), dy, shown)
+    dy, shown, inverse = np.zeros(rates.STATES), np.zeros(rates.SHOWN), np.linalg.inv(table.mass_matrix(platen))
+    rates.rates(1.0, y, spool, 2e5 * float(platen[0]["surge"] != 0), legs, platen, inverse, dy, shown)
     return dy, shown
-
-
-def inverse(platen: np.ndarray) -> np.ndarray:
-    return np.linalg.inv(table.mass_matrix(platen))
 
 
 def lively(random: np.random.Generator) -> np.ndarray:
@@ -152,9 +148,8 @@ def test_a_delayed_channel_shows_late_and_a_gain_shows_as_a_gain():
         sensors.Fault("length_sensor_error", (("actuator_displacement", 3),), gain=0.05),
     )
     exact = {**rule, "gain": 0.0, "skew": 0.0, "offset": {}}
-    seen = sensors.observe(
-        true, sensors.draw_instruments(exact, np.random.default_rng(0), faults), rule, np.random.default_rng(0)
-    )
+    drawn = sensors.draw_instruments(exact, np.random.default_rng(0), faults)
+    seen = sensors.observe(true, drawn, rule, np.random.default_rng(0))
     middle = slice(200, 1800)
     late = np.sin(2 * np.pi * 2 * (time[::4] - 0.004))
     # 16-bit steps of 3e-5 and the low-pass's ends
@@ -171,9 +166,7 @@ def written(tmp_path_factory):
 
 def test_a_written_case_is_a_campaign_of_valid_records_that_do_not_tell(written):
     case, folder = written
-    assert sorted(path.name for path in folder.iterdir()) == [
-        *("EQ.nc", "TX.nc", "TY.nc", "TZ.nc", "WN.nc", "campaign.toml")
-    ]
+    assert sorted(path.stem for path in folder.iterdir()) == ["EQ", "TX", "TY", "TZ", "WN", "campaign"]
     for test in case.tests:
         record = load_record(folder / f"{test.name}.nc")
         assert record.attrs["kind"] == "measured"
@@ -191,10 +184,9 @@ def test_a_written_case_is_a_campaign_of_valid_records_that_do_not_tell(written)
 def test_recorded_noise_is_that_of_the_instruments(written):
     _, folder = written
     calm = load_record(folder / "TX.nc")["chamber_pressure_a"].values[10:200]
+    floor = sensors.floor_of("chamber_pressure_a", cases.numbers()["sensors"])
     # 190 samples, coloured: the estimate scatters by some 10 %, the colour adds as much
-    assert calm.std(axis=0) == pytest.approx(
-        sensors.floor_of("chamber_pressure_a", cases.numbers()["sensors"]), rel=0.5
-    )
+    assert calm.std(axis=0) == pytest.approx(floor, rel=0.5)
 
 
 def test_velocity_and_acceleration_are_the_derivatives_of_the_displacement(written):
@@ -285,11 +277,8 @@ def test_scores_count_what_was_named_and_what_was_not():
     ]
     found = scoring.score(pairs)
     assert found["false name on nulls"] == (1, 2)
-    assert (found["family first"], found["exact set, one effect"], found["exact set, two effects"]) == (
-        (2, 2),
-        (1, 1),
-        (0, 1),
-    )
+    exact = [found[f"exact set, {count}"] for count in ("one effect", "two effects")]
+    assert (found["family first"], *exact) == ((2, 2), (1, 1), (0, 1))
     assert found["unexcited, nothing else named"] == (1, 1)
     assert math.isnan(found["median closure on held-out tests"])  # no case says
     assert (found["none of the above, named"], found["none of the above, flagged"]) == ((0, 1), (1, 1))

@@ -6,17 +6,17 @@ Commands run in this process through the installed entry point's function; a few
 import importlib.metadata
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
 import xarray as xr
-from commands import COARSE, SHORT, Ended, refused
+from commands import COARSE, SHORT, Ended, own_controller, refused
 from machine_cases import PENDULUM, PRACTICE, REFERENCE, STEWART
 
 import lhpost6_pin
@@ -41,7 +41,6 @@ ENTRY = Path(sys.executable).parent / "lhpost6"
 
 
 def process(*arguments: object, **options) -> subprocess.CompletedProcess:
-    """Run the installed entry point."""
     command = [str(ENTRY), *map(str, arguments)]
     return subprocess.run(command, check=False, timeout=300, **{"capture_output": True, "text": True, **options})
 
@@ -56,7 +55,6 @@ def sound(folder: Path) -> xr.Dataset:
 
 
 def everything(folder: Path) -> list[str]:
-    """Every file below a folder, hidden ones too."""
     return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
 
 
@@ -71,34 +69,24 @@ def test_help_names_every_command_once_grouped_by_job_in_their_order(lhpost6):
     panels = re.findall(r"╭─ (.+?) ─+╮\n(.*?)╰", ended.out, re.DOTALL)
     shown = {title: tuple(re.findall(r"^│ ([a-z-]+) ", rows, re.MULTILINE)) for title, rows in panels}
     assert list(shown.items())[1:] == list(JOBS.items())  # behind the options
+    said = {name: lhpost6(name, "--help").words for name in names} | {"": ended.words}
+    assert "<int>" in said["run"] and "--locked" in said["run"]
+    for name, words in said.items():  # flags have no kind of value
+        assert "bool" not in words.lower(), name
+        assert "Directory of the results" not in words or "default: out/NAME" in words, name
 
 
 def test_version_is_the_package_s_own(lhpost6):
     assert lhpost6("--version") == Ended(0, f"lhpost6 {lhpost6_pin.__version__}\n", "")
 
 
-def test_help_gives_flags_no_kind_of_value_and_says_where_results_go(lhpost6):
-    commands = [command_name(c) for c in cli.app.registered_commands]
-    said = {name: lhpost6(name, "--help").words for name in commands} | {"": lhpost6("--help").words}
-    assert "<int>" in said["run"] and "--locked" in said["run"]
-    for name, words in said.items():
-        assert "bool" not in words.lower(), name
-        assert "Directory of the results" not in words or "default: out/NAME" in words, name
-
-
-def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6):
+def test_doctor_says_versions_and_where_compiled_code_is_kept(lhpost6, monkeypatch):
     ended = lhpost6("doctor")
     assert ended.code == 0
     for part in ("pin", "numba", "xarray", "typer"):
         assert f"{part} {importlib.metadata.version(part)}" in ended.words
-    assert cache_folder().name in ended.words.replace(" ", "")
-    assert "first model step after" in ended.words
-
-
-def test_doctor_says_when_compiled_code_cannot_be_kept(lhpost6, monkeypatch):
-    import lhpost6_pin.cli.doctor
-
-    monkeypatch.setattr(lhpost6_pin.cli.doctor, "cache_folder", lambda: None)
+    assert cache_folder().name in ended.words.replace(" ", "") and "first model step after" in ended.words
+    monkeypatch.setattr("lhpost6_pin.cli.doctor.cache_folder", lambda: None)
     assert "every run compiles anew" in lhpost6("doctor").words
 
 
@@ -133,16 +121,12 @@ def test_info_shows_what_an_override_changes(lhpost6, tmp_path):
     assert "Modifiers of oil" in altered and "worn" in altered
 
 
-def test_capacity_compares_with_table_2_2_and_gives_the_oil_column_modes(lhpost6):
-    ended = lhpost6("capacity")
-    assert ended.code == 0 and "Table 2.2" in ended.words and "Oil-column modes" in ended.words
-    assert re.search(r"[+-]\d+\.\d %", ended.words)
-
-
-@pytest.mark.parametrize("machine", ["uniaxial", STEWART])
-def test_capacity_of_a_machine_without_that_table_gives_its_modes(lhpost6, machine):
+@pytest.mark.parametrize("machine", ["lhpost6", "uniaxial", STEWART])
+def test_capacity_gives_the_oil_column_modes_and_compares_the_lhpost6_with_table_2_2(lhpost6, machine):
     ended = lhpost6("capacity", "--machine", machine)
-    assert ended.code == 0 and "Oil-column modes" in ended.words and "Table 2.2" not in ended.words
+    assert ended.code == 0 and "Oil-column modes" in ended.words
+    compared = "Table 2.2" in ended.words and re.search(r"[+-]\d+\.\d %", ended.words) is not None
+    assert compared == (machine == "lhpost6")
 
 
 def test_motions_lists_every_motion_and_one_with_its_options(lhpost6):
@@ -188,9 +172,11 @@ def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6
     assert "206 comparisons, 0 suspicious" in lhpost6("check", PRACTICE).words
     record = load_record(PRACTICE)
     record["actuator_displacement"][:, 0] *= 1.05  # ten times the calibration range
+    record["actuator_force"] = record["actuator_force"] * 1.2
     save_record(record, tmp_path / "campaign" / "long.nc")
     ended = lhpost6("check", tmp_path / "campaign")
     assert "Sensors that disagree" in ended.out and "actuator_displacement[H1]" in ended.out
+    assert "actuator_force" in ended.out and "P_A" in ended.out
     assert ended.code == 0  # it can be used, with care
 
 
@@ -217,17 +203,12 @@ def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lh
     assert "lhpost6 run sine --set amplitude=0.02" in page  # how to repeat it
 
 
-def test_run_without_a_folder_names_one_after_the_motion(lhpost6, tmp_path):
-    assert lhpost6("run", *COARSE).code == 0
-    assert everything(tmp_path) == ["out/sine/record.nc", "out/sine/report.html"]
-
-
-def test_run_overwrites_its_own_results(lhpost6, tmp_path):
+def test_run_names_a_folder_after_the_motion_and_overwrites_its_own_results(lhpost6, tmp_path):
     for scale in ("1", "0.5"):
-        assert lhpost6("run", *COARSE, "--scale", scale, "--out", "here").code == 0
-        peak = np.abs(sound(tmp_path / "here")["reference_displacement"].values).max()
+        assert lhpost6("run", *COARSE, "--scale", scale).code == 0
+        peak = np.abs(sound(tmp_path / "out" / "sine")["reference_displacement"].values).max()
         assert peak == pytest.approx(0.02 * float(scale), rel=1e-3)
-    assert everything(tmp_path) == ["here/record.nc", "here/report.html"]
+    assert everything(tmp_path) == ["out/sine/record.nc", "out/sine/report.html"]
 
 
 @pytest.mark.parametrize(
@@ -240,6 +221,7 @@ def test_run_overwrites_its_own_results(lhpost6, tmp_path):
         (("--machine", "uniaxial"), {"machine": "uniaxial"}),
         (("--machine", STEWART), {"machine": "Stewart"}),
         (("--specimen", PENDULUM, "--locked"), {"specimen": "pendulum"}),
+        (("--specimen", PENDULUM, "--engine", "pinocchio"), {"specimen": "pendulum", "engine": "pinocchio"}),
         (("--controller", "lhpost6"), {"trouble": "none"}),
         (("--low-pass", "10", "--high-pass", "0.05"), {"trouble": "none"}),
     ],
@@ -250,23 +232,13 @@ def test_run_does_what_its_options_say(lhpost6, tmp_path, options, attributes):
     assert {name: record.attrs[name] for name in attributes} == attributes
 
 
-def test_run_with_free_joints_records_them(lhpost6, tmp_path):
-    assert lhpost6("run", *COARSE, "--engine", "pinocchio", "--specimen", PENDULUM, "--out", "here").code == 0
-    record = sound(tmp_path / "here")
-    assert record.attrs["engine"] == "pinocchio"
-    assert np.abs(record["specimen_joint_position"].sel(specimen_joint="pivot")).max() > 1e-3  # [rad]
-
-
-def test_run_moves_the_axes_asked_for(lhpost6, tmp_path):
-    assert lhpost6("run", *COARSE, "--axes", "y=x", "--out", "here").code == 0
-    asked = np.abs(sound(tmp_path / "here")["reference_displacement"].values).max(axis=0)
-    assert asked[1] == pytest.approx(0.02, rel=1e-3) and np.all(np.delete(asked, 1) == 0)
-
-
-def test_run_with_an_override_runs_the_changed_machine(lhpost6, tmp_path):
+def test_run_moves_the_axes_asked_for_on_the_machine_with_its_override(lhpost6, tmp_path):
     (tmp_path / "mine.toml").write_text('[hydraulics]\nsupply_pressure = { value = 19.5e6, unit = "Pa" }\n')
-    assert lhpost6("run", *COARSE, "--override", "mine.toml", "--out", "here").code == 0
-    assert np.all(sound(tmp_path / "here")["supply_pressure"].values == 19.5e6)
+    assert lhpost6("run", *COARSE, "--axes", "y=x", "--override", "mine.toml", "--out", "here").code == 0
+    record = sound(tmp_path / "here")
+    asked = np.abs(record["reference_displacement"].values).max(axis=0)
+    assert asked[1] == pytest.approx(0.02, rel=1e-3) and np.all(np.delete(asked, 1) == 0)
+    assert np.all(record["supply_pressure"].values == 19.5e6)
 
 
 def test_run_reproduces_a_motion_from_a_csv_file(lhpost6, tmp_path):
@@ -281,12 +253,6 @@ def test_run_reproduces_a_motion_from_a_csv_file(lhpost6, tmp_path):
     # a smooth bell of 2 s has nothing above the low-pass of 33 Hz
     assert np.abs(asked.interp(time=begin + t).values - bell).max() < 1e-6
     assert np.abs(np.delete(record["reference_displacement"].values, 2, axis=1)).max() == 0
-
-
-def test_a_folder_with_the_name_of_a_motion_does_not_hide_it(lhpost6, tmp_path):
-    (tmp_path / "sine").mkdir()
-    assert lhpost6("run", *COARSE, "--out", "sine").code == 0
-    assert lhpost6("run", *COARSE, "--out", "sine").code == 0
 
 
 def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_insisted(lhpost6, tmp_path):
@@ -328,6 +294,7 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--valves", "3"), ("--valves", "2")),
         (("sine", "--locked"), ("--locked", "--specimen")),
         (("sine", "--specimen", "absent.urdf"), ("absent.urdf", "no such URDF")),
+        *((("sine", "--specimen", "pendulum", "--specimen-at", x), ("x,y,z", x)) for x in ("1,2", "a,b,c", "1,2,3,4")),
         (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("--engine pinocchio", "--locked")),
         (("sine", "--machine", "absent"), ("no machine named 'absent'", "uniaxial")),
         (("sine", "--machine", "unaxial"), ("did you mean 'uniaxial'? valid names: lhpost6, uniaxial",)),
@@ -360,16 +327,12 @@ def test_commands_of_the_469d_say_why_they_take_no_other_controller(lhpost6, tmp
         (("--frequency", "nan"), ("--frequency",)),
         (("--amplitude", "0"), ("amplitude is 0.0", "above zero")),
         (("--amplitude", "-1"), ("--amplitude",)),
+        (("--amplitude", "10", "--frequency", "5"), ("largest scale that fits",)),
     ],
 )
-@pytest.mark.parametrize("beyond", [(), ("--beyond-limits",)])
-def test_a_sine_that_cannot_be_is_refused(lhpost6, tmp_path, arguments, phrases, beyond):
-    assert refused(lhpost6("sine", *arguments, *beyond), *phrases)
-    assert everything(tmp_path) == []
-
-
-def test_a_sine_that_the_table_cannot_reach_is_refused_with_the_scale_that_fits(lhpost6, tmp_path):
-    assert refused(lhpost6("sine", "--amplitude", "10", "--frequency", "5"), "largest scale that fits")
+def test_a_sine_that_cannot_be_is_refused(lhpost6, tmp_path, arguments, phrases):
+    for beyond in ((), ("--beyond-limits",))[: 1 + ("scale" not in phrases[0])]:
+        assert refused(lhpost6("sine", *arguments, *beyond), *phrases)
     assert everything(tmp_path) == []
 
 
@@ -383,12 +346,9 @@ def test_a_drive_and_an_inverse_of_another_machine_are_refused(lhpost6, tmp_path
     uniaxial = ("run", "sine", "--machine", "uniaxial")
     assert refused(lhpost6(*uniaxial, "--aic", "inverse.nc"), "inverse.nc", said)
     assert refused(lhpost6(*uniaxial, "--aic", "drive.nc"), "drive.nc: is not a saved inverse")
-    (tmp_path / "mine.py").write_text(
-        "class Mine:\n    def init(self, p, r): pass\n    def step(self, m, w, s): pass\n"
-    )
-    assert refused(
-        lhpost6("run", "sine", "--aic", "inverse.nc", "--controller", "mine.py:Mine"), "--aic", "does without"
-    )
+    own_controller(tmp_path / "mine.py", step="pass")
+    plugged = ("--controller", "mine.py:Mine")
+    assert refused(lhpost6("run", "sine", "--aic", "inverse.nc", *plugged), "--aic", "does without")
 
 
 @pytest.mark.parametrize(
@@ -424,9 +384,7 @@ def test_a_file_without_times_says_which_option_gives_them(lhpost6, tmp_path):
         (("--engine", "fused", "--specimen", PENDULUM), "--engine pinocchio"),
     ],
 )
-def test_options_that_cannot_be_are_refused_before_a_page_or_a_bar_is_shown(
-    lhpost6, tmp_path, monkeypatch, options, message
-):
+def test_options_that_cannot_be_are_refused_before_anything_is_shown(lhpost6, tmp_path, monkeypatch, options, message):
     target = make_target(find_motion("sine", cycles=1, ramp_cycles=1))
     save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
     for shown in ("progress_bar", "watched"):
@@ -446,15 +404,14 @@ def test_a_command_that_is_refused_before_anything_is_done_leaves_no_bar(lhpost6
 @pytest.mark.parametrize("name", ["[red]x", "[/red]y", "[bold]z[/bold]"])
 def test_brackets_in_names_are_shown_as_they_are(lhpost6, tmp_path, name):
     """Terminal markup, which rich would swallow or refuse."""
-    folder = tmp_path / name.replace("/", "_")
-    folder.mkdir()
     stem = name.replace("/", "_")
+    folder = tmp_path / stem
     (tmp_path / f"{stem}.csv").write_text("time_s,x_m\n0,0\n0.1,0.001\n0.2,0\n")
-    ended = lhpost6("run", f"{stem}.csv", "--engine", "fused", "--rate", "2048", "--out", folder / "o")
-    assert ended.code == 0 and f"wrote {folder / 'o' / 'record.nc'}" in ended.out
+    ended = lhpost6("run", f"{stem}.csv", "--engine", "fused", "--rate", "2048", "--out", folder)
+    assert ended.code == 0 and f"wrote {folder / 'record.nc'}" in ended.out
     assert stem in ended.err  # beside the progress bar
-    assert f"{stem}" in lhpost6("check", folder / "o" / "record.nc").words
-    machine = (STEWART).read_text().replace('"A Stewart platform for tests"', f'"{name}"')
+    assert stem in lhpost6("check", folder / "record.nc").words
+    machine = STEWART.read_text().replace('"A Stewart platform for tests"', f'"{name}"')
     (tmp_path / "machine.toml").write_text(machine)
     assert name in lhpost6("info", "--machine", "machine.toml").words
     assert refused(lhpost6("run", "sine", "--set", name), f"--set {name}")
@@ -478,40 +435,18 @@ def test_open_loop_drives_the_plant_with_a_records_spools(lhpost6, tmp_path, eng
     assert float(row.split("│")[4]) < rrmse  # as printed: noise and another step in the practice record
 
 
-def test_a_replay_never_replaces_the_record_it_came_from(lhpost6, tmp_path):
-    lhpost6("run", *SHORT, "--out", tmp_path / "here")
-    before = (tmp_path / "here" / "record.nc").read_bytes()
-    ended = lhpost6("open-loop", tmp_path / "here" / "record.nc", "--out", tmp_path / "here")
-    assert refused(ended, "would be replaced by its own replay", "--out")
-    assert (tmp_path / "here" / "record.nc").read_bytes() == before
-
-
-def test_a_record_made_with_a_specimen_is_not_replayed_without(lhpost6, tmp_path):
-    lhpost6("run", *SHORT, "--specimen", "pendulum", "--specimen-at", "1,0.5,0", "--locked", "--out", tmp_path / "made")
+def test_a_record_is_not_replayed_without_its_specimen_nor_over_itself(lhpost6, tmp_path):
+    mounted = ("--specimen", "pendulum", "--specimen-at", "1,0.5,0", "--locked")
+    lhpost6("run", *SHORT, *mounted, "--out", tmp_path / "made")
     record = tmp_path / "made" / "record.nc"
+    before = record.read_bytes()
     assert refused(lhpost6("open-loop", record), "specimen 'pendulum'", "--specimen")
-    again = ("open-loop", record, "--specimen", "pendulum", "--specimen-at", "1,0.5,0", "--locked")
-    assert lhpost6(*again, "--out", tmp_path / "again").code == 0
-
-
-@pytest.mark.parametrize("place", ["1,2", "a,b,c", "1,2,3,4"])
-def test_a_place_that_is_none_is_refused(lhpost6, place):
-    assert refused(lhpost6("run", *SHORT, "--specimen", "pendulum", "--specimen-at", place), "x,y,z", place)
-
-
-def test_check_holds_forces_against_pressures(lhpost6, tmp_path):
-    record = load_record(PRACTICE)
-    record["actuator_force"] = record["actuator_force"] * 1.2
-    save_record(record, tmp_path / "wrong.nc")
-    assert "actuator_force" in lhpost6("check", tmp_path / "wrong.nc").out
-    assert "P_A" in lhpost6("check", tmp_path / "wrong.nc").out
-
-
-def test_open_loop_does_not_claim_a_report_that_an_earlier_run_left(lhpost6, tmp_path):
-    (tmp_path / "here").mkdir()
-    (tmp_path / "here" / "report.html").write_text("older")
-    ended = lhpost6("open-loop", REFERENCE, "--engine", "fused", "--rate", "2048", "--out", "here")
-    assert ended.code == 0 and "report.html" not in ended.words
+    replaced = lhpost6("open-loop", record, *mounted, "--out", tmp_path / "made")
+    assert refused(replaced, "would be replaced by its own replay", "--out") and record.read_bytes() == before
+    (tmp_path / "two words; and more").mkdir()
+    (tmp_path / "two words; and more" / "report.html").write_text("older")
+    ended = lhpost6("open-loop", record, *mounted, "--out", tmp_path / "two words; and more")
+    assert ended.code == 0 and "report.html" not in ended.words  # which an earlier run left
 
 
 def test_open_loop_replays_a_record_of_another_machine_on_that_machine_only(lhpost6, tmp_path):
@@ -539,11 +474,6 @@ def test_what_cannot_be_replayed_is_refused_with_a_clear_message(lhpost6, tmp_pa
     assert everything(tmp_path) == []
 
 
-def test_a_record_without_chamber_b_is_refused_by_name(lhpost6, tmp_path):
-    save_record(load_record(PRACTICE).drop_vars("chamber_pressure_b"), tmp_path / "a.nc")
-    assert refused(lhpost6("open-loop", "a.nc"), "has no chamber_pressure_b")
-
-
 # Trouble on the way ---------------------------------------------------------------------------------------------------
 
 
@@ -558,10 +488,9 @@ def too_far(path: Path) -> None:
 def test_a_run_that_leaves_its_stroke_exits_1_keeps_what_was_done_and_says_when_and_what(tmp_path):
     too_far(tmp_path / "up.nc")
     ended = process("open-loop", tmp_path / "up.nc", "--out", tmp_path / "here", "--engine", "fused")
-    assert ended.returncode == 1
     words = " ".join(ended.stderr.split())
     found = re.search(r"stopped at (\d\.\d+) s: V\d left its stroke of \+-0\.127 m", words)
-    assert found and "Traceback" not in words
+    assert ended.returncode == 1 and found and "Traceback" not in words
     record = load_record(tmp_path / "here" / "record.nc")
     assert found[0] in record.attrs["trouble"]
     # the last sample is at most two before the stop: one of the record's end, one of rounding in the message
@@ -572,9 +501,8 @@ def test_a_run_that_leaves_its_stroke_exits_1_keeps_what_was_done_and_says_when_
 def test_a_run_that_diverges_exits_1_with_a_record_and_a_report_that_says_so(lhpost6, tmp_path):
     """The report's Euler on an oil column of 0.30 m at 2048 Hz."""
     assert lhpost6("run", *COARSE, "--scheme", "euler", "--out", "here").code == 1
-    record = load_record(tmp_path / "here" / "record.nc")
-    assert 1.0 < float(record["time"][-1]) < 8.0
-    assert "stopped at" in record.attrs["trouble"]
+    record = sound(tmp_path / "here")
+    assert 1.0 < float(record["time"][-1]) < 8.0 and "stopped at" in record.attrs["trouble"]
     assert "stopped at" in (tmp_path / "here" / "report.html").read_text()
 
 
@@ -590,7 +518,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_simulation(lhpost
 
 def test_a_disk_that_fills_up_is_a_clear_message_and_leaves_no_half_file(lhpost6, tmp_path):
     """A limit on the size of files in a process of its own does as a full disk does."""
-    assert lhpost6("run", *COARSE, "--out", "here").code == 0  # all is compiled, and kept
+    assert lhpost6("run", *COARSE, "--out", "sine").code == 0  # a folder of this name does not hide the motion
     before = everything(tmp_path)
     code = (
         "import resource, signal, sys; from lhpost6_pin.cli import main;"
@@ -608,14 +536,10 @@ def test_a_disk_that_fills_up_is_a_clear_message_and_leaves_no_half_file(lhpost6
 def test_an_unwritable_file_is_a_clear_message(lhpost6, tmp_path):
     (tmp_path / "here" / "record.nc").mkdir(parents=True)  # a folder where the file should be
     assert refused(lhpost6("run", *COARSE, "--out", "here"), "record.nc", "directory")
-    assert everything(tmp_path) == []
 
 
 def test_ctrl_c_while_simulating_leaves_nothing_and_says_so(lhpost6, tmp_path, monkeypatch):
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("rich.progress.Progress.update", interrupt)
+    monkeypatch.setattr("rich.progress.Progress.update", mock.Mock(side_effect=KeyboardInterrupt))
     for engine in ("pinocchio", "fused"):
         ended = lhpost6("run", "sine", "--engine", engine, "--out", "here")
         assert ended.code == 130
@@ -722,13 +646,9 @@ def test_completion_of_damaged_data_is_silent(completed, monkeypatch, tmp_path):
 
 
 def test_a_key_press_does_not_wait_for_the_simulator():
-    code = (
-        "import sys; from lhpost6_pin.cli import main\n"
-        "try:\n    sys.argv = ['lhpost6']; main()\n"
-        "finally:\n    print(*sys.modules)"
-    )
+    code = "import sys; from lhpost6_pin.cli import main\ntry:\n    sys.argv = ['lhpost6']; main()\n"
+    command = [sys.executable, "-c", f"{code}finally:\n    print(*sys.modules)"]
     environment = {**os.environ, **asking("lhpost6 run ridgecrest-cl")}
-    command = [sys.executable, "-c", code]
     ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, env=environment)
     name, modules = ended.stdout.splitlines()
     assert name == "ridgecrest-clc" and ended.stderr == ""
@@ -751,10 +671,8 @@ def test_output_into_a_closed_pipe_ends_quietly():
     """As in `lhpost6 info | head -1`."""
     read, write = os.pipe()
     os.close(read)
-    try:
-        ended = process("info", capture_output=False, stdout=write, stderr=subprocess.PIPE)
-    finally:
-        os.close(write)
+    ended = process("info", capture_output=False, stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
     assert "Traceback" not in ended.stderr and "error" not in ended.stderr
 
 
@@ -762,15 +680,3 @@ def test_output_into_a_closed_pipe_ends_quietly():
 def test_a_read_only_folder_is_refused(lhpost6, tmp_path):
     (tmp_path / "locked").mkdir(mode=0o500)
     assert refused(lhpost6("run", *COARSE, "--out", "locked/here"), "locked", "Permission denied")
-
-
-def test_run_works_from_names_that_a_shell_would_quote(lhpost6, tmp_path):
-    shutil.copy(PRACTICE, tmp_path / "two words; and more.nc")
-    assert lhpost6("open-loop", "two words; and more.nc", "--engine", "fused", "--rate", "2048").code == 0
-    assert (tmp_path / "out" / "two words; and more_open_loop" / "record.nc").is_file()
-
-
-def test_shipped_motions_have_names_that_find_them():
-    for entry in list_motions():
-        if entry.available and entry.kind == "record":
-            assert find_motion(entry.name.upper()).name == entry.name

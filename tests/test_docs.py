@@ -9,6 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 from doc_pages import PAGES, ROOT, Links, snippets
+from test_scripts import script
 from test_structure import ORDER
 
 from lhpost6_pin.cli import app
@@ -32,10 +33,8 @@ def name(page: Path) -> str:
 # --------------------------------------------------------------------------------------------------------- the site
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The finished site."""
     out = tmp_path_factory.mktemp("docs") / "site"
-    command = [sys.executable, str(ROOT / "scripts" / "build_docs.py"), "--out", str(out)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=3000)
+    ended = script("build_docs.py", "--out", out)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert ended.stdout.strip() == f"wrote {out / 'index.html'}"
     assert [p.name for p in out.parent.iterdir()] == ["site"]  # nothing half-built is left beside it
@@ -44,13 +43,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pages(site: Path) -> dict[Path, Links]:
-    """Every page of the site."""
     return {path: Links(path) for path in sorted(site.rglob("*.html"))}
-
-
-def test_every_page_by_hand_is_there(site):
-    for page in BY_HAND:
-        assert (site / page.relative_to(PAGES)).with_suffix(".html").is_file()
 
 
 def test_no_page_loads_anything_from_elsewhere(site, pages):
@@ -78,7 +71,9 @@ def test_every_link_and_anchor_leads_somewhere(site, pages):
                 assert anchor in pages[site / target.relative_to(site.resolve())].ids, f"{path.name}: {link}"
 
 
-def test_frames_in_braces_are_not_taken_for_markup(site):
+def test_every_page_by_hand_is_there_and_frames_in_braces_are_not_taken_for_markup(site):
+    for page in BY_HAND:
+        assert (site / page.relative_to(PAGES)).with_suffix(".html").is_file()
     text = (site / "machine.html").read_text(encoding="utf-8")
     assert "<td>those of {s}</td>" in text and "<td>{n_i}</td>" in text
 
@@ -160,8 +155,7 @@ def test_the_stored_wait_of_a_newcomer_is_within_what_is_wanted(site):
 
 def test_every_example_is_on_its_page_with_its_code(site):
     page = (site / "tutorials" / "examples.html").read_text()
-    for path in sorted((ROOT / "scripts").glob("example_*.py")):
-        assert path.name in page
+    assert all(path.name in page for path in (ROOT / "scripts").glob("example_*.py"))
     assert page.count("find_missing_effect") >= 2 and "simulate_many" in page
 
 
@@ -184,8 +178,7 @@ def test_figures_are_the_same_however_often_they_are_drawn(tmp_path):
 
 def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    command = [sys.executable, str(ROOT / "scripts" / "build_docs.py"), "--out", str(tmp_path)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
+    ended = script("build_docs.py", "--out", tmp_path)
     assert ended.returncode == 1 and "holds something else" in ended.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
@@ -219,17 +212,14 @@ def test_identifiers_of_the_glossary_are_in_use():
 
 
 # --------------------------------------------------------------------------------------------------------- snippets
+
+
 @pytest.mark.parametrize("page", BY_HAND, ids=name)
-def test_every_snippet_says_what_it_is(page):
+def test_every_snippet_says_what_it_is_and_what_is_typed_into_a_console_installs_and_no_more(page):
     for snippet in snippets(page):
         assert snippet.language in (*RUN, *SHOWN, "{"), f"{page.name}: {snippet.language}"
-
-
-@pytest.mark.parametrize("page", BY_HAND, ids=name)
-def test_what_is_to_be_typed_into_a_console_installs_and_no_more(page):
-    for snippet in snippets(page):
-        if snippet.language == "console":
-            assert all(re.match(r"\$ .*pip install ", line) for line in snippet.text.splitlines())
+        lines = snippet.text.splitlines() if snippet.language == "console" else []
+        assert all(re.match(r"\$ .*pip install ", line) for line in lines)
 
 
 def run_page(page: Path, folder: Path, *, slow: bool) -> None:

@@ -24,14 +24,12 @@ def path(target, tmp_path):
 
 
 def changed(path, change):
-    """The drive file with its dataset changed."""
     data = change(xr.load_dataset(path, engine="h5netcdf"))
     data.to_netcdf(path.with_name("changed.nc"), engine="h5netcdf")
     return path.with_name("changed.nc")
 
 
 def with_value(data, name, value):
-    """Dataset with a value at sample 5 of a variable."""
     values = data[name].values.copy()
     values[5, ...] = value
     return data.assign({name: (data[name].dims, values)})
@@ -67,10 +65,7 @@ def test_a_drive_comes_back_from_its_file(path, target):
 def test_what_is_no_drive_is_refused_by_file_and_reason(path, change, message):
     with pytest.raises(RecordError, match=f"changed.nc: .*{message}|changed.nc: {message}"):
         load_drive(changed(path, change))
-
-
-def test_half_a_file_is_refused(path):
-    path.write_bytes(path.read_bytes()[:20000])
+    path.write_bytes(path.read_bytes()[:20000])  # half a file
     with pytest.raises(RecordError, match=r"drive.nc: not a netCDF-4"):
         load_drive(path)
 

@@ -66,8 +66,5 @@ def test_many_names_are_not_listed_where_one_is_near_or_a_command_lists_them():
     assert "valve_deadband" not in str(caught.value)
     with pytest.raises(UnknownNameError, match="valve_deadband"):
         find_family("quite another")
-
-
-def test_where_nothing_exists_that_is_said():
     with pytest.raises(UnknownNameError, match=r"no effect of this machine named 'leak'; there are none$"):
         load_machine().without_effect("leak")

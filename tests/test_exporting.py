@@ -1,5 +1,7 @@
 """Exported records hold units in their names and come back the same; the two commands from end to end."""
 
+import sys
+
 import numpy as np
 import pytest
 import scipy.io
@@ -9,6 +11,7 @@ from data_files import LABELS, binary_469d, header, sines, typical_channels
 from machine_cases import PRACTICE
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
+from lhpost6_pin.core.names import AXES
 from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.importing import export_record, guess_map, is_export, load_raw, make_imported_record
 from lhpost6_pin.data.records import load_record, make_record
@@ -16,7 +19,6 @@ from lhpost6_pin.data.records import load_record, make_record
 
 @pytest.fixture(scope="module")
 def record() -> xr.Dataset:
-    """The first second of a practice record."""
     return load_record(PRACTICE).isel(time=slice(512))
 
 
@@ -63,19 +65,16 @@ def test_what_a_record_holds_beyond_the_layout_is_exported_too(tmp_path, record)
     assert raw.names[-2:] == ("extra_0 [m]", "extra_1 [m]")
 
 
-def test_an_unknown_format_and_a_broken_record_are_refused(tmp_path, record):
+def test_an_unknown_format_a_broken_record_and_a_missing_package_are_refused(tmp_path, record, monkeypatch):
     with pytest.raises(UnknownNameError, match="csv, mat, parquet"):
         export_record(record, tmp_path / "run.xls", "xls")
     broken = make_record([0.0, 0.1], {"supply_pressure": [1.0, 2.0]}, {}, {}).assign_coords(time=[0.1, 0.0])
     with pytest.raises(RecordError, match="does not increase"):
         export_record(broken, tmp_path / "run.csv", "csv")
-    assert not list(tmp_path.iterdir())
-
-
-def test_parquet_without_pyarrow_says_which_extra_brings_it(tmp_path, record, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(RecordError, match=r"lhpost6-pin\[formats\]"):
         export_record(record, tmp_path / "run.parquet", "parquet")
+    assert not list(tmp_path.iterdir())
 
 
 # --------------------------------------------------------------------------------------------- commands
@@ -90,19 +89,21 @@ def test_guess_then_import_shows_source_unit_and_range_of_every_channel(lhpost6,
     ended = lhpost6("import", "EQ1.bin", "--map", "EQ1_map.toml", "--out", "EQ1.nc")
     assert ended.code == 0
     assert "platen_displacement[x] EQ1.bin: Long Displ fbk [in] m" in ended.words
-    assert load_record(tmp_path / "EQ1.nc", LABELS).attrs["sample_rate_hz"] == 256
+    record = load_record(tmp_path / "EQ1.nc", LABELS)
+    assert record.attrs["sample_rate_hz"] == 256
+    column = next(k for k, t in enumerate(typical) if t.channel == "platen_acceleration[y]")
+    found = record["platen_acceleration"].sel(axis="y")
+    np.testing.assert_allclose(found, 9.80665 * values[:, column], rtol=2.0**-23, atol=0)  # rounding of a float32
+    assert "platen_acceleration[y] = EQ1.bin: Lat Accel fbk [g]" in record.attrs["columns"]
 
 
 def test_a_wrong_unit_is_seen_after_the_import(lhpost6, tmp_path):
     rows = "".join(f"{k / 256},{20 * np.sin(k / 40):.6f},0\n" for k in range(600))
     (tmp_path / "run.csv").write_text("time [s],x,other\n" + rows)
-    zero = "\n".join(
-        f'"platen_displacement[{a}]" = {{ constant = 0.0, unit = "{u}" }}'
-        for a, u in (("y", "m"), ("z", "m"), ("roll", "rad"), ("pitch", "rad"), ("yaw", "rad"))
-    )
-    (tmp_path / "map.toml").write_text(
-        f'[channel]\n"platen_displacement[x]" = {{ column = "x", unit = "m" }}\n{zero}\n'
-    )
+    zeros = "".join(f'"platen_displacement[{a}]" = {{ constant = 0.0, unit = "rad" }}\n' for a in AXES[3:])
+    zeros += "".join(f'"platen_displacement[{a}]" = {{ constant = 0.0, unit = "m" }}\n' for a in "yz")
+    given = '[channel]\n"platen_displacement[x]" = { column = "x", unit = "m" }\n'
+    (tmp_path / "map.toml").write_text(given + zeros)
     ended = lhpost6("import", "run.csv", "--map", "map.toml")
     assert ended.code == 0 and "wrote out/run.nc" in ended.words
     assert "reaches 20: mm or in for m?" in ended.words
@@ -111,6 +112,9 @@ def test_a_wrong_unit_is_seen_after_the_import(lhpost6, tmp_path):
 def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
     record.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     assert lhpost6("export", "a.nc", "--to", "csv")[:2] == (0, "wrote a.csv\n")
+    before = (tmp_path / "a.csv").read_bytes()
+    assert refused(lhpost6("import", "a.csv", "--out", "a.csv"), "is one of the files to import")
+    assert (tmp_path / "a.csv").read_bytes() == before
     ended = lhpost6("import", "a.csv", "--out", "b.nc")
     assert ended.code == 0 and "0 errors" in ended.words
     np.testing.assert_array_equal(load_record(tmp_path / "b.nc")["actuator_force"], record["actuator_force"])
@@ -130,10 +134,3 @@ def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
 def test_a_command_that_cannot_go_on_says_why(lhpost6, tmp_path, arguments, phrase):
     (tmp_path / "run.csv").write_text("time [s],x\n0,1\n1,2\n")
     assert refused(lhpost6(*arguments), phrase)
-
-
-def test_a_record_is_not_written_over_the_file_it_comes_from(lhpost6, tmp_path, record):
-    export_record(record, tmp_path / "a.csv", "csv")
-    before = (tmp_path / "a.csv").read_bytes()
-    assert refused(lhpost6("import", "a.csv", "--out", "a.csv"), "is one of the files to import")
-    assert (tmp_path / "a.csv").read_bytes() == before

@@ -30,7 +30,8 @@ def errors(fused, motion, band: Band) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("crossover", [None, 1.0])
-def test_sensors_without_noise_give_back_the_motion(plant, crossover) -> None:
+def test_sensors_without_noise_give_back_the_motion(plant, crossover):
+    np.testing.assert_allclose(kinematic_jacobian(plant), pose_jacobian(plant.machine, np.zeros(6)), atol=1e-12)
     record, motion = measured(plant)
     fused = fuse_motion(plant, record, SENSORS, crossover=crossover)
     for error, true in zip(errors(fused, motion, SENSORS.band), motion, strict=True):
@@ -49,7 +50,7 @@ def test_sensors_without_noise_give_back_the_motion(plant, crossover) -> None:
     ],
 )
 @pytest.mark.parametrize("crossover", [None, 2.0])
-def test_errors_are_as_large_as_predicted_from_whatever_sensors_there_are(plant, channels, crossover) -> None:
+def test_errors_are_as_large_as_predicted_from_whatever_sensors_there_are(plant, channels, crossover):
     record, motion = measured(plant)
     noisy = add_noise(record[channels], SENSORS, np.random.default_rng(7))
     band = Band(high=30.0)
@@ -61,7 +62,7 @@ def test_errors_are_as_large_as_predicted_from_whatever_sensors_there_are(plant,
         np.testing.assert_allclose(error, due, rtol=0.35 if order == 0 else 0.2)
 
 
-def test_fused_motion_is_better_than_each_sensor_alone_and_optimum_weights_than_a_fixed_crossover(plant) -> None:
+def test_fused_motion_is_better_than_each_sensor_alone_and_optimum_weights_than_a_fixed_crossover(plant):
     record, _ = measured(plant)
     noisy = add_noise(record[MOTION], SENSORS, np.random.default_rng(1))
     best = fuse_motion(plant, noisy, SENSORS).noise
@@ -74,7 +75,7 @@ def test_fused_motion_is_better_than_each_sensor_alone_and_optimum_weights_than_
     assert (best.acceleration < SENSORS.noise_sd("platen_acceleration")).all()
 
 
-def test_white_displacement_and_acceleration_noise_cross_over_where_their_spectra_meet(plant) -> None:
+def test_white_displacement_and_acceleration_noise_cross_over_where_their_spectra_meet(plant):
     record, _ = measured(plant)
     two = record[["platen_displacement", "platen_acceleration"]].isel(time=slice(0, 2048))
     meeting = float((SENSORS.noise["platen_acceleration"][0] / SENSORS.noise["platen_displacement"][0]) ** 0.5)
@@ -84,7 +85,7 @@ def test_white_displacement_and_acceleration_noise_cross_over_where_their_spectr
     np.testing.assert_allclose(optimum.motion.displacement[:, :3], fixed.motion.displacement[:, :3], atol=1e-12)
 
 
-def test_velocity_and_acceleration_are_the_derivatives_of_the_displacement(plant) -> None:
+def test_velocity_and_acceleration_are_the_derivatives_of_the_displacement(plant):
     record, _ = measured(plant)
     fused = fuse_motion(plant, add_noise(record, SENSORS, np.random.default_rng(2)), SENSORS, band=Band(high=40.0))
     for low, high in ((0, 1), (1, 2)):
@@ -94,14 +95,14 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_displacement(plant
         assert (error < 2e-3 * v.std(axis=0)).all()  # the stencil's own: (w dt)^6 / 140 at 40 Hz, 1e-4 of what is there
 
 
-def test_a_constant_error_of_an_accelerometer_does_not_reach_the_displacement(plant) -> None:
+def test_a_constant_error_of_an_accelerometer_does_not_reach_the_displacement(plant):
     record, motion = measured(plant)
     biased = record.assign(platen_acceleration=record["platen_acceleration"] + 0.05)
     fused = fuse_motion(plant, biased, SENSORS)
     assert (errors(fused, motion, SENSORS.band)[0] < 1e-9).all()
 
 
-def test_a_guided_platen_has_its_motion_from_one_length() -> None:
+def test_a_guided_platen_has_its_motion_from_one_length():
     plant = plant_named("uniaxial")
     t = np.arange(2048) * DT
     x = 0.1 * np.sin(2 * np.pi * t)[:, None]
@@ -112,11 +113,7 @@ def test_a_guided_platen_has_its_motion_from_one_length() -> None:
     assert not np.delete(fused.motion.displacement, axis, axis=1).any()
 
 
-def test_the_jacobian_is_that_of_the_report(plant) -> None:
-    np.testing.assert_allclose(kinematic_jacobian(plant), pose_jacobian(plant.machine, np.zeros(6)), atol=1e-12)
-
-
-def test_friction_keeps_its_memory_of_a_motion_through_a_rest(plant) -> None:
+def test_friction_keeps_its_memory_of_a_motion_through_a_rest(plant):
     """The platen goes 1 mm along x and rests for half a minute; seals stay as they were left."""
     t = np.arange(round(32 * RATE)) / RATE
     angle = np.pi * np.minimum(t, 1.0)
@@ -141,7 +138,7 @@ def test_friction_keeps_its_memory_of_a_motion_through_a_rest(plant) -> None:
     assert np.abs(fused.path - motion.displacement)[away, 0].max() < 4 * fused.noise.displacement[0]
 
 
-def test_what_cannot_be_fused_is_refused_by_name(plant) -> None:
+def test_what_cannot_be_fused_is_refused_by_name(plant):
     record, _ = measured(plant, duration=2.0)
     with pytest.raises(RecordError, match="neither actuator_displacement nor platen_displacement"):
         fuse_motion(plant, record[["platen_acceleration"]], SENSORS)
@@ -152,7 +149,7 @@ def test_what_cannot_be_fused_is_refused_by_name(plant) -> None:
 
 
 @pytest.mark.parametrize("channels", [MOTION, MOTION[:3], ["platen_displacement", "platen_velocity"]])
-def test_the_shares_of_the_channels_add_up_to_the_motion(plant, channels) -> None:
+def test_the_shares_of_the_channels_add_up_to_the_motion(plant, channels):
     record, _ = measured(plant)
     fused = fuse_motion(plant, add_noise(record[channels], SENSORS, np.random.default_rng(3)), SENSORS, shares=True)
     assert set(fused.share) == set(fused.used) == set(channels)

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plant_cases import TwoAxes
 from scipy import signal
 
 from lhpost6_pin.control.inverse import TAPER, InverseFilter, apply_inverse, load_inverse, make_inverse, save_inverse
@@ -19,36 +20,20 @@ pytestmark = pytest.mark.long
 
 RATE = 256.0
 LOW, HIGH = 0.5, 30.0
-DELAY = 5  # samples, 20 ms
 F = np.arange(1, 1025) / 8.0  # [Hz]
 T = np.arange(int(60 * RATE)) / RATE
 
 
-def oscillator(frequency: float, damping: float, gain: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Second-order low-pass as a digital filter."""
-    w = 2 * np.pi * frequency
-    return signal.bilinear([gain * w**2], [1, 2 * damping * w, w**2], RATE)
-
-
-PLANT = [[oscillator(25, 0.4), oscillator(12, 0.3, 0.2)], [oscillator(15, 0.3, -0.2), oscillator(40, 0.5)]]
-"""Two axes that resonate, roll off and couple; row output, column drive."""
-
-
-def respond(x: np.ndarray) -> np.ndarray:
-    """Output of the plant, `DELAY` samples late."""
-    y = np.stack([sum(signal.lfilter(*g, x[:, j]) for j, g in enumerate(row)) for row in PLANT], axis=1)
-    return np.vstack([np.zeros((DELAY, 2)), y[:-DELAY]])
+PLANT = TwoAxes((25, 0.4), (12, 0.3, 0.2), (15, 0.3, -0.2), (40, 0.5))
+"""Two axes that resonate, roll off and couple."""
 
 
 def true_transfer(frequency: np.ndarray = F, axes: tuple[str, ...] = ("x", "yaw")) -> Transfer:
     """The plant in closed form, trusted everywhere."""
-    late = np.exp(-2j * np.pi * frequency * DELAY / RATE)
-    rows = [[signal.freqz(*g, worN=frequency, fs=RATE)[1] * late for g in row] for row in PLANT]
-    return Transfer(frequency, np.moveaxis(np.array(rows), -1, 0), np.ones((len(frequency), 2)), axes)
+    return Transfer(frequency, PLANT.response(frequency), np.ones((len(frequency), 2)), axes)
 
 
 def one_axis(response: np.ndarray) -> Transfer:
-    """A transfer function of x alone."""
     return Transfer(F, response[:, None, None], np.ones((len(F), 1)), ("x",))
 
 
@@ -67,7 +52,7 @@ def reference(*columns: int, seed: int = 0) -> np.ndarray:
 
 
 # ------------------------------------------------------------------------------------------- the filter
-def test_inverse_times_table_is_one_in_the_band() -> None:
+def test_inverse_times_table_is_one_in_the_band():
     f = np.arange(0.7, 29, 0.0371)  # between the frequencies of either grid
     product = true_transfer(f).response @ response(make_inverse(true_transfer(), RATE, LOW, HIGH), f)
     # 4 s of taps blur the edges of the band over 2 / 4 s; inside, what they cut off has died out
@@ -76,7 +61,7 @@ def test_inverse_times_table_is_one_in_the_band() -> None:
     np.testing.assert_allclose(product, np.tile(np.eye(2), (len(f), 1, 1)), atol=0.05)
 
 
-def test_the_gain_is_one_at_rest_and_nothing_above_the_band() -> None:
+def test_the_gain_is_one_at_rest_and_nothing_above_the_band():
     inverse = make_inverse(true_transfer(), RATE, LOW, HIGH)
     np.testing.assert_allclose(inverse.taps.sum(axis=0), np.eye(2), atol=1e-12)  # rounding
     # slowly the plant follows but for its coupling of 0.2, which the inverse leaves alone an octave below the band
@@ -86,17 +71,20 @@ def test_the_gain_is_one_at_rest_and_nothing_above_the_band() -> None:
     np.testing.assert_allclose(above, 0, atol=1e-3)  # the same blur, of a drive of order one
 
 
-def test_a_table_that_was_measured_can_be_driven_to_follow() -> None:
+def test_a_table_that_was_measured_can_be_driven_to_follow():
     x = np.random.default_rng(1).standard_normal((int(150 * RATE), 2))
-    measured = estimate_transfer(x, respond(x), RATE, axes=("x", "yaw"))
+    measured = estimate_transfer(x, PLANT.respond(x), RATE, axes=("x", "yaw"))
     r = reference(0, 5)
     drive = apply_inverse(make_inverse(measured, RATE, LOW, HIGH), r)
-    before, after = rrmse(r[:, [0, 5]], respond(r[:, [0, 5]])), rrmse(r[:, [0, 5]], respond(drive[:, [0, 5]]))
+    before, after = (
+        rrmse(r[:, [0, 5]], PLANT.respond(r[:, [0, 5]])),
+        rrmse(r[:, [0, 5]], PLANT.respond(drive[:, [0, 5]])),
+    )
     assert (before > 0.9).all()  # 20 ms late at 8 Hz is a radian
     assert (after < 0.01).all()  # of the response, 2e-3 noise of the estimate from 36 segments
 
 
-def test_the_inverse_does_not_grow_where_the_table_does_not_move() -> None:
+def test_the_inverse_does_not_grow_where_the_table_does_not_move():
     notch = np.abs(1 - 1 / (1 + ((F - 10) / 2) ** 2))  # no response at all at 10 Hz
     inverse = make_inverse(one_axis(notch + 0j), RATE, LOW, HIGH, floor=0.1)
     gain = np.abs(response(inverse, np.linspace(5, 15, 401))[:, 0, 0])
@@ -105,7 +93,7 @@ def test_the_inverse_does_not_grow_where_the_table_does_not_move() -> None:
     np.testing.assert_allclose(far, [1 + 4 / 100, 1 + 4 / 225], rtol=2e-3)  # 1 / notch, untouched by the floor
 
 
-def test_an_axis_that_was_measured_badly_gets_its_reference_and_does_not_spoil_the_other() -> None:
+def test_an_axis_that_was_measured_badly_gets_its_reference_and_does_not_spoil_the_other():
     good = true_transfer()
     rubbish = np.random.default_rng(2).standard_normal((len(F), 2))
     bad = replace(good, response=good.response.copy(), coherence=good.coherence * [1.0, 0.3])
@@ -119,7 +107,7 @@ def test_an_axis_that_was_measured_badly_gets_its_reference_and_does_not_spoil_t
     )
 
 
-def test_frequencies_that_do_not_cohere_are_bridged_by_the_plain_delay() -> None:
+def test_frequencies_that_do_not_cohere_are_bridged_by_the_plain_delay():
     late = np.exp(-2j * np.pi * F * 0.02)
     hole = (F > 9) & (F < 12)
     deaf = replace(one_axis(np.where(hole, 0, 0.5 * late)), coherence=np.where(hole, 0.2, 1.0)[:, None])
@@ -130,7 +118,7 @@ def test_frequencies_that_do_not_cohere_are_bridged_by_the_plain_delay() -> None
 
 @settings(max_examples=20)
 @given(st.floats(-0.1, 0.1))
-def test_the_inverse_of_a_delay_is_an_advance(tau: float) -> None:
+def test_the_inverse_of_a_delay_is_an_advance(tau: float):
     inverse = make_inverse(one_axis(np.exp(-2j * np.pi * F * tau)), RATE, LOW, HIGH)
     r = reference(0)
     error = rrmse(align(r[:, 0], tau, 1 / RATE), apply_inverse(inverse, r)[:, 0])
@@ -138,7 +126,7 @@ def test_the_inverse_of_a_delay_is_an_advance(tau: float) -> None:
 
 
 # ------------------------------------------------------------------------------------------- applying it
-def test_axes_without_an_inverse_pass_unchanged() -> None:
+def test_axes_without_an_inverse_pass_unchanged():
     inverse = make_inverse(true_transfer(axes=("roll", "z")), RATE, LOW, HIGH)
     r = reference(0, 2, 3)
     drive = apply_inverse(inverse, r)
@@ -147,7 +135,7 @@ def test_axes_without_an_inverse_pass_unchanged() -> None:
     np.testing.assert_allclose(drive[:, [3, 2]], swapped[:, [2, 3]], atol=1e-12)  # rounding of the transform
 
 
-def test_the_record_is_filtered_as_if_silence_stood_around_it() -> None:
+def test_the_record_is_filtered_as_if_silence_stood_around_it():
     inverse = make_inverse(true_transfer(), RATE, LOW, HIGH)
     r = reference(0, 5)[: 10 * int(RATE)]
     framed = apply_inverse(inverse, np.pad(r, [(3000, 3000), (0, 0)]))[3000:-3000]
@@ -159,29 +147,26 @@ def test_the_record_is_filtered_as_if_silence_stood_around_it() -> None:
     assert inverse.delay == half / RATE == 2.0  # half of 4 s
 
 
-def test_a_signal_that_is_not_six_finite_columns_is_refused() -> None:
-    inverse = make_inverse(true_transfer(), RATE, LOW, HIGH)
+@pytest.mark.parametrize(
+    ("low", "high", "rate"), [(0.1, 30, RATE), (30, 0.5, RATE), (0.5, 110, RATE), (0.5, 30, 64.0), (-1, 30, RATE)]
+)
+def test_a_band_beyond_the_transfer_function_or_the_rate_is_refused(low: float, high: float, rate: float):
+    with pytest.raises(ValueError, match="needs the transfer function from"):
+        make_inverse(true_transfer(), rate, low, high)
+
+
+def test_what_is_not_square_has_no_inverse_and_what_is_not_six_finite_columns_is_not_filtered():
+    wide = true_transfer()
+    with pytest.raises(ValueError, match="square"):
+        make_inverse(replace(wide, response=wide.response[:, :1]), RATE, LOW, HIGH)
+    inverse = make_inverse(wide, RATE, LOW, HIGH)
     for wrong in (np.zeros((100, 2)), np.zeros(100), np.full((100, 6), np.nan)):
         with pytest.raises(ValueError, match="6 columns of finite samples"):
             apply_inverse(inverse, wrong)
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "rate"), [(0.1, 30, RATE), (30, 0.5, RATE), (0.5, 110, RATE), (0.5, 30, 64.0), (-1, 30, RATE)]
-)
-def test_a_band_beyond_the_transfer_function_or_the_rate_is_refused(low: float, high: float, rate: float) -> None:
-    with pytest.raises(ValueError, match="needs the transfer function from"):
-        make_inverse(true_transfer(), rate, low, high)
-
-
-def test_a_transfer_function_that_is_not_square_has_no_inverse() -> None:
-    wide = true_transfer()
-    with pytest.raises(ValueError, match="square"):
-        make_inverse(replace(wide, response=wide.response[:, :1]), RATE, LOW, HIGH)
-
-
 # ------------------------------------------------------------------------------------------- disk
-def test_a_saved_inverse_comes_back_the_same(tmp_path: Path) -> None:
+def test_a_saved_inverse_comes_back_the_same(tmp_path: Path):
     inverse = make_inverse(true_transfer(), RATE, LOW, HIGH)
     save_inverse(inverse, tmp_path / "table.nc")
     back = load_inverse(tmp_path / "table.nc")
@@ -192,7 +177,7 @@ def test_a_saved_inverse_comes_back_the_same(tmp_path: Path) -> None:
     assert load_inverse(tmp_path / "table.nc").made_with == {"machine": "mine"}
 
 
-def test_a_file_that_is_no_inverse_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_file_that_is_no_inverse_is_refused_by_name(tmp_path: Path):
     inverse = make_inverse(true_transfer(), RATE, LOW, HIGH)
     with pytest.raises(RecordError, match=r"gone.nc: no such file"):
         load_inverse(tmp_path / "gone.nc")

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
+from run_cases import with_tuning_numbers
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.names import AXES
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.machine.parameters import override_parameters
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
 from lhpost6_pin.tuning import identify as identify_module
 from lhpost6_pin.tuning import iterate as module
-from lhpost6_pin.tuning.identify import tuning_numbers
 from lhpost6_pin.tuning.iterate import Iteration, identify_inverse, iterate
 
 pytestmark = pytest.mark.long
@@ -21,10 +21,7 @@ pytestmark = pytest.mark.long
 @pytest.fixture(scope="module")
 def table():
     """The LHPOST6 with its shipped settings, from noise shorter than `tuning.toml` has it."""
-    numbers = override_parameters(tuning_numbers(), {"iteration.noise_duration": 80.0})
-    with pytest.MonkeyPatch.context() as patch:
-        for changed in (identify_module, module):
-            patch.setattr(changed, "tuning_numbers", lambda: numbers)
+    for _ in with_tuning_numbers({"iteration.noise_duration": 80.0}, identify_module, module):
         yield identify_inverse(load_machine(), load_controller("lhpost6"))
 
 
@@ -60,26 +57,16 @@ def test_the_best_drive_replayed_gives_the_run_that_was_judged_best(found, plant
     assert np.abs(motion.displacement[-100:, :3]).max() < 0.02  # it comes to rest where the motion does
 
 
-def test_the_second_drive_is_the_inverse_of_the_table_and_a_delay(found, table, strong):
+def test_the_second_drive_is_the_inverse_of_the_table_and_its_delay(found, table, strong):
     """AIC: no iteration goes into it."""
-    alone = iterate(load_machine(), strong, found.settings, table=table, most=1)
+    told = []
+    alone = iterate(load_machine(), strong, found.settings, table=table, most=1, progress=told.append)
     assert np.array_equal(alone.drives, found.drives[:2])
     assert alone.reason == "1 iterations were asked for" and alone.table is table
-
-
-def test_iterating_twice_gives_the_same_to_the_last_bit(found, table, strong):
-    again = iterate(load_machine(), strong, found.settings, table=table, most=3)
-    assert np.array_equal(again.drives, found.drives) and again.best == found.best
-
-
-def test_without_iterations_the_motion_itself_is_the_drive(table, strong):
-    once = iterate(load_machine(), strong, load_controller("lhpost6"), table=table, most=0)
+    assert told == sorted(told) and told[-1] == 1.0
+    assert 0.0 < table.delay < 0.03 and table.inverse.axes == table.transfer.axes == AXES
+    once = iterate(load_machine(), strong, found.settings, table=table, most=0)
     assert len(once.history) == 1 and once.best == 0 and once.best_run is once.first_run
-
-
-def test_the_delay_kept_is_the_tables_own(table):
-    assert 0.0 < table.delay < 0.03
-    assert table.inverse.axes == table.transfer.axes == ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 def test_a_run_that_leaves_its_stroke_names_the_iteration(table):
@@ -92,12 +79,6 @@ def test_a_run_that_leaves_its_stroke_names_the_iteration(table):
 def test_a_gain_that_is_none_is_refused(table, strong, gain):
     with pytest.raises(SimulationError, match="is no gain of a drive's update"):
         iterate(load_machine(), strong, load_controller("lhpost6"), table=table, gain=gain)
-
-
-def test_progress_is_told_in_order(table, strong):
-    told = []
-    iterate(load_machine(), strong, load_controller("lhpost6"), table=table, most=1, progress=told.append)
-    assert told == sorted(told) and told[-1] == 1.0
 
 
 def test_iterating_stops_when_two_in_turn_have_not_lowered_the_error():

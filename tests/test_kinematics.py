@@ -1,14 +1,16 @@
-"""The report's Chapter 3 against Pinocchio and against finite differences, over the whole travel range."""
+"""The report's Chapter 3, and single instants, against Pinocchio and finite differences over the travel range."""
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from machine_cases import FREE_MACHINES, MACHINES, machine_named, platen_se3, random_poses
+from machine_cases import FREE_MACHINES, MACHINES, machine_named, plant_named, platen_se3, random_poses
+from run_cases import at_rest
 
-from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.errors import RecordError, SimulationError
 from lhpost6_pin.mechanics import kinematics as kin
+from lhpost6_pin.mechanics.instant import displacement_of, legs_at, platen_pose_at, required_wrench_at, wrench_at
 from lhpost6_pin.mechanics.rigid_body import make_model
 
 LHPOST6 = machine_named("lhpost6")
@@ -36,12 +38,7 @@ def twists(count, seed=1):
 
 
 def motion_of(twist):
-    """pin.Motion of a twist in the report's order."""
     return pin.Motion(kin.to_pinocchio_order(twist))
-
-
-def force_of(wrench):
-    return pin.Force(kin.to_pinocchio_order(wrench))
 
 
 def all_frames(machine, pose):
@@ -69,24 +66,20 @@ def test_report_order_is_angular_first_and_pinocchio_order_linear_first():
 # Rotations -----------------------------------------------------------------------------------------------------------
 
 
-@given(st.floats(-7.0, 7.0))
-def test_elementary_rotations_are_pinocchios(angle):
+@given(st.floats(-7.0, 7.0), vectors, vectors)
+def test_elementary_rotations_and_the_skew_matrix_are_pinocchios(angle, x, y):
     for axis, rotation in zip("xyz", (kin.rotation_x, kin.rotation_y, kin.rotation_z), strict=True):
         assert np.allclose(rotation(angle), pin.utils.rotate(axis, angle), rtol=0.0, atol=1e-15)
+    assert np.array_equal(kin.skew(x), pin.skew(np.array(x)))
+    assert np.allclose(kin.skew(x) @ y, np.cross(x, y), rtol=0.0, atol=1e-13)
 
 
 @given(angles)
-def test_rotation_is_yaw_times_pitch_times_roll_as_pinocchio_has_it(euler):
-    assert np.allclose(kin.rotation(euler), pin.rpy.rpyToMatrix(*euler), rtol=0.0, atol=1e-15)
-
-
-@given(angles)
-def test_euler_rate_jacobians_are_pinocchios(euler):
+def test_rotation_and_the_euler_rate_jacobians_are_pinocchios(euler):
     rpy = np.array(euler)
-    fixed = pin.rpy.computeRpyJacobian(rpy, pin.LOCAL_WORLD_ALIGNED)
-    body = pin.rpy.computeRpyJacobian(rpy, pin.LOCAL)
-    assert np.allclose(kin.s_J_E(euler), fixed, rtol=0.0, atol=1e-15)
-    assert np.allclose(kin.b_J_E(euler), body, rtol=0.0, atol=1e-15)
+    assert np.allclose(kin.rotation(euler), pin.rpy.rpyToMatrix(*euler), rtol=0.0, atol=1e-15)
+    for own, reference in ((kin.s_J_E, pin.LOCAL_WORLD_ALIGNED), (kin.b_J_E, pin.LOCAL)):
+        assert np.allclose(own(euler), pin.rpy.computeRpyJacobian(rpy, reference), rtol=0.0, atol=1e-15)
 
 
 @given(angles, vectors)
@@ -98,12 +91,6 @@ def test_angular_velocity_is_what_turns_the_rotation_matrix(euler, rates):
     assert np.allclose(rate, turn @ kin.skew(kin.b_J_E(euler) @ rates), atol=DIFFERENCE)  # Eq. 3-9
     # Eq. 3-11: {b}'s components are {s}'s, turned back
     assert np.allclose(kin.b_J_E(euler), turn.T @ kin.s_J_E(euler), atol=ROUNDING)
-
-
-@given(vectors, vectors)
-def test_skew_matrix_is_the_cross_product(x, y):
-    assert np.array_equal(kin.skew(x), pin.skew(np.array(x)))
-    assert np.allclose(kin.skew(x) @ y, np.cross(x, y), rtol=0.0, atol=1e-13)
 
 
 # Twists and wrenches between frames ----------------------------------------------------------------------------------
@@ -125,40 +112,18 @@ def test_twist_jacobian_between_any_frames_is_pinocchios_action(euler_f, at_f, e
 
 
 @pytest.mark.parametrize("name", FREE_MACHINES)
-def test_twists_in_all_frames_are_one_motion_to_pinocchio(name):
+def test_twists_in_all_frames_are_one_motion_to_pinocchio_and_power_is_the_same(name):
     machine = machine_named(name)
-    for pose, twist in zip(random_poses(machine, 12), twists(12), strict=True):
+    for pose, twist, wrench in zip(random_poses(machine, 12), twists(12), twists(12, seed=2), strict=True):
         b = kin.frame_b(machine, pose)
         assert np.allclose(b.homogeneous, platen_se3(machine, pose).homogeneous, atol=ROUNDING)
         in_world = b.act(motion_of(twist))  # {s}
         for frame in all_frames(machine, pose):
-            mine = kin.f_J_g(frame, b) @ twist
+            mine, force = kin.f_J_g(frame, b) @ twist, kin.wrench_transform(frame, b) @ wrench
             assert np.allclose(mine, kin.to_report_order(frame.actInv(in_world).vector), atol=ROUNDING)
-
-
-@pytest.mark.parametrize("name", FREE_MACHINES)
-def test_power_is_the_same_in_every_frame(name):
-    machine = machine_named(name)
-    for pose, twist, wrench in zip(random_poses(machine, 12), twists(12), twists(12, seed=2), strict=True):
-        b = kin.frame_b(machine, pose)
-        for frame in all_frames(machine, pose):
-            power = (kin.f_J_g(frame, b) @ twist) @ (kin.wrench_transform(frame, b) @ wrench)  # Eq. 4-20
-            assert power == pytest.approx(twist @ wrench, abs=1e-12)
-            theirs = motion_of(kin.f_J_g(frame, b) @ twist).dot(force_of(kin.wrench_transform(frame, b) @ wrench))
-            assert theirs == pytest.approx(power, abs=1e-12)
-
-
-@pytest.mark.parametrize("name", FREE_MACHINES)
-def test_special_jacobians_are_the_general_one_between_their_frames(name):
-    machine = machine_named(name)
-    for pose in random_poses(machine, 12):
-        b, c = kin.frame_b(machine, pose), kin.frame_c(pose)
-        assert np.allclose(kin.c_J_b(machine, pose), kin.f_J_g(c, b), atol=ROUNDING)  # Eq. 3-18
-        for component in machine.components:
-            p = kin.frame_p(machine, pose, component)
-            assert np.allclose(
-                kin.p_J_c(p.translation - c.translation), kin.f_J_g(p, c), atol=ROUNDING
-            )  # Eqs. 3-14, 3-17
+            assert mine @ force == pytest.approx(twist @ wrench, abs=1e-12)  # Eq. 4-20
+            theirs = motion_of(mine).dot(pin.Force(kin.to_pinocchio_order(force)))
+            assert theirs == pytest.approx(twist @ wrench, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", FREE_MACHINES)
@@ -190,33 +155,16 @@ def test_platen_jacobians_are_pinocchios_frame_jacobians(name):
                 assert np.allclose(kin.swivel_jacobian(pose, component) @ kin.c_J_b(machine, pose), row, atol=ROUNDING)
 
 
-@pytest.mark.parametrize("name", FREE_MACHINES)
-def test_twist_of_c_is_the_rate_of_the_pose(name):
-    machine = machine_named(name)
-    for pose, rate in zip(random_poses(machine, 8), twists(8)[:, ::-1], strict=True):
-        twist = kin.twist_c(pose, rate)
-        for component in machine.components:  # Eq. 3-13: velocity of the platen's particle, by finite differences
-            particle = kin.rotation(pose[3:]).T @ (kin.frame_p(machine, pose, component).translation - pose[:3])
-            speed = central(lambda p, at=particle: p[:3] + kin.rotation(p[3:]) @ at, pose, rate)
-            r_CP = kin.rotation(pose[3:]) @ particle
-            assert np.allclose((kin.p_J_c(r_CP) @ twist)[3:], speed, atol=DIFFERENCE)
-
-
 # Components ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", MACHINES)
-def test_lengths_in_the_zero_position_are_the_distances_of_the_end_points(name):
-    machine = machine_named(name)
-    for component in machine.components:
-        apart = np.subtract(component.platen_point, component.base_point)
-        assert np.allclose(kin.component_vector(machine, np.zeros(6), component), apart, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_length_jacobians_are_finite_differences_of_the_lengths(name):
     machine = machine_named(name)
     free = np.ones(6) if machine.motion == "free" else np.eye(6)["xyz".index(machine.motion)]
+    for component in machine.components:
+        apart = np.subtract(component.platen_point, component.base_point)
+        assert np.allclose(kin.component_vector(machine, np.zeros(6), component), apart, atol=ROUNDING)
     for pose, rate in zip(random_poses(machine, 24), twists(24)[:, ::-1] * free, strict=True):
         for component in machine.components:
             speed = central(lambda p, c=component: np.linalg.norm(kin.component_vector(machine, p, c)), pose, rate)
@@ -235,19 +183,6 @@ def test_bearing_end_is_where_its_vertical_meets_the_sliding_plane():
             assert np.array_equal(end[:2], bearing.base_point[:2])  # stays vertical, exactly
             on_platen = placement.actInv(end)
             assert on_platen[2] == pytest.approx(LHPOST6.platen.bearing_plane[2], abs=ROUNDING)
-
-
-def test_bearing_rises_as_fast_as_the_platen_under_it_moves_along_its_normal():
-    bearings = [a for a in LHPOST6.actuators if kin.is_bearing(a)]
-    for pose, twist in zip(POSES, twists(len(POSES)), strict=True):
-        placement = platen_se3(LHPOST6, pose)
-        normal = placement.rotation[:, 2]
-        for bearing in bearings:
-            end = bearing.base_point + kin.bearing_vector(LHPOST6, pose, bearing)
-            at_end = pin.SE3(np.eye(3), end).actInv(placement.act(motion_of(twist)))
-            rise = normal @ at_end.linear / normal[2]
-            c_V = kin.c_J_b(LHPOST6, pose) @ twist
-            assert kin.bearing_jacobian(LHPOST6, pose, bearing) @ c_V == pytest.approx(rise, abs=ROUNDING)
 
 
 def test_plate_lies_in_the_sliding_plane_and_does_not_turn_about_its_normal():
@@ -335,3 +270,78 @@ def test_normal_thrust_conserves_power_and_the_reports_vertical_thrust_does_not(
     assert lost["normal"] < ROUNDING
     has_bearings = name == "lhpost6"
     assert (lost["report"] > 1e-3) == has_bearings  # tilt of 0.04 rad times slip of m/s
+
+
+RNG = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize("thrust", ["report", "normal"])
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_the_wrench_of_actuator_forces_is_that_of_eqs_4_22_to_4_24(name: str, thrust: str) -> None:
+    plant, machine = plant_named(name, thrust), machine_named(name, thrust)
+    for values in random_poses(machine, 12) / 3.0:
+        force = RNG.uniform(-1e6, 1e6, plant.spools)
+        found = wrench_at(plant, platen_pose_at(values), force)
+        due = pin.Force.Zero()
+        for component, axial in zip(machine.actuators, force, strict=True):
+            arm = kin.component_vector(machine, values, component) + component.base_point - values[:3]
+            push = kin.component_force(machine, values, component, axial)
+            due += pin.Force(push, np.cross(arm, push))
+        np.testing.assert_allclose(found.vector, due.vector, atol=1e-13 * 1e7)  # sums of ten
+
+
+def test_a_pose_is_the_reports_rotation_and_comes_back() -> None:
+    for values in random_poses(machine_named("lhpost6"), 12):
+        pose = platen_pose_at(values)
+        np.testing.assert_allclose(pose.rotation, kin.rotation(values[3:]), atol=1e-15)
+        np.testing.assert_allclose(displacement_of(pose), values, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_what_actuators_deliver_is_the_power_of_their_wrench(name: str) -> None:
+    """Power of the wrench on a twist is that of the forces on the rates, where thrust conserves energy."""
+    plant = plant_named(name, "normal")
+    for values in random_poses(machine_named(name), 12) / 3.0:
+        pose, force = platen_pose_at(values), RNG.uniform(-1e6, 1e6, plant.spools)
+        twist = pin.Motion(RNG.uniform(-1.0, 1.0, 6))
+        s, rates = legs_at(plant, pose, twist)
+        lengths = kin.inverse_kinematics(machine_named(name), values)
+        np.testing.assert_allclose(
+            s[: plant.spools], lengths - kin.inverse_kinematics(plant.machine, np.zeros(6)), atol=1e-14
+        )
+        missed = wrench_at(plant, pose, force).dot(twist) - force @ rates[: plant.spools]
+        assert abs(missed) < 1e-13 * np.abs(force).sum() * 10.0  # speeds up to 10 m/s
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_the_required_wrench_is_that_of_eqs_4_24_to_4_29(name: str) -> None:
+    plant, machine = plant_named(name), machine_named(name)
+    for values in random_poses(machine, 12):
+        twist, rate = pin.Motion(RNG.uniform(-1.0, 1.0, 6)), pin.Motion(RNG.uniform(-9.0, 9.0, 6))
+        found = required_wrench_at(plant, platen_pose_at(values), twist, rate)
+        turn, centre = kin.rotation(values[3:]), np.array(machine.platen.centre_of_gravity)
+        lever = turn @ centre
+        omega, alpha = twist.angular, rate.angular
+        v = twist.linear + np.cross(omega, lever)
+        a = rate.linear + np.cross(alpha, lever) + np.cross(omega, np.cross(omega, lever))
+        b_V = np.concatenate([turn.T @ omega, turn.T @ v])
+        b_A = np.concatenate([turn.T @ alpha, turn.T @ a - np.cross(turn.T @ omega, turn.T @ v)])
+        at_b = kin.inertial_wrench(machine, b_V, b_A) - kin.external_wrench(machine, values, {})
+        force, moment = turn @ at_b[3:], turn @ at_b[:3]
+        due = pin.Force(force, moment + np.cross(lever, force))
+        np.testing.assert_allclose(found.vector, due.vector, atol=1e-13 * np.abs(due.vector).max())
+
+
+@pytest.mark.parametrize("name", FREE_MACHINES)
+def test_actuators_at_rest_hold_the_weight_against_the_struts(name: str) -> None:
+    plant, rest = at_rest(machine_named(name))
+    pull = [-strut.pressure * strut.area for strut in plant.machine.struts]
+    still = required_wrench_at(plant, rest.pose, pin.Motion.Zero(), pin.Motion.Zero())
+    given = wrench_at(plant, rest.pose, [*rest.force, *pull])
+    np.testing.assert_allclose(given.vector, still.vector, atol=1e-8)  # of 5e6 N
+    np.testing.assert_allclose(rest.wrench.vector, wrench_at(plant, rest.pose, rest.force).vector, atol=1e-8)
+
+
+def test_a_pose_out_of_stroke_names_its_actuator() -> None:
+    with pytest.raises(RecordError, match=r"H[12] is out of its stroke"):
+        wrench_at(plant_named("lhpost6"), platen_pose_at([3.0, 0, 0, 0, 0, 0]), np.ones(10))

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from library_cases import as_measured, measured_of, record_at_model_steps, rms, shaken, stirred
+from run_cases import as_measured, at_rest, driven, measured_of, rms, shaken, stirred
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.files import models_folder
@@ -14,9 +14,7 @@ from lhpost6_pin.identification.inverse_dynamics import inverse_dynamics
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow
 from lhpost6_pin.machine.library import families, find_family
 from lhpost6_pin.machine.machine import Machine, load_machine
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
-from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 pytestmark = pytest.mark.long
 
@@ -86,14 +84,14 @@ def with_family(family: str) -> Machine:
 
 
 # ---------------------------------------------------------------------------------------------- all families
-def test_every_family_of_a_machine_is_tried_here() -> None:
+def test_every_family_of_a_machine_is_tried_here():
     for files, tried in ((("mechanical", "unnamed"), MECHANICAL), (("oil",), OIL)):
         texts = [(models_folder() / "library" / f"{file}.toml").read_text(encoding="utf-8") for file in files]
         assert {name for text in texts for name in tomllib.loads(text)} == set(tried)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_amplitudes_may_be_zero_and_start_values_lie_within_bounds(family: str) -> None:
+def test_amplitudes_may_be_zero_and_start_values_lie_within_bounds(family: str):
     known = find_family(family)
     for shape in known.shapes:
         assert shape.low <= shape.typical <= shape.high
@@ -105,14 +103,16 @@ def test_amplitudes_may_be_zero_and_start_values_lie_within_bounds(family: str) 
 
 
 @pytest.mark.parametrize("family", ["accelerometer_error", "channel_delay", "controller_mismatch"])
-def test_errors_of_sensors_and_controllers_are_no_part_of_a_machine(family: str) -> None:
+def test_errors_of_sensors_and_controllers_are_no_part_of_a_machine(family: str):
     assert set(find_family(family).confused_with) <= set(families())
     with pytest.raises(ParameterError, match=f"{family} is no part of a machine"):
         base().with_effect(family)
+    with pytest.raises(ParameterError, match="swivel_friction: cannot act on V1"):
+        base().with_effect("swivel_friction", ("V1",))
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_without_amplitude_nothing_changes_by_a_bit(family: str) -> None:
+def test_without_amplitude_nothing_changes_by_a_bit(family: str):
     components, values = FAMILIES[family]
     none = {shape.name: 0.0 for shape in find_family(family).shapes if shape.amplitude}
     nothing = base().with_effect(family, components, **{**values, **none})
@@ -125,12 +125,7 @@ def test_without_amplitude_nothing_changes_by_a_bit(family: str) -> None:
         np.testing.assert_array_equal(run.q, plain.q)
 
 
-def test_a_component_that_it_cannot_act_on_is_refused() -> None:
-    with pytest.raises(ParameterError, match="swivel_friction: cannot act on V1"):
-        base().with_effect("swivel_friction", ("V1",))
-
-
-def test_amplitudes_of_two_effects_on_one_actuator_add() -> None:
+def test_amplitudes_of_two_effects_on_one_actuator_add():
     twice = base().with_effect("turbulent_leakage", ("H1",), name="a", coefficient=1e-7)
     twice = twice.with_effect("turbulent_leakage", ("H1", "H2"), name="b", coefficient=2e-7)
     rows = make_plant(twice).rows[:3]
@@ -140,7 +135,7 @@ def test_amplitudes_of_two_effects_on_one_actuator_add() -> None:
 
 # ---------------------------------------------------------------------------------------------- what moves
 @pytest.mark.parametrize("family", MECHANICAL)
-def test_the_residuals_know_the_effect_and_miss_it_where_it_shows(family: str) -> None:
+def test_the_residuals_know_the_effect_and_miss_it_where_it_shows(family: str):
     """A simulated record of the machine with it, without noise, at the model's steps.
 
     What forces saw half a step off is left, some newtons beside the effect's kilonewtons.
@@ -160,7 +155,7 @@ def test_the_residuals_know_the_effect_and_miss_it_where_it_shows(family: str) -
 
 
 @pytest.mark.parametrize("family", MECHANICAL)
-def test_both_engines_run_it_alike(family: str) -> None:
+def test_both_engines_run_it_alike(family: str):
     machine = with_family(family)
     one, other = (shaken(machine, samples=80, engine=engine) for engine in ("fused", "pinocchio"))
     np.testing.assert_allclose(one.q, other.q, rtol=0.0, atol=1e-12)  # rounding of 80 steps
@@ -168,7 +163,7 @@ def test_both_engines_run_it_alike(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", MECHANICAL)
-def test_inverse_dynamics_and_residuals_leave_the_same(family: str) -> None:
+def test_inverse_dynamics_and_residuals_leave_the_same(family: str):
     machine = with_family(family)
     plant, measured = make_plant(machine), measured_of(shaken(machine, samples=200))
     found = inverse_dynamics(plant, measured.dt * np.arange(200), measured.motion, measured.channels["actuator_force"])
@@ -183,7 +178,7 @@ def test_inverse_dynamics_and_residuals_leave_the_same(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", [f for f in MECHANICAL if LAWS[with_family(f).added_effects[0].law].states])
-def test_amplitudes_leave_the_path_of_hidden_states_alone_and_shapes_are_followed_afresh(family: str) -> None:
+def test_amplitudes_leave_the_path_of_hidden_states_alone_and_shapes_are_followed_afresh(family: str):
     components, values = FAMILIES[family]
     shapes = find_family(family).shapes
     machine = with_family(family)
@@ -202,23 +197,9 @@ def test_amplitudes_leave_the_path_of_hidden_states_alone_and_shapes_are_followe
             np.testing.assert_array_equal(follow(make_plant(other), measured, (plant, path)).z, afresh)
 
 
-def test_a_record_at_the_models_steps_comes_apart_to_rounding_with_the_velocity_that_forces_saw() -> None:
-    machine = with_family("stribeck_friction")
-    run = simulate(
-        make_plant(machine),
-        OpenLoop(record_at_model_steps(machine, 100), find_equilibrium(make_plant(machine)).state),
-        samples=100,
-        steps_per_second=2048,
-        engine="fused",
-    )
-    measured = measured_of(run)
-    found = inverse_dynamics(run.plant, run.time, measured.motion, measured.channels["actuator_force"], model_step=True)
-    assert np.abs(found.residual).max() < 1e-3  # of meganewtons: rounding of Euler angles and back
-
-
 # ---------------------------------------------------------------------------------------------- oil
 @pytest.mark.parametrize("family", STRONG)
-def test_the_machine_with_the_effect_explains_its_run_and_the_one_without_does_not(family: str) -> None:
+def test_the_machine_with_the_effect_explains_its_run_and_the_one_without_does_not(family: str):
     altered = with_family(family)
     run = stirred(altered)
     assert run.trouble is None
@@ -226,29 +207,27 @@ def test_the_machine_with_the_effect_explains_its_run_and_the_one_without_does_n
     own, other = (evaluate_residuals(make_plant(machine), test, ("flow", "supply")) for machine in (altered, base()))
     # central differences of pressures at 2048 Hz leave 1.6e-4 m3/s without any effect; voids open between two samples
     share = 0.1 if family == "cavitation" else 0.5
-    assert (
-        rms(own.flow).max() < share * rms(other.flow).max() or rms(own.flow).max() < 2e-4 < 1.5 * rms(other.flow).max()
-    )
+    left, without = rms(own.flow, 5).max(), rms(other.flow, 5).max()
+    assert left < share * without or left < 2e-4 < 1.5 * without
     if family == "supply_droop":
-        assert rms(own.supply).max() < 1e-4 * rms(other.supply).max()  # the filter marched at 2048 Hz
-        assert rms(other.supply).max() > 1e6
+        assert rms(own.supply, 5).max() < 1e-4 * rms(other.supply, 5).max()  # the filter marched at 2048 Hz
+        assert rms(other.supply, 5).max() > 1e6
     else:
         np.testing.assert_array_equal(own.supply, 0.0)
 
 
 @pytest.mark.parametrize("family", STRONG)
-def test_an_altered_machine_stays_at_rest(family: str) -> None:
-    plant = make_plant(with_family(family))
-    rest = find_equilibrium(plant)
-    run = simulate(plant, OpenLoop(np.tile(rest.spool, (400, 1)), rest.state), samples=400, engine="fused")
-    pressures = [k for k, name in enumerate(plant.states) if "pressure" in name]
+def test_an_altered_machine_stays_at_rest(family: str):
+    _, rest = at_rest(with_family(family))
+    run = driven(with_family(family), np.zeros((400, 10)))
+    pressures = [k for k, name in enumerate(run.plant.states) if "pressure" in name]
     moved = np.abs(run.z[:, pressures] - rest.state.z[pressures]).max()
     assert moved < 1.0  # of 3 to 9 MPa; the spool is known to rounding and the valve's gain about null is large
     assert np.abs(run.q[:, :3] - rest.state.q[:3]).max() < 1e-9
 
 
 @pytest.mark.parametrize("family", ["supply_droop", "line_dynamics", "entrained_air"])
-def test_both_engines_and_all_schemes_agree(family: str) -> None:
+def test_both_engines_and_all_schemes_agree(family: str):
     altered = with_family(family)
     fused, step = stirred(altered, samples=100), stirred(altered, "pinocchio", samples=100)
     np.testing.assert_allclose(fused.q, step.q, rtol=1e-9, atol=1e-12)  # rounding, grown over 1600 steps

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from lhpost6_pin.core.errors import LhpostError, LinkError, UnknownNameError
 from lhpost6_pin.interfaces.link.protocol import (
-    COUNTS,
     Datagram,
     Kind,
     LinkMode,
@@ -25,15 +24,8 @@ from lhpost6_pin.interfaces.link.protocol import (
 
 U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
-HEAD = {
-    "session": U32,
-    "mode": st.sampled_from(LinkMode),
-    "state": st.sampled_from(PlantState),
-    "sequence": U32,
-    "acknowledged": U32,
-    "stamp": U64,
-    "echo": U64,
-}
+HEAD = {"mode": st.sampled_from(LinkMode), "state": st.sampled_from(PlantState), "stamp": U64, "echo": U64}
+HEAD |= dict.fromkeys(("session", "sequence", "acknowledged"), U32)
 ABOUT = Welcome(2048.0, "lhpost6", ("H1", "V1", "Längs"), (2, 1, 1))
 EXAMPLES = [
     Datagram(Kind.HELLO, 7),
@@ -75,11 +67,6 @@ def test_sensors_and_welcome_are_laid_out_as_the_table_says():
     assert struct.unpack_from("<15sB15sB", welcome, 88) == (b"H1".ljust(15, b"\0"), 2, b"V1".ljust(15, b"\0"), 1)
 
 
-@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
-def test_every_kind_of_frame_comes_back_as_it_was(frame):
-    assert same(decode(encode(frame)), frame)
-
-
 @given(st.fixed_dictionaries(HEAD), st.lists(FINITE, max_size=30))
 def test_commands_and_sensors_come_back_to_the_last_bit(head, numbers):
     command = Datagram(Kind.COMMAND, **head, valves=len(numbers), numbers=np.array(numbers, float))
@@ -116,18 +103,14 @@ def test_bytes_after_a_right_beginning_are_a_frame_or_refused(frame, data):
 
 
 @pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
-def test_a_frame_cut_short_is_short_and_one_too_long_is_refused(frame):
+def test_a_frame_comes_back_cut_short_is_short_and_too_long_or_with_a_changed_bit_is_refused(frame):
     datagram = encode(frame)
+    assert same(decode(datagram), frame)
     for size in range(len(datagram)):
         with pytest.raises(ShortDatagramError):
             decode(datagram[:size])
     with pytest.raises(LinkError, match="too many"):
         decode(datagram + b"\0")
-
-
-@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
-def test_no_bit_can_change_on_the_way_unnoticed(frame):
-    datagram = encode(frame)
     for bit in range(8 * len(datagram)):
         changed = bytearray(datagram)
         changed[bit // 8] ^= 1 << bit % 8
@@ -144,7 +127,7 @@ def test_what_is_wrong_with_a_header_is_said(offset, value, word):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_numbers_that_are_not_finite_are_neither_sent_nor_taken(value):
+def test_numbers_that_are_not_finite_or_do_not_fit_the_counts_are_neither_sent_nor_taken(value):
     frame = EXAMPLES[2]._replace(numbers=np.array([0.0, value, 0.0]))
     with pytest.raises(LinkError, match="number 2"):
         encode(frame)
@@ -153,9 +136,6 @@ def test_numbers_that_are_not_finite_are_neither_sent_nor_taken(value):
     struct.pack_into("<d", datagram, 56, value)
     with pytest.raises(LinkError, match="number 2"):
         decode(bytes(datagram))
-
-
-def test_a_payload_that_does_not_fit_its_counts_is_not_sent():
     with pytest.raises(LinkError, match="command frame of 2 actuators and 4 valves"):
         encode(EXAMPLES[2]._replace(valves=4))
 
@@ -170,8 +150,3 @@ def test_modes_are_found_by_name_and_a_wrong_one_is_told_the_valid_ones():
     assert [find_mode(m.label) for m in LinkMode] == list(LinkMode)
     with pytest.raises(UnknownNameError, match="free, lock-step, real-time"):
         find_mode("realtime")
-
-
-def test_a_status_has_a_number_for_each_count():
-    found = decode(encode(EXAMPLES[5]))
-    assert len(found.counts) == len(COUNTS)

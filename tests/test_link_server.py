@@ -5,11 +5,17 @@ Nothing here depends on how fast things go: waits are guards against a hanging t
 
 import math
 import socket
+import subprocess
+import sys
 import threading
 from contextlib import contextmanager
+from unittest import mock
 
 import numpy as np
 import pytest
+from commands import own_controller, refused
+from run_cases import amid_ridgecrest, at_rest
+from test_scripts import script
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.errors import LinkError, SimulationError
@@ -27,9 +33,7 @@ from lhpost6_pin.interfaces.link import (
     serve,
 )
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
-from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
 pytestmark = pytest.mark.long
@@ -54,36 +58,22 @@ def served(plant, rest, mode=LinkMode.LOCK_STEP, **options):
     assert not thread.is_alive()
 
 
-def closed_loop(plant, rest, first, samples):
-    """The 469D amid Ridgecrest."""
-    controller = make_controller(plant, rest, load_controller("lhpost6"))
-    target = make_target(find_motion("ridgecrest"))
-    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
-    return ClosedLoop(controller, np.ascontiguousarray(drive[first : first + samples]), rest)
-
-
 class Proportional:
     """A user's own controller: the actuators' displacement from what leg 1 should do, as a spool."""
 
     def init(self, plant, rest):
-        """The rest spools."""
         return rest.spool
 
     def step(self, memory, wanted, sensors):
-        """Proportional control of the horizontal actuators."""
         spool = memory.copy()
         spool[:4] += 2.0 * (wanted.displacement[0] - sensors.displacement[:4] * np.array([1, 1, -1, -1]))
         return spool
 
 
-class Wild:
+class Wild(Proportional):
     """A controller that opens all vertical valves."""
 
-    def init(self, plant, rest):
-        """No memory."""
-
     def step(self, memory, wanted, sensors):
-        """Full stroke."""
         return np.r_[np.zeros(4), np.ones(6)]
 
 
@@ -97,7 +87,7 @@ def wanted(samples, size=0.02):
 
 # -------------------------------------------------------------------------------------------------- the same run
 def test_the_closed_loop_over_udp_is_the_loop_in_one_process_sample_for_sample(plant, rest, tmp_path):
-    loop = closed_loop(plant, rest, 20 * 2048, 1500)  # amid the strong motion
+    loop = amid_ridgecrest(plant, rest, 1500)
     with served(plant, rest) as (_, address), LinkClient(*address) as client:
         run = run_over_link(client, plant, loop)
         counts = client.close()
@@ -114,7 +104,7 @@ def test_the_closed_loop_over_udp_is_the_loop_in_one_process_sample_for_sample(p
 
 
 def test_lost_and_repeated_datagrams_change_nothing_in_lock_step(plant, rest, monkeypatch):
-    loop = closed_loop(plant, rest, 20 * 2048, 200)
+    loop = amid_ridgecrest(plant, rest, 200)
     sent = [0]
     put, get = LinkClient._put, LinkClient._get
 
@@ -151,9 +141,8 @@ def test_a_users_own_controller_runs_over_the_link_as_in_one_process(plant, rest
 
 
 def test_two_valves_on_each_horizontal_actuator_take_fourteen_commands_and_move_the_same_plant():
-    twin = make_plant(load_machine().with_valves(2))
-    rest = find_equilibrium(twin)
-    loop = closed_loop(twin, rest, 20 * 2048, 200)
+    twin, rest = at_rest(load_machine().with_valves(2))
+    loop = amid_ridgecrest(twin, rest, 200)
     with served(twin, rest) as (_, address), LinkClient(*address) as client:
         assert client.valves[:4] == ("H1A", "H1B", "H2A", "H2B") and len(client.valves) == 14
         run = run_over_link(client, twin, loop)
@@ -269,16 +258,15 @@ def test_a_server_that_falls_silent_ends_the_run_with_its_address(plant, rest):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_server_ends_when_its_time_is_over(plant, rest, mode):
+def test_a_server_ends_when_its_time_is_over_or_by_the_keyboard_and_keeps_its_counts(plant, rest, mode, monkeypatch):
+    table = ServedPlant(plant, rest, mode)
     with open_socket(port=0) as sock:
-        timing = serve(sock, ServedPlant(plant, rest, mode), seconds=0.05)
-    assert timing.lateness.count == 0  # nobody came: no sample, no deadline
-
-
-@pytest.mark.parametrize("seconds", [-1.0, math.nan, math.inf])
-def test_a_time_that_is_none_is_refused(plant, rest, seconds):
-    with open_socket(port=0) as sock, pytest.raises(LinkError, match="cannot be served for"):
-        serve(sock, ServedPlant(plant, rest, LinkMode.FREE), seconds=seconds)
+        assert serve(sock, table, seconds=0.05).lateness.count == 0  # nobody came: no sample, no deadline
+        monkeypatch.setattr(table, "watch", mock.Mock(side_effect=KeyboardInterrupt))
+        assert serve(sock, table).lateness.count == 0
+        for seconds in (-1.0, math.nan, math.inf):
+            with pytest.raises(LinkError, match="cannot be served for"):
+                serve(sock, table, seconds=seconds)
 
 
 def test_a_run_over_the_link_refuses_a_drive_of_another_width(plant, rest):
@@ -288,19 +276,8 @@ def test_a_run_over_the_link_refuses_a_drive_of_another_width(plant, rest):
             run_over_link(client, plant, ClosedLoop(loop, np.zeros((8, 3)), rest))
 
 
-def test_a_server_interrupted_by_the_keyboard_ends_and_keeps_its_counts(plant, rest, monkeypatch):
-    table = ServedPlant(plant, rest, LinkMode.REAL_TIME)
-
-    def interrupted(now):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(table, "watch", interrupted)
-    with open_socket(port=0) as sock:
-        assert serve(sock, table).lateness.count == 0
-
-
 # ---------------------------------------------------------------------------------------- controller and plant alike
-def test_a_controller_for_another_machine_is_refused(plant, rest):
+def test_a_controller_for_another_machine_and_a_plant_not_at_rest_are_refused(plant, rest):
     loop = PluggedLoop(Proportional(), *wanted(10), rest)
     twin = make_plant(load_machine().with_valves(2))
     with served(plant, rest) as (_, address), LinkClient(*address) as client:
@@ -309,18 +286,14 @@ def test_a_controller_for_another_machine_is_refused(plant, rest):
         client.machine = "another"
         with pytest.raises(LinkError, match="server's machine is another"):
             run_over_link(client, plant, loop)
-
-
-def test_a_run_begins_with_a_plant_at_rest(plant, rest):
-    with served(plant, rest) as (_, address), LinkClient(*address) as client:
+        client.machine = plant.machine.name
         client.exchange(rest.spool)
         with pytest.raises(LinkError, match="connect once more"):
-            run_over_link(client, plant, PluggedLoop(Proportional(), *wanted(10), rest))
+            run_over_link(client, plant, loop)
 
 
 def test_commands_may_be_given_per_actuator_or_per_valve_and_in_no_other_number(plant):
-    twin = make_plant(load_machine().with_valves(2))
-    rest = find_equilibrium(twin)
+    twin, rest = at_rest(load_machine().with_valves(2))
     with served(twin, rest) as (table, address), LinkClient(*address) as client:
         client.exchange(np.full(10, 0.1))
         assert np.array_equal(table.spool, np.full(10, 0.1))
@@ -328,3 +301,63 @@ def test_commands_may_be_given_per_actuator_or_per_valve_and_in_no_other_number(
         assert np.array_equal(table.spool, np.full(10, 0.2))
         with pytest.raises(LinkError, match=r"shape \(12,\).*10 actuators and 14 servovalves"):
             client.send(np.zeros(12))
+
+
+SERVE = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {!r}; main()"
+SHORT = "sine --scale 0.2 --set amplitude=0.02 --set cycles=0.5 --set ramp_cycles=0.5 --set period=1".split()
+
+
+@pytest.fixture
+def port(plant, rest):
+    """Port of a plant served in lock-step by a thread."""
+    with served(plant, rest) as (_, address):
+        yield address[1]
+
+
+@pytest.mark.parametrize("mode", [m.label for m in LinkMode])
+def test_a_server_says_where_it_listens_and_what_it_met(lhpost6, mode):
+    ended = lhpost6("serve", "--mode", mode, "--port", 0, "--seconds", 0.05)
+    assert ended.code == 0
+    assert "listens at 127.0.0.1:" in ended.words and f", {mode}; Ctrl-C ends" in ended.words
+    assert "missed deadlines" in ended.words and "malformed" in ended.words
+
+
+def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6):
+    command = [sys.executable, "-c", SERVE.format(["serve", "--port", "0", "--seconds", str(GUARD)])]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            where = server.stdout.readline()
+            port = where.split("127.0.0.1:")[1].split(",")[0]
+            ended = lhpost6("link", *SHORT, "--port", port, "--out", tmp_path / "out")
+        finally:
+            server.kill()
+    assert ended.code == 0, ended
+    record = load_record(tmp_path / "out" / "record.nc")
+    assert record.attrs["title"] == "sine at scale 0.2 over the link"
+    assert record.attrs["link_mode"] == "lock-step" and record.attrs["lost"] == 0
+    assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in ended.words.replace(" ", "")
+
+
+def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6, port):
+    own = own_controller(tmp_path / "mine.py")
+    ended = lhpost6("link", *SHORT, "--port", port, "--controller", own)
+    assert ended.code == 0, ended
+    assert abs(load_record(tmp_path / "out" / "sine_link" / "record.nc")["actuator_displacement"]).max() < 1e-6
+    wild = own_controller(tmp_path / "wild.py", step="return [0.0] * 4 + [1.0] * 6")
+    ended = lhpost6("link", *SHORT, "--port", port, "--controller", wild)
+    assert ended.code == 1 and "the plant tripped" in ended.words
+    failing = own_controller(tmp_path / "failing.py", step="return 1 / 0")
+    ended = lhpost6("link", *SHORT, "--port", port, "--controller", failing)
+    assert refused(ended, "Mine.step failed at sample 0: ZeroDivisionError")
+
+
+def test_what_cannot_be_done_is_said_and_ends_with_two(lhpost6, port):
+    assert refused(lhpost6("serve", "--port", port), f"cannot listen on 127.0.0.1:{port}")
+    assert refused(lhpost6("serve", "--mode", "fast"), "free, lock-step, real-time")
+    assert refused(lhpost6("link", *SHORT, "--port", port, "--valves", 2), "choose --valves alike")
+
+
+def test_the_round_trip_script_measures_and_keeps_its_figures(tmp_path):
+    ended = script("link_round_trip.py", "--seconds", "0.2", "--out", tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert "deadlines missed" in ended.stdout and (tmp_path / "link_round_trip.json").is_file()

@@ -18,11 +18,6 @@ from lhpost6_pin.tuning.tune import stays_stable
 
 
 @pytest.fixture(scope="module")
-def controller(plant, rest):
-    return make_controller(plant, rest, load_controller("lhpost6"))
-
-
-@pytest.fixture(scope="module")
 def model(controller):
     return make_loop_model(controller)
 

@@ -1,6 +1,7 @@
-"""Targets: consistent derivatives, exact resampling, rest at both ends, and refusal of what does not fit."""
+"""Targets: derivatives, resampling, rest at both ends, refusal of what does not fit; and response spectra."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from lhpost6_pin.motions import (
     largest_scale,
     make_motion,
     make_target,
+    response_spectrum,
     with_scale,
 )
 from lhpost6_pin.motions.limits import _round_down
@@ -141,18 +143,11 @@ def test_a_window_cuts_the_record():
 @pytest.mark.parametrize(
     "options",
     [
-        {"axes": "q"},
-        {"axes": ""},
-        {"axes": "xx"},
-        {"axes": "x=w"},
-        {"scale": np.nan},
-        {"window": (5.0, 1.0)},
-        {"window": (0.0, 900.0)},
-        {"high_pass": 50.0},
-        {"high_pass": 0.0},
-        {"low_pass": 5000.0},
-        {"pad": 0.0},
+        *({"axes": x} for x in ("q", "", "xx", "x=w")),
+        *({"window": x} for x in ((5.0, 1.0), (0.0, 900.0))),
+        *({"high_pass": 50.0}, {"high_pass": 0.0}, {"low_pass": 5000.0}, {"pad": 0.0}, {"scale": np.nan}),
     ],
+    ids=str,
 )
 def test_processing_that_makes_no_sense_is_refused(options):
     with pytest.raises(MotionError):
@@ -184,6 +179,12 @@ def limited(**changes: tuple[str, float]) -> MotionLimits:
     for quantity, (axis, value) in changes.items():
         arrays[quantity][AXES.index(axis)] = value
     return MotionLimits(**arrays)
+
+
+def leg_across(displacement: np.ndarray, velocity: np.ndarray, stroke: float = 0.02) -> ActuatorUtilisation:
+    """A leg across the motion, 3 m long."""
+    length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0
+    return ActuatorUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / stroke)
 
 
 def test_an_over_range_target_names_axis_value_limit_time_and_the_scale_that_fits():
@@ -221,20 +222,12 @@ def test_a_target_at_exactly_its_limit_passes():
 def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
     target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
 
-    def legs(displacement: np.ndarray, velocity: np.ndarray) -> ActuatorUtilisation:
-        length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0  # a leg across the motion, 3 m long
-        return ActuatorUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 0.02)
-
-    with pytest.raises(
-        OutOfRangeError, match=r"H1 actuator stroke \d+(\.\d)? % of its stroke at t = .* s \(sample"
-    ) as caught:
-        check_limits(target, WIDE, legs)
-    # closed form: sqrt(9.25) - 3 over 0.02 is 206.9 %
-    assert "H1 actuator stroke 206.9 %" in str(caught.value)
-    # closed form: (0.5 s)^2 = 3.02^2 - 9, so s = 0.6940, rounded down
-    assert "fits is 0.694" in str(caught.value) or "fits is 0.693" in str(caught.value)
-    fits = largest_scale(target, WIDE, legs)
-    assert check_limits(with_scale(target, fits), WIDE, legs).utilisation["actuator stroke"]["H1"] <= 1
+    # closed forms: sqrt(9.25) - 3 over 0.02 is 206.9 %; (0.5 s)^2 = 3.02^2 - 9, so s = 0.6940, rounded down
+    said = r"fits is 0.69[34]; .*H1 actuator stroke 206.9 % of its stroke at t = .* s \(sample"
+    with pytest.raises(OutOfRangeError, match=said):
+        check_limits(target, WIDE, leg_across)
+    fits = largest_scale(target, WIDE, leg_across)
+    assert check_limits(with_scale(target, fits), WIDE, leg_across).utilisation["actuator stroke"]["H1"] <= 1
 
 
 def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_legs_by_quantity():
@@ -275,11 +268,7 @@ def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_
 def test_the_scale_that_fits_does_not_depend_on_the_scale_that_was_asked(scale):
     motion = find_motion("sine", amplitude=0.5, period=2.0)
     limits = limited(displacement=("x", 0.3))
-
-    def legs(displacement: np.ndarray, velocity: np.ndarray) -> ActuatorUtilisation:
-        length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0
-        return ActuatorUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / 2.0)
-
+    legs = partial(leg_across, stroke=2.0)
     target = make_target(motion, scale=scale)
     if scale > 1:
         with pytest.raises(OutOfRangeError) as caught:
@@ -307,18 +296,91 @@ def test_a_scale_is_rounded_down_to_three_digits(value):
     assert float(f"{found:.2e}") == found
 
 
-def test_a_still_target_fits_at_any_scale():
+def test_a_still_target_fits_at_any_scale_and_limits_that_are_none_are_refused():
     still = GroundMotion("still", 0.01, np.zeros((500, 6)), "displacement", "test")
     assert largest_scale(make_target(still), WIDE) == np.inf
-
-
-@pytest.mark.parametrize("bad", [np.zeros(6), np.ones(3), np.full(6, np.nan), -np.ones(6)])
-def test_limits_that_are_no_limits_are_refused(bad):
-    with pytest.raises(ValueError, match="six positive numbers"):
-        MotionLimits(np.ones(6), bad, np.ones(6))
+    for bad in (np.zeros(6), np.ones(3), np.full(6, np.nan), -np.ones(6)):
+        with pytest.raises(ValueError, match="six positive numbers"):
+            MotionLimits(np.ones(6), bad, np.ones(6))
 
 
 def test_axes_that_leave_nothing_of_a_motion_are_refused():
     with pytest.raises(MotionError, match="moves x only, of which axes 'z' leave nothing; 'z=x' moves z of the table"):
         make_target(find_motion("sine"), axes="z")
     assert make_target(find_motion("sine"), axes="z=x").displacement[:, 2].any()
+
+
+def test_resonant_harmonic_builds_up_to_the_closed_form():
+    damping, period, amplitude, cycles = 0.05, 0.5, 2.0, 40
+    w = 2 * np.pi / period
+    step = period / 400
+    time = np.arange(cycles * 400 + 1) * step
+    found = response_spectrum(amplitude * np.sin(w * time), step, [period], damping)
+    # u = A/(2 D w^2) (1 - exp(-D w t)) at the peaks, up to D^2; the excitation linear between samples loses
+    # (w dt)^2/12 = 2e-5 and the sampled peak (w dt)^2/8 = 3e-5
+    steady = amplitude / (2 * damping * w**2)
+    assert found.displacement[0] == pytest.approx(steady, rel=1.3e-3)  # D^2/2 = 1.25e-3
+    assert found.displacement[0] < steady
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02, 0.05, 0.3])
+def test_a_sudden_constant_acceleration_overshoots_as_the_step_response(damping):
+    period, amplitude = 0.8, 1.5
+    w = 2 * np.pi / period
+    half = np.pi / (w * np.sqrt(1 - damping**2))  # time of the first peak, placed on a sample
+    step = half / 64
+    found = response_spectrum(np.full(400, amplitude), step, [period], damping)
+    overshoot = np.exp(-damping * np.pi / np.sqrt(1 - damping**2))
+    # the input is linear between samples, so the recurrence is exact: rounding only
+    assert found.displacement[0] == pytest.approx(amplitude / w**2 * (1 + overshoot), rel=1e-10)
+
+
+def test_a_stiff_oscillator_follows_the_ground_and_a_soft_one_stays_behind():
+    step = 1 / 2048
+    time = np.arange(8 * 2048) * step
+    envelope = np.sin(np.pi * time / time[-1]) ** 2
+    displacement = 0.1 * envelope * np.sin(2 * np.pi * time)
+    acceleration = np.gradient(np.gradient(displacement, step), step)
+    found = response_spectrum(acceleration, step, [0.02, 200.0])
+    # stiff: PSA = PGA (1 + (T/T_ground)^2 ...) = 4e-4; soft: SD = PGD within the ratio of the periods, 5e-3
+    assert found.pseudo_acceleration[0] == pytest.approx(np.abs(acceleration).max(), rel=2e-3)
+    assert found.displacement[1] == pytest.approx(np.abs(displacement).max(), rel=2e-2)
+
+
+def test_the_recurrence_agrees_with_a_general_integrator_on_a_random_input():
+    from scipy.integrate import solve_ivp
+
+    step, period, damping = 0.02, 0.7, 0.05
+    acceleration = np.random.default_rng(5).standard_normal(60)
+    time = np.arange(60) * step
+    w = 2 * np.pi / period
+
+    def rate(t, state):
+        return state[1], -np.interp(t, time, acceleration) - 2 * damping * w * state[1] - w**2 * state[0]
+
+    solution = solve_ivp(rate, (0, time[-1]), [0, 0], t_eval=time, rtol=1e-11, atol=1e-14, max_step=step / 4)
+    found = response_spectrum(acceleration, step, [period], damping)
+    # the integrator's tolerance over the kinks of the input
+    assert found.displacement[0] == pytest.approx(np.abs(solution.y[0]).max(), rel=1e-6)
+
+
+def test_pseudo_quantities_are_the_displacement_times_powers_of_the_frequency():
+    # 20 s at 2048 Hz: angle per step 1.5e-4; the same motion sampled coarsely, whose peaks miss at most (w dt)^2 / 8
+    coarse = np.random.default_rng(2).standard_normal(100)
+    fine = np.interp(np.arange(99 * 512 + 1) / 512, np.arange(100), coarse)
+    slow, fast = (response_spectrum(x, dt, [20.0]).displacement[0] for x, dt in ((coarse, 0.25), (fine, 0.25 / 512)))
+    assert fast == pytest.approx(slow, rel=8e-4)
+    acceleration = np.random.default_rng(1).standard_normal(500)
+    periods = np.geomspace(0.05, 10, 30)
+    found = response_spectrum(acceleration, 0.005, periods)
+    w = 2 * np.pi / periods
+    np.testing.assert_allclose(found.pseudo_velocity, w * found.displacement, rtol=1e-14)
+    np.testing.assert_allclose(found.pseudo_acceleration, w**2 * found.displacement, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("step", "period", "damping"), [(0.0, 1.0, 0.05), (0.01, 0.0, 0.05), (0.01, 1.0, 1.0), (0.01, 1.0, -0.1)]
+)
+def test_impossible_oscillators_are_refused(step, period, damping):
+    with pytest.raises(ValueError, match="positive"):
+        response_spectrum(np.zeros(10), step, [period], damping)

@@ -40,20 +40,11 @@ def spelled(unit):
 
 
 @pytest.mark.parametrize("file", FILES)
-def test_every_number_has_a_unit_an_evidence_and_a_source(file):
+def test_every_number_has_an_si_unit_an_evidence_and_a_source(file):
     for path, quantity in load_parameters(file).items():
-        assert quantity.unit, path
-        assert quantity.evidence in EVIDENCE, path
-        assert len(quantity.source) > 5, path
+        assert quantity.unit and quantity.evidence in EVIDENCE and len(quantity.source) > 5, path
         assert quantity.assumed == (quantity.evidence == "assumed")
-        for unit in quantity.unit.split(" | "):
-            assert unit == "1" or UNITS.Quantity(1.0, spelled(unit)), path
-
-
-@pytest.mark.parametrize("file", FILES)
-def test_numbers_are_in_si(file):
-    for path, quantity in load_parameters(file).items():
-        for unit in quantity.unit.split(" | "):
+        for unit in quantity.unit.split(" | "):  # of SI, whose base units are one
             if unit != "1":
                 assert UNITS.Quantity(1.0, spelled(unit)).to_base_units().magnitude == pytest.approx(1.0), path
 
@@ -89,8 +80,8 @@ def test_report_values_without_print_are_those_of_table_6_1():
 
 def test_nominal_platen_is_the_second_estimate_of_table_4_1():
     parameters = load_parameters("lhpost6")
-    assert parameters["platen.mass"].value == parameters["estimates.second.mass"].value
-    assert parameters["platen.inertia"].value == parameters["estimates.second.inertia"].value
+    for what in ("mass", "inertia"):
+        assert parameters[f"platen.{what}"].value == parameters[f"estimates.second.{what}"].value
 
 
 def test_mapping_lists_paths_in_file_order_and_names_near_ones_for_a_wrong_path():
@@ -104,40 +95,26 @@ def test_mapping_lists_paths_in_file_order_and_names_near_ones_for_a_wrong_path(
 
 # Bad files: one error that names the key ------------------------------------------------------------------------------
 
+ASSUMED = "evidence = 'assumed', source = 'x' }"
+
 BAD = {
     "a unit of another dimension": (r'^(supply_pressure.*unit = )"Pa"', r'\1"m"', "hydraulics.supply_pressure.*'m'"),
     "a missing unit": (r'^(gas_length = .*), unit = "m"', r"\1", "hold_down.gas_length: unit is missing"),
-    "a missing source": (
-        r"^(stroke = \{ value = 0.75.*), source = .*\}",
-        r"\1 }",
-        "horizontal.stroke: source is missing",
-    ),
+    "a missing source": (r"^(stroke = \{ value = 0.75.*), source = .*\}", r"\1 }", "horizontal.stroke: source is miss"),
     "a missing key": (r"^bulk_modulus = .*\n", "", "hydraulics.bulk_modulus is missing"),
     "a key missing that only a bearing needs": (r"^pad_yield = .*\n", "", "vertical.pad_yield is missing; a 3-way"),
-    "a negative area": (r"^area_a = \{ value = 0.2027", "area_a = { value = -0.2027", "horizontal.area_a: -0.2027"),
-    "a zero mass": (r"^mass = \{ value = \[168100.0", "mass = { value = [0.0", "platen.mass: .*should be positive"),
-    "a shape beyond 1": (r"^seal_shape = \{ value = 0.1", "seal_shape = { value = 1.1", "seal_shape: 1.1 .*0 and 1"),
-    "an unknown key": (
-        r"^bulk_modulus = ",
-        "bulk_moduluss = ",
-        "unknown key hydraulics.bulk_moduluss; did you mean 'bulk_m",
-    ),
+    "a negative area": (r"^(area_a = \{ value = )0.2027", r"\1-0.2027", "horizontal.area_a: -0.2027"),
+    "a zero mass": (r"^(mass = \{ value = \[)168100.0", r"\g<1>0.0", "platen.mass: .*should be positive"),
+    "a shape beyond 1": (r"^(seal_shape = \{ value = )0.1", r"\g<1>1.1", "seal_shape: 1.1 .*0 and 1"),
+    "an unknown key": (r"^bulk_modulus = ", "bulk_moduluss = ", "unknown key hydraulics.bulk_moduluss; did"),
     "an unknown key beside the right one": (
         r"^(bulk_modulus = .*)\n",
-        r"\1\nbulk_stiffness = { value = 1.0, unit = 'Pa', evidence = 'assumed', source = 'x' }\n",
+        rf"\1\nbulk_stiffness = {{ value = 1.0, unit = 'Pa', {ASSUMED}\n",
         "unknown key hydraulics.bulk_stiffness; valid names: bulk_modulus, .*supply_pressure",
     ),
-    "an unknown word in a quantity": (
-        r"^gravity = \{ ",
-        "gravity = { colour = 'red', ",
-        "platen.gravity: unknown colour",
-    ),
+    "an unknown word in a quantity": (r"^gravity = \{", "gravity = { colour = 'red',", "platen.gravity: unknown col"),
     "an unknown evidence": (r'^(gravity.*)"standard"', r'\1"hearsay"', "platen.gravity: evidence 'hearsay'"),
-    "not a number": (
-        r"^gravity = \{ value = 9.80665",
-        "gravity = { value = nan",
-        "platen.gravity: value nan is not fin",
-    ),
+    "not a number": (r"value = 9.80665", "value = nan", "platen.gravity: value nan is not fin"),
     "infinity in a vector": (
         r"\[6.19, 0.48, -1.25\]",
         "[6.19, inf, -1.25]",
@@ -157,53 +134,25 @@ BAD = {
     "a stroke longer than its chamber": (r"^stroke = \{ value = 0.75", "stroke = { value = 0.85", "leaves no oil"),
     "a bearing that is not vertical": (r"\[4.624, 2.871, -2.0\]", "[4.6, 2.871, -2.0]", "V1: a bearing .* vertical"),
     "a bearing off its plane": (r"\[4.624, 2.871, -1.2\]", "[4.624, 2.871, -1.1]", "V1.platen_point must lie in"),
-    "a bearing plane off the axis": (
-        r"\[0.0, 0.0, -1.2\]",
-        "[0.1, 0.0, -1.2]",
-        "bearing_plane must lie straight below",
-    ),
+    "a bearing plane off the axis": (r"\[0.0, 0.0, -1.2\]", "[0.1, 0.0, -1.2]", "bearing_plane must lie straight"),
     "a return above the supply": (r"value = 550000.0", "value = 5.5e7", "return_pressure is not below"),
-    "a component of no length": (
-        r"\[4.89, 0.0, -6.0\]",
-        "[4.89, 0.0, -2.43]",
-        "S1: platen_point and base_point coincide",
-    ),
+    "a component of no length": (r"\[4.89, 0.0, -6.0\]", "[4.89, 0.0, -2.43]", "S1: platen_point and base_point coin"),
     "a number outside any section": (r"^\[machine\]", "odd = 1\n[machine]", "odd stands outside any section"),
-    "a section that is a number": (
-        r"^\[component.H1\]",
-        "[component]\nH0 = 1\n[component.H1]",
-        "component.H0 must be a sec",
-    ),
-    "a path given twice": (
-        r"^\[kind.horizontal\]",
-        "[kind.platen]\nmass = 1\n[kind.horizontal]",
-        "platen.mass is given twice",
-    ),
+    "a section that is a number": (r"^(\[component).H1\]", r"\1]\nH0 = 1\n\1.H1]", "component.H0 must be a sec"),
+    "a path given twice": (r"^(\[kind).horizontal\]", r"\1.platen]\nmass = 1\n\1.horizontal]", "platen.mass is given"),
     "a chamber area on a 3-way valve": (
-        r"^area_a = \{ value = 0.515",
-        "area_b = { value = 0.1, unit = 'm2', evidence = 'assumed', source = 'x' }\narea_a = { value = 0.515",
+        r"^(area_a = \{ value = 0.515)",
+        rf"area_b = {{ value = 0.1, unit = 'm2', {ASSUMED}\n\1",
         "vertical.area_b is given, but a 3-way valve",
     ),
     "text that is not TOML": (r"^\[machine\]", "[machine", "changed.toml: not a TOML file"),
-    "an empty vector with a deviation": (
-        r"^size = \{ value = \[12.2, 7.6\]",
-        "size = { rel_sd = 0.1, value = []",
-        "platen.size",
-    ),
+    "an empty vector with a deviation": (r"^(size = \{ )value = .*?\]", r"\1rel_sd = 0.1, value = []", "platen.size"),
     "a number beyond any float": (r"value = 9.80665", "value = 1" + 400 * "0", "platen.gravity"),
     "a component with a dot in its name": (r"^\[component.H1\]", '[component."H.1"]', "H.1"),
-    "a kind where none belongs": (
-        r"^\[estimates.first\]",
-        '[estimates.first]\nkind = "horizontal"',
-        "estimates.first.kind",
-    ),
+    "a kind where none belongs": (r"^(\[estimates.first\])", r'\1\nkind = "horizontal"', "estimates.first.kind"),
     "a misspelt word": (r"^thrust = ", 'thrst = "normal"\nthrust = ', "machine.thrst"),
     "a misspelt word of a component": (r"^\[component.H1\]", "[component.H1]\nvalvez = 2", "H1.valvez"),
-    "a misspelt limit": (
-        r"^bandwidth = ",
-        "bandwith = { value = 1.0, unit = 'Hz', evidence = 'assumed', source = 'x' }\nbandwidth = ",
-        "limits.bandwith",
-    ),
+    "a wrong limit": (r"^bandwidth = ", rf"bandwith = {{ value = 1, unit = 'Hz', {ASSUMED}\n\g<0>", "limits.bandwith"),
     "a misspelt section": (r"^\[hydraulics\]", "[hydraulic]\nodd = 'x'\n[hydraulics]", "hydraulic"),
 }
 
@@ -218,17 +167,13 @@ def test_bad_file_is_refused_with_file_and_key(fault, tmp_path):
 
 
 def test_file_that_is_not_there_or_not_text_is_refused(tmp_path):
-    with pytest.raises(ParameterError, match="no such machine file"):
-        load_machine(tmp_path / "none.toml")
     (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(ParameterError, match="cannot be read"):
-        load_machine(tmp_path / "folder.toml")
     (tmp_path / "image.toml").write_bytes(b"\xff\xd8\xff\xe0")
-    with pytest.raises(ParameterError, match="not a TOML file"):
-        load_machine(tmp_path / "image.toml")
     (tmp_path / "empty.toml").write_text("", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"empty.toml"):
-        load_machine(tmp_path / "empty.toml")
+    words = {"none": "no such machine file", "folder": "cannot be read", "image": "not a TOML file", "empty": "empty"}
+    for name, message in words.items():
+        with pytest.raises(ParameterError, match=message):
+            load_machine(tmp_path / f"{name}.toml")
 
 
 # Changed copies -------------------------------------------------------------------------------------------------------
@@ -237,15 +182,11 @@ def test_file_that_is_not_there_or_not_text_is_refused(tmp_path):
 def test_override_by_keyword_mapping_and_file_are_the_same(tmp_path):
     machine = load_machine()
     file = tmp_path / "small.toml"
-    file.write_text(
-        '[hydraulics]\nsupply_pressure = { value = 20.0, unit = "MPa", evidence = "assumed", source = "a test" }\n',
-        encoding="utf-8",
-    )
+    file.write_text("[hydraulics]\nsupply_pressure = { value = 20.0, unit = 'MPa', source = 'a test' }\n")
     by_keyword = machine.with_params(hydraulics__supply_pressure=20e6)
     by_mapping = machine.with_params({"hydraulics.supply_pressure": 20e6})
     by_file = machine.with_params(file)
-    on_load = load_machine("lhpost6", file)
-    for changed_machine in (by_keyword, by_mapping, by_file, on_load):
+    for changed_machine in (by_keyword, by_mapping, by_file, load_machine("lhpost6", file)):
         assert changed_machine.hydraulics.supply_pressure == pytest.approx(20e6, rel=1e-15)
     assert machine.hydraulics.supply_pressure == 20.7e6  # the original is as it was
     assert by_mapping.parameters["hydraulics.supply_pressure"].evidence == "override"
@@ -269,10 +210,6 @@ def test_one_component_can_have_more_servovalves_open_than_its_kind():
     assert [a.valves for a in load_machine().with_params({"H1.valves": 2}).actuators[:2]] == [2, 1]
 
 
-def test_override_takes_arrays():
-    assert load_machine().with_params(platen__mass=np.full(3, 1e5)).platen.mass == (1e5, 1e5, 1e5)
-
-
 def test_one_component_can_differ_from_its_kind():
     machine = load_machine().with_params({"H3.seal_friction": 5e3})
     assert [a.seal_friction for a in machine.actuators[:4]] == [9250.0, 9250.0, 5e3, 9250.0]
@@ -284,6 +221,7 @@ def test_one_component_can_differ_from_its_kind():
 
 def test_words_are_options_that_can_be_changed_too():
     machine = load_machine()
+    assert machine.with_params(platen__mass=np.full(3, 1e5)).platen.mass == (1e5, 1e5, 1e5)  # arrays too
     assert machine.with_params({"machine.thrust": "normal"}).thrust == "normal"
     assert machine.with_params({"horizontal.valves": 2}).actuators[0].valves == 2
     with pytest.raises(ParameterError, match=r"machine.thrust = 'sideways'"):
@@ -315,14 +253,6 @@ def test_override_that_cannot_be_is_refused_by_key(change, message):
         load_machine().with_params(change)
 
 
-def test_overriding_parameters_leaves_those_given_alone():
-    parameters = load_parameters("lhpost6")
-    before = dict(parameters.quantities)
-    override_parameters(parameters, {"platen.gravity": 9.8, "machine.thrust": "normal"})
-    assert dict(parameters.quantities) == before
-    assert parameters.words["machine.thrust"] == "report"
-
-
 def test_standard_deviation_is_in_the_units_of_the_value():
     parameters = load_parameters("lhpost6")
     assert parameters["hydraulics.bulk_modulus"].sd == pytest.approx(89.6e6)  # rel_sd 0.1
@@ -346,15 +276,8 @@ KEYS = ("value", "unit", "evidence", "source", "sd", "rel_sd", "printed")
 
 
 values = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(),
-    st.floats(),
-    st.text(max_size=5),
-    st.lists(st.floats(), max_size=4),
-    st.dictionaries(
-        st.sampled_from(KEYS), st.one_of(st.floats(), st.text(max_size=5), st.lists(st.floats(), max_size=3))
-    ),
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.lists(st.floats(), max_size=4),
+    st.dictionaries(st.sampled_from(KEYS), st.floats() | st.text(max_size=5) | st.lists(st.floats(), max_size=3)),
 )
 
 

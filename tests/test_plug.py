@@ -3,14 +3,16 @@
 import math
 import sys
 from dataclasses import dataclass
-from itertools import count
+from itertools import chain, count, repeat
 from typing import Any
 
 import numpy as np
 import pytest
+from commands import own_controller
 from machine_cases import SCRIPTS
+from run_cases import amid_ridgecrest
 
-from lhpost6_pin.control import Controller, load_controller, make_controller
+from lhpost6_pin.control import Controller, load_controller
 from lhpost6_pin.control.plug import checked_command, is_plugged, load_plugged
 from lhpost6_pin.core.errors import ControllerError, SimulationError
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
@@ -22,34 +24,22 @@ from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.rehearse import rehearse
-from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
+from lhpost6_pin.simulation.simulate import PluggedLoop, simulate
 
 pytestmark = pytest.mark.long
 
 HOLD = """
-from __future__ import annotations
 from dataclasses import dataclass
-
 @dataclass
 class Hold:
     share: float = 1.0
-
-    def init(self, plant, rest):
-        return self.share * rest.spool
-
-    def step(self, memory, wanted, sensors):
-        return memory.tolist()
-
-def made():
-    return Hold(1.0)
-
+    def init(self, plant, rest): return self.share * rest.spool
+    def step(self, memory, wanted, sensors): return memory.tolist()
+def made(): return Hold(1.0)
 class Needy:
-    def __init__(self, gain):
-        self.gain = gain
-
+    def __init__(self, gain): pass
 class Half:
-    def init(self, plant, rest):
-        return None
+    def init(self, plant, rest): pass
 """
 
 
@@ -57,11 +47,9 @@ class Hold:
     """Commands the spools at rest, whatever is wanted."""
 
     def init(self, plant, rest):
-        """Memory: the spools at rest."""
         return rest.spool
 
     def step(self, memory, wanted, sensors):
-        """Command them."""
         return memory
 
 
@@ -73,10 +61,9 @@ class Faulty(Hold):
 
     def init(self, plant, rest):
         """Memory: the commands to come."""
-        return iter([*[rest.spool] * 5, *[self.wrong] * 100])
+        return chain(repeat(rest.spool, 5), repeat(self.wrong))
 
     def step(self, memory, wanted, sensors):
-        """Command the next."""
         return next(memory)
 
 
@@ -88,11 +75,9 @@ class Plugged469D:
     drive: np.ndarray
 
     def init(self, plant, rest):
-        """Memory: the 469D's, and numbers of the samples."""
         return self.loop.init(), count()
 
     def step(self, memory, wanted, sensors):
-        """Step the 469D."""
         own, samples = memory
         return self.loop.step(own, next(samples), self.drive, sensors)
 
@@ -110,7 +95,6 @@ class DesignedFor:
         return self.controller.init(own, find_equilibrium(own))
 
     def step(self, memory, wanted, sensors):
-        """Step on whatever plant."""
         return self.controller.step(memory, wanted, sensors)
 
 
@@ -131,11 +115,12 @@ def test_a_file_and_a_name_mean_a_plugged_controller_and_a_name_alone_means_sett
 
 
 @pytest.mark.parametrize("name", ["Hold", "made"])
-def test_a_class_and_a_function_that_returns_a_controller_work_alike(file, plant, rest, name):
-    controller = load_plugged(f"{file}:{name}")
-    run = simulate(plant, PluggedLoop(controller, *standing(64), rest), samples=64)
+def test_a_class_and_a_function_that_returns_a_controller_hold_the_table_at_rest_alike(file, plant, rest, name):
+    run = simulate(plant, PluggedLoop(load_plugged(f"{file}:{name}"), *standing(512), rest), samples=512)
     assert run.trouble is None and run.clipped == 0
-    assert np.array_equal(run.command, np.tile(rest.spool, (64, 1)))
+    assert np.array_equal(run.command, np.tile(rest.spool, (512, 1)))
+    assert np.abs(run.q - rest.state.q).max() < 1e-12  # rounding: 1e-16 m grows with the slow mode of the struts
+    assert np.abs(run.v).max() < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -194,14 +179,13 @@ def test_what_is_no_command_is_refused_with_controller_and_sample(command, messa
         ("return 1 / 0", "return [0.0] * 10", r"Mine.init failed: ZeroDivisionError: .*mine.py, line 2\)"),
         ("return 1", "raise KeyError('gain')", r"Mine.step failed at sample 0: KeyError: 'gain' .*mine.py, line 3\)"),
         ("return 1", "raise SystemExit('left')", "Mine.step failed at sample 0: SystemExit: left"),
-        ("return 1", "w.displacement[:] = 1.0", "Mine.step failed at sample 0: ValueError: .*read-only"),
+        ("return 1", "wanted.displacement[:] = 1.0", "Mine.step failed at sample 0: ValueError: .*read-only"),
     ],
 )
 def test_what_a_users_own_code_raises_is_told_with_its_line(file, plant, rest, init, step, message):
-    file.write_text(f"class Mine:\n    def init(self, p, r): {init}\n    def step(self, m, w, s): {step}\n")
     motion = standing(4)
     with pytest.raises(ControllerError, match=message):
-        simulate(plant, PluggedLoop(load_plugged(f"{file}:Mine"), *motion, rest), samples=4)
+        simulate(plant, PluggedLoop(load_plugged(own_controller(file, init, step)), *motion, rest), samples=4)
     assert not np.any(motion)  # what is wanted stays as it was
 
 
@@ -211,51 +195,35 @@ def test_a_controller_with_other_arguments_than_the_plug_points_is_told_so(file,
         simulate(plant, PluggedLoop(load_plugged(f"{file}:Mine"), *standing(4), rest), samples=4)
 
 
-def test_a_faulty_command_stops_a_run_at_its_sample(plant, rest):
+def test_a_faulty_command_stops_a_run_at_its_sample_and_one_beyond_full_stroke_is_clipped_and_counted(plant, rest):
     with pytest.raises(ControllerError, match="Faulty returned nan for actuator 1 of 10 at sample 5"):
         simulate(plant, PluggedLoop(Faulty([math.nan] * 10), *standing(20), rest), samples=20)
-
-
-def test_commands_beyond_full_stroke_are_clipped_and_counted(plant, rest):
-    far = PluggedLoop(Faulty([2.0] * 4 + [0.0] * 6), *standing(20), rest)
-    run = simulate(plant, far, samples=20)
+    run = simulate(plant, PluggedLoop(Faulty([2.0] * 4 + [0.0] * 6), *standing(20), rest), samples=20)
     assert run.clipped == 4 * 15  # four spools in each of the fifteen samples after the first five
     assert np.abs(run.command).max() == 1.0
-
-
-def test_holding_the_spools_at_rest_keeps_the_table_at_rest(plant, rest):
-    run = simulate(plant, PluggedLoop(Hold(), *standing(1024), rest), samples=1024)
-    assert np.abs(run.q - rest.state.q).max() < 1e-12  # rounding: 1e-16 m grows with the slow mode of the struts
-    assert np.abs(run.v).max() < 1e-12
 
 
 @pytest.mark.parametrize("scheme", ["semi_implicit", "rk4"])
 def test_the_469d_through_the_plug_point_is_the_compiled_loop_to_the_last_bit(plant, rest, scheme):
     """Same step, same sensors, same delay: only the way in differs."""
-    target = make_target(find_motion("ridgecrest"), window=(12.0, 13.0), rate=float(SAMPLE_RATE))
-    motion = [x[8192:9216] for x in (target.displacement, target.velocity, target.acceleration)]
-    loop = make_controller(plant, rest, load_controller("lhpost6"))
-    drive = loop.drive_for(*motion)
-    compiled = simulate(plant, ClosedLoop(loop, drive, rest), samples=1024, scheme=scheme)
-    plugged = simulate(plant, PluggedLoop(Plugged469D(loop, drive), *motion, rest), samples=1024, scheme=scheme)
+    loop = amid_ridgecrest(plant, rest, 1024)
+    own = PluggedLoop(Plugged469D(loop.controller, loop.drive), *standing(1024), rest)
+    compiled, plugged = (simulate(plant, one, samples=1024, scheme=scheme) for one in (loop, own))
     assert np.abs(compiled.command - rest.spool).max() > 0.01  # the table moves
     for name in ("command", "spool", "q", "v", "z"):
         assert np.array_equal(getattr(compiled, name), getattr(plugged, name)), name
 
 
-def test_the_fused_engine_refuses_a_controller_in_python(plant, rest):
-    with pytest.raises(SimulationError, match="fused engine runs compiled controllers; take the engine pinocchio"):
-        simulate(plant, PluggedLoop(Hold(), *standing(8), rest), samples=8, engine="fused")
-
-
-def test_what_is_wanted_must_fit_the_samples_and_be_finite(plant, rest):
-    short = PluggedLoop(Hold(), *standing(7), rest)
-    with pytest.raises(SimulationError, match=r"wanted displacement has shape \(7, 6\); \(8, 6\) is needed"):
-        simulate(plant, short, samples=8)
+def test_what_is_wanted_must_fit_the_samples_and_be_finite_and_the_engine_run_python(plant, rest):
     motion = standing(8)
     motion[2][3, 1] = math.nan
-    with pytest.raises(SimulationError, match="wanted acceleration is not finite at sample 3, column 1"):
-        simulate(plant, PluggedLoop(Hold(), *motion, rest), samples=8)
+    for wanted, engine, message in (
+        (standing(7), "pinocchio", r"wanted displacement has shape \(7, 6\); \(8, 6\) is needed"),
+        (motion, "pinocchio", "wanted acceleration is not finite at sample 3, column 1"),
+        (standing(8), "fused", "fused engine runs compiled controllers; take the engine pinocchio"),
+    ):
+        with pytest.raises(SimulationError, match=message):
+            simulate(plant, PluggedLoop(Hold(), *wanted, rest), samples=8, engine=engine)
 
 
 def test_a_controller_runs_from_the_command_line_by_a_relative_path(lhpost6, file, monkeypatch):
@@ -278,14 +246,10 @@ def errors(machine, controller, target):
     """RRMSE of displacement and acceleration of the axes asked to move, 0 to 33 Hz, delay removed; and the delays."""
     test = rehearse(machine, target, controller, attrs={"test": "lqg"})
     assert test.run.trouble is None and test.run.clipped == 0
-    dt = 1 / SAMPLE_RATE
-    found = {}
+    dt, moved, found = 1 / SAMPLE_RATE, target.displacement.any(axis=0), {}
     for name in ("displacement", "acceleration"):
-        moved = target.displacement.any(axis=0)
-        asked, achieved = (
-            lowpass_zero_phase(x[:, moved], dt, 33.0)
-            for x in (getattr(target, name), test.record[f"platen_{name}"].values)
-        )
+        pair = getattr(target, name), test.record[f"platen_{name}"].values
+        asked, achieved = (lowpass_zero_phase(x[:, moved], dt, 33.0) for x in pair)
         late = delay(asked, achieved, dt)
         found[name] = rrmse(asked, align(achieved, late, dt)), late
     return found
@@ -353,18 +317,6 @@ def test_lqg_model_has_the_oil_column_modes_of_the_plant(lqg, plant):
     modes = [mode.frequency for mode in oil_column_modes(plant.machine)]
     assert len(found) == len(AXES)
     assert np.allclose(found, modes, rtol=1e-3)  # damping ratios below 1 % shift them by their squares
-
-
-def test_the_example_compares_both_controllers_on_one_page(lqg, tmp_path, monkeypatch, capsys):
-    module = sys.modules[type(lqg).__module__]
-    monkeypatch.setattr(module, "make_target", lambda *_, **__: sine("x", 0.05))
-    module.main("sine", out=tmp_path)
-    printed = capsys.readouterr().out
-    for words in ("displacement x: RRMSE", "acceleration x: RRMSE", "largest spool", "spool values clipped"):
-        assert words in printed
-    text = (tmp_path / "lqg.html").read_text(encoding="utf-8")
-    assert "LQG follows more closely than the 469D in 2 of 2 quantities" in text
-    assert all(f'id="{name}"' in text for name in ("displacement-x", "acceleration-x", "peak-x"))
 
 
 def test_lqg_refuses_what_its_model_has_no_place_for(lqg):

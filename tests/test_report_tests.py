@@ -40,6 +40,7 @@ def components(tmp_path) -> list[Path]:
 def test_each_test_of_the_report_is_listed_with_what_it_needs(lhpost6, without_package):
     entries = {name: entry for entry in list_motions() for name in (entry.name, *entry.aliases)}
     assert {*READY, *PACKAGE, *OWN, "elcentro", "el_centro"} <= set(entries)
+    assert [find_motion(name).name for name in READY] == [*READY]
     ended = lhpost6("motions")
     words = ended.out
     assert ended.code == 0
@@ -47,11 +48,6 @@ def test_each_test_of_the_report_is_listed_with_what_it_needs(lhpost6, without_p
         assert entries[name].remedy in words and entries[name].remedy.startswith("your file: ")
     assert "or your file: PEER RSN 1503" in words
     assert "PEER RSN 143 " in words and "PEER RSN 1120 " in words and "PEER RSN 6 " in words
-
-
-@pytest.mark.parametrize("name", READY)
-def test_those_that_need_no_file_are_there_at_once(name):
-    assert find_motion(name).name == name
 
 
 @pytest.mark.parametrize("name", [*OWN, *PACKAGE, "elcentro", "el_centro", "rinaldi"])

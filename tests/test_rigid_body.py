@@ -3,31 +3,23 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from machine_cases import (
-    FREE_MACHINES,
-    MACHINES,
-    PENDULUM,
-    frame_array,
-    machine_named,
-    plant_named,
-    platen_se3,
-    random_poses,
-)
+from machine_cases import FREE_MACHINES, MACHINES, PENDULUM, machine_named, plant_named, platen_se3, random_poses
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.special import ellipk
 
 from lhpost6_pin.core.errors import ParameterError, SimulationError
 from lhpost6_pin.effects.effect import Effect
-from lhpost6_pin.effects.evaluate import wrench_on_platen
 from lhpost6_pin.effects.registry import LAWS, law_of
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.port_names import PLATEN_PORTS
 from lhpost6_pin.mechanics import kinematics as kin
 from lhpost6_pin.mechanics.forward_dynamics import platen_acceleration
-from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.required_wrench import refuse_joints
 from lhpost6_pin.mechanics.rigid_body import lumped_inertia, make_model, platen_inertia
 from lhpost6_pin.mechanics.schemes import FORCE, TAU, V_SEEN, dexp_inverse, forces_stage, pose_stage
+from lhpost6_pin.mechanics.specimen_joints import joints_beyond, specimen_doubts, specimen_joints, specimen_positions
 from lhpost6_pin.mechanics.workspace import make_workspace
 
 BOB, ARM, BOB_INERTIA, POST = 500.0, 2.0, 25.0, 200.0  # of pendulum.urdf: kg, m, kg m2 about Y, kg
@@ -96,38 +88,12 @@ def test_aba_with_directional_mass_bias_and_weight_is_the_reports_equation_of_mo
         assert np.abs(inert - external).max() < 1e-13 * scale
 
 
-def test_directional_mass_needs_its_bias_and_its_weight():
-    # left out, each would be seen: the check above is not blind to them
-    plant = plant_named("lhpost6")
-    extra = np.array(plant.machine.platen.mass) - min(plant.machine.platen.mass)
-    _, q, v, z = list(random_states(plant, 8))[-1]
-    ws = forces_at(plant, q, v, z)
-    a = pin.aba(plant.model, plant.model.createData(), q, v, ws.motion[TAU])
-    bias = extra * np.cross(v[3:], v[:3])
-    weight = extra[2] * G
-    assert np.abs(bias).max() > 100.0 and weight > 6e4
-    m = np.array(plant.machine.platen.mass)
-    gravity = ws.frame[:3].T @ [0.0, 0.0, -G]
-    ports = ws.JB[1][:, :3].T @ ws.port[FORCE]
-    assert np.allclose(m * (a[:3] + np.cross(v[3:], v[:3])), ports + m[2] * gravity, rtol=0.0, atol=1e-6)
+LOADED = machine_named("lhpost6").with_specimen(PENDULUM, (2.0, -1.0, 0.1), (0.1, -0.2, 0.7), locked=True)
 
 
-@pytest.mark.parametrize("name", FREE_MACHINES)
-def test_weight_is_straight_down_with_the_vertical_mass_at_any_tilt(name):
-    # Eq. 4-24: R^T (0, 0, -m_z g), not a force in platen axes with each direction's mass
-    machine, plant = machine_named(name), plant_named(name)
-    for pose in random_poses(machine, 12):
-        frame = frame_array(machine, pose)
-        wrench_on_platen(frame, plant.body, np.zeros((len(plant.ports), 6)), np.zeros(len(plant.ports)))
-        in_inertia = min(machine.platen.mass) * frame[:3].T @ [0.0, 0.0, -G]
-        weight = frame[:3] @ (frame[6] + in_inertia)
-        assert np.allclose(weight, [0.0, 0.0, -machine.platen.mass[2] * G], rtol=0.0, atol=1e-8)
-        assert np.array_equal(frame[7], np.zeros(3))
-
-
-@pytest.mark.parametrize("name", MACHINES)
-def test_fused_forward_dynamics_are_pinocchios(name):
-    plant = plant_named(name)
+@pytest.mark.parametrize("machine", [*map(machine_named, MACHINES), LOADED], ids=[*MACHINES, "rigid specimen"])
+def test_fused_forward_dynamics_are_pinocchios(machine):
+    plant = make_plant(machine)
     table, data = plant.tables.inertia, plant.model.createData()
     a = np.zeros(plant.axes.size)
     for _, q, v, z in random_states(plant, 24):
@@ -135,17 +101,6 @@ def test_fused_forward_dynamics_are_pinocchios(name):
         platen_acceleration(table, plant.axes, ws.frame, ws.motion[TAU], np.zeros((2, 6)), a)
         wanted = pin.aba(plant.model, data, q, v, ws.motion[TAU])
         assert np.allclose(a, wanted, rtol=1e-12, atol=1e-11)  # up to 100 m/s2; inverse of a well-conditioned 6x6
-
-
-def test_fused_forward_dynamics_take_a_rigid_specimen_anywhere_on_the_platen():
-    machine = machine_named("lhpost6").with_specimen(PENDULUM, (2.0, -1.0, 0.1), (0.1, -0.2, 0.7), locked=True)
-    plant = make_plant(machine)
-    table, data = plant.tables.inertia, plant.model.createData()
-    a = np.zeros(6)
-    for _, q, v, z in random_states(plant, 12):
-        ws = forces_at(plant, q, v, z)
-        platen_acceleration(table, plant.axes, ws.frame, ws.motion[TAU], np.zeros((2, 6)), a)
-        assert np.allclose(a, pin.aba(plant.model, data, q, v, ws.motion[TAU]), rtol=1e-12, atol=1e-11)
 
 
 def test_a_guided_platen_has_one_coordinate_and_the_mass_along_its_guide():
@@ -178,10 +133,8 @@ def test_inverse_exponential_differential_is_exact_for_the_steps_of_a_shake_tabl
     assert worst_inverse_differential(1e-4, exact_inverse_differential) < 1e-15
     assert worst_inverse_differential(1e-3, exact_inverse_differential) < 1e-14
     # fourth order: twice the step, sixteen times the error
-    ratio = worst_inverse_differential(0.1, exact_inverse_differential) / worst_inverse_differential(
-        0.05, exact_inverse_differential
-    )
-    assert ratio == pytest.approx(16.0, rel=0.05)
+    large, half = (worst_inverse_differential(size, exact_inverse_differential) for size in (0.1, 0.05))
+    assert large / half == pytest.approx(16.0, rel=0.05)
 
 
 def test_inverse_exponential_differential_is_pinocchios():
@@ -303,8 +256,7 @@ def test_locked_specimen_adds_its_mass_and_inertia_to_the_platen():
 def test_free_specimen_joins_the_same_model_with_its_joints():
     plant = make_plant(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE))
     assert list(plant.model.names) == ["universe", "platen", "pivot"]
-    assert plant.model.nv == 7
-    assert plant.axes.size == 6
+    assert plant.model.nv == 7 and plant.axes.size == 6
     assert pin.computeTotalMass(plant.model) == pytest.approx(168060.0 + POST + BOB)
     with pytest.raises(SimulationError, match="free joints"):
         refuse_joints(plant)
@@ -324,24 +276,12 @@ def held_swing(model, angle, rate):
     return -pin.nonLinearEffects(model, data, q, v)[6] / pin.crba(model, data, q)[6, 6]
 
 
-def test_pendulum_on_a_held_platen_swings_at_its_closed_form_frequency():
-    model = make_model(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE))
-    angle = 1e-4  # sin(x) = x to 2e-9 of it
-    assert held_swing(model, angle, 0.0) == pytest.approx(-(pendulum_rate() ** 2) * angle, rel=1e-8)
-
-
 def test_pendulum_swings_wide_with_the_period_of_the_elliptic_integral():
     model = make_model(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE))
     start = 1.2  # rad
     period = 4.0 * ellipk(np.sin(0.5 * start) ** 2) / pendulum_rate()
-    swing = solve_ivp(
-        lambda _, y: [y[1], held_swing(model, *y)],
-        (0.0, 0.3 * period),
-        [start, 0.0],
-        events=lambda _, y: y[0],
-        rtol=1e-10,
-        atol=1e-12,
-    )
+    options = {"events": lambda _, y: y[0], "rtol": 1e-10, "atol": 1e-12}
+    swing = solve_ivp(lambda _, y: [y[1], held_swing(model, *y)], (0.0, 0.3 * period), [start, 0.0], **options)
     assert swing.t_events[0][0] == pytest.approx(0.25 * period, rel=1e-8)  # the solver's tolerance
 
 
@@ -360,22 +300,6 @@ def test_pendulum_on_a_platen_free_to_roll_swings_faster_by_the_mass_ratio():
     assert all_mass * a[0] - BOB * ARM * np.cos(angle) * a[1] == pytest.approx(0.0, abs=1e-11)
 
 
-def test_platen_and_pendulum_falling_free_keep_their_momentum_balance():
-    machine = machine_named("lhpost6").with_params(platen__mass=[168e3] * 3).with_specimen(PENDULUM, ABOVE)
-    model = make_model(machine)
-    data = model.createData()
-    rng = np.random.default_rng(11)
-    weight = pin.computeTotalMass(model) * G
-    for _ in range(12):
-        q = pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, 7))
-        v = rng.uniform(-2.0, 2.0, 7)
-        a = pin.aba(model, data, q, v, np.zeros(7))
-        rate = pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
-        # Newton: total force is the weight, no moment about the common centre of gravity; rounding of 1e6 N
-        assert np.allclose(rate.linear, [0.0, 0.0, -weight], rtol=0.0, atol=1e-6)
-        assert np.allclose(rate.angular, 0.0, rtol=0.0, atol=1e-5)
-
-
 @pytest.mark.parametrize("robot, joints", [("double_pendulum", 2), ("ur5", 6), ("solo12", 12)])
 def test_models_of_example_robot_data_mount_as_specimens(robot, joints):
     import example_robot_data  # here: it takes a second to import
@@ -389,28 +313,103 @@ def test_models_of_example_robot_data_mount_as_specimens(robot, joints):
     total = 168060.0 + sum(i.mass for i in alone.inertias)  # the root link's mass sits on Pinocchio's universe joint
     assert sum(i.mass for i in free.model.inertias) == pytest.approx(total, rel=1e-12)
     assert locked.model.inertias[1].mass == pytest.approx(total, rel=1e-12)
-    a = pin.aba(
-        free.model, free.model.createData(), pin.neutral(free.model), np.zeros(6 + joints), np.zeros(6 + joints)
-    )
-    assert np.all(np.isfinite(a))
+    still = np.zeros(6 + joints)
+    assert np.isfinite(pin.aba(free.model, free.model.createData(), pin.neutral(free.model), still, still)).all()
 
 
-def test_urdf_that_cannot_be_a_specimen_is_refused_with_its_name(tmp_path):
-    machine = machine_named("lhpost6")
-    with pytest.raises(ParameterError, match=r"nowhere.urdf: no such URDF"):
-        make_plant(machine.with_specimen(tmp_path / "nowhere.urdf"))
-    broken = tmp_path / "broken.urdf"
-    broken.write_text("<robot name='x'><link", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"broken.urdf: not a URDF"):
-        make_plant(machine.with_specimen(broken))
-    light = tmp_path / "light.urdf"
-    light.write_text("<robot name='light'><link name='air'/></robot>", encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"light.urdf: the specimen has no mass"):
-        make_plant(machine.with_specimen(light))
-
-
-def test_specimen_with_a_joint_named_as_the_platen_is_refused_with_its_name(tmp_path):
-    path = tmp_path / "clash.urdf"
-    path.write_text(PENDULUM.read_text(encoding="utf-8").replace('"pivot"', '"platen"'), encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"clash.urdf"):
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("nowhere", None, "no such URDF"),
+        ("broken", "<robot name='x'><link", "not a URDF"),
+        ("light", "<robot name='light'><link name='air'/></robot>", "the specimen has no mass"),
+        ("clash", PENDULUM.read_text(encoding="utf-8").replace('"pivot"', '"platen"'), ""),
+    ],
+)
+def test_urdf_that_cannot_be_a_specimen_is_refused_with_its_name(tmp_path, name, text, message):
+    path = tmp_path / f"{name}.urdf"
+    if text:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(ParameterError, match=rf"{name}.urdf.*{message}"):
         make_plant(machine_named("lhpost6").with_specimen(path))
+
+
+URDF = """<robot name="tower">
+  <link name="base">
+    <inertial><mass value="{mass}"/><inertia ixx="4e4" iyy="4e4" izz="4e4" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="hinge" type="revolute">
+    <parent link="base"/><child link="arm"/><origin xyz="0 0 3"/><axis xyz="0 1 0"/>
+    <limit lower="-0.1" upper="0.2" effort="0" velocity="1"/><dynamics friction="{friction}" damping="100"/>
+  </joint>
+  <link name="arm">
+    <inertial><origin xyz="0 0 -2"/><mass value="500"/>
+      <inertia ixx="20" iyy="25" izz="10" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="turntable" type="continuous">
+    <parent link="base"/><child link="slider"/><origin xyz="0 0 4"/><axis xyz="0 0 1"/>
+  </joint>
+  <link name="slider">
+    <inertial><mass value="10"/><inertia ixx="2" iyy="2" izz="2" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="lift" type="prismatic">
+    <parent link="slider"/><child link="load"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="0" velocity="1"/>
+  </joint>
+  <link name="load">
+    <inertial><mass value="10"/><inertia ixx="2" iyy="2" izz="2" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+</robot>
+"""
+
+
+@pytest.fixture
+def tower(tmp_path):
+    def make(mass: float = 2e4, friction: float = 0.0, at=(0.0, 0.0, 0.0), locked: bool = False) -> Plant:
+        path = tmp_path / "tower.urdf"
+        path.write_text(URDF.format(mass=mass, friction=friction))
+        return make_plant(load_machine().with_specimen(path, at, locked=locked))
+
+    return make
+
+
+def test_a_specimen_that_the_table_can_carry_raises_no_doubt(tower, plant):
+    assert specimen_doubts(plant) == specimen_doubts(tower()) == specimen_doubts(tower(locked=True)) == []
+
+
+def test_weight_place_and_friction_that_speak_against_a_specimen_are_said(tower):
+    capacity = 20e6 / load_machine().platen.gravity - 520.0  # payload of Table 2.2 less the moving links
+    assert specimen_doubts(tower(mass=0.999 * capacity)) == []
+    (heavy,) = specimen_doubts(tower(mass=1.01 * capacity))
+    assert "more than the payload of 20 MN" in heavy
+    assert specimen_doubts(tower(at=(6.0, -3.7, 0.0))) == []
+    (beside,) = specimen_doubts(tower(at=(0.0, 3.9, 0.0)))
+    assert "beside the platen, which is 12.2 by 7.6 m" in beside
+    (rubs,) = specimen_doubts(tower(friction=3.0))
+    assert "friction of hinge" in rubs
+    assert specimen_doubts(tower(friction=3.0, locked=True)) == []  # no joint is left to rub
+
+
+def test_joints_have_their_names_units_and_unwrapped_positions(tower):
+    loaded = tower()
+    joints = specimen_joints(loaded)
+    assert [(j.name, j.unit) for j in joints] == [("hinge", "rad"), ("turntable", "rad"), ("lift", "m")]
+    turned = np.linspace(0.0, 12.0, 50)  # almost two turns
+    q = np.tile(loaded.zero_state().q, (50, 1))
+    for joint, values in zip(joints, (0.1 * turned, turned, 0.05 * turned), strict=True):
+        cosine = len(joint.places) == 2
+        q[:, list(joint.places)] = np.stack([np.cos(values), np.sin(values)], axis=1) if cosine else values[:, None]
+    expected = np.stack([0.1 * turned, turned, 0.05 * turned], axis=1)
+    np.testing.assert_allclose(specimen_positions(loaded, q), expected, rtol=0.0, atol=1e-12)  # rounding
+    (beyond,) = joints_beyond(loaded, np.arange(50.0), q)
+    assert beyond.startswith("specimen joint hinge went to 1.2 rad at 49.00 s, beyond -0.1 to 0.2 rad")
+    assert joints_beyond(loaded, np.arange(8.0), q[:8]) == []
+
+
+def test_a_run_warns_before_and_reports_what_the_joints_did(lhpost6, tower, tmp_path, caplog):
+    tower(friction=3.0)
+    asked = ("run", "sine", "--set", "amplitude=0.005", "--set", "cycles=1", "--rate", "2048")
+    assert lhpost6(*asked, "--specimen", "tower.urdf", "--out", tmp_path).code == 0
+    assert "friction of hinge is in its URDF and not simulated" in caplog.text
+    page = (tmp_path / "report.html").read_text()
+    assert "Specimen joints over time" in page and "friction of hinge" in page and "specimen joint lift" in page

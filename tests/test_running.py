@@ -1,18 +1,25 @@
-"""The plant sample by sample: the same run as `simulate`'s, and what it refuses."""
+"""The plant sample by sample: the same run as `simulate`'s, what it refuses, and what is seen of it on the way."""
+
+import time
 
 import numpy as np
 import pytest
-from machine_cases import PENDULUM, plant_named
+from commands import SHORT
+from machine_cases import PENDULUM, machine_named
+from run_cases import amid_ridgecrest, at_rest
 
-from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.cli import live_view as live
 from lhpost6_pin.core.errors import SimulationError
-from lhpost6_pin.core.names import SAMPLE_RATE, SCHEMES
+from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, encode
+from lhpost6_pin.interfaces.link.served import ServedPlant
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium
-from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.viewer import LiveView
+from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.running import RunningPlant
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
+from lhpost6_pin.simulation.snapshot import EVERY, Snapshot
 
 N = 1024
 
@@ -20,14 +27,10 @@ N = 1024
 @pytest.fixture(scope="module")
 def strong(plant, rest):
     """Controller and drive of half a second of Ridgecrest."""
-    target = make_target(find_motion("ridgecrest"), window=(12.0, 13.0), rate=float(SAMPLE_RATE))
-    motion = [x[8192 : 8192 + N] for x in (target.displacement, target.velocity, target.acceleration)]
-    loop = make_controller(plant, rest, load_controller("lhpost6"))
-    return loop, loop.drive_for(*motion)
+    return amid_ridgecrest(plant, rest, N)[:2]
 
 
 def run_by_samples(table, loop, drive, watch=lambda k: None):
-    """States at each sample, and commands."""
     memory, states, commands, spools = loop.init(), [], [], []
     for k in range(len(drive)):
         state = table.state
@@ -72,24 +75,16 @@ def test_two_tables_of_one_plant_do_not_disturb_each_other(plant, rest, strong):
     assert np.array_equal(alone, between)
 
 
-@pytest.mark.parametrize("name", ["uniaxial", "stewart"])
-def test_other_machines_run_sample_by_sample_too(name):
-    plant = plant_named(name)
-    rest = find_equilibrium(plant)
+@pytest.mark.parametrize(
+    "machine", [*map(machine_named, ("uniaxial", "stewart")), load_machine().with_specimen(PENDULUM)]
+)
+def test_other_machines_and_a_pendulum_on_one_run_sample_by_sample_too(machine):
+    plant, rest = at_rest(machine)
     table = RunningPlant(plant, rest)
     for _ in range(200):
         table.advance(rest.spool)
     assert np.abs(table.state.v).max() < 1e-9  # it rests
     assert np.allclose(table.sensors().displacement, 0.0, atol=1e-9)
-
-
-def test_a_pendulum_on_the_table_runs_sample_by_sample_too():
-    plant = make_plant(load_machine().with_specimen(PENDULUM))
-    rest = find_equilibrium(plant)
-    table = RunningPlant(plant, rest)
-    for _ in range(100):
-        table.advance(rest.spool)
-    assert len(table.state.v) == plant.model.nv > 6
 
 
 def test_sensors_at_rest_tell_of_rest(plant, rest):
@@ -108,18 +103,12 @@ def test_a_command_beyond_full_stroke_is_clipped_and_counted(plant, rest):
     assert np.array_equal(table.state.q, full.state.q)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_command_that_is_not_finite_is_refused_and_nothing_moves(plant, rest, bad):
+def test_a_command_that_is_not_finite_or_of_another_shape_is_refused_and_nothing_moves(plant, rest):
     table = RunningPlant(plant, rest)
-    with pytest.raises(SimulationError, match="10 finite spool values"):
-        table.advance(np.full(10, bad))
+    for bad in (*(np.full(10, x) for x in (np.nan, np.inf)), *map(np.zeros, [(9,), (11,), (1, 10), ()])):
+        with pytest.raises(SimulationError, match="10 finite spool values"):
+            table.advance(bad)
     assert table.sample == 0 and np.array_equal(table.state.q, rest.state.q)
-
-
-@pytest.mark.parametrize("shape", [(9,), (11,), (1, 10), ()])
-def test_a_command_of_another_shape_is_refused(plant, rest, shape):
-    with pytest.raises(SimulationError, match="10 finite spool values"):
-        RunningPlant(plant, rest).advance(np.zeros(shape))
 
 
 @pytest.mark.parametrize("rate", [0, 1000, 3000, -2048])
@@ -135,3 +124,62 @@ def test_a_leg_that_leaves_its_stroke_stops_the_table_by_name(plant, rest):
     with pytest.raises(SimulationError, match=r"stopped at \d\.\d+ s: V\d left its stroke of \+-0.127 m"):
         for _ in range(4 * SAMPLE_RATE):
             table.advance(up)
+
+
+@pytest.fixture(scope="module")
+def loop(controller, rest):
+    target = make_target(find_motion("sine", amplitude=0.02, cycles=0.5, ramp_cycles=0.5), rate=float(SAMPLE_RATE))
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    begin = int(np.argmax(np.abs(drive[:, 0]) > 1e-3 * np.abs(drive[:, 0]).max()))
+    return ClosedLoop(controller, drive[begin : begin + 4000], rest)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ENGINES)
+def test_snapshots_are_those_of_the_record_and_looking_changes_nothing(plant, loop, engine):
+    seen: list[Snapshot] = []
+    run = simulate(plant, loop, samples=4000, engine=engine, watch=seen.append)
+    unseen = simulate(plant, loop, samples=4000, engine=engine)
+    for name in ("q", "v", "a", "z", "spool", "command"):
+        assert np.array_equal(getattr(run, name), getattr(unseen, name)), name
+    record = record_of_run(run, {"test": "sine"})
+    assert [one.time for one in seen] == [k / SAMPLE_RATE for k in range(0, 4000, EVERY)]
+    places = record.isel(time=slice(0, None, EVERY))
+    moved = np.array([one.displacement for one in seen])
+    assert np.abs(moved[:, 0]).max() > 1e-3
+    np.testing.assert_allclose(moved, places["platen_displacement"].values, atol=1e-15)
+    force = np.array([one.force for one in seen])
+    # the ledger's forces against pressures times areas: rounding of 1 MN
+    np.testing.assert_allclose(force[:, : plant.spools], places["actuator_force"].values, rtol=1e-12, atol=1e-6)
+    gas = places["strut_pressure"].values * [s.area for s in plant.machine.struts]
+    np.testing.assert_allclose(-force[:, plant.spools :], gas, rtol=1e-12)  # seals of Table 6.1 have no friction
+
+
+@pytest.mark.long
+def test_a_served_plant_shows_itself_now_and_then(plant, rest):
+    table, seen = ServedPlant(plant, rest, LinkMode.LOCK_STEP), []
+    table.watcher = seen.append
+    table.receive(encode(Datagram(Kind.HELLO, 1)), "a", 0)
+    n = plant.spools
+    for k in range(1, 2 * EVERY + 2):
+        frame = Datagram(Kind.COMMAND, 1, actuators=n, valves=n, sequence=k, numbers=rest.spool)
+        table.receive(encode(frame), "a", k)
+    assert [one.time for one in seen] == [EVERY / SAMPLE_RATE, 2 * EVERY / SAMPLE_RATE]
+
+
+@pytest.mark.long
+def test_a_live_view_is_no_faster_than_the_table(plant):
+    still = Snapshot(0.0, np.zeros(6), np.ones(plant.legs.size))
+    with LiveView(plant.machine, "still") as view:
+        begin = time.monotonic()
+        for moment in (3.0, 3.1, 3.3):  # a plant may have run before it is watched
+            view.show(still._replace(time=moment))
+        assert time.monotonic() - begin >= 0.3
+
+
+@pytest.mark.long
+def test_a_run_can_be_watched_from_the_command_line(lhpost6, monkeypatch, tmp_path):
+    monkeypatch.setattr(live, "PATIENCE", 0.0)
+    ended = lhpost6("run", *SHORT, "--live", "--no-open", "--out", tmp_path)
+    assert ended.code == 0 and "http://127.0.0.1:" in ended.out and "no viewer connected" in ended.err
+    assert (tmp_path / "record.nc").is_file()

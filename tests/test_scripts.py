@@ -9,18 +9,16 @@ import sys
 import numpy as np
 import pytest
 from machine_cases import SCRIPTS, machine_named
+from run_cases import at_rest
 
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium
-from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 pytestmark = pytest.mark.long
 
 
 def script(name: str, *arguments: object) -> subprocess.CompletedProcess:
-    """Run a script in a process of its own."""
     command = [sys.executable, str(SCRIPTS / name), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
 
@@ -62,10 +60,8 @@ def test_the_audit_balances_energy_and_repeats_bit_by_bit(tmp_path):
     assert text.strip() == ended.stdout.strip() and "DIFFERENT" not in text and text.count("| the same |") == 2
     over = float(re.search(r"\| ([\d.e+-]+) \|$", text, re.MULTILINE)[1])
     assert over < 2e-3  # the trapezoidal rule at 2048 Hz over flows that jump with the spool
-    report, view = (
-        float(size) for size in re.findall(r"^\| (?:report|animation.*?) \| ([\d.]+) \|$", text, re.MULTILINE)
-    )
-    assert report < 6.0 and view < 6.0  # [MB], of 40 s
+    report, view = re.findall(r"^\| (?:report|animation.*?) \| ([\d.]+) \|$", text, re.MULTILINE)
+    assert float(report) < 6.0 and float(view) < 6.0  # [MB], of 40 s
 
 
 def test_the_convergence_study_runs_and_keeps_its_errors(tmp_path):
@@ -111,8 +107,7 @@ def test_the_plain_loop_is_the_fused_engines_euler_to_rounding():
     """
     from plain_loop import PlainPlant
 
-    plant = make_plant(machine_named("lhpost6"))
-    rest = find_equilibrium(plant)
+    plant, rest = at_rest(machine_named("lhpost6"))
     samples, steps = 160, 16
     dt = 1.0 / (steps * SAMPLE_RATE)
     rng = np.random.default_rng(1)
@@ -122,14 +117,8 @@ def test_the_plain_loop_is_the_fused_engines_euler_to_rounding():
 
     z = rest.state.z
     # our hidden states: A and B of H1..H4 in turn, A of V1..V6, seals, pads
-    state = (
-        rest.state.q.copy(),
-        np.zeros(6),
-        np.r_[z[0:8:2], z[8:14]],
-        z[1:8:2].copy(),
-        np.zeros(10),
-        np.zeros((6, 2)),
-    )
+    pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
+    state = rest.state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2))
     plain, supply = PlainPlant(plant.machine), plant.supply
     least, slid = np.inf, np.zeros(2)
     for row in spool:

@@ -1,15 +1,28 @@
-"""Sensors: stated noise, simulated noise that has the stated spectrum, noise found again in a rest."""
+"""Sensors: stated noise, noise with the stated spectrum and found again in a rest, and a channel more."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from run_cases import shaken
 from scipy.signal import welch
 
 from lhpost6_pin.core.errors import ParameterError, UnknownNameError
 from lhpost6_pin.core.files import models_folder
-from lhpost6_pin.data.channels import LAYOUT, sensor_groups
-from lhpost6_pin.data.records import make_record
-from lhpost6_pin.data.sensors import add_noise, estimate_noise, find_rest, load_sensors, spectrum
+from lhpost6_pin.data.alignment import group_delays
+from lhpost6_pin.data.channels import LAYOUT, Channel, channel_unit, sensor_groups
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.consistency import check_sensors
+from lhpost6_pin.data.importing.channel_map import channels_of
+from lhpost6_pin.data.records import load_record, make_record, save_record
+from lhpost6_pin.data.sensors import SensorSet, add_noise, estimate_noise, find_rest, load_sensors, spectrum
+from lhpost6_pin.identification.calibration.sensor_errors import corrected, sensor_unknowns
+from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.simulated_campaign import as_sensed, draw_errors
 
 SENSORS = load_sensors()
 
@@ -24,23 +37,23 @@ def still(rate: float, duration: float = 40.0, moves: float | None = None) -> xr
     return make_record(t, channels, {"actuator": ["H1", "H2"]}, {})
 
 
-def test_every_noise_has_a_channel_a_unit_and_a_source() -> None:
+def test_every_noise_has_a_channel_a_unit_and_a_source():
     assert set(SENSORS.noise) <= set(LAYOUT)
     assert set(SENSORS.delay_range) == set(sensor_groups())
     assert all(q.source and q.evidence for q in SENSORS.parameters.values())
 
 
-def test_the_noise_left_by_the_low_pass_is_the_integral_of_its_gain() -> None:
+def test_the_noise_left_by_the_low_pass_is_the_integral_of_its_gain():
     # Butterworth of order 8 both ways: integral of (1 + x^16)^-2 over x is (1 - 1/16) (pi/16) / sin(pi/16)
     share = 15 / 16 * (np.pi / 16) / np.sin(np.pi / 16) * 100 / 1024
     assert SENSORS.noise_sd("actuator_force")[0] == pytest.approx(4000 * np.sqrt(share), rel=1e-4)  # trapezoid
 
 
-def test_the_noise_below_a_sharp_cutoff_within_the_band_is_the_whites_share() -> None:
+def test_the_noise_below_a_sharp_cutoff_within_the_band_is_the_whites_share():
     assert SENSORS.noise_sd("actuator_force", 30.0)[0] == pytest.approx(4000 * np.sqrt(30 / 1024), rel=1e-6)
 
 
-def test_a_range_becomes_the_standard_deviation_of_a_uniform_error() -> None:
+def test_a_range_becomes_the_standard_deviation_of_a_uniform_error():
     assert SENSORS.gain_sd("actuator_force") == pytest.approx(0.005 / np.sqrt(3))
     assert SENSORS.offset_sd("chamber_pressure_a") == pytest.approx(3e4 / np.sqrt(3))
     assert SENSORS.delay_sd("strut_pressure") == pytest.approx(3e-4 / np.sqrt(3))
@@ -48,7 +61,7 @@ def test_a_range_becomes_the_standard_deviation_of_a_uniform_error() -> None:
 
 
 @pytest.mark.parametrize("rate", [150.0, 512.0, 2048.0, 8192.0])
-def test_simulated_noise_has_the_stated_spectrum_at_any_rate(rate: float) -> None:
+def test_simulated_noise_has_the_stated_spectrum_at_any_rate(rate: float):
     noisy = add_noise(still(rate), SENSORS, np.random.default_rng(0))
     f, power = welch(noisy["actuator_force"].values, rate, nperseg=round(rate), axis=0)
     power = power.mean(axis=1)
@@ -60,21 +73,21 @@ def test_simulated_noise_has_the_stated_spectrum_at_any_rate(rate: float) -> Non
     assert noisy["actuator_force"].values.std() == pytest.approx(SENSORS.noise_sd("actuator_force")[0], rel=0.04)
 
 
-def test_noisy_channels_are_recorded_with_the_stated_number_of_steps() -> None:
+def test_noisy_channels_are_recorded_with_the_stated_number_of_steps():
     values = add_noise(still(512.0), SENSORS, np.random.default_rng(0))["actuator_force"].values
     steps = values / np.diff(np.unique(values)).min()
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)  # rounding of the quotient
     assert np.ptp(steps) <= 2**16
 
 
-def test_the_resolution_adds_to_the_spectrum_of_a_coarse_channel() -> None:
+def test_the_resolution_adds_to_the_spectrum_of_a_coarse_channel():
     record = add_noise(still(512.0, moves=1.0), SENSORS, np.random.default_rng(0))  # 150 m: a step of 2 mm
     step = np.ptp(record["platen_displacement"].values) / (2**16 - 1)
     density = spectrum(SENSORS, record, "platen_displacement", np.array([1.0]))
     assert density[0, 0] == pytest.approx(step**2 / 6 / 512, rel=1e-3)  # the sensor's own is far smaller
 
 
-def test_rest_ends_where_the_table_begins_to_move() -> None:
+def test_rest_ends_where_the_table_begins_to_move():
     record = add_noise(still(512.0, 4.0, moves=2.0), SENSORS, np.random.default_rng(0))
     rest = find_rest(record, SENSORS)
     # 0.1 t^2 passes six standard deviations of 6 um + resolution after 30 ms
@@ -82,13 +95,13 @@ def test_rest_ends_where_the_table_begins_to_move() -> None:
     assert 2.0 < rest.stop / 512 < 2.05
 
 
-def test_a_record_that_begins_in_motion_has_no_rest_and_no_estimate() -> None:
+def test_a_record_that_begins_in_motion_has_no_rest_and_no_estimate():
     record = add_noise(still(512.0, 4.0, moves=-1.0), SENSORS, np.random.default_rng(0))
     assert find_rest(record, SENSORS) == slice(0, 0)
     assert estimate_noise(record, SENSORS) == ()
 
 
-def test_noise_is_found_again_within_its_standard_error() -> None:
+def test_noise_is_found_again_within_its_standard_error():
     estimates = estimate_noise(add_noise(still(512.0), SENSORS, np.random.default_rng(3)), SENSORS)
     assert len(estimates) == 9
     for estimate in estimates:
@@ -107,7 +120,7 @@ def test_noise_is_found_again_within_its_standard_error() -> None:
         ("bits = { value = 16.0", "bits = { value = 0.0", "positive"),
     ],
 )
-def test_a_wrong_file_is_refused_by_the_name_of_its_key(tmp_path, old: str, new: str, names: str) -> None:
+def test_a_wrong_file_is_refused_by_the_name_of_its_key(tmp_path, old: str, new: str, names: str):
     text = (models_folder() / "sensors" / "lhpost6.toml").read_text(encoding="utf-8")
     assert old in text
     (tmp_path / "wrong.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -115,8 +128,70 @@ def test_a_wrong_file_is_refused_by_the_name_of_its_key(tmp_path, old: str, new:
         load_sensors(tmp_path / "wrong.toml")
 
 
-def test_unknown_sensors_are_refused_with_those_that_exist() -> None:
+def test_unknown_sensors_are_refused_with_those_that_exist():
     with pytest.raises(UnknownNameError, match="lhpost6"):
         load_sensors("no_such")
     with pytest.raises(UnknownNameError, match="actuator_force"):
         SENSORS.noise_sd("force")
+
+
+MACHINE = load_machine()
+NAME = "load_cell"
+CELL = Channel(
+    dims=("time", "actuator"),
+    units="N",
+    long_name="force of a second load cell",
+    residuals=("force",),
+    fault="pressure_sensor_error",
+    same_as="actuator_force",
+)
+STATED = {"noise": (2000.0, "N"), "gain_range": (0.005, "1"), "offset_range": (3000.0, "N"), "delay_range": (2e-4, "s")}
+
+
+@pytest.fixture
+def with_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SensorSet:
+    """The shipped sensors and the new one, its descriptor in the layout."""
+    monkeypatch.setitem(LAYOUT, NAME, CELL)  # type: ignore[arg-type]
+    text = (models_folder() / "sensors" / "lhpost6.toml").read_text(encoding="utf-8")
+    for section, (value, unit) in STATED.items():
+        entry = f'{NAME} = {{ value = {value}, unit = "{unit}", evidence = "assumed", source = "a test" }}'
+        text = text.replace(f"[{section}]\n", f"[{section}]\n{entry}\n")
+    path = tmp_path / "sensors.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_sensors(path)
+
+
+def test_a_channel_is_one_descriptor_and_its_entries_in_a_sensors_file(with_cell, tmp_path):
+    assert with_cell.noise_sd(NAME)[0] > 0.0 and with_cell.delay_sd(NAME) == pytest.approx(2e-4 / np.sqrt(3))
+    assert sensor_groups()[NAME] == (NAME,) and channel_unit(f"{NAME}[H1]") == "N"
+    assert channels_of(MACHINE.labels)[f"{NAME}[V6]"] == (NAME, "V6")  # what a channel map can name
+
+    rng = np.random.default_rng(1)  # a simulated test shows it, through a sensor of its own
+    clean = record_of_run(shaken(MACHINE, 4096), {"test": "shaken"})
+    np.testing.assert_array_equal(clean[NAME], clean["actuator_force"])
+    drawn = draw_errors(clean, with_cell, rng)
+    record = as_sensed(clean, with_cell, drawn, 1024.0, rng)
+    assert np.abs(record[NAME] - record["actuator_force"]).max() > 1000.0
+    path = tmp_path / "test.nc"
+    save_record(record, path)
+    assert load_record(path, MACHINE.labels)[NAME].attrs["units"] == "N"
+
+    stuck = record.copy(deep=True)  # checks look at it
+    stuck[NAME].values[1000:, 2] = stuck[NAME].values[1000, 2]
+    assert f"{NAME}[H3]" in {f.channel for f in check_dataset(stuck) if f.severity == "warning"}
+
+    plant = make_plant(MACHINE)  # it is aligned and compared with what it repeats
+    late = group_delays(plant, [record])[NAME]
+    due = drawn.delay[NAME] - drawn.delay["actuator_force"]
+    assert late.reference == "actuator_force" and late.delay == pytest.approx(due, abs=5 * late.standard_error)
+    found = [f for f in check_sensors(plant, [record], with_cell) if f.channel == f"{NAME}[V2]"]
+    assert {f.quantity for f in found} == {"gain", "delay", "offset", "residual"}
+    assert all(f.verdict != "suspicious" for f in found)
+
+    test = prepare_test(plant, record, with_cell, AS_RECORDED)  # its errors are unknowns of a calibration
+    unknowns = sensor_unknowns(MACHINE, with_cell, test)
+    own = [u.name for u in unknowns if u.channel == NAME]
+    assert {f"gain {NAME}[H1]", f"offset {NAME}[V6]", f"delay {NAME}"} <= set(own) and len(own) == 21
+    values = np.array([100.0 * (u.name == f"offset {NAME}[H2]") for u in unknowns])
+    change = corrected(test, unknowns, values).channels[NAME] - test.channels[NAME]
+    assert np.allclose(change[:, 1], -100.0) and not np.delete(change, 1, axis=1).any()

@@ -1,10 +1,12 @@
-"""Signals against closed forms: known delays, shifts, derivatives and filters of band-limited waves."""
+"""Signals and their conditioning against closed forms: delays, shifts, derivatives, filters, gaps and integrals."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.conditioning import fill_gaps, integrate, resolution, without_offset
 from lhpost6_pin.data.signals import (
     Band,
     align,
@@ -28,8 +30,7 @@ INSIDE = slice(200, -200)  # clear of the ends, where a record says nothing of i
 class Waves:
     """A sum of sines up to `highest` Hz with random phases, known with its derivative at any time."""
 
-    def __init__(self, highest: float, columns: int = 3, seed: int = 0) -> None:
-        """Draw the waves."""
+    def __init__(self, highest: float, columns: int = 3, seed: int = 0):
         rng = np.random.default_rng(seed)
         self.omega = 2 * np.pi * rng.uniform(0.3, highest, (60, columns))
         self.phase = rng.uniform(0, 2 * np.pi, (60, columns))
@@ -44,46 +45,43 @@ class Waves:
 
 
 # ------------------------------------------------------------------------------------------- measures
-def test_the_error_of_a_scaled_signal_is_its_scale_error() -> None:
+def test_the_error_of_a_scaled_signal_is_its_scale_error():
     x = Waves(30)(T)
     np.testing.assert_allclose(rrmse(x, 1.05 * x), 0.05, rtol=1e-12)  # rounding
     np.testing.assert_allclose(peak_ratio(x, -1.05 * x), 1.05, rtol=1e-12)
     np.testing.assert_allclose(correlation(x, -3 * x + 7), -1.0, rtol=1e-12)
 
 
-def test_the_error_of_a_sine_late_by_a_phase_is_twice_the_sine_of_half_of_it() -> None:
+def test_the_error_of_a_sine_late_by_a_phase_is_twice_the_sine_of_half_of_it():
     x, late = np.sin(2 * np.pi * 4 * T), np.sin(2 * np.pi * 4 * T - 0.3)
     assert rrmse(x, late) == pytest.approx(2 * np.sin(0.15), rel=1e-12)  # 48 whole periods: exact but for rounding
 
 
-def test_an_axis_at_rest_has_no_error_if_the_table_rests_and_an_infinite_one_if_it_moves() -> None:
+def test_an_axis_at_rest_has_no_error_if_the_table_rests_and_an_infinite_one_if_it_moves():
     still, moving = np.zeros((9, 2)), np.stack([np.zeros(9), np.ones(9)], axis=1)
     np.testing.assert_array_equal(rrmse(still, moving), [0.0, np.inf])
     np.testing.assert_array_equal(peak_ratio(still, moving), [0.0, np.inf])
     np.testing.assert_array_equal(correlation(still, moving), [0.0, 0.0])
-
-
-def test_the_drift_rate_is_the_slope_of_a_line() -> None:
-    error = np.array([4.0, 5.0]) + np.multiply.outer(T, [2e-5, -3e-3])
-    np.testing.assert_allclose(drift_rate(error, DT), [2e-5, -3e-3], rtol=1e-9)  # 4 / 2e-5 roundings
-
-
-def test_signals_of_different_shape_are_refused() -> None:
     with pytest.raises(ValueError, match="differ in shape"):
         rrmse(np.zeros((5, 2)), np.zeros((5, 3)))
+
+
+def test_the_drift_rate_is_the_slope_of_a_line():
+    error = np.array([4.0, 5.0]) + np.multiply.outer(T, [2e-5, -3e-3])
+    np.testing.assert_allclose(drift_rate(error, DT), [2e-5, -3e-3], rtol=1e-9)  # 4 / 2e-5 roundings
 
 
 # ---------------------------------------------------------------------------------------------- delay
 @settings(max_examples=30, deadline=None)
 @given(st.floats(-0.09, 0.09), st.integers(0, 99), st.floats(1.0, 150.0))
-def test_a_fractional_delay_is_found(late: float, seed: int, highest: float) -> None:
+def test_a_fractional_delay_is_found(late: float, seed: int, highest: float):
     waves = Waves(highest, seed=seed)
     found = delay(waves(T), 0.9 * waves(T - late) + 0.2, DT, max_delay=0.1)
     # the signal's cut ends reach into the interpolation: far below the 0.05 ms wanted
     np.testing.assert_allclose(found, late, atol=1e-6)
 
 
-def test_noise_moves_the_delay_by_no_more_than_its_cramer_rao_bound_allows() -> None:
+def test_noise_moves_the_delay_by_no_more_than_its_cramer_rao_bound_allows():
     waves, rng = Waves(30), np.random.default_rng(3)
     noise = 0.2 * rng.standard_normal((len(T), 3))
     found = delay(waves(T), waves(T - 0.0271) + noise, DT)
@@ -92,52 +90,57 @@ def test_noise_moves_the_delay_by_no_more_than_its_cramer_rao_bound_allows() -> 
     assert np.all(5 * bound < 5e-5)  # and that is within 0.05 ms
 
 
-def test_a_slow_signal_that_ends_elsewhere_than_it_began_has_its_delay_found() -> None:
+def test_a_slow_signal_that_ends_elsewhere_than_it_began_has_its_delay_found():
     ramp = 0.5 * T + np.sin(2 * np.pi * 0.2 * T)
     late = 0.5 * (T - 0.02) + np.sin(2 * np.pi * 0.2 * (T - 0.02))
     assert delay(ramp, late, DT) == pytest.approx(0.02, abs=1e-5)  # a fifth of the accuracy wanted
 
 
-def test_a_delay_has_a_sign_and_a_limit() -> None:
+def test_a_delay_has_a_sign_and_a_limit():
     waves = Waves(5)
     np.testing.assert_allclose(delay(waves(T - 0.03), waves(T), DT), -0.03, atol=1e-5)
     assert np.all(np.abs(delay(waves(T), waves(T - 0.03), DT, max_delay=0.01)) <= 0.01)
 
 
-def test_a_silent_signal_has_no_delay_and_a_short_record_is_refused() -> None:
+def test_a_silent_signal_has_no_delay_and_a_short_record_is_refused():
     assert np.isnan(delay(np.sin(T), np.zeros_like(T), DT))
     with pytest.raises(ValueError, match="at least"):
         delay(np.ones(20), np.ones(20), DT)
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        held = 0.1 + 1e-17 * rng.integers(-3, 4, (2, 4096))  # a spool that holds: equal to the last bit, or nearly
+        late = delay(held[0], held[1], 1 / 2048)
+        assert np.isnan(late) or abs(late) <= 0.1
 
 
 # ---------------------------------------------------------------------------------------------- align
-def test_aligning_undoes_a_delay_of_each_column() -> None:
+def test_aligning_undoes_a_delay_of_each_column():
     waves, late = Waves(150), np.array([0.0271, -0.0033, 0.0999])
     shifted = np.stack([waves(T - tau)[:, k] for k, tau in enumerate(late)], axis=1)
     # the ends' curvature reaches in, falling off as 1 / distance^3; far from them little but rounding is left
     assert rrmse(waves(T)[INSIDE], align(shifted, late, DT)[INSIDE]).max() < 1e-6
 
 
-def test_aligning_by_whole_samples_moves_samples_and_holds_the_end() -> None:
+def test_aligning_by_whole_samples_moves_samples_and_holds_the_end():
     x = Waves(20)(T)
     np.testing.assert_allclose(align(x, 5 * DT, DT)[:-5], x[5:], atol=1e-9)  # rounding of 12000-point FFTs
     np.testing.assert_array_equal(align(x, 5 * DT, DT)[-5:], np.tile(x[-1], (5, 1)))
     np.testing.assert_array_equal(align(x, -5 * DT, DT)[:5], np.tile(x[0], (5, 1)))
 
 
-def test_nothing_wraps_around_the_ends_of_a_record() -> None:
+def test_nothing_wraps_around_the_ends_of_a_record():
     pulse = np.exp(-(((T - T[-1] + 0.05) / 0.02) ** 2))
     moved = align(pulse, -0.5, DT)  # out over the end
     assert np.abs(moved[: len(T) // 2]).max() < 1e-9
 
 
-def test_a_line_stays_a_line_under_any_shift() -> None:
+def test_a_line_stays_a_line_under_any_shift():
     line = 3.0 - 2.0 * T
     np.testing.assert_allclose(align(line, 0.0123, DT)[:-10], (line - 2.0 * 0.0123)[:-10], atol=1e-10)
 
 
 # ------------------------------------------------------------------------------------------- resampling
-def test_a_band_limited_record_is_interpolated_to_a_millionth() -> None:
+def test_a_band_limited_record_is_interpolated_to_a_millionth():
     waves = Waves(0.8 * RATE / 2)
     fine = np.arange(4 * len(T) - 3) / (4 * RATE)
     inside = slice(4 * 30, -4 * 30)
@@ -145,13 +148,13 @@ def test_a_band_limited_record_is_interpolated_to_a_millionth() -> None:
     assert error.max() < 60 * 1e-7  # the window's stop band, 140 dB, for each of 60 waves
 
 
-def test_interpolation_returns_the_samples_at_their_own_times_and_keeps_constants() -> None:
+def test_interpolation_returns_the_samples_at_their_own_times_and_keeps_constants():
     x = Waves(100)(T)
     np.testing.assert_allclose(resample_band_limited(x, T, T), x, atol=1e-12 * 60)
     np.testing.assert_allclose(resample_band_limited(np.ones(99), T[:99], T[:99] * 0.77), 1.0, atol=1e-12)
 
 
-def test_interpolation_follows_a_record_that_starts_and_ends_at_rest_up_to_its_ends() -> None:
+def test_interpolation_follows_a_record_that_starts_and_ends_at_rest_up_to_its_ends():
     def rest_to_rest(t: np.ndarray) -> np.ndarray:
         return np.sin(np.pi * np.clip(t / T[-1], 0, 1)) ** 4 * np.sin(2 * np.pi * 20 * t)
 
@@ -159,7 +162,7 @@ def test_interpolation_follows_a_record_that_starts_and_ends_at_rest_up_to_its_e
     assert np.abs(resample_band_limited(rest_to_rest(T), T, fine) - rest_to_rest(fine)).max() < 1e-7
 
 
-def test_interpolation_holds_the_ends_outside_the_record_and_refuses_uneven_time() -> None:
+def test_interpolation_holds_the_ends_outside_the_record_and_refuses_uneven_time():
     x = Waves(30)(T)
     np.testing.assert_allclose(resample_band_limited(x, T, [-1.0, 99.0]), x[[0, -1]], atol=1e-9)
     uneven = T.copy()
@@ -168,21 +171,16 @@ def test_interpolation_holds_the_ends_outside_the_record_and_refuses_uneven_time
         resample_band_limited(x, uneven, T)
 
 
-def test_a_hold_repeats_each_sample_until_the_next() -> None:
-    x = np.arange(5.0)
-    np.testing.assert_array_equal(hold(x, 512, 2048), np.repeat(x, 4))
-    np.testing.assert_array_equal(hold(x, 2, 3), [0, 0, 1, 2, 2, 3, 4])
+@given(st.integers(1, 20000), st.integers(1, 64), st.integers(1, 40))
+def test_a_hold_repeats_each_sample_until_the_next_whatever_the_rate(rate: int, times: int, n: int):
+    x = np.arange(float(n))
+    np.testing.assert_array_equal(hold(x, rate, rate * times), np.repeat(x, times))
+    np.testing.assert_array_equal(hold(np.arange(5.0), 2, 3), [0, 0, 1, 2, 2, 3, 4])
     np.testing.assert_array_equal(hold(np.stack([x, -x], axis=1), 1, 2)[:, 1], -np.repeat(x, 2))
 
 
-@given(st.integers(1, 20000), st.integers(1, 64), st.integers(1, 40))
-def test_a_hold_to_a_multiple_of_the_rate_is_exact_whatever_the_rate(rate: int, times: int, n: int) -> None:
-    x = np.arange(float(n))
-    np.testing.assert_array_equal(hold(x, rate, rate * times), np.repeat(x, times))
-
-
 # ---------------------------------------------------------------------------------------------- filters
-def test_the_low_pass_halves_a_wave_at_its_cutoff_and_turns_no_phase() -> None:
+def test_the_low_pass_halves_a_wave_at_its_cutoff_and_turns_no_phase():
     for f, gain in ((20.0, 1 / (1 + 0.5**8)), (40.0, 0.5), (80.0, 1 / (1 + 2.0**8))):
         wave = np.sin(2 * np.pi * f * T)
         # 3 %: the bilinear transform warps 80 of 256 Hz; at the cutoff it is exact
@@ -190,7 +188,8 @@ def test_the_low_pass_halves_a_wave_at_its_cutoff_and_turns_no_phase() -> None:
         assert np.abs(error).max() < (1e-9 if f == 40.0 else 3e-3)
 
 
-def test_differentiation_is_exact_for_band_limited_waves() -> None:
+def test_differentiation_is_exact_for_band_limited_waves():
+    np.testing.assert_allclose(differentiate(3.0 - 2.0 * T, DT), -2.0, atol=1e-9)  # and for a line
     waves = Waves(100)
     peak = np.abs(waves.rate(T)).max()
     error = np.abs(differentiate(waves(T), DT) - waves.rate(T))
@@ -200,11 +199,7 @@ def test_differentiation_is_exact_for_band_limited_waves() -> None:
     assert np.abs(differentiate(tapered, DT)[0]) < 1e-6 * np.abs(rate).max()  # at rest to its very end
 
 
-def test_the_derivative_of_a_line_is_its_slope() -> None:
-    np.testing.assert_allclose(differentiate(3.0 - 2.0 * T, DT), -2.0, atol=1e-9)
-
-
-def test_the_noise_of_a_derivative_is_as_stated() -> None:
+def test_the_noise_of_a_derivative_is_as_stated():
     noise = np.random.default_rng(8).standard_normal(100_000)
     sharp = 2 * np.pi * (RATE / 2) * np.sqrt(2 * (RATE / 2) * DT / 3)
     assert np.std(differentiate(noise, DT)) == pytest.approx(sharp, rel=0.01)  # 100 000 samples: 0.3 %
@@ -215,7 +210,7 @@ def test_the_noise_of_a_derivative_is_as_stated() -> None:
 
 
 # ----------------------------------------------------------------------------------------------- bands
-def test_a_band_passes_what_is_inside_and_stops_what_is_outside_without_phase() -> None:
+def test_a_band_passes_what_is_inside_and_stops_what_is_outside_without_phase():
     band = Band(2.0, 30.0)
     for f, gain in ((0.2, 0.0), (8.0, 1.0), (30.0, 0.5), (200.0, 0.0)):
         x = np.sin(2 * np.pi * f * T)
@@ -224,7 +219,7 @@ def test_a_band_passes_what_is_inside_and_stops_what_is_outside_without_phase() 
         assert band.gain(f) == pytest.approx(gain, abs=1e-4)
 
 
-def test_a_low_pass_band_keeps_a_line_and_is_the_butterworth_low_pass_run_both_ways() -> None:
+def test_a_low_pass_band_keeps_a_line_and_is_the_butterworth_low_pass_run_both_ways():
     np.testing.assert_allclose(Band(high=20.0).apply(3 + 2 * T, DT), 3 + 2 * T, atol=1e-12)
     x = Waves(60)(T)
     both = lowpass_zero_phase(x, DT, 20.0)
@@ -232,24 +227,64 @@ def test_a_low_pass_band_keeps_a_line_and_is_the_butterworth_low_pass_run_both_w
     np.testing.assert_allclose(Band(high=20.0).apply(x, DT)[INSIDE], both[INSIDE], atol=0.05 * x.std())
 
 
-def test_a_band_commutes_with_differentiation() -> None:
+def test_a_band_commutes_with_differentiation():
     x, band = Waves(40)(T) * np.hanning(len(T))[:, None] ** 2, Band(1.0, 25.0)  # at rest at both ends, as a test is
     first = band.apply(differentiate(x, DT), DT)
     second = differentiate(band.apply(x, DT), DT)
-    np.testing.assert_allclose(
-        first, second, atol=1e-4 * second.std()
-    )  # what the taper leaves at the ends, where the low corner rings
+    # what the taper leaves at the ends, where the low corner rings
+    np.testing.assert_allclose(first, second, atol=1e-4 * second.std())
 
 
 @pytest.mark.parametrize(("low", "high"), [(5.0, 5.0), (7.0, 5.0), (-1.0, 5.0), (0.0, float("nan"))])
-def test_a_band_that_passes_nothing_is_refused(low: float, high: float) -> None:
+def test_a_band_that_passes_nothing_is_refused(low: float, high: float):
     with pytest.raises(ValueError, match="no band"):
         Band(low, high)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_delay_of_what_varies_by_rounding_alone_is_no_error(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    held = 0.1 + 1e-17 * rng.integers(-3, 4, (2, 4096))  # a spool that holds: equal to the last bit, or nearly
-    late = delay(held[0], held[1], 1 / 2048)
-    assert np.isnan(late) or abs(late) <= 0.1
+def test_what_is_left_of_a_rest_has_no_mean():
+    x = np.stack([np.full(100, 3.0), np.arange(100.0)], axis=1)
+    left = without_offset(x, slice(0, 11))
+    np.testing.assert_allclose(left[:11].mean(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(left[-1], [0.0, 94.0])
+    with pytest.raises(ValueError, match="no samples"):
+        without_offset(x, slice(0, 0))
+
+
+def test_the_resolution_is_the_smallest_step():
+    assert resolution(0.25 * np.round(np.sin(T) / 0.25)) == pytest.approx(0.25)
+    assert resolution(np.ones(9)) == 0.0
+
+
+def test_short_gaps_are_filled_from_both_sides():
+    x = np.stack([np.sin(2 * np.pi * 3 * T), np.cos(2 * np.pi * 3 * T)], axis=1)
+    holed = x.copy()
+    holed[100:105, 0] = np.nan
+    holed[2000, 1] = np.inf
+    filled = fill_gaps(holed, DT, 0.02)
+    # a cubic over h = 6 samples: curvature change (w h)^3 / 6 of the amplitude, 2 %, at most; Akima's slopes less
+    np.testing.assert_allclose(filled, x, atol=5e-3)
+    np.testing.assert_array_equal(filled[np.isfinite(holed)], x[np.isfinite(holed)])
+    assert np.isnan(holed[100, 0])  # the original stays as it is
+
+
+@given(st.integers(0, 199), st.integers(1, 60))
+def test_a_gap_is_filled_or_named(first: int, length: int):
+    x = np.linspace(0.0, 1.0, 200)[:, None] * np.ones(2)
+    end = min(first + length, 200)
+    x[first:end, 1] = np.nan
+    if first == 0 or end == 200 or (end - first) > 20:
+        with pytest.raises(RecordError, match=rf"force\[1\]: {end - first} samples missing from sample {first}"):
+            fill_gaps(x, 0.001, 0.020, "force")
+    else:
+        np.testing.assert_allclose(fill_gaps(x, 0.001, 0.020)[:, 1], x[:, 0], atol=1e-12)  # a line stays one
+
+
+@pytest.mark.parametrize(("frequency", "accuracy"), [(5.0, 1e-9), (51.2, 1e-5)])
+def test_integrals_are_those_of_a_sine(frequency: float, accuracy: float):
+    w = 2 * np.pi * frequency
+    once, twice = integrate(np.sin(w * T)[:, None], DT)
+    np.testing.assert_allclose(
+        once[:, 0] * w, 1 - np.cos(w * T), atol=100 * accuracy
+    )  # of ends, which a spline guesses
+    np.testing.assert_allclose(np.diff(once[100:-100, 0]) * w, np.diff(-np.cos(w * T))[100:-100], atol=accuracy)
+    assert twice[0, 0] == once[0, 0] == 0.0

@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from run_cases import with_tuning_numbers
 
-from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.machine.parameters import override_parameters
 from lhpost6_pin.tuning import identify as identify_module
 from lhpost6_pin.tuning import sine as module
-from lhpost6_pin.tuning.identify import tuning_numbers
 from lhpost6_pin.tuning.sine import sine_target, sine_test, with_cancellers
 
 pytestmark = pytest.mark.long
@@ -23,28 +22,18 @@ QUICK = {"sine.time_constant": 1.5, "sine.harmonics": 15.0, "sine.settling": 6.0
 @pytest.fixture(scope="module", autouse=True)
 def quick():
     """Faster learning of fewer harmonics than `tuning.toml` has."""
-    numbers = override_parameters(tuning_numbers(), QUICK)
-    with pytest.MonkeyPatch.context() as patch:
-        for changed in (identify_module, module):
-            patch.setattr(changed, "tuning_numbers", lambda: numbers)
-        yield
+    yield from with_tuning_numbers(QUICK, identify_module, module)
 
 
-def test_cancellers_bring_a_sine_to_its_amplitude_and_phase_and_halve_its_distortion():
-    """0.1 m at 1 Hz along X."""
-    test = sine_test(load_machine(), load_controller("lhpost6"), axis="x", amplitude=0.1, frequency=1.0)
+@pytest.mark.parametrize(("axis", "amplitude", "frequency"), [("x", 0.1, 1.0), ("yaw", 0.01, 2.0)])
+def test_cancellers_bring_a_sine_to_its_amplitude_and_phase_and_halve_its_distortion(axis, amplitude, frequency):
+    test = sine_test(load_machine(), load_controller("lhpost6"), axis=axis, amplitude=amplitude, frequency=frequency)
     before, after = test.before, test.after
     assert abs(after.amplitude_error) < 0.01 and abs(np.degrees(after.phase_error)) < 2.0
     assert after.distortion < 0.5 * before.distortion
     assert abs(after.amplitude_error) < abs(before.amplitude_error) or abs(before.amplitude_error) < 0.002
-    assert after.displacement.amplitude[0] == pytest.approx(0.1, rel=0.01)
+    assert after.displacement.amplitude[0] == pytest.approx(amplitude, rel=0.01)
     assert after.peak_spool < 1.0 and after.run.clipped == 0
-
-
-def test_a_turn_is_brought_to_its_amplitude_too():
-    test = sine_test(load_machine(), load_controller("lhpost6"), axis="yaw", amplitude=0.01, frequency=2.0)
-    assert abs(test.after.amplitude_error) < 0.01 and abs(np.degrees(test.after.phase_error)) < 2.0
-    assert test.after.distortion < 0.5 * test.before.distortion
 
 
 @pytest.mark.parametrize("amplitude, frequency", [(0.1, 1.0), (0.75, 0.5), (0.02, 3.3)])
@@ -71,25 +60,32 @@ def test_a_sine_is_judged_over_whole_cycles_at_full_amplitude_after_learning(amp
     )
 
 
-def test_cancellers_sit_on_the_multiples_of_their_axis(plant, rest):
-    alone = make_controller(plant, rest, load_controller("lhpost6"))
-    found = with_cancellers(alone, "z", 2.0, 5, 3.0)
+def test_cancellers_sit_on_the_multiples_of_their_axis(controller):
+    found = with_cancellers(controller, "z", 2.0, 5, 3.0)
     assert np.array_equal(found.canceller["axis"], [2.0] * 5)
     assert np.allclose(found.canceller["turn"] * SAMPLE_RATE / (2 * np.pi), [2.0, 4.0, 6.0, 8.0, 10.0])
     assert np.allclose(found.canceller["cosine"] ** 2 + found.canceller["sine"] ** 2, 1.0)
-    assert len(alone.canceller) == 0  # a changed copy
+    assert len(controller.canceller) == 0  # a changed copy
 
 
-def test_a_sine_that_cannot_be_is_refused():
-    with pytest.raises(SimulationError, match="uniaxial cannot move in y; choose --axis from x"):
-        sine_test(load_machine("uniaxial"), load_controller("uniaxial"), axis="y", amplitude=0.01, frequency=1.0)
-    with pytest.raises(SimulationError, match="a sine of 40 Hz lies outside the table's band"):
-        sine_test(load_machine(), load_controller("lhpost6"), axis="x", amplitude=1e-4, frequency=40.0)
+@pytest.mark.parametrize(
+    ("machine", "axis", "amplitude", "frequency", "message"),
+    [
+        ("uniaxial", "y", 0.01, 1.0, "uniaxial cannot move in y; choose --axis from x"),
+        ("lhpost6", "x", 1e-4, 40.0, "a sine of 40 Hz lies outside the table's band"),
+        ("lhpost6", "z", 0.3, 0.5, r"without cancellers stopped at .* V. left its stroke"),
+    ],
+)
+def test_a_sine_that_cannot_be_is_refused(machine, axis, amplitude, frequency, message):
+    options = {"axis": axis, "amplitude": amplitude, "frequency": frequency}
+    with pytest.raises(SimulationError, match=message):
+        sine_test(load_machine(machine), load_controller(machine), **options)
+
+
+def test_frequencies_without_end_and_other_modes_are_refused():
     for frequency in (0.0, 1e-4, np.nan, np.inf):  # before time and memory are spent on endless periods
         with pytest.raises(SimulationError, match=r"outside the table's band; choose a frequency from 0.07 to 33 Hz"):
             sine_target("x", 0.1, frequency)
     displacement = replace(load_controller("lhpost6"), mode="displacement")
     with pytest.raises(SimulationError, match="cancellers need a reference generator in acceleration mode"):
         sine_test(load_machine(), displacement, axis="x", amplitude=0.1, frequency=1.0)
-    with pytest.raises(SimulationError, match=r"without cancellers stopped at .* V. left its stroke"):
-        sine_test(load_machine(), load_controller("lhpost6"), axis="z", amplitude=0.3, frequency=0.5)

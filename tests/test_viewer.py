@@ -4,6 +4,7 @@ import asyncio
 import gc
 import html
 import logging
+import os
 import re
 import socket
 import struct
@@ -12,6 +13,7 @@ import time
 from dataclasses import replace
 from http.client import HTTPConnection
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -103,12 +105,9 @@ def test_what_cannot_be_drawn_is_refused_in_words(rate, amplify, bad, columns):
         assert columns == 6 and rate > 0 and amplify > 0 and np.isfinite(frames.displacement).all()
 
 
-def test_a_record_of_hours_is_refused_before_it_is_drawn():
+def test_a_record_of_hours_and_a_platen_amplified_until_it_turns_over_are_refused():
     with pytest.raises(ParameterError, match="more than 36000: cut the record"):
         make_frames(np.linspace(0.0, 5000.0, 500), np.zeros((500, 6)))
-
-
-def test_a_platen_amplified_until_it_turns_over_is_refused():
     with pytest.raises(ParameterError, match="amplify less"):
         make_frames(np.array([0.0, 1.0]), np.full((2, 6), 0.02), look=Look(amplify=100.0))
 
@@ -117,9 +116,10 @@ def test_a_motion_drawn_beyond_the_stroke_is_said_to_be(machine, bodies, caplog)
     motion = np.zeros((2, 6))
     motion[1, 2] = 0.1
     with caplog.at_level(logging.WARNING):
-        draw_animation(Recorder(), machine, bodies, make_frames(np.array([0.0, 1.0]), motion))
-        assert not caplog.records
-        draw_animation(Recorder(), machine, bodies, make_frames(np.array([0.0, 1.0]), motion, look=Look(amplify=2.0)))
+        for amplify in (1.0, 2.0):
+            assert not caplog.records
+            frames = make_frames(np.array([0.0, 1.0]), motion, look=Look(amplify=amplify))
+            draw_animation(Recorder(), machine, bodies, frames)
     assert "V1, V2, V3, V4, V5, V6" in caplog.text and "H1" not in caplog.text
 
 
@@ -162,9 +162,8 @@ def test_joints_of_a_record_are_drawn_enlarged_if_they_are_numbers(machine, reco
     moved = record.assign(specimen_joint_position=(("time", "specimen_joint"), angle))
     moved = moved.assign_coords(specimen_joint=["pivot"])
     frames = record_frames(machine, moved, look=Look(amplify=3.0))
-    np.testing.assert_allclose(
-        frames.joints["pivot"][[0, -1]], [0.0, 0.6], atol=2e-3
-    )  # the last frame is before the end
+    # the last frame is before the end
+    np.testing.assert_allclose(frames.joints["pivot"][[0, -1]], [0.0, 0.6], atol=2e-3)
     angle[7] = np.nan
     for broken in (moved, record.assign(specimen_joint_position=("time", np.zeros(len(angle))))):
         with pytest.raises(RecordError, match="specimen_joint_position must be finite"):
@@ -227,17 +226,10 @@ def test_an_arrow_is_as_long_as_its_force_and_turns_round_under_tension(machine,
     down = [clips[f"{s.name}_rod/force"][".scale"][:, 2].max() for s in machine.struts]
     up = [clips[f"{a.name}_rod/force"][".scale"][:, 2].min() for a in machine.actuators if a.mount == "bearing"]
     assert max(down) < 0.0 < min(up)  # struts hold the platen down against what carries it
-
-
-def test_forces_since_the_start_begin_at_nothing(machine, record):
-    part = record.isel(time=slice(0, 2048))
-    frames, whole = record_frames(machine, part, look=Look(change=True)), record_frames(machine, part)
-    assert np.abs(frames.force[0]).max() == 0.0
-    np.testing.assert_allclose(frames.force + whole.force[0], whole.force, rtol=1e-12)
-
-
-def test_an_arrow_without_force_can_still_be_drawn(machine):
-    assert np.abs(arrow_sizes(machine, np.zeros(3), 1.0)).min() > 0.0
+    assert np.abs(arrow_sizes(machine, np.zeros(3), 1.0)).min() > 0.0  # no force can still be drawn
+    since = record_frames(machine, record.isel(time=slice(0, 2048)), look=Look(change=True))
+    assert np.abs(since.force[0]).max() == 0.0
+    np.testing.assert_allclose(since.force + frames.force[0], frames.force, rtol=1e-12)
 
 
 def test_a_colour_says_push_or_pull_and_how_much():
@@ -266,14 +258,11 @@ def test_a_record_without_forces_has_no_arrows(machine, bodies, record):
 
 
 # -------------------------------------------------------------------------------------------------- pages
-def forty_seconds() -> "np.ndarray":
-    t = np.arange(0, 40, 1 / 256)
-    return np.stack([0.1 * np.sin(2 * np.pi * f * t) for f in (0.3, 0.4, 0.5)] + [0.003 * np.sin(3 * t)] * 3, axis=1)
 
 
 def test_forty_seconds_at_30_frames_fit_in_four_megabytes_and_load_nothing(machine, tmp_path):
-    motion = forty_seconds()
-    time = np.arange(len(motion)) / 256
+    time = np.arange(0, 40, 1 / 256)
+    motion = np.sin(np.outer(time, [2.0, 2.5, 3.0, 3.0, 3.0, 3.0])) * [0.1, 0.1, 0.1, 0.003, 0.003, 0.003]
     force = 1e5 * np.sin(np.outer(time, np.arange(1, 11)))
     pressure = 1e7 + 1e5 * np.sin(np.outer(time, np.arange(1, 4)))
     channels = {"platen_displacement": motion, "reference_displacement": 1.01 * motion}
@@ -290,9 +279,7 @@ def test_forty_seconds_at_30_frames_fit_in_four_megabytes_and_load_nothing(machi
 
 
 def test_the_export_starts_no_server_and_no_process(machine, record, tmp_path, monkeypatch):
-    def refuse(*_args: object, **_keywords: object) -> None:
-        raise AssertionError("the export must not do this")
-
+    refuse = mock.Mock(side_effect=AssertionError("the export must not do this"))
     monkeypatch.setattr(subprocess, "Popen", refuse)
     monkeypatch.setattr(socket.socket, "bind", refuse)
     monkeypatch.setattr(socket.socket, "connect", refuse)
@@ -302,15 +289,9 @@ def test_the_export_starts_no_server_and_no_process(machine, record, tmp_path, m
 
 def listening() -> dict[str, str]:
     """Local address by inode of this process's listening TCP sockets, as in /proc/net/tcp and tcp6."""
-    own = set()
-    for fd in Path("/proc/self/fd").iterdir():
-        try:
-            own.add(fd.readlink().name)
-        except FileNotFoundError:  # the folder's own handle
-            continue
-    rows = [
-        line.split() for name in ("tcp", "tcp6") for line in Path(f"/proc/self/net/{name}").read_text().splitlines()[1:]
-    ]
+    own = {os.readlink(fd) for fd in Path("/proc/self/fd").iterdir() if os.path.lexists(fd)}
+    files = [Path(f"/proc/self/net/{name}").read_text() for name in ("tcp", "tcp6")]
+    rows = [line.split() for text in files for line in text.splitlines()[1:]]
     return {row[9]: row[1] for row in rows if row[3] == "0A" and f"socket:[{row[9]}]" in own}
 
 
@@ -336,6 +317,16 @@ def ask(window: LoopbackWindow, path: str = "/", **headers: str) -> tuple[int, b
         talk.close()
 
 
+class Command:
+    """A property set on an object of the scene."""
+
+    def __init__(self, path: str, value: object) -> None:
+        self.fields = {"type": "set_property", "path": path, "property": "visible", "value": value}
+
+    def lower(self) -> dict[str, object]:
+        return self.fields
+
+
 def test_the_live_page_answers_this_computer_only():
     with LoopbackWindow("the page") as window:
         assert ask(window, Host="127.0.0.1") == (200, b"the page")
@@ -348,13 +339,6 @@ def test_the_live_page_answers_this_computer_only():
 
 
 def test_a_browser_that_comes_late_gets_what_was_drawn_and_what_is_drawn_later():
-    class Command:
-        def __init__(self, path: str, value: int) -> None:
-            self.fields = {"type": "set_property", "path": path, "property": "visible", "value": value}
-
-        def lower(self) -> dict[str, object]:
-            return self.fields
-
     async def listen(window: LoopbackWindow) -> list[object]:
         browser = await websocket_connect(window.url.replace("http", "ws") + "commands")
         early = [await browser.read_message() for _ in range(2)]
@@ -371,10 +355,6 @@ def test_a_browser_that_comes_late_gets_what_was_drawn_and_what_is_drawn_later()
 
 
 def test_a_browser_that_leaves_in_the_middle_of_a_message_leaves_no_complaint(caplog):
-    class Command:
-        def lower(self) -> dict[str, object]:
-            return {"type": "set_property", "path": "/a", "property": "visible", "value": "x" * 20_000}
-
     ask = (
         "GET /commands HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
@@ -388,7 +368,7 @@ def test_a_browser_that_leaves_in_the_middle_of_a_message_leaves_no_complaint(ca
                 assert window.wait(60.0)
                 browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # as a killed tab
             for _ in range(200):
-                window.send(Command())
+                window.send(Command("/a", "x" * 20_000))
             time.sleep(0.05)
     gc.collect()  # what nobody has asked after is complained of when it goes
     assert caplog.text == ""

@@ -15,10 +15,7 @@ from lhpost6_pin.show.viewer import LiveView, Look, live_animation, record_frame
 from lhpost6_pin.simulation.running import RunningPlant
 from lhpost6_pin.simulation.snapshot import EVERY
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer"),
-]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")]
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
 

@@ -22,8 +22,8 @@ from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.core.files import refuse_folder, write_whole
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.interfaces.link import LinkClient, LinkMode, ServedPlant, find_mode, open_socket, run_over_link, serve
+from lhpost6_pin.interfaces.link.clock import Histogram
 from lhpost6_pin.interfaces.link.link_summary import print_link
-from lhpost6_pin.interfaces.link.statistics import Histogram
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant

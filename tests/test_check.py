@@ -9,12 +9,13 @@ import xarray as xr
 from lhpost6_pin.data.check import check_dataset, check_record
 from lhpost6_pin.data.layout_faults import RecordFinding
 from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.machine.machine import load_machine
 
 pytestmark = pytest.mark.long
 
 RECORDS = Path(__file__).parent / "data" / "records"
 PRACTICE = sorted(RECORDS.glob("practice_*.nc"))
-AREAS = {f"H{k}": (0.2027, 0.1297) for k in range(1, 5)} | {f"V{k}": (0.515, 0.0) for k in range(1, 7)}
+MACHINE = load_machine()
 
 
 @pytest.fixture(scope="module")
@@ -201,9 +202,9 @@ def test_swapped_accelerometers_are_found(tests):
 
 def test_forces_agree_with_pressures_times_areas(tests):
     record = tests["EQ"]
-    assert faults(check_dataset(record, AREAS)) == []
+    assert faults(check_dataset(record, MACHINE)) == []
     flipped = change(record, "actuator_force[H2]", values=-series(record, "actuator_force[H2]"))
-    assert faults(check_dataset(flipped, AREAS)) == [("warning", "actuator_force[H2]", None)]
+    assert faults(check_dataset(flipped, MACHINE)) == [("warning", "actuator_force[H2]", None)]
     assert faults(check_dataset(flipped)) == []  # without areas nothing can be said
 
 
@@ -212,12 +213,12 @@ def test_noise_is_not_taken_for_a_wrong_gain_of_forces(tests):
     force, pressure = series(record, "actuator_force[V3]"), series(record, "chamber_pressure_a[V3]")
     size = len(force)
     noisy = change(record, "actuator_force[V3]", values=force + 0.2 * force.std() * rng.standard_normal(size))
-    assert faults(check_dataset(noisy, AREAS)) == []
+    assert faults(check_dataset(noisy, MACHINE)) == []
     still = change(record, "actuator_force[V3]", values=force.mean() + 500.0 * rng.standard_normal(size))
     still = change(still, "chamber_pressure_a[V3]", values=pressure.mean() + 3000.0 * rng.standard_normal(size))
-    assert faults(check_dataset(still, AREAS)) == []  # 1.5 kN beside the others' tens
+    assert faults(check_dataset(still, MACHINE)) == []  # 1.5 kN beside the others' tens
     halved = change(record, "actuator_force[V3]", values=0.5 * force)
-    assert faults(check_dataset(halved, AREAS)) == [("warning", "actuator_force[V3]", None)]
+    assert faults(check_dataset(halved, MACHINE)) == [("warning", "actuator_force[V3]", None)]
 
 
 # -------------------------------------------------------------------------------------------------- errors
@@ -237,7 +238,7 @@ def test_a_gap_in_time_is_found_with_its_length(tests):
 
 @pytest.mark.parametrize("count", [1, 2, 3, 9, 70, 300])
 def test_a_record_of_any_length_can_be_checked(tests, count: int):
-    found = faults(check_dataset(tests["TX"].isel(time=slice(0, count)), AREAS))
+    found = faults(check_dataset(tests["TX"].isel(time=slice(0, count)), MACHINE))
     assert [severity for severity, channel, _ in found if channel == "time"] == ["error"] * (count == 1)
 
 

@@ -228,7 +228,7 @@ def test_a_step_that_is_no_multiple_of_a_sample_fails_and_says_which_to_use(inst
 def test_a_step_from_another_time_than_the_plants_fails(instance, caplog):
     instance.step(0.0)
     refused(instance, 0.0)
-    assert "the plant is at 0.000488 s; it can neither go back nor leave out time" in caplog.text
+    assert "the plant is at 0.000488 s; it can neither go back nor skip time" in caplog.text
 
 
 def test_the_clock_may_start_at_any_time_and_its_rounding_is_forgiven(folder):

@@ -133,7 +133,7 @@ KNOWN = {
     "test without kind": ("tests", lambda: seed("tests", b"\nkind = ", b"\nkid = "), "tests.toml: is dam"),
     "unknown type in MATLAB v5": ("mat5", lambda: seed("mat5", b"\x09\0\0\0\x60", b"\x08\0\0\0\x60"), "no"),
     "no numbers in MATLAB v5": ("mat5", lambda: seed("mat5", b"\x09\0\0\0\x60", b"\x0e\0\0\0\x60"), "no"),
-    "two billion cells": ("mat5", lambda: cells(2**31 - 1), "fewer cells than it says"),
+    "two billion cells": ("mat5", lambda: cells(2**31 - 1), "fewer cells than its dimensions"),
     "a rate without end": ("map", lambda: seed("map", b"128.0", b"1e300"), "rate = 1e[+]300 must be"),
     "8 TB in HDF5": ("hdf5", lambda: claiming(False), "claims 8e[+]03 GB"),
     "8 TB in MATLAB v7.3": ("mat73", lambda: claiming(True), "claims 8e[+]03 GB"),

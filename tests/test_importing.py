@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.core.units import quantity_unit
 from lhpost6_pin.data.importing import (
     ChannelMap,
     Source,
@@ -323,7 +324,7 @@ def test_tdms_channels_bring_unit_and_interval(tmp_path):
     ("content", "phrase"),
     [
         (b"", "is empty"),
-        (b"\x00\x01\x02" * 99, "no format known here; readable are MTS 469D"),
+        (b"\x00\x01\x02" * 99, "unknown format; readable are MTS 469D"),
         (b"MATLAB 5.0 MAT-file" + b"\x07" * 200, "not a MATLAB file, or damaged"),
         (b"MATLAB 7.3 MAT-file" + b"\x07" * 600, "not a MATLAB v7.3 file"),
         (b"\x89HDF\r\n\x1a\n" + b"\x07" * 200, "not an HDF5 file"),
@@ -489,7 +490,7 @@ def test_a_bad_map_is_refused_with_file_and_key(tmp_path, old, new, phrase):
         ({"supply_pressure": Source("c*")}, "'c\\*' could be any of run.csv column 1 'c1', run.csv column 2"),
         ({"supply_pressure": Source(4)}, "no column 4; run.csv has 1 to 3"),
         ({"supply_pressure": Source("c1", file="other*")}, "no file is called 'other\\*'; files are 'run.csv'"),
-        ({"supply_pressure": Source("c2")}, "'c2' of run.csv: unit 'g' cannot be turned into Pa"),
+        ({"supply_pressure": Source("c2")}, "'c2' of run.csv: unit 'g' cannot be converted to Pa"),
         ({"supply_pressure": Source("c1", "flob")}, "unknown unit 'flob'"),
         ({"supply_pressure": Source("c3")}, "'c3' of run.csv has no unit in the file; add unit"),
         ({"supply_pressure": Source(constant=1.0, unit="g")}, "every channel is constant"),
@@ -524,10 +525,11 @@ def test_forces_follow_from_pressures_where_only_these_were_measured(tmp_path):
     names += [f"chamber_pressure_b[{a}]" for a in LABELS["horizontal"]]
     channels = mapped({name: Source(k + 1, "MPa") for k, name in enumerate(names)})
     columns = [raw(sines(400, 14), [None] * 14, TIME)]
-    areas = {name: (0.2, 0.1) if name[0] == "H" else (0.5, 0.0) for name in LABELS["actuator"]}
-    record = make_imported_record(columns, channels, LABELS, areas)
+    machine = load_machine()
+    area_a, area_b = machine.actuators[1].area_a, machine.actuators[1].area_b
+    record = make_imported_record(columns, channels, LABELS, machine)
     p_a, p_b = record["chamber_pressure_a"].sel(actuator="H2"), record["chamber_pressure_b"].sel(horizontal="H2")
-    np.testing.assert_allclose(record["actuator_force"].sel(actuator="H2"), 0.2 * p_a - 0.1 * p_b, rtol=1e-12)
+    np.testing.assert_allclose(record["actuator_force"].sel(actuator="H2"), area_a * p_a - area_b * p_b, rtol=1e-12)
     assert "chamber pressures" in record.attrs["derived"]
     assert "actuator_force" not in make_imported_record(columns, channels, LABELS)
 
@@ -535,7 +537,7 @@ def test_forces_follow_from_pressures_where_only_these_were_measured(tmp_path):
 # --------------------------------------------------------------------------------------------- time, gaps, rates
 def test_a_file_that_says_nothing_of_time_needs_its_rate():
     columns = [raw(VALUES[:, :1], ["Pa"], None)]
-    with pytest.raises(RecordError, match=r"says nothing about time; .* file_rate"):
+    with pytest.raises(RecordError, match=r"has no time; .* file_rate"):
         make_imported_record(columns, supply(), LABELS)
     assert make_imported_record(columns, supply(file_rate=RATE), LABELS).attrs["sample_rate_hz"] == RATE
 

@@ -288,7 +288,7 @@ def test_a_controller_for_another_machine_and_a_plant_not_at_rest_are_refused(pl
             run_over_link(client, plant, loop)
         client.machine = plant.machine.name
         client.exchange(rest.spool)
-        with pytest.raises(LinkError, match="connect once more"):
+        with pytest.raises(LinkError, match="connect again"):
             run_over_link(client, plant, loop)
 
 

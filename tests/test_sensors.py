@@ -16,7 +16,7 @@ from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.consistency import check_sensors
 from lhpost6_pin.data.importing.channel_map import channels_of
 from lhpost6_pin.data.records import load_record, make_record, save_record
-from lhpost6_pin.data.sensors import SensorSet, add_noise, estimate_noise, find_rest, load_sensors, spectrum
+from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors, spectrum
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, sensor_unknowns
 from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.machine.machine import load_machine
@@ -85,29 +85,6 @@ def test_the_resolution_adds_to_the_spectrum_of_a_coarse_channel():
     step = np.ptp(record["platen_displacement"].values) / (2**16 - 1)
     density = spectrum(SENSORS, record, "platen_displacement", np.array([1.0]))
     assert density[0, 0] == pytest.approx(step**2 / 6 / 512, rel=1e-3)  # the sensor's own is far smaller
-
-
-def test_rest_ends_where_the_table_begins_to_move():
-    record = add_noise(still(512.0, 4.0, moves=2.0), SENSORS, np.random.default_rng(0))
-    rest = find_rest(record, SENSORS)
-    # 0.1 t^2 passes six standard deviations of 6 um + resolution after 30 ms
-    assert rest.start / 512 < 0.05
-    assert 2.0 < rest.stop / 512 < 2.05
-
-
-def test_a_record_that_begins_in_motion_has_no_rest_and_no_estimate():
-    record = add_noise(still(512.0, 4.0, moves=-1.0), SENSORS, np.random.default_rng(0))
-    assert find_rest(record, SENSORS) == slice(0, 0)
-    assert estimate_noise(record, SENSORS) == ()
-
-
-def test_noise_is_found_again_within_its_standard_error():
-    estimates = estimate_noise(add_noise(still(512.0), SENSORS, np.random.default_rng(3)), SENSORS)
-    assert len(estimates) == 9
-    for estimate in estimates:
-        # five standard errors over nine columns: once in 10^5
-        assert estimate.sd == pytest.approx(estimate.stated, abs=5 * estimate.standard_error), estimate.channel
-        assert estimate.standard_error < 0.01 * estimate.stated
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from lhpost6_pin.data.signals import (
     delay,
     differentiate,
     drift_rate,
-    hold,
     lowpass_zero_phase,
     peak_ratio,
     resample_band_limited,

@@ -67,8 +67,6 @@ def serve(
     json: Json = False,
 ) -> None:
     """Serve the virtual table over UDP, to be driven by a controller in another process or on another computer."""
-    from dataclasses import asdict
-
     from ..interfaces.link import ServedPlant, find_mode, open_socket
     from ..interfaces.link import serve as serve_link
     from ..interfaces.link.link_summary import link_entries, print_link
@@ -89,8 +87,8 @@ def serve(
             timing = serve_link(sock, served, seconds=seconds)
     times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
     times |= {"answer of the client": served.answer_time}
-    counts = asdict(served.counts)
-    tell(json, lambda: link_entries(counts, times), lambda: print_link(f"{table.name}, {mode}", counts, times))
+    title, counts = f"{table.name}, {mode}", served.counts
+    tell(json, lambda: link_entries(counts, times), lambda: print_link(title, counts, times))
 
 
 @app.command()

@@ -65,13 +65,12 @@ def import_(
     if map_ is None and not is_export(raws):
         raise RecordError(f"{files[0]}: which column is which channel? --guess writes a first map, --map uses one")
     channels = load_map(map_) if map_ else guess_map(raws, table.labels).channels
-    areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
-    record = make_imported_record(raws, channels, table.labels, areas)
+    record = make_imported_record(raws, channels, table.labels, table)
     path = out or Path("out") / f"{record.attrs['test'].replace('/', '_')}.nc"
     if any(path.exists() and path.samefile(file) for file in files):
         raise RecordError(f"{path}: is one of the files to import; name another with --out")
     save_record(record, path)
-    sources, findings = described_sources(raws, channels), check_dataset(record, areas)
+    sources, findings = described_sources(raws, channels), check_dataset(record, table)
 
     def show() -> None:
         _print_channels(record, sources)

@@ -80,9 +80,8 @@ def check(
     from ..show.tables import print_findings, print_sensor_findings
 
     table = find_machine(machine, override)
-    areas = {a.name: (a.area_a, a.area_b or 0.0) for a in table.actuators}
     files = sorted(file.glob("*.nc")) or [file]
-    found = {str(path): check_record(path, areas) for path in files}
+    found = {str(path): check_record(path, table) for path in files}
     wrong = any(f.severity == "error" for findings in found.values() for f in findings)
     compared = None if wrong else _check_sensors(table, files, sensors)
 

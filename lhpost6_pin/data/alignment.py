@@ -1,4 +1,4 @@
-"""Skews between groups of channels, from pairs that are one quantity measured twice; and taking them out.
+"""Delays between groups of channels, from redundant channels, and their removal.
 
 Only identities and kinematics are used, nothing that has dynamics of its own between the two:
 
@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arrays import Array
 from ..machine.machine import Machine
 from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
@@ -31,12 +32,12 @@ __all__ = [
     "combine_delays",
     "due_spools",
     "group_delays",
+    "hydraulic_force",
     "oil_force",
     "phase_delay",
     "slow_delay",
 ]
 
-Array = NDArray[np.float64]
 
 SEGMENT = 2.0  # s: of Welch's average, Hann windows
 LEAKAGE = 1e-6  # of the largest power: below it a spectrum may show the window's side lobes
@@ -74,7 +75,7 @@ def phase_delay(reference: ArrayLike, signal: ArrayLike, dt: float, band: Band =
     m = len(ref) / length
     coherence = np.divide(np.abs(cross) ** 2, power, out=np.zeros_like(power), where=power > 0)
     if m > 1:
-        coherence = np.clip((m * coherence - 1) / (m - 1), 0.0, 1.0)  # the estimate's bias, off
+        coherence = np.clip((m * coherence - 1) / (m - 1), 0.0, 1.0)  # without the estimate's bias
     coherence = np.minimum(coherence, MOST)
     weight = 2 * m * coherence / (1 - coherence)
     delay = _coarse(cross, weight, omega)
@@ -121,7 +122,7 @@ def combine_delays(delay: ArrayLike, error: ArrayLike) -> tuple[float, float]:
     """Mean of delays weighted by their inverse variances, and its standard error.
 
     Those ten times as uncertain as the best are left out: they could add a hundredth to what is known, and their
-    phases may have wrapped. Where the rest scatter by more than their errors say, the error is widened by that ratio.
+    phases may have wrapped. Where the rest scatter by more than their errors, the error is widened by that ratio.
     """
     tau, sigma = np.ravel(np.asarray(delay, float)), np.ravel(np.asarray(error, float))
     good = np.isfinite(sigma) & (sigma <= 10 * sigma.min(initial=np.inf))
@@ -135,10 +136,10 @@ def combine_delays(delay: ArrayLike, error: ArrayLike) -> tuple[float, float]:
 
 
 def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay]:
-    """Delay of every group of `channels.sensor_groups` that can be had from its channels' twins, over all records.
+    """Delay of every group of `channels.sensor_groups` that has redundant channels, over all records.
 
     Motion and struts are counted from `platen_displacement`, chamber pressures from `actuator_force`. A group that is
-    missing here has no twin in these records.
+    missing here has no redundant channel in these records.
     """
     found: dict[str, tuple[str, list[Array], list[Array]]] = {}
     for record in records:
@@ -156,7 +157,7 @@ def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay
 
 
 def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.Dataset:
-    """Record whose groups are advanced by their delays [s]; what was done is written in its attribute `aligned`."""
+    """Record whose groups are advanced by their delays [s]; its attribute `aligned` lists them."""
     if not delays:
         return record
     channels, done = {}, []
@@ -172,33 +173,33 @@ def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.
     return record.assign(channels).assign_attrs(aligned="; ".join(before + done))
 
 
-# ------------------------------------------------------------------------------------------------ twins
+# ------------------------------------------------------------------------------------------------ redundant channels
 def due_spools(plant: Plant, command: Array, dt: float) -> Array:
     """Spool positions (n, n_actuators) [1] that commands give: late by each valve's delay, and by its lag if any."""
     late = align(command, -plant.delays, dt)
     return lag(late, plant.lags, dt) if plant.lags.any() else late
 
 
-def _hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
+def hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
     """P_A A_1 - P_B A_2 (n, actuators) of the measured chamber pressures [N]; NaN where one is missing."""
-    a = record["chamber_pressure_a"].sel(actuator=list(machine.actuator_names)).values
+    a = record["chamber_pressure_a"].reindex(actuator=list(machine.actuator_names)).values
+    b = np.full((len(a), len(machine.double_acting)), np.nan)
     if "chamber_pressure_b" in record:
-        b = record["chamber_pressure_b"].sel(horizontal=list(machine.double_acting)).values
-    else:
-        b = np.full((len(a), len(machine.double_acting)), np.nan)
+        b = record["chamber_pressure_b"].reindex(horizontal=list(machine.double_acting)).values
     return oil_force(machine, a, b)
 
 
-def oil_force(machine: Machine, pressure_a: Array, pressure_b: Array) -> Array:
-    """P_A A_1 - P_B A_2 (n, actuators) [N] of pressures in all chambers A and those B there are [Pa] (Eq. 4-6)."""
+def oil_force(machine: Machine, pressure_a: Array, pressure_b: Array | None = None) -> Array:
+    """P_A A_1 - P_B A_2 (n, actuators) [N] of the pressures [Pa] in all chambers A, and in B if any (Eq. 4-6)."""
     force = pressure_a * np.array([a.area_a for a in machine.actuators])
-    double = [a.area_b is not None for a in machine.actuators]
-    force[:, double] -= pressure_b * np.array([a.area_b for a in machine.actuators if a.area_b is not None])
+    if pressure_b is not None:
+        double = [a.area_b is not None for a in machine.actuators]
+        force[:, double] -= pressure_b * np.array([a.area_b for a in machine.actuators if a.area_b is not None])
     return np.asarray(force, np.float64)
 
 
 def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, str, Array, Array]]:
-    """Group, its reference, measured (n, k) and what it is to follow (n, k)."""
+    """Group, its reference, measured signals (n, k) and the signals they follow (n, k)."""
     count = plant.spools
     for name, channel in LAYOUT.items():
         if {name, channel.same_as} <= set(record.data_vars):
@@ -219,6 +220,6 @@ def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, s
             gas = strut_pressures(plant.machine, legs[:, count:])
             yield "strut_pressure", base, record["strut_pressure"].values, gas
     if {"actuator_force", "chamber_pressure_a"} <= set(record.data_vars):
-        force = _hydraulic_force(plant.machine, record)
+        force = hydraulic_force(plant.machine, record)
         whole = np.isfinite(force).all(axis=0)
         yield "chamber_pressure", "actuator_force", force[:, whole], record["actuator_force"].values[:, whole]

@@ -37,16 +37,16 @@ def load_campaign(folder: Path | str, machine: Machine) -> Campaign:
         record.attrs.setdefault("test", path.stem)
         records.append(record)
     for fact in ("valves_per_horizontal_actuator", "specimen"):
-        found = {str(r.attrs.get(fact, "not said")): p.name for r, p in zip(records, files, strict=True)}
+        found = {str(r.attrs.get(fact, "not stated")): p.name for r, p in zip(records, files, strict=True)}
         if len(found) > 1:
-            said = "; ".join(f"{name}: {value}" for value, name in found.items())
-            why = "a campaign is of one machine in one state: give each state a folder, or mend the attribute"
-            raise RecordError(f"{folder}: tests differ in {fact} ({said}); {why}")
+            stated = "; ".join(f"{name}: {value}" for value, name in found.items())
+            why = "a campaign is of one machine in one state: give each state a folder, or correct the attribute"
+            raise RecordError(f"{folder}: tests differ in {fact} ({stated}); {why}")
     return Campaign(folder.resolve().name, tuple(records))
 
 
 def save_campaign(campaign: Campaign, folder: Path) -> list[Path]:
-    """Write each record as TEST.nc, and say where; raises RecordError for one that breaks the layout."""
+    """Write each record as TEST.nc; returns the paths. Raises RecordError for one that breaks the layout."""
     paths = [folder / f"{record.attrs['test']}.nc" for record in campaign.records]
     for record, path in zip(campaign.records, paths, strict=True):
         save_record(record, path)

@@ -5,15 +5,15 @@ import, checks, simulated campaigns, alignment, cross-checks and the sensor erro
 """
 
 import math
-import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Literal
 
 import xarray as xr
 
+from ..core.arrays import Array
 from ..core.names import AXES
+from ..core.units import parse_unit
 
 __all__ = [
     "LAYOUT",
@@ -23,6 +23,7 @@ __all__ = [
     "calibrated_channels",
     "channel_name",
     "channel_unit",
+    "columns_of",
     "residuals_of",
     "same_unit",
     "sensor_groups",
@@ -157,6 +158,11 @@ def residuals_of(name: str, present: Collection[str]) -> tuple[str, ...]:
     return ("wrench", *channel.residuals) if stands_in else channel.residuals
 
 
+def columns_of(variable: xr.DataArray) -> Array:
+    """Values (n, columns) of a variable along time."""
+    return variable.values.astype(float).reshape(len(variable), -1)
+
+
 def channel_name(variable: xr.DataArray, column: int) -> str:
     """Name of one column of a variable, as in `platen_displacement[yaw]`."""
     if variable.ndim < 2:
@@ -181,26 +187,8 @@ def same_unit(units: object, wanted: str) -> bool:
         return False
     if units == wanted:
         return True
-    ours, theirs = ([_spelled(part) for part in text.split(",")] for text in (units, wanted))
-    if len(ours) != len(theirs) or not all(ours):
-        return False
-    ureg = _unit_registry()
-    try:
-        pairs = zip(ours, theirs, strict=True)
-        return all(math.isclose(ureg.Quantity(1.0, a).to(b).magnitude, 1.0, rel_tol=1e-9) for a, b in pairs)
-    except Exception:  # pint raises its own, token and type errors for what is not a unit
-        return False
-
-
-def _spelled(units: str) -> str:
-    """Return units with exponents in Python's manner; empty if not simply a product of named units."""
-    units = re.sub(r"(?<=[^\W\d_])\s?(\^|\*\*)?(?=-?\d)", "**", units.strip()).replace("·", "*")
-    units = {"": "1", "-": "1"}.get(units, units)
-    return units if re.fullmatch(r"(1|[^\W\d_]+(\*\*-?\d)?)(\s?[ */]\s?[^\W\d_]+(\*\*-?\d)?)*", units) else ""
-
-
-@cache
-def _unit_registry() -> Any:
-    import pint  # takes 0.2 s: only where a unit is not spelled as in the layout
-
-    return pint.UnitRegistry()
+    ours, theirs = ([parse_unit(part.strip() or "1") for part in text.split(",")] for text in (units, wanted))
+    return len(ours) == len(theirs) and all(
+        a is not None and b is not None and a.dimension == b.dimension and math.isclose(a.factor, b.factor)
+        for a, b in zip(ours, theirs, strict=True)
+    )

@@ -1,35 +1,38 @@
-"""What is in a record and what is wrong with it, as a list of findings.
+"""Contents and faults of a record, as a list of findings.
 
-What breaks the layout (`layout_faults`) is an error; values that a valid record may hold but a sound test
-does not are warnings. Limits are relative to the record's own motion and resolution (its smallest step), not
-to a machine; the few absolute ones only tell a forgotten unit from a real value.
+Violations of the layout (`layout_faults`) are errors; values that a valid record may hold but a sound test does not
+are warnings. Limits are relative to the record's own motion and resolution (its smallest step), not to a machine; the
+few absolute ones only distinguish a forgotten unit from a real value.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.errors import RecordError
-from .channels import LAYOUT, MOTION, channel_name, channel_unit
+from ..machine.machine import Machine
+from .alignment import hydraulic_force
+from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
+from .conditioning import resolution
 from .layout_faults import RecordFinding, layout_faults
 from .records import open_record, sample_interval
 from .signals import differentiate, lowpass_zero_phase
 
 __all__ = ["check_dataset", "check_record"]
 
-Array = NDArray[np.float64]
 _Warning = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
 START = 2e-3  # of the largest span in the same unit: how far the first sample may be from rest
 START_NOISE = 8.0  # and how many standard deviations of the noise
-STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop dead by itself
-SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike cannot be told from a kink
+STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop at once by itself
+SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike and a kink look alike
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
-NEARLY_STILL = 0.1  # share of the variation of others of its kind below which a channel says nothing of its gain
+NEARLY_STILL = 0.1  # share of the variation of others of its kind below which the gain of a channel is unknown
 GAIN_TOLERANCE = 0.1  # between a channel and the derivative of another; calibration errors are far smaller
 LIKE_AXES = tuple((j, k) for k in range(6) for j in range(6) if j // 3 == k // 3)  # of one unit
 USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
@@ -42,7 +45,7 @@ USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
     0.0254: "the other in inches",
     np.pi / 180: "the other in degrees",
 }
-LIKELY_UNITS = {  # unit: least and greatest believable peak, and what lies outside
+LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mistake outside
     "m": (0.0, 3.0, "mm or in for m"),
     "rad": (0.0, 1.0, "deg for rad"),
     "Pa": (1e5, 2e8, "MPa, bar or psi for Pa"),
@@ -50,37 +53,35 @@ LIKELY_UNITS = {  # unit: least and greatest believable peak, and what lies outs
 }
 
 
-def check_record(path: Path | str, areas: Mapping[str, tuple[float, float]] | None = None) -> list[RecordFinding]:
-    """List what is in the record at `path` and what is wrong with it; an unreadable file is one error.
+def check_record(path: Path | str, machine: Machine | None = None) -> list[RecordFinding]:
+    """Contents and faults of the record at `path`; an unreadable file is one error.
 
-    `areas` are the piston areas (A_1, A_2) [m²] by actuator; with them forces are compared with pressures.
+    With a `machine` forces are compared with its piston areas times the chamber pressures.
     """
     try:
-        return check_dataset(open_record(path), areas)
+        return check_dataset(open_record(path), machine)
     except RecordError as error:
         return [RecordFinding("error", "", None, str(error))]
 
 
-def check_dataset(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]] | None = None) -> list[RecordFinding]:
+def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[RecordFinding]:
     """List errors, then warnings, then the contents of a record in memory; see `check_record`."""
     errors = layout_faults(dataset)
     broken = {finding.channel.split("[")[0] for finding in errors}
     contents = [RecordFinding("info", *fact) for fact in _contents(dataset)]
     known = [name for name in LAYOUT if name in dataset and not {name, *LAYOUT[name].dims} & broken]
     if "time" in broken or not known:
-        return errors + contents  # nothing can be said about signals on a broken time axis
+        return errors + contents  # signals cannot be judged on a broken time axis
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
-    faults = chain(
-        _unlikely_units(sound),
-        _unquiet_start(sound),
-        _saturated_spools(sound),
-        _frozen(sound),
-        _spikes(sound),
+    columns = tuple(_columns(sound, known))
+    by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
+    warnings = chain(
+        (warning for judge in by_column for c in columns if (warning := judge(c))),
         _odd_rates(sound),
         _inconsistent_motion(sound),
-        _inconsistent_forces(sound, areas or {}),
+        _inconsistent_forces(sound, machine),
     )
-    return errors + [RecordFinding("warning", *fault) for fault in faults] + contents
+    return errors + [RecordFinding("warning", *warning) for warning in warnings] + contents
 
 
 # -------------------------------------------------------------------------------------------- contents
@@ -105,108 +106,93 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
 
 
 # -------------------------------------------------------------------------------------------- values
-def _columns(dataset: xr.Dataset, *names: str) -> Iterator[tuple[str, Array, float]]:
-    """Yield every column of the named variables with its name and the largest span in the same unit."""
-    for name in names or tuple(map(str, dataset.data_vars)):
-        if name in dataset:
-            values = dataset[name].values.reshape(dataset.sizes["time"], -1)
-            spans = np.ptp(values, axis=0)
-            for k, x in enumerate(values.T):
-                first = 3 * (k // 3) if "axis" in dataset[name].dims else 0
-                alike = spans[first : first + 3] if "axis" in dataset[name].dims else spans
-                yield channel_name(dataset[name], k), x, float(max(alike.max(), 1e-6 * spans.max()))
+class _Column(NamedTuple):
+    """One column of a channel, with the largest span of the columns in the same unit."""
+
+    channel: str
+    x: Array  # (n,)
+    span: float
+    measured: bool
+
+    @property
+    def is_command(self) -> bool:
+        """Whether it is no sensor's: it may hold still or jump."""
+        return LAYOUT[self.channel.split("[")[0]].role == "command"
 
 
-def _is_command(channel: str) -> bool:
-    """Whether a column is no sensor's: it may hold still or jump."""
-    return LAYOUT[channel.split("[")[0]].role == "command"
+def _columns(dataset: xr.Dataset, names: Iterable[str]) -> Iterator[_Column]:
+    measured = dataset.attrs.get("kind") == "measured"
+    for variable in (dataset[name] for name in names if name in dataset):
+        values = columns_of(variable)
+        spans = np.ptp(values, axis=0)
+        for k, x in enumerate(values.T):
+            alike = spans[3 * (k // 3) :][:3] if "axis" in variable.dims else spans
+            yield _Column(channel_name(variable, k), x, float(max(alike.max(), 1e-6 * spans.max())), measured)
 
 
-def _resolution(x: Array) -> float:
-    """Smallest step of a channel: its digital resolution, or nearly nothing for a computed one."""
-    steps = np.abs(np.diff(x))
-    return float(steps[steps > 0].min(initial=np.inf))
+def _implausible_unit(c: _Column) -> _Warning | None:
+    least, most, guess = LIKELY_UNITS.get(channel_unit(c.channel), (0.0, np.inf, ""))
+    size = np.abs(c.x)
+    if least <= size.max() <= most:
+        return None
+    return c.channel, int(size.argmax()), f"reaches {size.max():.4g}: {guess}?", "convert to SI"
 
 
-def _unlikely_units(dataset: xr.Dataset) -> Iterator[_Warning]:
-    for channel, x, _ in _columns(dataset):
-        least, most, guess = LIKELY_UNITS.get(channel_unit(channel), (0.0, np.inf, ""))
-        peak = float(np.abs(x).max())
-        if not least <= peak <= most:
-            yield channel, int(np.abs(x).argmax()), f"reaches {peak:.4g}: {guess}?", "convert to SI"
+def _starts_in_motion(c: _Column) -> _Warning | None:
+    noise = 1.4826 * float(np.median(np.abs(np.diff(c.x, n=3)))) if len(c.x) > 3 else 0.0  # motion cancels
+    start = float(np.median(c.x[:8]))  # the very first sample bears the filter's edge
+    moves = channel_unit(c.channel)[0] in "mr" and np.ptp(c.x) > 0
+    if not (moves and abs(start) > START * c.span + START_NOISE * noise + 2 * resolution(c.x)):
+        return None
+    remedy = "begin the record before the motion; subtract the offset"
+    return c.channel, 0, f"starts at {start:.4g}, not at rest in the zero pose", remedy
 
 
-def _unquiet_start(dataset: xr.Dataset) -> Iterator[_Warning]:
-    for channel, x, span in _columns(dataset, *(n for n, c in LAYOUT.items() if c.units.startswith("m"))):
-        noise = 1.4826 * float(np.median(np.abs(np.diff(x, n=3)))) if len(x) > 3 else 0.0  # motion cancels
-        start = float(np.median(x[:8]))  # the very first sample bears the filter's edge
-        if np.ptp(x) > 0 and abs(start) > START * span + START_NOISE * noise + 2 * _resolution(x):
-            what = f"starts at {start:.4g}, not at rest in the zero pose"
-            yield channel, 0, what, "begin the record before the motion; take out the offset"
+def _saturated_spool(c: _Column) -> _Warning | None:
+    full = np.abs(c.x) >= 0.999
+    if channel_unit(c.channel) != "1" or not full.any():
+        return None
+    what = f"is {'beyond' if np.abs(c.x).max() > 1.001 else 'at'} the end of its stroke in {full.sum()} samples"
+    return c.channel, int(full.argmax()), what, "reduce the scale of the test"
 
 
-def _saturated_spools(dataset: xr.Dataset) -> Iterator[_Warning]:
-    for channel, x, _ in _columns(dataset, *(n for n, c in LAYOUT.items() if c.units == "1")):
-        full = np.abs(x) >= 0.999
-        if full.any():
-            beyond = "beyond" if np.abs(x).max() > 1.001 else "at"
-            yield (
-                channel,
-                int(full.argmax()),
-                f"is {beyond} the stroke's end in {full.sum()} samples",
-                "scale the test down",
-            )
+def _frozen(c: _Column) -> _Warning | None:
+    """First run of one value into which a moving channel falls."""
+    x = c.x
+    if c.is_command:
+        return None
+    if np.ptp(x) == 0:
+        what = f"is constant at {x[0]:.4g}"
+        return (c.channel, 0, what, "check the sensor, or omit the channel") if c.measured else None
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(x)) + 1])
+    lengths = np.diff(starts, append=len(x))
+    moved = max(RESOLUTION_STEPS * resolution(x), STILL * c.span)
+    extreme = (x[starts] == x.max()) | (x[starts] == x.min())
+    for k in np.flatnonzero(lengths >= np.maximum(np.where(extreme, 4, 8), 5 * np.median(lengths))):
+        start, count = int(starts[k]), int(lengths[k])
+        before = np.abs(np.diff(x[max(start - 4, 0) : start]))
+        if start > 0 and len(before) and np.mean(before) > moved:
+            what = f"is {'clipped' if extreme[k] else 'stuck'} at {x[start]:.4g} for {count} samples"
+            return c.channel, start, what, "check the sensor's range"
+    return None
 
 
-def _frozen(dataset: xr.Dataset) -> Iterator[_Warning]:
-    """Find runs of one and the same value into which a moving channel falls."""
-    for channel, x, span in _columns(dataset):
-        if _is_command(channel):
-            continue
-        if np.ptp(x) == 0:
-            if dataset.attrs.get("kind") == "measured":
-                yield channel, 0, f"is {x[0]:.4g} throughout", "check the sensor; leave the channel out"
-            continue
-        starts = np.concatenate([[0], np.flatnonzero(np.diff(x)) + 1])
-        lengths = np.diff(starts, append=len(x))
-        moved = max(RESOLUTION_STEPS * _resolution(x), STILL * span)
-        extreme = (x[starts] == x.max()) | (x[starts] == x.min())
-        for k in np.flatnonzero(lengths >= np.maximum(np.where(extreme, 4, 8), 5 * np.median(lengths))):
-            start, end = int(starts[k]), int(starts[k] + lengths[k])
-            before = np.abs(np.diff(x[max(start - 4, 0) : start]))
-            if start > 0 and (np.mean(before) if len(before) else 0.0) > moved:
-                what = "clipped" if extreme[k] else "stuck"
-                yield (
-                    channel,
-                    start,
-                    f"is {what} at {x[start]:.4g} for {end - start} samples",
-                    "check the sensor's range",
-                )
-                break
-
-
-def _spikes(dataset: xr.Dataset) -> Iterator[_Warning]:
-    """Find single samples off the smooth curve through their neighbours, but for three at either end."""
+def _spike(c: _Column) -> _Warning | None:
+    """First single sample off the smooth curve through its neighbours, but for three at either end."""
     from scipy.ndimage import maximum_filter1d
 
+    if c.is_command or len(c.x) < 64:
+        return None
     taps = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20  # x less its sixth-order interpolation
-    for channel, x, span in _columns(dataset):
-        if _is_command(channel) or len(x) < 64:
-            continue
-        rough = np.convolve(np.pad(x, 3, "reflect", reflect_type="odd"), taps, mode="valid")
-        size = np.abs(rough)
-        beside = maximum_filter1d(np.stack([np.roll(size, s) for s in (-10, 10)]), 13, axis=1).max(axis=0)
-        least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * _resolution(x), STILL * span)
-        for k in np.flatnonzero(((size > 4 * beside) & (size > least))[3:-3]) + 3:
-            alone = rough[k] * taps  # what a lone sample leaves; a step or a kink leaves something else
-            if np.sum((rough[k - 3 : k + 4] - alone) ** 2) < 0.01 * np.sum(alone**2):
-                yield (
-                    channel,
-                    int(k),
-                    f"is {rough[k]:+.4g} off its neighbours for one sample",
-                    "interpolate it",
-                )
-                break
+    rough = np.convolve(np.pad(c.x, 3, "reflect", reflect_type="odd"), taps, mode="valid")
+    size = np.abs(rough)
+    beside = maximum_filter1d(np.stack([np.roll(size, s) for s in (-10, 10)]), 13, axis=1).max(axis=0)
+    least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * resolution(c.x), STILL * c.span)
+    for k in np.flatnonzero(((size > 4 * beside) & (size > least))[3:-3]) + 3:
+        alone = rough[k] * taps  # the response to a lone sample; that to a step or a kink differs
+        if np.sum((rough[k - 3 : k + 4] - alone) ** 2) < 0.01 * np.sum(alone**2):
+            return c.channel, int(k), f"is {rough[k]:+.4g} off its neighbours for one sample", "interpolate it"
+    return None
 
 
 # -------------------------------------------------------------------------------------------- sampling
@@ -215,24 +201,16 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
 
     count, rate = dataset.sizes["time"], 1 / sample_interval(dataset)
     if not 200 <= rate <= 1e5:
-        yield (
-            "time",
-            None,
-            f"runs at {rate:g} Hz; 256 to 8192 Hz are usual",
-            "record faster or check the time's unit",
-        )
+        what = f"runs at {rate:g} Hz; 256 to 8192 Hz are usual"
+        yield "time", None, what, "record faster, or check the unit of time"
     if count < 256:
         return
-    for channel, x, span in _columns(dataset, "platen_acceleration", "actuator_force"):
+    for channel, x, span, _ in _columns(dataset, ("platen_acceleration", "actuator_force")):
         f, power = welch(x - x.mean(), rate, nperseg=256)
         top = float(power[f > 0.4 * rate].sum() / power.sum()) if power.sum() > 0 else 0.0
-        if top > 0.05 and np.ptp(x) > max(0.05 * span, 100 * _resolution(x)):
-            yield (
-                channel,
-                None,
-                f"has {100 * top:.0f} % of its power near half the sampling rate",
-                "it may be aliased",
-            )
+        if top > 0.05 and np.ptp(x) > max(0.05 * span, 100 * resolution(x)):
+            what = f"has {100 * top:.0f} % of its power near half the sampling rate"
+            yield channel, None, what, "check the anti-aliasing filter"
 
 
 # -------------------------------------------------------------------------------------------- consistency
@@ -255,12 +233,7 @@ def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
             place, source = channel_name(dataset[MOTION[high]], k), channel_name(dataset[MOTION[low]], j)
             if j == k and gain is not None and not right:
                 reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
-                yield (
-                    place,
-                    None,
-                    f"is {gain:.3g} times that derived from {source}{reason}",
-                    "check unit and sign",
-                )
+                yield place, None, f"is {gain:.3g} times that derived from {source}{reason}", "check unit and sign"
             elif j != k and right and gains[k, k] is None:
                 yield place, None, f"is the derivative of {source}", "the two channels may be swapped"
 
@@ -276,23 +249,21 @@ def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
     return float(np.median((cross[band] / ours[band]).real)) if band.sum() >= 5 else None
 
 
-def _inconsistent_forces(dataset: xr.Dataset, areas: Mapping[str, tuple[float, float]]) -> Iterator[_Warning]:
-    if not {"actuator_force", "chamber_pressure_a"} <= set(dataset.data_vars):
+def _inconsistent_forces(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:
+    if machine is None or not {"actuator_force", "chamber_pressure_a"} <= set(dataset.data_vars):
         return
-    expected = {}
-    for name in (str(n) for n in dataset["actuator"].values if str(n) in areas):
-        force = areas[name][0] * dataset["chamber_pressure_a"].sel(actuator=name).values
-        if "chamber_pressure_b" in dataset and name in dataset["horizontal"].values:
-            force = force - areas[name][1] * dataset["chamber_pressure_b"].sel(horizontal=name).values
-        expected[name] = force - force.mean()
-    for name, varying in expected.items():
-        alike = [np.std(force) for other, force in expected.items() if areas[other] == areas[name]]
-        if np.std(varying) < NEARLY_STILL * max(alike):
-            continue  # noise, for the most part
-        found = dataset["actuator_force"].sel(actuator=name).values
+    expected = hydraulic_force(machine, dataset)
+    expected = expected - expected.mean(axis=0)  # NaN where a pressure is missing
+    sd = np.std(expected, axis=0)
+    kinds = [(a.area_a, a.area_b) for a in machine.actuators]
+    for k, actuator in enumerate(machine.actuators):
+        alike = [sd[j] for j, kind in enumerate(kinds) if kind == kinds[k] and np.isfinite(sd[j])]
+        if not np.isfinite(sd[k]) or sd[k] < NEARLY_STILL * max(alike):
+            continue  # unknown, or noise for the most part
+        found, varying = dataset["actuator_force"].sel(actuator=actuator.name).values, expected[:, k]
         moving = found - found.mean()
-        error = float(np.std(moving - varying) / (np.std(varying) or np.inf))
+        error = float(np.std(moving - varying) / (sd[k] or np.inf))
         gain = float(moving @ varying / (varying @ varying or np.inf))
         if error > GAIN_TOLERANCE and abs(gain - 1.0) > GAIN_TOLERANCE:  # with a right gain the rest is noise
             what = f"is {gain:.3g} times P_A A_1 - P_B A_2, {100 * error:.0f} % off"
-            yield f"actuator_force[{name}]", None, what, "check unit and sign of force and pressures"
+            yield f"actuator_force[{actuator.name}]", None, what, "check unit and sign of force and pressures"

@@ -1,53 +1,18 @@
-"""Making a measured channel fit to be used: offsets, gaps, resolution, integrals. Time runs along the first axis."""
+"""Conditioning of measured channels: resolution, smoothing at rest, integrals. Time runs along the first axis."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..core.errors import RecordError
+from ..core.arrays import Array
 
-__all__ = ["WIDTHS", "fill_gaps", "integrate", "quieted", "resolution", "without_offset"]
-
-Array = NDArray[np.float64]
-
-
-def without_offset(x: ArrayLike, rest: slice) -> Array:
-    """Signal less its mean over the samples `rest`, per column; raises ValueError if there are none."""
-    x = np.asarray(x, dtype=float)
-    if not len(x[rest]):
-        raise ValueError(f"no samples at rest in {rest} of {len(x)}")
-    return x - x[rest].mean(axis=0)
+__all__ = ["WIDTHS", "integrate", "quieted", "resolution"]
 
 
 def resolution(x: ArrayLike) -> float:
-    """Smallest step of a channel: its digital resolution, or nearly nothing for a computed one; 0 if it holds still."""
+    """Smallest step of a channel: its digital resolution, near zero for a computed one; 0 if it is constant."""
     steps = np.abs(np.diff(np.asarray(x, dtype=float), axis=0))
     least = float(steps[steps > 0].min(initial=np.inf))
     return least if np.isfinite(least) else 0.0
-
-
-def fill_gaps(x: ArrayLike, dt: float, most: float, name: str = "signal") -> Array:
-    """Fill runs of samples that are not finite, up to `most` [s] long, by Akima's piecewise cubic through the others.
-
-    Raises `RecordError` naming channel (`name` and column) and first sample of a longer run, or of one that reaches
-    an end of the record: there is nothing to interpolate from.
-    """
-    from scipy.interpolate import Akima1DInterpolator
-
-    x = np.array(x, dtype=float)
-    columns = x.reshape(len(x), -1)  # a view: filling it fills x
-    for k in np.flatnonzero(~np.isfinite(columns).all(axis=0)):
-        good = np.isfinite(columns[:, k])
-        edges = np.flatnonzero(np.diff(np.concatenate([[True], good, [True]]).astype(int)))
-        for first, end in edges.reshape(-1, 2):
-            at_end = first == 0 or end == len(x)
-            if at_end or (end - first) * dt > most * (1 + 1e-9):
-                why = "at an end of the record" if at_end else f"longer than {most:g} s"
-                channel = name if x.ndim == 1 else f"{name}[{k}]"
-                what = f"{channel}: {end - first} samples missing from sample {first}, {why}"
-                raise RecordError(f"{what}; cut the record there")
-        at = np.flatnonzero(good)
-        columns[~good, k] = Akima1DInterpolator(at, columns[at, k])(np.flatnonzero(~good))
-    return x
 
 
 WIDTHS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64)

@@ -20,8 +20,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..core.arrays import Array, Mask
 from ..mechanics.plant import Plant
 from .channels import channel_unit
 from .records import require
@@ -30,8 +30,8 @@ from .sensors import SensorSet
 
 __all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+
+Verdict = Literal["ok", "suspicious", "untested"]
 
 LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise
 CONFIDENCE = 3.0  # standard deviations
@@ -56,7 +56,7 @@ class ConsistencyFinding:
     standard_error: float
     expected: float
     tolerance: float
-    verdict: Literal["ok", "suspicious", "untested"]
+    verdict: Verdict
     instead: tuple[str, ...] = ()
 
     @property
@@ -165,23 +165,6 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
 
 
 def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[ConsistencyFinding]:
-    def finding(
-        quantity: str,
-        unit: str,
-        numbers: tuple[float, float, float, float],
-        *,
-        untested: bool = False,
-        instead: tuple[str, ...] = (),
-    ) -> ConsistencyFinding:
-        """Suspicious if beyond noise and tolerance; a residual may be smaller. numbers end in error, due, tolerance."""
-        estimate, error, expected, tolerance = map(float, numbers)
-        off = estimate - expected if quantity == "residual" else abs(estimate - expected)
-        far = off > np.hypot(CONFIDENCE * error, tolerance)
-        verdict: Literal["ok", "suspicious", "untested"] = "untested" if untested else "suspicious" if far else "ok"
-        return ConsistencyFinding(
-            check, channel, quantity, unit, estimate, error, expected, tolerance, verdict, instead
-        )
-
     unit_y = channel_unit(channel)
     hidden = s.noise * np.diag(scaled_inverse(s.xx, np.diag(s.xx))) > MOST_NOISE
     whole = any(h and not term.beside for h, term in zip(hidden, s.terms, strict=True))
@@ -196,14 +179,23 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterato
         if term.delay is not None:
             gain = by.theta[0] or 1.0
             value, sigma = term.delay - value / gain, sigma / abs(gain)
+        value, sigma, due, range_ = float(value), float(sigma), float(term.expected), float(range_)
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
-        numbers = value, sigma, term.expected, range_
-        yield finding(term.quantity, term.unit or unit_y, numbers, untested=held[i], instead=others)
+        verdict: Verdict = "untested" if held[i] else _verdict(abs(value - due), sigma, range_)
+        unit = term.unit or unit_y
+        yield ConsistencyFinding(check, channel, term.quantity, unit, value, sigma, due, range_, verdict, others)
     # an untested coefficient may explain most; a channel of zeros has no noise
     best = min(free, tested, key=lambda by: by.square / max(by.noise, 1e-300))
-    rms, floor = np.sqrt(max(best.square, 0.0)), np.sqrt(best.noise)
-    range_ = np.sqrt((1 + noise_range) ** 2 * best.noise + CONFIDENCE**2 * best.allowed) - floor
-    yield finding("residual", unit_y, (rms, floor / np.sqrt(2 * s.independent), floor, range_))
+    rms, floor = float(np.sqrt(max(best.square, 0.0))), float(np.sqrt(best.noise))
+    sigma = float(floor / np.sqrt(2 * s.independent))
+    range_ = float(np.sqrt((1 + noise_range) ** 2 * best.noise + CONFIDENCE**2 * best.allowed) - floor)
+    verdict = _verdict(rms - floor, sigma, range_)  # it may be smaller than the noise
+    yield ConsistencyFinding(check, channel, "residual", unit_y, rms, sigma, floor, range_, verdict)
+
+
+def _verdict(off: float, error: float, tolerance: float) -> Verdict:
+    """Suspicious if beyond noise and tolerance."""
+    return "suspicious" if off > np.hypot(CONFIDENCE * error, tolerance) else "ok"
 
 
 def scaled_inverse(matrix: Array, squares: Array) -> Array:

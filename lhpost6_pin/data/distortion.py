@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from ..core.arrays import Array
 
 __all__ = ["Harmonics", "harmonics", "phase_between", "total_harmonic_distortion"]
-
-Array = NDArray[np.float64]
 
 
 class Harmonics(NamedTuple):

@@ -1,4 +1,4 @@
-"""Platen motion from all that was measured of it: displacement, velocity and acceleration sensors in one.
+"""Platen motion fused from displacement, velocity and acceleration sensors.
 
 As in a composite feedback generator, displacement sensors give the low frequencies and accelerometers the high ones;
 offline it can be done without phase. With weights W that are real functions of frequency and add up to one,
@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, forward_kinematics, leg_displacements
@@ -35,7 +35,6 @@ from .signals import Band, differentiate
 
 __all__ = ["FusedMotion", "fuse_motion", "kinematic_jacobian"]
 
-Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
 NO_NOISE = 1e-60  # least density [unit2/Hz], so that sensors free of noise can be weighed against each other
@@ -46,9 +45,9 @@ class FusedMotion(NamedTuple):
 
     motion: PlatenMotion  # displacement, velocity, acceleration (n, 6)
     noise: PlatenMotion  # (6,) each
-    path: Array  # (n, 6) displacement, still where it rests: for friction, whose memory noise would shake out of it
+    path: Array  # (n, 6) displacement, constant where it rests: for the memory of friction, which noise would erase
     used: tuple[str, ...]
-    share: Mapping[str, PlatenMotion]  # of each channel in the motion, which is their sum; empty if not wanted
+    share: Mapping[str, PlatenMotion]  # of each channel in the motion, which is their sum; empty if not requested
 
 
 class _Sensor(NamedTuple):

@@ -1,4 +1,4 @@
-"""Everything in which a dataset breaks the record layout, as findings that say where and what to do."""
+"""Violations of the record layout, as findings with place and remedy."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..core.names import AXES
 from ..machine.parameters import LARGEST, unusable
-from .channels import LAYOUT, LAYOUT_VERSION, Channel, channel_name, same_unit
+from .channels import LAYOUT, LAYOUT_VERSION, Channel, channel_name, columns_of, same_unit
 
 __all__ = ["FASTEST", "SLOWEST", "STEP_TOLERANCE", "RecordFinding", "is_number", "layout_faults", "sampling_rate"]
 
@@ -22,7 +22,7 @@ SLOWEST, FASTEST = 0.1, 1e6  # [Hz]: a test at another rate has its time in anot
 
 @dataclass(frozen=True)
 class RecordFinding:
-    """One thing found in a record: where it is, what it is and what to do about it.
+    """One finding of a record: place, what it is, and remedy.
 
     `channel` is a variable with its label, as in `platen_displacement[yaw]`, or empty for the whole record.
     """
@@ -43,7 +43,7 @@ _Fault = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
 
 def layout_faults(dataset: xr.Dataset, labels: Mapping[str, Sequence[str]] | None = None) -> list[RecordFinding]:
-    """List everything in which a dataset breaks the layout; empty for a valid record."""
+    """All violations of the layout by a dataset; empty for a valid record."""
     faults = chain(
         _time_faults(dataset),
         _label_faults(dataset, labels or {}),
@@ -78,15 +78,15 @@ def _time_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
         what = f"a gap of {lost} missing samples" if lost > 0 else f"a step of {step[k - 1]:g} s"
         yield "time", k, f"is not uniform: {what} where {usual:g} s is usual", "resample to a uniform rate"
     elif not SLOWEST <= (rate := sampling_rate(time)) <= FASTEST:
-        yield "time", None, f"runs at {rate:g} Hz, which no test does", "give time in seconds"
+        yield "time", None, f"runs at {rate:g} Hz, outside any test's range", "give time in seconds"
     else:
         stated = dataset.attrs.get("sample_rate_hz", rate)
         if not (is_number(stated) and abs(stated / rate - 1) <= RATE_TOLERANCE):
-            yield "time", None, f"runs at {rate:g} Hz, sample_rate_hz says {stated}", "correct the wrong one"
+            yield "time", None, f"runs at {rate:g} Hz, sample_rate_hz is {stated}", "correct the wrong one"
 
 
 def sampling_rate(time: NDArray[np.float64]) -> float:
-    """Samples a second; infinite for times too close to tell apart."""
+    """Samples a second; infinite for times that coincide."""
     with np.errstate(over="ignore", divide="ignore"):
         return float((len(time) - 1) / (time[-1] - time[0]))
 
@@ -119,11 +119,11 @@ def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault
         return
     if not same_unit(units := variable.attrs.get("units"), channel.units):
         what = "has no units" if units is None else f"has units {units!r}"
-        yield name, None, what, f"give it in {channel.units!r} and say so in its attribute units"
+        yield name, None, what, f"give it in {channel.units!r}, with the attribute units"
     if not variable.size:
         yield name, None, "is empty", "leave it out"
         return
-    values = variable.values.reshape(len(variable), -1).astype(float)
+    values = columns_of(variable)
     bad = ~(np.abs(values) <= LARGEST)  # NaN is not either
     for column in np.flatnonzero(bad.any(axis=0)):
         sample = int(np.argmax(bad[:, column]))
@@ -133,8 +133,8 @@ def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault
 
 def _attribute_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
     for key in ("kind", "test", "title", "specimen", "machine", "scheme", "controller", "motion", "drive"):
-        if not isinstance(said := dataset.attrs.get(key, ""), str) or "\0" in said:
-            yield "", None, f"attribute {key} is {said!r}", "it must be a text"
+        if not isinstance(text := dataset.attrs.get(key, ""), str) or "\0" in text:
+            yield "", None, f"attribute {key} is {text!r}", "it must be a text"
     if not is_number(steps := dataset.attrs.get("steps_per_second", 1)):
         yield "", None, f"attribute steps_per_second is {steps!r}", "it must be a number"
     valves = dataset.attrs.get("valves_per_horizontal_actuator", 1)

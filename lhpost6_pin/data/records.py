@@ -1,7 +1,7 @@
-"""Test records: one netCDF-4 layout for measured and simulated tests, so that one can be laid over the other.
+"""Test records: one netCDF-4 layout for measured and simulated tests, so that they can be compared.
 
 A record is an `xarray.Dataset` over uniform `time`, SI throughout. Any channel of `LAYOUT` may be missing and
-others may be added; what is there must be right: `load_record` refuses a record that is not.
+others may be added; those present must be valid: `load_record` refuses any other record.
 """
 
 import warnings
@@ -40,7 +40,7 @@ DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 
 
 # ---------------------------------------------------------------------------------------------- disk
 def open_record(path: Path | str) -> xr.Dataset:
-    """Read a whole netCDF-4 file into memory without judging its content; an older layout is brought to today's.
+    """Read a whole netCDF-4 file into memory without checking its content; an older layout is migrated.
 
     The file stays as it is. Raises `RecordError`, naming the file, if it is missing, not netCDF-4, or damaged.
     """
@@ -65,18 +65,18 @@ def open_record(path: Path | str) -> xr.Dataset:
 
 
 def _brought_up(dataset: xr.Dataset) -> xr.Dataset:
-    """A record in today's layout; what says no version, or none that is known, is left for `layout_faults`."""
-    said = dataset.attrs.get("layout_version", LAYOUT_VERSION)
-    for version in range(int(said) if is_number(said) and said >= 1 else LAYOUT_VERSION, LAYOUT_VERSION):
-        dataset = STEPS[version](dataset).assign_attrs(layout_version=version + 1, written_in_layout=said)
+    """A record in the current layout; a missing or unknown version is left to `layout_faults`."""
+    stated = dataset.attrs.get("layout_version", LAYOUT_VERSION)
+    for version in range(int(stated) if is_number(stated) and stated >= 1 else LAYOUT_VERSION, LAYOUT_VERSION):
+        dataset = STEPS[version](dataset).assign_attrs(layout_version=version + 1, written_in_layout=stated)
     return dataset
 
 
 def load_record(path: Path | str, labels: Mapping[str, Sequence[str]] | None = None) -> xr.Dataset:
-    """Load a record and make sure that it is right; channels of the layout come as float64.
+    """Load a valid record; channels of the layout are float64.
 
     `labels` are those of the machine the record must belong to, e.g. `{"actuator": ["H1", ...]}`; without it
-    any machine will do. Raises `RecordError` naming file, channel and sample of whatever breaks the layout.
+    any machine is accepted. Raises `RecordError` naming file, channel and sample of whatever breaks the layout.
     """
     dataset = open_record(path)
     _refuse(layout_faults(dataset, labels), str(path))
@@ -120,7 +120,7 @@ def make_record(
         else:
             channel, values = LAYOUT[name], np.asarray(values, dtype=float)
             if values.ndim != len(channel.dims):
-                raise RecordError(f"{name}: has shape {values.shape}; the layout wants dimensions {channel.dims}")
+                raise RecordError(f"{name}: has shape {values.shape}; the layout has dimensions {channel.dims}")
             variables[name] = (channel.dims, values, {"units": channel.units, "long_name": channel.long_name})
     used = {dim for dims, *_ in variables.values() for dim in ([dims] if isinstance(dims, str) else dims)}
     names = {dim: list(values) for dim, values in ({"axis": AXES} | dict(labels)).items() if dim in used}

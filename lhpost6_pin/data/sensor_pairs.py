@@ -11,12 +11,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.names import AXES
 from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.pose import forward_kinematics, leg_displacements
 from .alignment import due_spools
-from .channels import LAYOUT, channel_name
+from .channels import LAYOUT, channel_name, columns_of
 from .conditioning import resolution
 from .fusion import kinematic_jacobian
 from .records import sample_interval
@@ -25,7 +26,6 @@ from .signals import Band, differentiate
 
 __all__ = ["SensorComparison", "Regressor", "comparisons", "loose_lengths"]
 
-Array = NDArray[np.float64]
 
 BAND = Band(high=20.0)  # Hz: where motion exceeds noise
 TRIM = 0.1  # s: cut off at both ends, where filters settle
@@ -79,7 +79,7 @@ class _View:
 
     def values(self, name: str) -> Array:
         """Columns (n, k) of a channel at the record's rate."""
-        return self.record[name].values.astype(float).reshape(self.record.sizes["time"], -1)
+        return columns_of(self.record[name])
 
     def signals(self, x: Array, *orders: int) -> list[Array]:
         """Derivatives of these orders of x (n, k) in the band, thinned and trimmed."""

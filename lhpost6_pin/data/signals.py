@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arrays import Array
+
 __all__ = [
     "Band",
     "align",
@@ -18,7 +20,6 @@ __all__ = [
     "delay",
     "differentiate",
     "drift_rate",
-    "hold",
     "lag",
     "lowpass_zero_phase",
     "peak_ratio",
@@ -26,7 +27,6 @@ __all__ = [
     "rrmse",
 ]
 
-Array = NDArray[np.float64]
 
 FADE = 32
 """Samples over which at least a reflection fades out that is made longer for a fast transform."""
@@ -173,7 +173,7 @@ class Band:
     order: int = 8
 
     def __post_init__(self) -> None:
-        """Refuse a band that passes nothing."""
+        """Refuse an empty band."""
         if not (0.0 <= self.low < self.high and self.order >= 2):
             raise ValueError(f"no band from {self.low} to {self.high} Hz of order {self.order}")
 
@@ -236,14 +236,6 @@ def resample_band_limited(x: ArrayLike, t_old: ArrayLike, t_new: ArrayLike, half
     for k in range(2 * half_width):
         result += weight[which, k].reshape(-1, *[1] * (x.ndim - 1)) * extended[first + k + 1]
     return result
-
-
-def hold(x: ArrayLike, rate_old: float, rate_new: float) -> Array:
-    """Zero-order hold to another rate [Hz]: sample j holds over [j, j + 1) / `rate_old`."""
-    x = np.asarray(x, dtype=float)
-    count = int(np.floor(len(x) * rate_new / rate_old + 1e-9))
-    held = np.floor(np.arange(count) * (rate_old / rate_new) + 1e-9).astype(int)
-    return x[np.minimum(held, len(x) - 1)]
 
 
 # ---------------------------------------------------------------------------------------------- helpers

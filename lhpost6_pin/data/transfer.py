@@ -1,4 +1,4 @@
-"""Transfer functions between sampled signals, with the coherence that says how far to trust them.
+"""Transfer functions between sampled signals, with their coherence.
 
 The response of q outputs to p inputs is T(f) = Syx Sxx⁻¹ (the H1 estimate: noise on the outputs averages out),
 with cross spectra averaged over Hann-windowed segments that overlap by half (Welch 1967; Bendat and Piersol,
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arrays import Array
 from ..core.errors import UnknownNameError
 from ..core.names import AXES
 
 __all__ = ["Transfer", "band", "band_within", "delay_of", "estimate_transfer"]
 
-Array = NDArray[np.float64]
 
 QUIET = 1e-8  # of an input's largest power density: below that the input counts as silent at a frequency
 
@@ -70,17 +70,15 @@ def estimate_transfer(
 
 
 def _check(x: Array, y: Array, axes: tuple[str, ...]) -> None:
-    for name in axes:
-        if name not in AXES:
-            raise UnknownNameError("axis", name, AXES)
+    if unknown := [name for name in axes if name not in AXES]:
+        raise UnknownNameError("axis", unknown[0], AXES)
     if x.ndim != 2 or y.ndim != 2 or len(x) != len(y):
         raise ValueError(f"inputs {x.shape} and outputs {y.shape} must be tables with as many rows")
     if x.shape[1] != len(axes) or len(set(axes)) < len(axes):
         raise ValueError(f"{x.shape[1]} inputs need as many different axes, not {' '.join(axes)}")
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise ValueError("inputs and outputs must be finite")
-    silent = [name for name, column in zip(axes, x.T, strict=True) if not np.ptp(column)] if len(x) else []
-    if silent:
+    if silent := [name for name, column in zip(axes, x.T, strict=True) if len(x) and not np.ptp(column)]:
         raise ValueError(f"input {', '.join(silent)} is silent: pass only the inputs that move, and their axes")
 
 
@@ -98,12 +96,8 @@ def band(transfer: Transfer, low: float, high: float) -> Transfer:
     inside = (transfer.frequency >= low) & (transfer.frequency <= high)
     if not inside.any():
         raise ValueError(f"the transfer function has no frequency from {low:g} to {high:g} Hz")
-    return replace(
-        transfer,
-        frequency=transfer.frequency[inside],
-        response=transfer.response[inside],
-        coherence=transfer.coherence[inside],
-    )
+    parts = {name: getattr(transfer, name)[inside] for name in ("frequency", "response", "coherence")}
+    return replace(transfer, **parts)
 
 
 def delay_of(transfer: Transfer, output: int, source: int, low: float, high: float) -> float:

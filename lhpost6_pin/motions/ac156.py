@@ -39,7 +39,7 @@ def required_spectrum(
 
 
 class Ac156(NamedTuple):
-    """Numbers of a motion: the spectrum's, the record's, and where nothing is left."""
+    """Numbers of a motion: its spectrum, its record and its band."""
 
     sds: float  # design spectral acceleration S_DS [m/s2]
     height_ratio: float  # z/h [1]
@@ -65,7 +65,7 @@ class Ac156(NamedTuple):
 def ac156(*, name: str, **numbers: Any) -> GroundMotion:
     """Tri-axial acceleration [m/s^2] whose response spectra match AC156 from the second to the last knee.
 
-    numbers are those of `Ac156`; `sds` and `height_ratio` set the level. Below `high_pass` nothing is left, which keeps
+    numbers are those of `Ac156`; `sds` and `height_ratio` set the level. The high-pass keeps
     the displacement within a table's stroke; the spectrum is then not met far below the second knee. The axes are
     independent: each has its own noise, drawn with `seed`.
 

@@ -1,6 +1,5 @@
 """PEER strong-motion files `.AT2`: one acceleration component a file, four header lines, values in g."""
 
-import logging
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,12 +8,11 @@ import numpy as np
 
 from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
-from .motion_units import to_si
+from .motion_units import acceleration_in_si
 from .text import parse_numbers, read_text
 
 __all__ = ["is_at2", "load_at2"]
 
-_log = logging.getLogger(__name__)
 _NUMBER = r"(\d*\.?\d+(?:[eE][-+]?\d+)?)"
 _COUNT_AND_STEP = (
     re.compile(rf"NPTS\s*=\s*(\d{{1,9}})\D*?DT\s*=\s*{_NUMBER}", re.IGNORECASE),
@@ -34,8 +32,8 @@ def load_at2(
 ) -> GroundMotion:
     """Read one to three PEER files into one motion.
 
-    A sequence of paths goes to x, y, z in that order; a mapping says the axis of each, as in
-    ``{"y": "NIS090.AT2"}``. Components that differ by a few samples are cut to the shortest, with a warning.
+    A sequence of paths goes to x, y, z in that order; a mapping is by axis, as in ``{"y": "NIS090.AT2"}``. Components
+    that differ by a few samples are cut to the shortest, with a warning.
 
     Raises MotionError naming the file and line when a file cannot be understood, or when the time steps of
     the files differ.
@@ -48,27 +46,18 @@ def load_at2(
         paths = dict(zip("xyz", paths, strict=False))
     if not paths:
         raise MotionError("no PEER file given; give one to three, for x, y, z")
-    steps: dict[str, float] = {}
-    channels: dict[str, np.ndarray] = {}
-    for axis, path in paths.items():
-        steps[axis], channels[axis] = _parse_at2(read_text(path), str(path))
+    parsed = {axis: _parse_at2(read_text(path), str(path)) for axis, path in paths.items()}
+    steps = {axis: step for axis, (step, _) in parsed.items()}
     if len(set(steps.values())) > 1:
         listed = ", ".join(f"{paths[axis]} {step:g} s" for axis, step in steps.items())
         raise MotionError(f"time steps differ: {listed}; give components of one record")
-    shortest = min(map(len, channels.values()))
-    if any(len(channel) > shortest for channel in channels.values()):
-        _log.warning(
-            "%s: components differ in length; cut to %d samples",
-            ", ".join(map(str, paths.values())),
-            shortest,
-        )
-    first = next(iter(paths.values()))
+    files = [Path(path) for path in paths.values()]
     return make_motion(
-        name or Path(first).stem,
+        name or files[0].stem,
         next(iter(steps.values())),
-        {axis: channel[:shortest] for axis, channel in channels.items()},
+        {axis: channel for axis, (_, channel) in parsed.items()},
         "acceleration",
-        "PEER files " + ", ".join(Path(path).name for path in paths.values()),
+        f"PEER files {', '.join(file.name for file in files)}",
     )
 
 
@@ -83,20 +72,14 @@ def _parse_at2(text: str, where: str) -> tuple[float, np.ndarray]:
     unit = _UNITS.search(" ".join(head[: number + 1]))
     if unit is None:
         raise MotionError(
-            f"{where}: header does not say 'ACCELERATION TIME SERIES IN UNITS OF G'; velocity (.VT2) and "
-            "displacement (.DT2) files are not read: use the .AT2 file"
+            f"{where}: header lacks 'ACCELERATION TIME SERIES IN UNITS OF G'; velocity (.VT2) and displacement (.DT2) "
+            "files are not read: use the .AT2 file"
         )
     count, step = int(match[1]), float(match[2])
     values = parse_numbers(lines[number + 1 :], where, number + 2)
     if len(values) != count:
         raise MotionError(
-            f"{where}: header says {count} points, the file has {len(values)}; "
-            "it is cut short or damaged: fetch it again"
+            f"{where}: header announces {count} points, the file has {len(values)}; it is truncated or damaged: "
+            "download it again"
         )
-    try:
-        values, quantity = to_si(values, unit[1], "x")
-    except MotionError as error:
-        raise MotionError(f"{where}, line {number}: {error}") from None
-    if quantity != "acceleration":
-        raise MotionError(f"{where}, line {number}: unit {unit[1]} is not an acceleration; use the .AT2 file in g")
-    return step, values
+    return step, acceleration_in_si(values, unit[1], f"{where}, line {number}", "use the .AT2 file in g")

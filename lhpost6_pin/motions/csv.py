@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.decimals import cut_at_decimal_commas, has_decimal_comma
 from ..core.errors import MotionError, meant
+from ..core.number_table import Dialect, has_decimal_comma, is_number, read_rows
 from .motion import AXES, GroundMotion, make_motion
 from .motion_units import to_si
 from .text import read_text
@@ -53,17 +53,21 @@ def load_csv(
     """
     where = str(path)
     lines = read_text(path).splitlines()
-    start = next((i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), None)
+    start = next((i for i, line in enumerate(lines) if line.strip() and not _is_comment(line)), None)
     if start is None:
         raise MotionError(f"{where}: no header row; the first line that is no comment must name the columns")
-    separator = next((mark for mark in ";\t" if mark in lines[start]), ",")
-    names = [field.strip().strip('"') for field in lines[start].split(separator)]
-    if all(_is_number(name) or has_decimal_comma(name) for name in names):
+    dialect = Dialect(next((mark for mark in ";\t" if mark in lines[start]), ","))
+    names = [field.strip().strip('"') for field in lines[start].split(dialect.separator)]
+    if all(is_number(name, dialect) or has_decimal_comma(name) for name in names):
         raise MotionError(f"{where}, line {start + 1}: no header row; the first must name the columns, as time_s,x_g")
     if len(set(names)) != len(names):
         twice = next(column for column in names if names.count(column) > 1)
         raise MotionError(f"{where}, line {start + 1}: two columns named {twice!r}; rename one")
-    table = _table(lines, start + 1, separator, names, where)
+    rows = [(k, line) for k, line in enumerate(lines[start + 1 :], start + 2) if line.strip() and not _is_comment(line)]
+    if len(rows) < 2:
+        raise MotionError(f"{where}: {len(rows)} row(s) of numbers; a motion needs at least 2")
+    remedy = "fill the gap or cut the record there"
+    table = read_rows(rows, names, dialect, where, error=MotionError, commas=_COMMAS, correct=remedy)
     time_column = next((i for i, column in enumerate(names) if _TIME.fullmatch(column)), None)
     chosen = _channels(names, time_column, columns, units, f"{where}, line {start + 1}")
     step = _time_step(table, time_column, names, time_step, where)
@@ -80,12 +84,8 @@ def load_csv(
     return make_motion(name or Path(path).stem, step, data, kind, f"CSV file {Path(path).name}")
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith("#")
 
 
 def _channels(
@@ -95,42 +95,37 @@ def _channels(
     units: "str | Mapping[str, str] | None",
     where: str,
 ) -> list[_Channel]:
-    """Which column moves which axis, in which unit."""
-    chosen = []
-    if columns is not None:
-        for axis, column in columns.items():
-            if axis not in AXES:
-                raise MotionError(f"{where}: option columns names axis {axis!r}; axes are {', '.join(AXES)}")
-            if column not in names:
-                asked = meant(column, names)
-                raise MotionError(
-                    f"{where}: no column {column!r} for axis {axis}; {asked}columns are {', '.join(names)}"
-                )
-            match = _COLUMN.fullmatch(column)
-            chosen.append(_Channel(axis, names.index(column), _unit(match, axis, units)))
+    """Column and unit of each axis."""
+    if columns is None:
+        pairs = [(_axis_of(name, where), name) for k, name in enumerate(names) if k != time_column]
     else:
-        for index, column in enumerate(names):
-            if index == time_column:
-                continue
-            match = _COLUMN.fullmatch(column)
-            if match is None:
-                raise MotionError(
-                    f"{where}: column {column[:60]!r} names no axis; call it such as x_m_s2, ay_g, z_m, "
-                    "roll_rad (from Python, columns={axis: column} says which to use)"
-                )
-            axis = _AXIS_NAMES[match["axis"].lower()]
-            if axis in (channel.axis for channel in chosen):
-                raise MotionError(f"{where}: two columns for axis {axis}; leave one out")
-            chosen.append(_Channel(axis, index, _unit(match, axis, units)))
+        pairs = list(columns.items())
+    chosen: list[_Channel] = []
+    for axis, column in pairs:
+        if axis not in AXES:
+            raise MotionError(f"{where}: option columns names axis {axis!r}; axes are {', '.join(AXES)}")
+        if column not in names:
+            near = meant(column, names)
+            raise MotionError(f"{where}: no column {column!r} for axis {axis}; {near}columns are {', '.join(names)}")
+        if axis in (channel.axis for channel in chosen):
+            raise MotionError(f"{where}: two columns for axis {axis}; leave one out")
+        unit = _unit(_COLUMN.fullmatch(column), axis, units)
+        if not unit:
+            raise MotionError(f"{where}: column {column!r} has no unit; write it in the name ({column}_m_s2)")
+        chosen.append(_Channel(axis, names.index(column), unit))
     if not chosen:
         raise MotionError(f"{where}: no column for any axis; call them such as x_m_s2, ay_g, z_m, roll_rad")
-    for channel in chosen:
-        if not channel.unit:
-            raise MotionError(
-                f"{where}: column {names[channel.column]!r} has no unit; write it in the name "
-                f"({names[channel.column]}_m_s2)"
-            )
     return chosen
+
+
+def _axis_of(column: str, where: str) -> str:
+    match = _COLUMN.fullmatch(column)
+    if match is None:
+        raise MotionError(
+            f"{where}: column {column[:60]!r} names no axis; call it such as x_m_s2, ay_g, z_m, roll_rad (from Python, "
+            "columns={axis: column} selects them)"
+        )
+    return _AXIS_NAMES[match["axis"].lower()]
 
 
 def _unit(match: "re.Match[str] | None", axis: str, units: "str | Mapping[str, str] | None") -> str:
@@ -139,40 +134,6 @@ def _unit(match: "re.Match[str] | None", axis: str, units: "str | Mapping[str, s
     if units is not None and axis in units:
         return units[axis]
     return (match["bracketed"] or match["suffix"] or "") if match else ""
-
-
-def _table(lines: list[str], start: int, separator: str, names: list[str], where: str) -> np.ndarray:
-    """All rows (n, columns); the slow reading of a faulty file only serves to name the place."""
-    numbered = [
-        (i + 1, line) for i, line in enumerate(lines[start:], start) if line.strip() and line.lstrip()[0] != "#"
-    ]
-    if len(numbered) < 2:
-        raise MotionError(f"{where}: {len(numbered)} row(s) of numbers; a motion needs at least 2")
-    try:
-        table = np.array([line.split(separator) for _, line in numbered], dtype=float)
-    except ValueError:
-        table = np.empty((0, 0))
-    if table.ndim == 2 and table.shape[1] == len(names) and np.isfinite(table).all():
-        return table
-    for number, line in numbered:
-        fields = line.split(separator)
-        if len(fields) != len(names):
-            commas = separator == "," and cut_at_decimal_commas(fields, len(names))
-            remedy = _COMMAS if commas else "correct it"
-            raise MotionError(f"{where}, line {number}: {len(fields)} fields, the header has {len(names)}; {remedy}")
-        for column, field in zip(names, fields, strict=True):
-            try:
-                value = float(field)
-            except ValueError:
-                remedy = _COMMAS if has_decimal_comma(field) else "fill the gap or cut the record there"
-                raise MotionError(
-                    f"{where}, line {number}, column {column!r}: {field.strip()[:40]!r} is not a number; {remedy}"
-                ) from None
-            if not np.isfinite(value):
-                raise MotionError(
-                    f"{where}, line {number}, column {column!r}: value is {value}; fill the gap or cut the record there"
-                )
-    raise MotionError(f"{where}: cannot be read as a table of numbers; check the separator")
 
 
 def _time_step(

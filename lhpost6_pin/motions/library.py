@@ -1,6 +1,6 @@
 """Ground motions by name: shipped records, tests made from a few numbers, records of a package or of the user."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
@@ -18,7 +18,6 @@ from .pulse_records import INSTALL, load_pulse_record, missing_package
 from .readers import MotionFiles, load_motion
 from .synthetic import sine, six_axial, triangle, white_noise
 from .toml import load_toml, values_of
-from .wanted import WantedRecord, request
 
 __all__ = ["MotionEntry", "find_motion", "list_motions", "motion_entry", "motion_options"]
 
@@ -31,16 +30,27 @@ _GENERATORS: dict[str, Callable[..., GroundMotion]] = {
 }
 
 
+class WantedRecord(NamedTuple):
+    """A record that the user provides, as `models/ground_motions/index.toml` describes it."""
+
+    event: str
+    station: str
+    record: str  # a short description
+    files: str
+    where: str
+    command: str  # FILE, or FILE_X FILE_Y FILE_Z, stand for the user's files
+
+
 class MotionEntry(NamedTuple):
     """A line of the table of motions."""
 
     name: str
     kind: str  # "record", "package", "file" (the user's) or the kind of generator
     title: str
-    aliases: tuple[str, ...]
-    available: bool
-    remedy: str  # what to install or to bring where not available
-    options: tuple[str, ...]  # names of what `find_motion` takes for it; see `motion_options`
+    aliases: tuple[str, ...] = ()
+    available: bool = True
+    remedy: str = ""  # what to install or to provide where not available
+    options: tuple[str, ...] = ()  # names of the options of `find_motion`; see `motion_options`
     wanted: WantedRecord | None = None  # the record that may come from the user's own files
 
     @property
@@ -49,7 +59,17 @@ class MotionEntry(NamedTuple):
         if self.wanted is None:
             return ""
         first = f"{self.remedy or 'ready'} for its horizontal components, or " if self.kind == "package" else ""
-        return request(self.name, self.wanted, first)
+        event, station, record, files, where, command = self.wanted
+        order = "   (longitudinal, transverse, vertical; or one FILE of all axes)" if "FILE_X" in command else ""
+        lines = (
+            f"{self.name}: {first}run it from your own file",
+            f"  earthquake: {event}",
+            f"  station:    {station}",
+            f"  wanted:     {record}: {files}",
+            f"  from:       {where}",
+            f"  then type:  {command}{order}",
+        )
+        return "\n".join(lines)
 
 
 @cache
@@ -62,22 +82,29 @@ def list_motions() -> tuple[MotionEntry, ...]:
     """Every motion known by name, with what is needed to have it."""
     index, tests = _tables()
     with _blamed("index.toml"):
-        records, packaged = _records_of(index)
+        package = index["package"]
+        remedy = INSTALL if missing_package(package["module"]) else ""
+        wanted = {n: WantedRecord(*(str(r[key]) for key in WantedRecord._fields)) for n, r in index["wanted"].items()}
+        records = [_entry(name, "record", record) for name, record in index["records"].items()]
+        others = [
+            _entry(name, "package", record, available=not remedy, remedy=remedy, wanted=wanted.pop(name, None))
+            for name, record in package["records"].items()
+        ]
+        others += [
+            _entry(n, "file", index["wanted"][n], available=False, remedy=f"your file: {own.record}", wanted=own)
+            for n, own in wanted.items()
+        ]
     with _blamed("tests.toml"):
         made = [
-            MotionEntry(name, test["kind"], test["title"], (), True, "", _options_of(test))
+            _entry(name, test["kind"], test, options=tuple(key for key in test if key not in ("kind", "title")))
             for name, test in tests.items()
             if name != "processing"
         ]
-    return (*records, *made, *packaged)
+    return (*records, *made, *others)
 
 
-def _texts(words: Iterable[Any]) -> tuple[str, ...]:
-    return tuple(map(str, words))
-
-
-def _options_of(test: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(key for key in test if key not in ("kind", "title"))
+def _entry(name: str, kind: str, table: Mapping[str, Any], **others: Any) -> MotionEntry:
+    return MotionEntry(name, kind, table["title"], tuple(map(str, table.get("aliases", ()))), **others)
 
 
 @contextmanager
@@ -87,28 +114,6 @@ def _blamed(file: str) -> Iterator[None]:
         yield
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise MotionError(f"{file}: is damaged: {error!r}; install the package again") from error
-
-
-def _records_of(index: Mapping[str, Any]) -> tuple[list[MotionEntry], list[MotionEntry]]:
-    """Entries of the records that are shipped; and of those that come with a package or from the user."""
-    records = [
-        MotionEntry(name, "record", record["title"], _texts(record["aliases"]), True, "", ())
-        for name, record in index["records"].items()
-    ]
-    entries = []
-    package = index["package"]
-    remedy = INSTALL if missing_package(package["module"]) else ""
-    wanted = {
-        name: WantedRecord(*_texts(record[key] for key in WantedRecord._fields))
-        for name, record in index["wanted"].items()
-    }
-    for name, record in package["records"].items():
-        aliases, own = _texts(record.get("aliases", ())), wanted.pop(name, None)
-        entries.append(MotionEntry(name, "package", record["title"], aliases, not remedy, remedy, (), own))
-    for name, own in wanted.items():
-        record, remedy = index["wanted"][name], f"your file: {own.record}"
-        entries.append(MotionEntry(name, "file", record["title"], _texts(record["aliases"]), False, remedy, (), own))
-    return records, entries
 
 
 def motion_options(name: str) -> tuple[MotionOption, ...]:
@@ -130,7 +135,7 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
 
     Raises UnknownNameError for a name that does not exist, MotionError for an option the motion does not
     take, a value that it cannot have (named), numbers that do not go together, files that cannot be read or are
-    missing (with the record wanted and where it can be had), or a package that is not installed.
+    missing (with the record needed and its source), or a package that is not installed.
     """
     entry = motion_entry(name)
     if files:
@@ -144,8 +149,7 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
     if entry.kind == "record":
         record = index["records"][entry.name]
         motion = load_csv(models_folder() / "ground_motions" / record["file"], name=entry.name)
-        source = f"{record['title']}; {record['source']}; {record['licence']}"
-        return GroundMotion(motion.name, motion.time_step, motion.samples, motion.quantity, source)
+        return replace(motion, source=f"{record['title']}; {record['source']}; {record['licence']}")
     if entry.kind == "package":
         package = index["package"]
         number = package["records"][entry.name]["number"]
@@ -157,8 +161,8 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
         with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite
             return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **chosen})
     except (ArithmeticError, MemoryError, TypeError, ValueError) as error:
-        said = ", ".join(f"{key} = {value}" for key, value in options.items())
-        raise MotionError(f"{name}: cannot be made with {said}: {error}") from error
+        given = ", ".join(f"{key} = {value}" for key, value in options.items())
+        raise MotionError(f"{name}: cannot be made with {given}: {error}") from error
 
 
 def _from_files(entry: MotionEntry, files: MotionFiles, options: Mapping[str, Any]) -> GroundMotion:

@@ -56,10 +56,8 @@ class LimitsSummary:
     @property
     def highest(self) -> tuple[str, str, float]:
         """Quantity, axis or actuator, and value of the governing utilisation."""
-        return max(
-            ((quantity, name, value) for quantity, row in self.utilisation.items() for name, value in row.items()),
-            key=lambda item: item[2],
-        )
+        rows = ((quantity, name, value) for quantity, row in self.utilisation.items() for name, value in row.items())
+        return max(rows, key=lambda item: item[2])
 
 
 class _Peak(NamedTuple):
@@ -101,26 +99,25 @@ def largest_scale(target: Target, limits: MotionLimits, actuator_check: Actuator
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
+
+    def exceeds(trial: float) -> bool:
+        peaks = _actuator_peaks(target, actuator_check, trial) if actuator_check else []
+        return any(peak.utilisation > _FULL for peak in peaks)
+
     factor = 1 / highest
-    if actuator_check is not None:
-
-        def exceeds(trial: float) -> bool:
-            return max(peak.utilisation for peak in _actuator_peaks(target, actuator_check, trial)) > _FULL
-
-        if exceeds(factor):
-            low, high = 0.0, factor
-            while high - low > 1e-4 * high:
-                middle = (low + high) / 2
-                low, high = (low, middle) if exceeds(middle) else (middle, high)
-            factor = low
+    if exceeds(factor):
+        low, high = 0.0, factor
+        while high - low > 1e-4 * high:
+            middle = (low + high) / 2
+            low, high = (low, middle) if exceeds(middle) else (middle, high)
+        factor = low
     return _round_down(factor * abs(target.reference.scale))
 
 
 def _clauses(over: Sequence[_Peak], time: np.ndarray) -> list[str]:
     """One clause per quantity: its governing axis or actuator in full, the others by name; axes first."""
-    ranked = sorted(over, key=lambda peak: (peak.quantity not in _QUANTITIES, -peak.utilisation))
     groups: dict[str, list[_Peak]] = {}
-    for peak in ranked:
+    for peak in sorted(over, key=lambda peak: (peak.quantity not in _QUANTITIES, -peak.utilisation)):
         groups.setdefault(peak.quantity, []).append(peak)
     clauses = []
     for quantity, (worst, *others) in groups.items():
@@ -132,14 +129,13 @@ def _clauses(over: Sequence[_Peak], time: np.ndarray) -> list[str]:
 
 def _axis_peaks(target: Target, limits: MotionLimits) -> list[_Peak]:
     peaks = []
-    for quantity in _QUANTITIES:
+    for quantity, per in zip(_QUANTITIES, ("", "/s", "/s^2"), strict=True):
         values = np.abs(getattr(target, quantity))
         for i, axis in enumerate(AXES):
             sample = int(np.argmax(values[:, i]))
             value, limit = float(values[sample, i]), float(getattr(limits, quantity)[i])
-            unit = _unit(quantity, rotation=i >= 3)
-            text = f"{value:.4g} {unit} against {limit:.4g} {unit}"
-            peaks.append(_Peak(quantity, axis, value / limit, sample, text))
+            unit = ("m" if i < 3 else "rad") + per
+            peaks.append(_Peak(quantity, axis, value / limit, sample, f"{value:.4g} {unit} against {limit:.4g} {unit}"))
     return peaks
 
 
@@ -158,11 +154,6 @@ def _actuator_peaks(target: Target, actuator_check: ActuatorCheck, factor: float
             share = f"{100 * value:.4g} %" if np.isfinite(value) else "infinitely many times"
             peaks.append(_Peak(quantity, name, value, sample, f"{share} {of}"))
     return peaks
-
-
-def _unit(quantity: str, rotation: bool) -> str:
-    length = "rad" if rotation else "m"
-    return {"displacement": length, "velocity": f"{length}/s", "acceleration": f"{length}/s^2"}[quantity]
 
 
 def _round_down(value: float) -> float:

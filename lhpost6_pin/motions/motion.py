@@ -1,5 +1,6 @@
-"""What a ground motion is: six channels at a uniform time step, accelerations or displacements, in SI."""
+"""A ground motion: six channels at a uniform time step, accelerations or displacements, in SI."""
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ from ..core.names import AXES
 
 __all__ = ["AXES", "QUANTITIES", "GroundMotion", "make_motion"]
 
+_log = logging.getLogger(__name__)
+
 QUANTITIES = ("acceleration", "displacement")
 
 
@@ -17,7 +20,7 @@ class GroundMotion:
     """A ground motion as recorded or generated, before any processing for the table.
 
     `samples` has shape (n, 6) in the order of `AXES`: accelerations [m/s^2, rad/s^2] or displacements
-    [m, rad] as `quantity` says; rotations are Euler angles and their second derivatives. Sample j is at
+    [m, rad] according to `quantity`; rotations are Euler angles and their second derivatives. Sample j is at
     time j `time_step` [s]. The array is made read-only.
 
     Raises MotionError for a wrong shape, a value that is not finite, or an impossible time step.
@@ -30,7 +33,7 @@ class GroundMotion:
     source: str
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a motion."""
+        """Check quantity, time step and samples."""
         if self.quantity not in QUANTITIES:
             raise MotionError(f"{self.name}: quantity is {self.quantity!r}; use one of {', '.join(QUANTITIES)}")
         if not (np.isfinite(self.time_step) and self.time_step > 0):
@@ -71,14 +74,14 @@ class GroundMotion:
 def make_motion(
     name: str, time_step: float, channels: dict[str, np.ndarray], quantity: str, source: str
 ) -> GroundMotion:
-    """Motion from channels (n,) by axis name; the axes not named stay still."""
+    """Motion from channels (n,) by axis name, cut to the shortest with a warning; the other axes do not move."""
     unknown = sorted(set(channels) - set(AXES))
     if unknown:
         raise MotionError(f"{name}: no axis {', '.join(unknown)}; axes are {', '.join(AXES)}")
-    lengths = {axis: len(channel) for axis, channel in channels.items()}
-    if len(set(lengths.values())) != 1:
-        raise MotionError(f"{name}: channels differ in length: {lengths}; give channels of one length")
-    samples = np.zeros((next(iter(lengths.values())), len(AXES)))
+    count = min(map(len, channels.values()))
+    if any(len(channel) > count for channel in channels.values()):
+        _log.warning("%s: channels differ in length; cut to %d samples", name, count)
+    samples = np.zeros((count, len(AXES)))
     for axis, channel in channels.items():
-        samples[:, AXES.index(axis)] = channel
+        samples[:, AXES.index(axis)] = channel[:count]
     return GroundMotion(name, time_step, samples, quantity, source)

@@ -1,4 +1,4 @@
-"""Options of the motions made by name: what there is to choose, and refusal of values that cannot be."""
+"""Options of the motions made by name, and checks of their values."""
 
 import math
 from collections.abc import Mapping
@@ -14,7 +14,6 @@ __all__ = ["MotionOption", "checked_options", "options_of"]
 
 _MAY_BE_ZERO = ("height_ratio", "seed")
 _WHOLE = ("seed",)
-_SWITCH = {"true": True, "false": False}
 
 
 class MotionOption(NamedTuple):
@@ -37,7 +36,7 @@ def options_of(tests: dict[str, Any], section: str) -> tuple[MotionOption, ...]:
 
 
 def checked_options(name: str, defaults: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of motion `name`, each of the kind of its default and possible by itself.
+    """Options of motion `name`, each of the type of its default and possible by itself.
 
     Lists may be given as text, "0.5, 0.5, 0.9"; switches as "true" or "false". Raises MotionError naming the
     option whose value is not a finite positive number (zero where that makes sense), axis or switch.
@@ -48,40 +47,33 @@ def checked_options(name: str, defaults: Mapping[str, Any], options: Mapping[str
 def _checked(where: str, key: str, default: Any, value: Any) -> Any:
     problem = f"{where} is {value!r}; give"
     if isinstance(default, bool):
-        switch = _SWITCH.get(str(value).lower())
-        if switch is None:
+        if str(value).lower() not in ("true", "false"):
             raise MotionError(f"{problem} true or false")
-        return switch
+        return str(value).lower() == "true"
     if isinstance(default, str):
         if value not in AXES:
             raise MotionError(f"{problem} one of {', '.join(AXES)}")
         return value
     if isinstance(default, list):
-        numbers = _numbers(value)
-        if len(numbers) not in (1, len(default)) or not all(math.isfinite(number) and number > 0 for number in numbers):
+        items = value.split(",") if isinstance(value, str) else np.ravel(np.asarray(value, dtype=object))
+        numbers = [_number(item) for item in items]
+        if len(numbers) not in (1, len(default)) or not all(0 < number < math.inf for number in numbers):
             raise MotionError(f"{problem} {len(default)} finite positive numbers, or one for all")
         return numbers * len(default) if len(numbers) == 1 else numbers
     least = "zero or more" if key in _MAY_BE_ZERO else "above zero"
-    kind = "whole" if key in _WHOLE else "finite"
     number = math.nan if isinstance(value, str) else _number(value)
-    possible = math.isfinite(number) and (number > 0 or (number == 0 and key in _MAY_BE_ZERO))
+    possible = 0 < number < math.inf or (number == 0 and key in _MAY_BE_ZERO)
     if not possible or (key in _WHOLE and not number.is_integer()):
-        raise MotionError(f"{problem} a {kind} number, {least}")
+        raise MotionError(f"{problem} a {'whole' if key in _WHOLE else 'finite'} number, {least}")
     return int(number) if key in _WHOLE else value
 
 
 def _number(value: Any) -> float:
-    """Value as a number; not-a-number where it is none."""
+    """Value as a number; NaN where it is none."""
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
-
-
-def _numbers(value: Any) -> list[float]:
-    """Numbers of a scalar, a sequence or a text with commas."""
-    items = value.split(",") if isinstance(value, str) else np.ravel(np.asarray(value, dtype=object))
-    return [_number(item) for item in items]
 
 
 def _text(value: Any) -> str:

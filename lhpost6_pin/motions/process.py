@@ -1,4 +1,4 @@
-"""From a ground motion to what the table is asked to do: displacement, velocity and acceleration targets.
+"""From a ground motion to a target of the table: displacement, velocity and acceleration.
 
 One Fourier series carries all three: with the motion's spectrum A(f), a zero-phase band-pass
 H(f) = 1 / (1 + (f_high/f)^2n) / (1 + (f/f_low)^2m) and D = -H A / (2 pi f)^2, the series for D, 2 pi i f D
@@ -8,7 +8,7 @@ continuous derivatives then brings the displacement to rest at both ends; veloci
 the product rule, (w d)' and (w d)'', so they stay consistent.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 
@@ -21,14 +21,13 @@ from .toml import load_toml, values_of
 
 __all__ = ["Reference", "Target", "axes_map", "make_target", "smooth_step", "with_scale"]
 
-
 _MOST = 2**24
 """Samples that a target may have: more than two hours at 2048 Hz, and 0.8 GB an array."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What was done to the motion to make a target of it."""
+    """Processing by which a target was made from a motion."""
 
     motion: str
     source: str
@@ -100,19 +99,19 @@ def make_target(
 
     `scale` multiplies it, `axes` selects and permutes (see `axes_map`; all axes by default), `window`
     (begin, end) [s] cuts a part of it. Corners [Hz] of the zero-phase band-pass default to the values in
-    `models/ground_motions/tests.toml`; a displacement motion is not high-passed unless asked. The record is
+    `models/ground_motions/tests.toml`; a displacement motion is not high-passed by default. The record is
     extended by `pad` [s] at both ends, over which the target comes from and goes to rest. `rate` is the
     controller's [1/s].
 
     Raises MotionError for a window, corner or scale that makes no sense, or numbers too large to compute with.
     """
     settings = _settings()
-    acceleration_given = motion.quantity == "acceleration"
+    integrated = motion.quantity == "acceleration"
     if high_pass is None:
-        high_pass = settings["high_pass"] if acceleration_given else 0.0
+        high_pass = settings["high_pass"] if integrated else 0.0
     low_pass = settings["low_pass"] if low_pass is None else low_pass
     pad = settings["pad"] if pad is None else pad
-    pairs = axes_map(axes) if axes is not None else tuple((axis, axis) for axis in AXES)
+    pairs = axes_map(",".join(AXES) if axes is None else axes)
     if not np.isfinite(scale):
         raise MotionError(f"{motion.name}: scale is {scale}; give a finite number")
     if not (0 <= high_pass < low_pass < rate / 2 and pad > 0):
@@ -120,14 +119,14 @@ def make_target(
             f"{motion.name}: high-pass {high_pass:g} Hz, low-pass {low_pass:g} Hz and {pad:g} s of padding; "
             f"need 0 <= high-pass < low-pass < {rate / 2:g} Hz and some padding"
         )
-    if acceleration_given and high_pass <= 0:
+    if integrated and high_pass <= 0:
         raise MotionError(f"{motion.name}: an acceleration needs a positive high-pass corner to integrate")
     first, last = _cut(motion, window)
     channels = np.zeros((last - first, len(AXES)))
     for axis, channel in pairs:
         channels[:, AXES.index(axis)] = scale * motion.samples[first:last, AXES.index(channel)]
     _refuse_infinite(motion.name, scale, channels)
-    given = [axis for axis, samples in zip(AXES, motion.samples.T, strict=True) if samples.any()]
+    given = motion.axes
     if given and not any(channel in given for _, channel in pairs):
         raise MotionError(
             f"{motion.name}: moves {', '.join(given)} only, of which axes {axes!r} leave nothing; "
@@ -135,51 +134,46 @@ def make_target(
         )
     step = Fraction(motion.time_step * rate).limit_denominator(10_000)  # in samples of the target
     memory = max(settings["memory"] / high_pass if high_pass else 0.0, 2 * pad)
-    _refuse_endless(motion, (last - first) * motion.time_step + 2 * memory, rate)
+    span = (last - first) * motion.time_step + 2 * memory
+    if max(span / motion.time_step, span * rate) > _MOST:
+        raise MotionError(
+            f"{motion.name}: {span:g} s with a time step of {motion.time_step:g} s are more than {_MOST} samples; "
+            "correct the time step, or cut a window"
+        )
     # both the record's first sample and the period fall on samples of the target
     ends = _multiple(round(memory / motion.time_step) + 1, step.denominator)
     total = _multiple(len(channels) + 2 * ends, step.denominator)
-    if acceleration_given:
+    if integrated:
         extended = _extend_acceleration(channels, ends, total, round(settings["taper"] / motion.time_step))
     else:
         extended = _extend_displacement(channels, ends, total)
-    series = _filtered_displacement(extended, motion.time_step, acceleration_given, high_pass, low_pass, settings)
-    begin = int(ends * step) - round(pad * rate)
-    count = round((len(channels) - 1) * float(step)) + 2 * round(pad * rate) + 1
-    size = int(total * step)
-    angular = 2 * np.pi * np.fft.rfftfreq(total, motion.time_step)[:, None]
+    frequency = np.fft.rfftfreq(total, motion.time_step)[:, None]
+    series = np.fft.rfft(extended, axis=0) * _gain(frequency, high_pass, low_pass, settings)
+    if total % 2 == 0:
+        series[-1] = 0  # the highest frequency has no derivative in a real series
+    if integrated:
+        series = -series / (2 * np.pi * np.where(frequency == 0, np.inf, frequency)) ** 2
+    lead = round(pad * rate)
+    begin, count = int(ends * step) - lead, round((len(channels) - 1) * float(step)) + 2 * lead + 1
+    size, angular = int(total * step), 2 * np.pi * frequency
     d, v, a = (
         _evaluate(series * factor, total, size)[begin : begin + count] for factor in (1.0, 1j * angular, -(angular**2))
     )
-    w, w1, w2 = _rest_window(count, round(pad * rate), rate)
+    w, w1, w2 = _rest_window(count, lead, rate)
     moved = np.isin(AXES, [axis for axis, _ in pairs])
-    reference = Reference(
-        motion.name,
-        motion.source,
-        scale,
-        pairs,
-        high_pass,
-        low_pass,
-        first * motion.time_step - round(pad * rate) / rate,
-    )
-    displacement = np.where(moved, w * d, 0.0)
-    velocity = np.where(moved, w1 * d + w * v, 0.0)
-    acceleration = np.where(moved, w2 * d + 2 * w1 * v + w * a, 0.0)
+    products = (w * d, w1 * d + w * v, w2 * d + 2 * w1 * v + w * a)
+    displacement, velocity, acceleration = (np.where(moved, x, 0.0) for x in products)
     _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
+    start = first * motion.time_step - lead / rate
+    reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start)
     return Target(np.arange(count) / rate, displacement, velocity, acceleration, reference)
 
 
 def with_scale(target: Target, scale: float) -> Target:
     """Copy of a target at another `scale` of its motion (the processing is linear)."""
     factor = scale / target.reference.scale
-    reference = Reference(**{**target.reference.__dict__, "scale": scale})
-    return Target(
-        target.time,
-        factor * target.displacement,
-        factor * target.velocity,
-        factor * target.acceleration,
-        reference,
-    )
+    rows = {key: factor * getattr(target, key) for key in ("displacement", "velocity", "acceleration")}
+    return replace(target, reference=replace(target.reference, scale=scale), **rows)
 
 
 def smooth_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -194,22 +188,13 @@ def _refuse_infinite(name: str, scale: float, *arrays: np.ndarray) -> None:
         raise MotionError(f"{name}: at scale {scale:g} its samples are too large to compute with; give a smaller scale")
 
 
-def _refuse_endless(motion: GroundMotion, span: float, rate: float) -> None:
-    """Refuse a time step with which some `span` [s] would need more samples than memory holds."""
-    if max(span / motion.time_step, span * rate) > _MOST:
-        raise MotionError(
-            f"{motion.name}: {span:g} s with a time step of {motion.time_step:g} s are more than {_MOST} samples; "
-            "correct the time step, or cut a window"
-        )
-
-
 def _multiple(count: int, of: int) -> int:
     """Smallest multiple of `of` that is at least `count`."""
     return -(-count // of) * of
 
 
 def _cut(motion: GroundMotion, window: tuple[float, float] | None) -> tuple[int, int]:
-    """First sample and one past the last of the part asked for."""
+    """First sample of the window and one past its last."""
     if window is None:
         return 0, len(motion.samples)
     begin, end = window
@@ -247,27 +232,13 @@ def _extend_displacement(channels: np.ndarray, ends: int, total: int) -> np.ndar
     return extended
 
 
-def _filtered_displacement(
-    extended: np.ndarray,
-    time_step: float,
-    acceleration_given: bool,
-    high_pass: float,
-    low_pass: float,
-    settings: dict[str, float],
-) -> np.ndarray:
-    """Fourier coefficients of the displacement (total//2 + 1, 6)."""
-    frequency = np.fft.rfftfreq(len(extended), time_step)[:, None]
+def _gain(frequency: np.ndarray, high_pass: float, low_pass: float, settings: dict[str, float]) -> np.ndarray:
+    """Gain of the zero-phase band-pass."""
     gain = 1 / (1 + (frequency / low_pass) ** (2 * settings["low_pass_order"]))
     if high_pass:
         ratio = (frequency / high_pass) ** (2 * settings["high_pass_order"])
         gain = gain * ratio / (1 + ratio)
-    spectrum = np.fft.rfft(extended, axis=0) * gain
-    if len(extended) % 2 == 0:
-        spectrum[-1] = 0  # the highest frequency has no derivative in a real series
-    if acceleration_given:
-        frequency[0] = np.inf
-        spectrum = -spectrum / (2 * np.pi * frequency) ** 2
-    return spectrum
+    return gain
 
 
 def _evaluate(series: np.ndarray, total: int, size: int) -> np.ndarray:

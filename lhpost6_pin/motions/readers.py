@@ -1,4 +1,4 @@
-"""Reading a ground-motion file of any kind the package knows."""
+"""Reading a ground-motion file of any supported kind."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
@@ -19,7 +19,7 @@ MotionFiles = Path | str | Sequence[Path | str] | Mapping[str, Path | str]
 
 
 def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
-    """Read a motion from a PEER .AT2, COSMOS/CSMIP V1 or CSV file, told apart by what is in it.
+    """Read a motion from a PEER .AT2, COSMOS/CSMIP V1 or CSV file, recognised by its content.
 
     Several paths (a sequence for x, y, z or a mapping by axis) are components in PEER files; one alone may hold all
     axes. `options` go to the reader of the kind found: `load_at2`, `load_v1` or `load_csv`.
@@ -31,7 +31,7 @@ def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
     if not isinstance(paths, str | Path):
         return _call(load_at2, paths, options)
     text = read_text(paths)
-    suffix = Path(paths).suffix.lower()  # where the content is not enough, its reader says what is missing
+    suffix = Path(paths).suffix.lower()  # an incomplete file is refused by the reader of its suffix
     if is_at2(text) or suffix == ".at2":
         return _call(load_at2, paths, options)
     if is_v1(text) or suffix in (".v1", ".raw"):
@@ -46,11 +46,11 @@ _KINDS: dict[str, tuple[Any, str]] = {
     "columns": (Mapping, "columns by axis from Python, or name the axes in the file's header"),
     "channels": (Mapping, "axes by channel from Python"),
 }
-"""What options of readers are, and what to give."""
+"""Types of the readers' options, in Python and in words."""
 
 
 def _call(reader: Any, paths: Any, options: dict[str, Any]) -> GroundMotion:
-    """Read, or say which options this kind of file takes."""
+    """Read; raises MotionError for options that the reader does not take."""
     known = set(reader.__kwdefaults__)
     unknown = sorted(set(options) - known)
     if unknown:

@@ -27,24 +27,19 @@ def parse_numbers(lines: Sequence[str], where: str, first_line: int) -> np.ndarr
     try:
         return np.array(" ".join(lines).split(), dtype=float)
     except ValueError:
-        for number, line in enumerate(lines, first_line):
-            for token in line.split():
-                _number(token, where, number)
-        raise  # unreachable: one of the tokens is at fault
+        return np.array(
+            [_number(token, where, k) for k, line in enumerate(lines, first_line) for token in line.split()]
+        )
 
 
 def parse_fixed_width(lines: Sequence[str], width: int, where: str, first_line: int) -> np.ndarray:
     """Numbers in columns of `width` characters (n,), as Fortran writes them: without blanks where full."""
     values = [
-        _number(field, where, number)
-        for number, line in enumerate(lines, first_line)
-        for field in _fields(line.rstrip(), width)
+        _number(line[start : start + width], where, number)
+        for number, line in enumerate(map(str.rstrip, lines), first_line)
+        for start in range(0, len(line), width)
     ]
     return np.array(values, dtype=float)
-
-
-def _fields(line: str, width: int) -> list[str]:
-    return [line[start : start + width] for start in range(0, len(line), width)]
 
 
 def _number(token: str, where: str, line: int) -> float:

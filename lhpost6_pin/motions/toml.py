@@ -9,9 +9,6 @@ from ..core.files import read_toml
 __all__ = ["load_toml", "si_unit", "values_of"]
 
 
-_SI = ("", "1", "m", "m/s", "m/s^2", "rad", "s", "Hz")  # "" for texts and switches
-
-
 def load_toml(path: "Path | str") -> dict[str, Any]:
     """Contents of a TOML file; raises MotionError naming the file and line."""
     try:
@@ -28,7 +25,10 @@ def values_of(table: dict[str, Any], section: str) -> dict[str, Any]:
             found[key] = entry
             continue
         try:
-            found[key] = _si(entry["value"], entry["unit"])
+            value, factor = entry["value"], _to_si(entry["unit"])[0]
+            if factor != 1.0:
+                value = [factor * item for item in value] if isinstance(value, list) else factor * value
+            found[key] = value
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise MotionError(f"tests.toml, [{section}] {key}: {error!r}; write {{ value, unit, source }}") from error
     return found
@@ -36,20 +36,14 @@ def values_of(table: dict[str, Any], section: str) -> dict[str, Any]:
 
 def si_unit(unit: str) -> str:
     """SI unit that a value given in `unit` is converted to."""
-    if unit in _SI:
-        return unit
+    return _to_si(unit)[1]
+
+
+def _to_si(unit: str) -> tuple[float, str]:
+    """Factor to SI base units, and their product."""
+    if unit in ("", "1", "m", "m/s", "m/s^2", "rad", "s", "Hz"):  # "" for texts and switches
+        return 1.0, unit
     import pint
 
-    base = pint.get_application_registry().Quantity(1.0, unit).to_base_units().units
-    return f"{base:~C}".replace("**", "^")
-
-
-def _si(value: Any, unit: str) -> Any:
-    """Value or list of values in SI base units."""
-    if unit in _SI:
-        return value
-    import pint
-
-    registry = pint.get_application_registry()
-    factor = float(registry.Quantity(1.0, unit).to_base_units().magnitude)
-    return [factor * item for item in value] if isinstance(value, list) else factor * value
+    one = pint.get_application_registry().Quantity(1.0, unit).to_base_units()
+    return float(one.magnitude), f"{one.units:~C}".replace("**", "^")

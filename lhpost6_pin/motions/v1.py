@@ -5,7 +5,6 @@ Fortran format), the data in fixed-width columns, and an end line. The CSMIP for
 the announcement; the COSMOS form (v01.20) gives the interval in the real header (value 62 [ms], else 34 [s]).
 """
 
-import logging
 import re
 from collections.abc import Iterator, Mapping
 from itertools import takewhile
@@ -16,12 +15,11 @@ import numpy as np
 
 from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
-from .motion_units import to_si
+from .motion_units import acceleration_in_si
 from .text import parse_fixed_width, read_text
 
 __all__ = ["V1Channel", "is_v1", "load_v1", "make_v1_motion", "parse_v1"]
 
-_log = logging.getLogger(__name__)
 _WIDEST = 200  # characters of a header line that are looked at
 _FORMAT = r"Format\s*[:=]?\s*\(\s*(?P<per_line>\d{1,3})[FIEfie](?P<width>\d{1,2})"
 _HEADER = re.compile(
@@ -42,7 +40,7 @@ class V1Channel(NamedTuple):
     """One channel of a Volume 1 file."""
 
     number: int
-    orientation: str  # "90", "360", "up", "down" or what the file says
+    orientation: str  # "90", "360", "up", "down", or as in the file
     time_step: float  # [s]
     acceleration: np.ndarray  # (n,) [m/s^2]
 
@@ -74,36 +72,22 @@ def make_v1_motion(
     channels: "Mapping[int, str] | None" = None,
     name: str | None = None,
 ) -> GroundMotion:
-    """One motion from the channels of a file, cut to the shortest channel with a warning."""
+    """One motion from the channels of a file."""
     by_axis: dict[str, np.ndarray] = {}
     steps = {channel.time_step for channel in found}
     if len(steps) != 1:
         raise MotionError(f"{where}: channels have different time steps {sorted(steps)} s; give channels of one rate")
-    if channels:
-        missing = sorted(set(channels) - {channel.number for channel in found})
-        if missing:
-            have = ", ".join(str(channel.number) for channel in found)
-            raise MotionError(f"{where}: no channel {missing[0]}; the file has {have}")
+    numbers = [channel.number for channel in found]
+    if missing := sorted(set(channels or ()) - set(numbers)):
+        raise MotionError(f"{where}: no channel {missing[0]}; the file has {', '.join(map(str, numbers))}")
     for channel in found:
-        if channels is None:
-            axis, sign = _axis(channel, where)
-        elif channel.number in channels:
-            axis, sign = channels[channel.number], 1
-        else:
+        if channels and channel.number not in channels:
             continue
+        axis, sign = (channels[channel.number], 1) if channels else _axis(channel, where)
         if axis in by_axis:
             raise MotionError(f"{where}, channel {channel.number}: a second channel for axis {axis}; {_CHOOSE}")
         by_axis[axis] = sign * channel.acceleration
-    shortest = min(map(len, by_axis.values()))
-    if any(len(channel) > shortest for channel in by_axis.values()):
-        _log.warning("%s: channels differ in length; cut to %d samples", where, shortest)
-    return make_motion(
-        name or Path(where).stem,
-        steps.pop(),
-        {axis: channel[:shortest] for axis, channel in by_axis.items()},
-        "acceleration",
-        f"V1 file {Path(where).name}",
-    )
+    return make_motion(name or Path(where).stem, steps.pop(), by_axis, "acceleration", f"V1 file {Path(where).name}")
 
 
 def parse_v1(text: str, where: str) -> "list[V1Channel]":
@@ -138,14 +122,10 @@ def _channels(lines: "list[str]", where: str) -> Iterator[V1Channel]:
             if len(values) != count:
                 raise MotionError(
                     f"{here}, line {at}: announces {count} points, {len(values)} follow; "
-                    "the file is damaged: fetch it again"
+                    "the file is damaged: download it again"
                 )
-            yield V1Channel(
-                number,
-                _orientation(label, headers),
-                _step(data, headers, here, at),
-                _si(values, data, here, at),
-            )
+            step = _step(data, headers, here, at)
+            yield V1Channel(number, _orientation(label, headers), step, _si(values, data, here, at))
             at, headers, label = at + len(rows), {}, None
         elif channel := _CHANNEL.search(line):
             label = label or channel
@@ -179,13 +159,7 @@ def _si(values: np.ndarray, data: "re.Match[str]", where: str, line: int) -> np.
     unit = _UNIT.search(data["about"])
     if unit is None:
         raise MotionError(f"{where}, line {line}: no unit announced; convert the file to CSV")
-    try:
-        values, quantity = to_si(values, unit[1], "x")
-    except MotionError as error:
-        raise MotionError(f"{where}, line {line}: {error}; raw counts need a V1 file in g or cm/s^2") from None
-    if quantity != "acceleration":
-        raise MotionError(f"{where}, line {line}: unit {unit[1]!r} is not an acceleration")
-    return values
+    return acceleration_in_si(values, unit[1], f"{where}, line {line}", "raw counts need a V1 file in g or cm/s^2")
 
 
 def _orientation(label: "re.Match[str] | None", headers: "dict[str, np.ndarray]") -> str:

@@ -1,6 +1,7 @@
 """Measured tests from data files of any usual format into records, and records out again.
 
-`load_raw` reads a file, `guess_map` or `load_map` says what its columns are, `make_imported_record` makes the record.
+`load_raw` reads a file, `guess_map` or `load_map` assigns its columns to channels, `make_imported_record` makes the
+record.
 """
 
 from .build import described_sources, make_imported_record

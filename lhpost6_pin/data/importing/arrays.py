@@ -1,15 +1,16 @@
 """From named arrays, as MATLAB, HDF5 and TDMS files hold them, to channels: one `RawTest` for each sampling."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import RecordError
 from .channel_units import si_factor, time_unit, unit_in_name
-from .raw import Array, RawTest, make_raw
+from .raw import RawTest, make_raw
 
 __all__ = ["Leaf", "leaves_of", "raws_of_leaves"]
 
@@ -19,7 +20,7 @@ _NAMES, _UNITS = ("columns", "names", "channels", "labels", "label", "desc", "na
 
 
 class Leaf(NamedTuple):
-    """An array of a file: where it is, what it says of itself, and its columns (n,) or (n, k)."""
+    """An array (n,) or (n, k) of a file: its place, attributes, and names of its columns."""
 
     group: tuple[str, ...]
     name: str
@@ -30,7 +31,7 @@ class Leaf(NamedTuple):
 
 
 def leaves_of(tree: Mapping[str, Any], group: tuple[str, ...] = ()) -> tuple[list[Leaf], dict[str, str]]:
-    """Arrays in a tree of named values, with the step, names and units that stand beside them; and its texts."""
+    """Arrays in a tree of named values, with the step, names and units beside them; and its texts."""
     leaves: list[Leaf] = []
     facts: dict[str, str] = {}
     step, names, units = _step(tree), _texts(tree, _NAMES), _texts(tree, _UNITS)
@@ -40,9 +41,9 @@ def leaves_of(tree: Mapping[str, Any], group: tuple[str, ...] = ()) -> tuple[lis
         if isinstance(value, list | tuple) and value and all(isinstance(item, Mapping) for item in value):
             value = {f"{k + 1}": item for k, item in enumerate(value)}
         if isinstance(value, Mapping):
-            found, said = leaves_of(value, (*group, name))
+            found, texts = leaves_of(value, (*group, name))
             leaves += [leaf._replace(step=leaf.step or step) for leaf in found]
-            facts |= said
+            facts |= texts
         elif isinstance(value, str):
             facts[name] = value
         elif _is_array(value):
@@ -54,40 +55,33 @@ def leaves_of(tree: Mapping[str, Any], group: tuple[str, ...] = ()) -> tuple[lis
     return leaves, facts
 
 
-def raws_of_leaves(leaves: Iterable[Leaf], source: str, form: str, facts: Mapping[str, str]) -> tuple[RawTest, ...]:
-    """Put arrays of one length and one time together.
+def raws_of_leaves(leaves: Sequence[Leaf], facts: Mapping[str, str], source: str, form: str) -> tuple[RawTest, ...]:
+    """One `RawTest` for all arrays of the same length and time.
 
     Time is an array named so, in the array's own group or the nearest above, or else its step. Raises RecordError if
     there are no channels.
     """
-    leaves = list(leaves)
     times = [leaf for leaf in leaves if time_unit(leaf.name, leaf.unit) and np.squeeze(leaf.values).ndim == 1]
     together: dict[tuple[Any, int], list[tuple[str, str | None, Array]]] = {}
     clocks: dict[Any, Array | None] = {}
-    for leaf in leaves:
-        if any(leaf is time for time in times):
-            continue
-        clock = _clock(leaf, times)
-        shape = np.squeeze(leaf.values).shape
+    for leaf in (leaf for leaf in leaves if not any(leaf is time for time in times)):
+        clock, shape = _clock(leaf, times), np.squeeze(leaf.values).shape
         if len(shape) not in (1, 2):
             continue
         length = clock.values.size if clock is not None else max(shape)
         key = (clock.group if clock is not None else leaf.step, length)
         if key not in clocks:
-            with np.errstate(over="ignore", invalid="ignore"):  # times without end are refused with their sample
+            with np.errstate(over="ignore", invalid="ignore"):  # infinite times are refused with their sample
                 steps = None if leaf.step is None else leaf.step * np.arange(length)
             clocks[key] = steps if clock is None else _seconds(clock, source)
         together.setdefault(key, []).extend(_columns(leaf, length))
     if not together:
         raise RecordError(f"{source}: holds no array of samples; a test is one or more arrays along time")
-    return tuple(
-        make_raw(source, form, [c[0] for c in cols], [c[1] for c in cols], _beside(cols), clocks[key], facts)
-        for key, cols in together.items()
-    )
-
-
-def _beside(columns: Sequence[tuple[str, str | None, Array]]) -> Array:
-    return np.column_stack([values for _, _, values in columns])
+    found = []
+    for key, columns in together.items():
+        names, units, values = zip(*columns, strict=True)
+        found.append(make_raw(source, form, names, units, np.column_stack(values), clocks[key], facts))
+    return tuple(found)
 
 
 def _columns(leaf: Leaf, length: int) -> list[tuple[str, str | None, Array]]:

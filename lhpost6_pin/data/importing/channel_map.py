@@ -1,4 +1,4 @@
-"""The channel map: a TOML file that says which column of a data file is which channel of a record.
+"""The channel map: a TOML file that assigns columns of data files to channels of a record.
 
 [test]
 name = "EQ1"
@@ -33,10 +33,10 @@ Labels = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel comes from: a column, or a number that it is known to be.
+    """Source of a channel: a column, or a known constant.
 
     Its value in SI is sign · gain · (column + offset), offset in the column's unit. `column` is a name, a pattern
-    (`Long*fbk`) or the column's number from 1; `file` a pattern for the file's name. Without `unit` the file's holds.
+    (`Long*fbk`) or the column's number from 1; `file` a pattern for the file's name. The default `unit` is the file's.
     """
 
     column: str | int | None = None
@@ -50,14 +50,14 @@ class Source:
 
 @dataclass(frozen=True)
 class TestFacts:
-    """What the files do not say about a test."""
+    """Facts about a test that its files lack."""
 
     name: str | None = None  # else the first file's name
     kind: str = "measured"
     valves_per_horizontal_actuator: int = 1
     specimen: str = "none"
     rate: float | None = None  # [Hz] of the record; else the highest of the files
-    file_rate: float | None = None  # [Hz] of files that do not say theirs
+    file_rate: float | None = None  # [Hz] of files without time
     fill_gaps: int = 0  # longest run of missing samples that is interpolated
 
     __test__ = False  # no test of pytest's
@@ -83,14 +83,15 @@ def load_map(path: Path | str) -> ChannelMap:
     except ValueError as error:  # of TOML and of UTF-8
         raise RecordError(f"{origin}: not a TOML file: {error}") from None
     _known(tree, ("test", "channel"), origin)
-    for section in ("test", "channel"):
-        if not isinstance(tree.get(section, {}), dict):
-            raise RecordError(f"{origin}: {section} must be a section [{section}]")
-    if not tree.get("channel"):
+    sections: dict[str, Any] = {"test": {}, "channel": {}, **tree}
+    for name, section in sections.items():
+        if not isinstance(section, dict):
+            raise RecordError(f"{origin}: {name} must be a section [{name}]")
+    if not sections["channel"]:
         raise RecordError(f"{origin}: [channel] names no channel; --guess writes a first map")
-    test = _typed(TestFacts, tree.get("test", {}), f"{origin}, [test]")
+    test = _typed(TestFacts, sections["test"], f"{origin}, [test]")
     channels = {}
-    for name, entry in tree["channel"].items():
+    for name, entry in sections["channel"].items():
         where = f"{origin}, [channel] {name}"
         if not isinstance(entry, dict):
             raise RecordError(f'{where}: write {{ column = "...", unit = "..." }}')
@@ -114,8 +115,8 @@ def save_map(channels: ChannelMap, path: Path | str, remarks: Sequence[str] = ()
         "[channel]",
     ]
     for name, source in channels.channels.items():
-        said = {f.name: getattr(source, f.name) for f in fields(Source) if getattr(source, f.name) != f.default}
-        lines.append(f"{_toml(name)} = {{ {', '.join(f'{key} = {_toml(value)}' for key, value in said.items())} }}")
+        given = {f.name: getattr(source, f.name) for f in fields(Source) if getattr(source, f.name) != f.default}
+        lines.append(f"{_toml(name)} = {{ {', '.join(f'{key} = {_toml(value)}' for key, value in given.items())} }}")
     lines += ["", *(f"# {' '.join(remark.split())}" for remark in remarks)]
     with write_whole(path) as beside:
         beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -191,52 +192,47 @@ def channels_of(labels: Labels) -> dict[str, tuple[str, str | None]]:
 def check_map(channels: ChannelMap, labels: Labels) -> None:
     """Raise RecordError for a channel that no record of the machine has, or a variable with a channel missing."""
     known = channels_of(labels)
-    mapped: dict[str, list[str | None]] = {}
+    where = f"{channels.origin}, [channel]"
     for name in channels.channels:
         if name not in known:
-            variable = name.split("[")[0]
-            near = [other for other in known if other.split("[")[0] == variable]
-            valid = near or list(dict.fromkeys(v for v, _ in known.values()))
-            said = instead_of(name, valid)
-            raise RecordError(f"{channels.origin}, [channel] {name}: is no channel of a record; {said}")
-        variable, label = known[name]
-        mapped.setdefault(variable, []).append(label)
-    for variable, have in mapped.items():
-        missing = [label for v, label in known.values() if v == variable and label not in have]
+            near = [other for other in known if other.split("[")[0] == name.split("[")[0]]
+            valid = near or list(dict.fromkeys(variable for variable, _ in known.values()))
+            raise RecordError(f"{where} {name}: is no channel of a record; {instead_of(name, valid)}")
+    for variable in dict.fromkeys(known[name][0] for name in channels.channels):
+        every = {name: str(label) for name, (v, label) in known.items() if v == variable}
+        missing = [name for name in every if name not in channels.channels]
         if missing:
-            said = f"{variable} has {', '.join(map(str, have))}, but not {', '.join(map(str, missing))}"
-            unit = channel_unit(f"{variable}[{missing[0]}]")
+            have = ", ".join(label for name, label in every.items() if name not in missing)
+            lacks, unit = ", ".join(every[name] for name in missing), channel_unit(missing[0])
             raise RecordError(
-                f'{channels.origin}, [channel]: {said}; map them too, or give {{ constant = 0, unit = "{unit}" }} for '
-                f"what is known to be zero, or leave {variable} out"
+                f"{where}: {variable} has {have}, but not {lacks}; map them too, or omit {variable}, or give "
+                f'{{ constant = 0, unit = "{unit}" }} for what is known to be zero'
             )
 
 
 def find_column(source: Source, raws: Sequence[RawTest], where: str) -> tuple[int, int]:
-    """File and column that a source means; raises RecordError if there is none, or more than one."""
-    called = [Path(raw.source).name for raw in raws]
-    wanted_file = source.file or "*"
-    files = [k for k, name in enumerate(called) if name == wanted_file or fnmatch.fnmatchcase(name, wanted_file)]
+    """File and column of a source; raises RecordError if there is none, or more than one."""
+    files = [k for k, raw in enumerate(raws) if _like(Path(raw.source).name, source.file or "*")]
     if not files:
         raise RecordError(f"{where}: no file is called {source.file!r}; files are {shown([r.source for r in raws])}")
     if isinstance(source.column, int):
+        first = raws[files[0]]
         if len(files) > 1:
             raise RecordError(f'{where}: column {source.column} of which file? add file = "..."')
-        count = len(raws[files[0]].names)
-        if not 1 <= source.column <= count:
-            raise RecordError(f"{where}: no column {source.column}; {raws[files[0]].source} has 1 to {count}")
+        if not 1 <= source.column <= len(first.names):
+            raise RecordError(f"{where}: no column {source.column}; {first.source} has 1 to {len(first.names)}")
         return files[0], source.column - 1
     every = [(k, j, name) for k in files for j, name in enumerate(raws[k].names)]
-    wanted = str(source.column)
-    found = [(k, j) for k, j, name in every if name == wanted]
-    found = found or [(k, j) for k, j, name in every if fnmatch.fnmatchcase(name, wanted)]
+    wanted, names = str(source.column), [name for *_, name in every]
+    found = [(k, j) for k, j, name in every if (name == wanted if wanted in names else _like(name, wanted))]
     if len(found) == 1:
         return found[0]
     if not found:
-        named = shown([raws[k].source for k in files])
-        names = [name for *_, name in every]
-        raise RecordError(
-            f"{where}: no column {wanted!r} in {named}; {meant(wanted, names)}columns are {shown(names, 40)}"
-        )
+        near, files_ = meant(wanted, names), shown([raws[k].source for k in files])
+        raise RecordError(f"{where}: no column {wanted!r} in {files_}; {near}columns are {shown(names, 40)}")
     places = ", ".join(f"{Path(raws[k].source).name} column {j + 1} {raws[k].names[j]!r}" for k, j in found[:6])
     raise RecordError(f'{where}: {wanted!r} could be any of {places}; give the column\'s number, or file = "..."')
+
+
+def _like(name: str, pattern: str) -> bool:
+    return name == pattern or fnmatch.fnmatchcase(name, pattern)

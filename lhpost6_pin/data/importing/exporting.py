@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ...core.arrays import Array
 from ...core.errors import RecordError, UnknownNameError
 from ...core.files import write_whole
-from ..channels import LAYOUT_VERSION, channel_name, channel_unit
+from ..channels import LAYOUT_VERSION, channel_name, channel_unit, columns_of
 from ..layout_faults import layout_faults
-from .raw import Array
+from .raw import need_package
 
 __all__ = ["FORMATS", "channel_units", "export_record"]
 
@@ -24,9 +25,8 @@ def channel_units(record: xr.Dataset) -> Iterator[tuple[str, str, Array]]:
     for variable in record.data_vars.values():
         if variable.dims[:1] != ("time",) or variable.ndim > 2 or variable.dtype.kind not in "fiu":
             continue
-        table = variable.values.reshape(len(variable), -1).astype(float)
         units = str(variable.attrs.get("units", "-"))
-        for k, values in enumerate(table.T):
+        for k, values in enumerate(columns_of(variable).T):
             channel = channel_name(variable, k)
             yield channel, channel_unit(channel, units) or "-", values
 
@@ -60,10 +60,7 @@ def _write_csv(columns: dict[str, Array], facts: dict[str, str], path: Path) -> 
 
 
 def _write_parquet(columns: dict[str, Array], facts: dict[str, str], path: Path) -> None:
-    try:
-        import pyarrow  # noqa: F401  # what pandas writes Parquet with
-    except ModuleNotFoundError as error:
-        raise RecordError(f"{path}: writing Parquet needs pyarrow: pip install 'lhpost6-pin[formats]'") from error
+    need_package("pyarrow", f"{path}: writing Parquet")
     import pandas as pd
 
     table = pd.DataFrame(columns)

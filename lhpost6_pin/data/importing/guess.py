@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from ...core.errors import RecordError
 from ...core.names import AXES
+from ...core.units import quantity_unit
 from ..channels import channel_unit
 from .channel_map import ChannelMap, Source, TestFacts, channels_of
-from .channel_units import quantity_unit, without_unit
+from .channel_units import without_unit
 from .raw import RawTest, shown
 
 __all__ = ["Guess", "guess_map", "is_export"]
@@ -59,7 +60,7 @@ class Guess(NamedTuple):
 
 
 def is_export(raws: Sequence[RawTest]) -> bool:
-    """Whether the files were written by `export_record` or are records: their columns say what they are."""
+    """Whether the files were written by `export_record` or are records, whose columns are named by channel."""
     return all("layout_version" in raw.facts for raw in raws)
 
 
@@ -117,7 +118,7 @@ def _test(facts: Mapping[str, str]) -> TestFacts:
 
 # --------------------------------------------------------------------------------------------- names
 def _channel(name: str, unit: str | None, labels: Labels, known: Mapping[str, tuple[str, str | None]]) -> str | None:
-    """Channel that a column is named like; None if it is like none, or its unit says otherwise."""
+    """Channel of a column by its name; None if there is none, or its unit does not fit."""
     plain = without_unit(name)
     own = next((c for c, (v, label) in known.items() if plain in (c, v if label is None else f"{v}_{label}")), None)
     if own:

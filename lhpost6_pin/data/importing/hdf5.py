@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import RecordError
 from ..records import DEFLATE_LIMIT
 from .arrays import Leaf, leaves_of, raws_of_leaves
 from .raw import RawTest
@@ -14,35 +13,29 @@ from .raw import RawTest
 __all__ = ["read_hdf5", "read_netcdf3", "text_of", "values_of"]
 
 
-def read_hdf5(content: bytes, source: str) -> tuple[RawTest, ...]:
-    """Read an HDF5 or netCDF-4 file; raises RecordError naming the file."""
+def read_hdf5(content: bytes, source: str, form: str) -> tuple[RawTest, ...]:
+    """Read an HDF5 or netCDF-4 file."""
     import h5py
 
     leaves: list[Leaf] = []
-    try:
-        with h5py.File(BytesIO(content), "r") as file:
-            _walk(file, (), None, leaves)
-            facts = {text_of(name): text_of(value) for name, value in file.attrs.items() if np.size(value) == 1}
-    except Exception as error:  # a damaged file makes HDF5 raise nearly anything
-        raise RecordError(f"{source}: not an HDF5 file, or damaged: {error}; make it again") from error
-    return raws_of_leaves(leaves, source, "HDF5 file", facts)
+    with h5py.File(BytesIO(content), "r") as file:
+        _walk(file, (), None, leaves)
+        facts = {text_of(name): text_of(value) for name, value in file.attrs.items() if np.size(value) == 1}
+    return raws_of_leaves(leaves, facts, source, form)
 
 
-def read_netcdf3(content: bytes, source: str) -> tuple[RawTest, ...]:
-    """Read a classic netCDF file; raises RecordError naming the file."""
+def read_netcdf3(content: bytes, source: str, form: str) -> tuple[RawTest, ...]:
+    """Read a classic netCDF file."""
     import xarray as xr
 
-    try:
-        with xr.open_dataset(BytesIO(content), engine="scipy", decode_times=False) as dataset:
-            leaves = [
-                Leaf((), str(name), item.values, item.attrs.get("units"), None, _coords(item))
-                for name, item in ((name, dataset[name]) for name in dataset.variables)
-                if item.dtype.kind in "fiu" and item.size > 1
-            ]
-            facts = {str(name): text_of(value) for name, value in dataset.attrs.items() if np.size(value) == 1}
-    except Exception as error:  # a damaged file makes scipy raise nearly anything
-        raise RecordError(f"{source}: not a netCDF file, or damaged: {error}; make it again") from error
-    return raws_of_leaves(leaves, source, "netCDF file", facts)
+    with xr.open_dataset(BytesIO(content), engine="scipy", decode_times=False) as dataset:
+        leaves = [
+            Leaf((), str(name), item.values, item.attrs.get("units"), None, _coords(item))
+            for name, item in ((name, dataset[name]) for name in dataset.variables)
+            if item.dtype.kind in "fiu" and item.size > 1
+        ]
+        facts = {str(name): text_of(value) for name, value in dataset.attrs.items() if np.size(value) == 1}
+    return raws_of_leaves(leaves, facts, source, form)
 
 
 def _walk(group: Any, path: tuple[str, ...], step: float | None, leaves: list[Leaf]) -> None:
@@ -59,7 +52,7 @@ def _walk(group: Any, path: tuple[str, ...], step: float | None, leaves: list[Le
 
 
 def values_of(item: Any) -> NDArray[Any]:
-    """What a dataset holds; raises ValueError if it claims more than so small a file can hold."""
+    """Values of a dataset; raises ValueError if it claims more than so small a file can hold."""
     if item.size and item.nbytes > DEFLATE_LIMIT * item.file.id.get_filesize():
         raise ValueError(f"{item.name} claims {item.nbytes / 1e9:.3g} GB, more than so small a file can hold")
     return np.asarray(item[()])

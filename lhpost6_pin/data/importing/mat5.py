@@ -1,7 +1,7 @@
-"""The elements of a MATLAB v5 to v7 file, looked through before scipy reads them.
+"""Check of the elements of a MATLAB v5 to v7 file before scipy reads them.
 
-scipy trusts what a file says of itself: with a data type that there is none of it crashes the process, and it makes
-room for as many cells as are claimed. An element is a tag (type, size) and data, padded to eight bytes; a matrix is an
+scipy does not check the tags of a file: an unknown data type crashes the process, and memory is allocated for as many
+cells as a variable claims. An element is a tag (type, size) and data, padded to eight bytes; a matrix is an
 element made of elements: flags, dimensions, name, and its numbers, or a matrix for each cell or field.
 """
 
@@ -31,7 +31,7 @@ def is_mat5(content: bytes) -> bool:
 
 
 def unpacked_mat5(content: bytes) -> bytes:
-    """The file with nothing compressed; raises ValueError, struct.error or zlib.error for elements that cannot be."""
+    """The file uncompressed; raises ValueError, struct.error or zlib.error for impossible elements."""
     order = ">" if content[126:_HEADER] == b"MI" else "<"
     parts, at = [content[:_HEADER]], _HEADER
     while at < len(content):
@@ -56,16 +56,16 @@ def _elements(body: bytes, order: str) -> list[_Element]:
             kind, size, start, after = kind & 0xFFFF, kind >> 16, at + _TAG // 2, at + _TAG
         data = body[start : start + size]
         if len(data) < size or start + size > after or kind not in (*_NUMERIC, _MATRIX):
-            raise ValueError(f"an element of type {kind} and {size} bytes cannot be")
+            raise ValueError(f"an element of type {kind} and {size} bytes is impossible")
         found.append(_Element(kind, data))
         at = after
     return found
 
 
 def _check_matrix(element: _Element, order: str, depth: int) -> None:
-    """Raise ValueError unless a matrix holds what its class, flags and dimensions promise."""
+    """Raise ValueError unless the content of a matrix fits its class, flags and dimensions."""
     if element.kind != _MATRIX or depth > _DEEPEST:
-        raise ValueError("there are no variables where they should be, or too deep in others")
+        raise ValueError("variables are missing, or nested too deeply")
     if not element.data:
         return  # an empty cell
     flags, *parts = _elements(element.data, order)
@@ -81,7 +81,7 @@ def _check_matrix(element: _Element, order: str, depth: int) -> None:
         return
     inner = [part for part in parts if part.kind == _MATRIX]
     if kind in (_CELL, _STRUCT, _OBJECT) and len(inner) < _cells(kind, parts, order):
-        raise ValueError("a variable has fewer cells than it says")
+        raise ValueError("a variable has fewer cells than its dimensions")
     for part in inner:
         _check_matrix(part, order, depth + 1)
 

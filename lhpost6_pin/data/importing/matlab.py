@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import RecordError
 from .arrays import leaves_of, raws_of_leaves
 from .hdf5 import text_of, values_of
 from .mat5 import is_mat5, unpacked_mat5
@@ -15,38 +14,26 @@ from .raw import RawTest
 __all__ = ["read_mat", "read_mat73"]
 
 
-def read_mat(content: bytes, source: str) -> tuple[RawTest, ...]:
-    """Read a `.mat` file up to v7; raises RecordError naming the file."""
+def read_mat(content: bytes, source: str, form: str) -> tuple[RawTest, ...]:
+    """Read a `.mat` file up to v7."""
     from scipy.io import loadmat
 
-    try:
-        if is_mat5(content):
-            content = unpacked_mat5(content)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", UserWarning)  # scipy's, of what it would rather guess: two of one name
-            tree = loadmat(BytesIO(content), simplify_cells=True)
-    except Exception as error:  # a damaged file makes scipy raise nearly anything
-        raise RecordError(f"{source}: not a MATLAB file, or damaged: {error}; save it again") from error
-    plain = {name: value for name, value in tree.items() if not name.startswith("__")}
-    return raws_of_leaves(*_arranged(plain, source, "MATLAB file"))
+    if is_mat5(content):
+        content = unpacked_mat5(content)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)  # scipy warns where it guesses: two variables of one name
+        tree = loadmat(BytesIO(content), simplify_cells=True)
+    return raws_of_leaves(*leaves_of({k: v for k, v in tree.items() if not k.startswith("__")}), source, form)
 
 
-def read_mat73(content: bytes, source: str) -> tuple[RawTest, ...]:
-    """Read a `.mat` file of v7.3; raises RecordError naming the file."""
+def read_mat73(content: bytes, source: str, form: str) -> tuple[RawTest, ...]:
+    """Read a `.mat` file of v7.3."""
     import h5py
 
-    try:
-        with h5py.File(BytesIO(content), "r") as file:
-            named = {text_of(name): item for name, item in file.items()}
-            tree = {name: _value(item) for name, item in named.items() if not name.startswith("#")}
-    except Exception as error:  # a damaged file makes HDF5 raise nearly anything
-        raise RecordError(f"{source}: not a MATLAB v7.3 file, or damaged: {error}; save it again") from error
-    return raws_of_leaves(*_arranged(tree, source, "MATLAB v7.3 file"))
-
-
-def _arranged(tree: dict[str, Any], source: str, form: str) -> tuple[Any, str, str, Any]:
-    leaves, facts = leaves_of(tree)
-    return leaves, source, form, facts
+    with h5py.File(BytesIO(content), "r") as file:
+        named = {text_of(name): item for name, item in file.items()}
+        tree = {name: _value(item) for name, item in named.items() if not name.startswith("#")}
+    return raws_of_leaves(*leaves_of(tree), source, form)
 
 
 def _value(item: Any) -> Any:

@@ -1,8 +1,8 @@
 """Data files of the MTS 469D: header records of a key and a value, then all channels sample by sample.
 
 In the binary form a record is 128 bytes, a key of 32 characters and a value of 96, and the samples are float32 to
-the end of the file. The text form has a line for each record, and then numbers. A header may say with
-EXTENDED_HEADER_RECORDS how many records of any other key follow it.
+the end of the file. The text form has a line for each record, and then numbers. EXTENDED_HEADER_RECORDS in a header
+is the number of records of any other key that follow it.
 """
 
 import re
@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import RecordError
-from .raw import Array, RawTest, make_raw
+from .raw import RawTest, make_raw
 
 __all__ = ["is_469d", "read_469d"]
 
@@ -69,7 +70,7 @@ def _read_binary(content: bytes, source: str) -> tuple[dict[str, str], NDArray[n
         further = further - 1 if further else _count(entries, _EXTENDED, source) if record[0] == _EXTENDED else None
     if further:
         raise RecordError(f"{source}: {_EXTENDED} announces {further} more records than there are; the file is damaged")
-    _header(entries, source)  # what is missing is better said now than from misread samples
+    _header(entries, source)  # errors of the header before those of misread samples
     data = content[place:]
     if len(data) % 4:
         raise RecordError(
@@ -139,19 +140,18 @@ def _add(entries: dict[str, str], key: str, value: str, where: str) -> None:
 def _header(entries: Mapping[str, str], source: str) -> _Header:
     """Channels and time step; raises RecordError naming the key that is missing or makes no sense."""
     count = _count(entries, "CHANNELS", source)
-    if not 1 <= count <= len(entries):
-        raise RecordError(f"{source}: CHANNELS is {count}, described are {_described(entries)}; the header is damaged")
-    missing = next((k for k in range(1, count + 1) if f"DESC.CHAN_{k}" not in entries), None)
-    if missing or f"DESC.CHAN_{count + 1}" in entries:
-        lost = f"; DESC.CHAN_{missing} is missing" if missing else ""
-        raise RecordError(f"{source}: CHANNELS is {count}, described are {_described(entries)}{lost}")
+    described = sum(key.startswith("DESC.CHAN_") for key in entries)
+    missing = [f"DESC.CHAN_{k}" for k in range(1, min(count, len(entries)) + 1) if f"DESC.CHAN_{k}" not in entries]
+    if not 1 <= count <= len(entries) or missing or f"DESC.CHAN_{count + 1}" in entries:
+        lost = f"{missing[0]} is missing" if missing else "the header is damaged"
+        raise RecordError(f"{source}: CHANNELS is {count}, described are {described}; {lost}")
     try:
         step = float(entries["DELTA_T"].split()[0])
     except (KeyError, IndexError, ValueError):
         step = -1.0
     if not (np.isfinite(step) and step > 0):
-        said = f"is {entries['DELTA_T'][:40]!r}" if "DELTA_T" in entries else "is missing"
-        raise RecordError(f"{source}: DELTA_T {said}; it must be the sample interval in seconds")
+        found = f"is {entries['DELTA_T'][:40]!r}" if "DELTA_T" in entries else "is missing"
+        raise RecordError(f"{source}: DELTA_T {found}; it must be the sample interval in seconds")
     channels = range(1, count + 1)
     names = tuple(entries[f"DESC.CHAN_{k}"] or f"channel {k}" for k in channels)
     units = tuple(entries.get(f"UNITS.CHAN_{k}") for k in channels)
@@ -159,13 +159,9 @@ def _header(entries: Mapping[str, str], source: str) -> _Header:
     return _Header(names, units, step, facts)
 
 
-def _described(entries: Mapping[str, str]) -> int:
-    return sum(key.startswith("DESC.CHAN_") for key in entries)
-
-
 def _count(entries: Mapping[str, str], key: str, source: str) -> int:
     text = entries.get(key)
     if text is None or not re.fullmatch(r"\d{1,9}", text):
-        said = "is missing" if text is None else f"is {text[:40]!r}"
-        raise RecordError(f"{source}: {key} {said}; it must be a whole number")
+        found = "is missing" if text is None else f"is {text[:40]!r}"
+        raise RecordError(f"{source}: {key} {found}; it must be a whole number")
     return int(text)

@@ -1,16 +1,13 @@
-"""What a data file holds before anybody says what it means: named columns, their units as written, time."""
+"""Content of a data file before its channels are mapped: named columns, their units as written, time."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ...core.arrays import Array
 from ...core.errors import RecordError
 
-__all__ = ["Array", "RawTest", "make_raw", "shown"]
-
-Array = NDArray[np.float64]
+__all__ = ["RawTest", "make_raw", "need_package", "shown"]
 
 
 @dataclass(frozen=True)
@@ -18,8 +15,8 @@ class RawTest:
     """Columns of one file that were sampled together.
 
     `names` and `units` (k,) are as written in the file, a unit is None where the file gives none. `values` (n, k) are
-    in those units, NaN where the file has a hole. `time` (n,) [s] is None where the file does not tell. `facts` are
-    what else the file says about itself.
+    in those units, NaN where a sample is missing. `time` (n,) [s] is None where the file has none. `facts` are the
+    other attributes of the file.
     """
 
     source: str
@@ -53,3 +50,11 @@ def shown(names: Sequence[str], most: int = 12) -> str:
     """Return the first few names for a message."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(repr(name[:60]) for name in names[:most]) + more
+
+
+def need_package(name: str, job: str) -> None:
+    """Raise RecordError if an optional package is not installed."""
+    try:
+        import_module(name)
+    except ModuleNotFoundError as error:
+        raise RecordError(f"{job} needs {name}: pip install 'lhpost6-pin[formats]'") from error

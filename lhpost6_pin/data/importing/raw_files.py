@@ -1,14 +1,15 @@
-"""Open a data file of a test, whatever its format; the content decides, the suffix hardly."""
+"""Open a data file of a test in any readable format, recognised by its content (MATLAB v4 by its suffix)."""
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from ...core.errors import RecordError
 from ...core.files import reason_of
 from .hdf5 import read_hdf5, read_netcdf3
 from .matlab import read_mat, read_mat73
 from .mts469d import is_469d, read_469d
-from .raw import RawTest
+from .raw import RawTest, need_package
 from .tdms import read_tdms
 from .text_tables import read_parquet, read_table
 
@@ -16,16 +17,26 @@ __all__ = ["READABLE", "load_raw"]
 
 READABLE = "MTS 469D (binary or text), CSV or other text, MATLAB .mat, HDF5, netCDF, TDMS, Parquet"
 
-_Reader = Callable[[bytes, str], RawTest | tuple[RawTest, ...]]
 
-_MAGIC: tuple[tuple[bytes, _Reader], ...] = (
-    (b"MATLAB 5.0", read_mat),
-    (b"MATLAB 7.3", read_mat73),
-    (b"\x89HDF\r\n\x1a\n", read_hdf5),
-    (b"CDF\x01", read_netcdf3),
-    (b"CDF\x02", read_netcdf3),
-    (b"TDSm", read_tdms),
-    (b"PAR1", read_parquet),
+class _Format(NamedTuple):
+    """A binary format that a library reads; `read` takes content, file and the format's name."""
+
+    magic: bytes
+    article: str
+    name: str
+    read: Callable[[bytes, str, str], RawTest | tuple[RawTest, ...]]
+    package: str = ""  # of the extra `formats`
+
+
+_MATLAB = _Format(b"MATLAB 5.0", "a", "MATLAB file", read_mat)
+_FORMATS = (
+    _MATLAB,
+    _Format(b"MATLAB 7.3", "a", "MATLAB v7.3 file", read_mat73),
+    _Format(b"\x89HDF\r\n\x1a\n", "an", "HDF5 file", read_hdf5),
+    _Format(b"CDF\x01", "a", "netCDF file", read_netcdf3),
+    _Format(b"CDF\x02", "a", "netCDF file", read_netcdf3),
+    _Format(b"TDSm", "a", "TDMS file", read_tdms, "nptdms"),
+    _Format(b"PAR1", "a", "Parquet file", read_parquet, "pyarrow"),
 )
 
 
@@ -46,19 +57,26 @@ def load_raw(path: Path | str) -> tuple[RawTest, ...]:
         raise RecordError(f"{source}: cannot be read: {reason_of(error)}") from error
     if not content.strip():
         raise RecordError(f"{source}: is empty")
-    found = _reader(content, path)(content, source)
-    return found if isinstance(found, tuple) else (found,)
-
-
-def _reader(content: bytes, path: Path) -> _Reader:
+    known = next((form for form in _FORMATS if content.startswith(form.magic)), None)
+    if known is None and path.suffix.lower() == ".mat":  # v4 has no magic
+        known = _MATLAB
     if is_469d(content):
-        return read_469d
-    for magic, reader in _MAGIC:
-        if content.startswith(magic):
-            return reader
-    if path.suffix.lower() == ".mat":  # v4 has no magic
-        return read_mat
-    utf16 = content[:2] in (b"\xff\xfe", b"\xfe\xff")
-    if b"\0" in content[:4096] and not utf16:
-        raise RecordError(f"{path}: is in no format known here; readable are {READABLE}")
-    return read_table
+        return (read_469d(content, source),)
+    if known is not None:
+        return _read(known, content, source)
+    if b"\0" in content[:4096] and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):  # and no text in UTF-16
+        raise RecordError(f"{source}: unknown format; readable are {READABLE}")
+    return (read_table(content, source),)
+
+
+def _read(form: _Format, content: bytes, source: str) -> tuple[RawTest, ...]:
+    if form.package:
+        need_package(form.package, f"{source}: reading a {form.name}")
+    try:
+        found = form.read(content, source, form.name)
+    except RecordError:
+        raise
+    except Exception as error:  # a damaged file makes the libraries raise nearly anything
+        what = f"not {form.article} {form.name}, or damaged: {error}"
+        raise RecordError(f"{source}: {what}; export it again") from error
+    return found if isinstance(found, tuple) else (found,)

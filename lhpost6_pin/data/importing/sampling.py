@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import RecordError
 from ..layout_faults import STEP_TOLERANCE
 from ..signals import lowpass_zero_phase, resample_band_limited
-from .raw import Array
 
 __all__ = ["Sampling", "common_time", "fill_holes", "resample", "uniform"]
 
@@ -38,8 +38,8 @@ class Sampling(NamedTuple):
 def uniform(time: Array, most_missing: int, where: str) -> Sampling:
     """Uniform times that the stamps `time` (n,) [s] stand for.
 
-    Stamps may be off their place by 1 % of a sample, or by what their decimals or single precision cannot say. Gaps of
-    up to `most_missing` samples are allowed. Raises RecordError naming the sample of anything else.
+    Stamps may be off their place by 1 % of a sample, or by their rounding to decimals or single precision. Gaps of up
+    to `most_missing` samples are allowed. Raises RecordError naming the sample of anything else.
     """
     usable = np.abs(time) < _LONGEST
     if not usable.all():
@@ -77,7 +77,7 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
 
 
 def _written_to(time: Array) -> float:
-    """How far a stamp may be from the time it stands for by the way it is written [s]."""
+    """Largest rounding error of a stamp as it is written [s]."""
     if np.array_equal(time, time.astype(np.float32)):
         return float(np.spacing(np.float32(np.abs(time).max())))
     for digits in range(_MOST_DIGITS):
@@ -126,7 +126,7 @@ def common_time(samplings: Sequence[Sampling], rate: float | None, where: str) -
     start, end = max(float(s.time[0]) for s in samplings), min(float(s.time[-1]) for s in samplings)
     count = int(np.floor((end - start) / step + _SAME_TIME)) + 1
     if count > max(_MOST, *(len(s.time) for s in samplings)):
-        raise RecordError(f"{where}: {count:.3g} samples at {1 / step:g} Hz are too many; ask for a lower rate")
+        raise RecordError(f"{where}: {count:.3g} samples at {1 / step:g} Hz are too many; choose a lower rate")
     if count < 2:
         spans = ", ".join(f"{s.time[0]:g} to {s.time[-1]:g} s" for s in samplings)
         raise RecordError(f"{where}: the files do not overlap in time: {spans}; give files of one test")
@@ -140,7 +140,7 @@ def common_time(samplings: Sequence[Sampling], rate: float | None, where: str) -
 
 
 def resample(values: Array, sampling: Sampling, time: Array) -> Array:
-    """Values (m,) of a sampling at other times; what a lower rate cannot hold is taken out without phase first."""
+    """Values (m,) of a sampling at other times; before a lower rate, without phase, a low-pass."""
     k = int(np.argmin(np.abs(sampling.time - time[0])))
     own = sampling.time[k : k + len(time)]
     if len(own) == len(time) and np.abs(own - time).max() <= _SAME_TIME * sampling.step:

@@ -21,6 +21,7 @@ from pythonfmu.enums import Fmi2Initial, Fmi2Status, Fmi2Variability
 from lhpost6_pin import __version__
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.data.channels import LAYOUT, MOTION, channel_unit
 from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
@@ -45,8 +46,11 @@ _UNITS: dict[str, dict[str, int]] = {
 }
 """Units of the variables by their exponents of SI base units."""
 
+_ACTUATORS = ("actuator_displacement", "actuator_force", "spool_position", "chamber_pressure_a", "chamber_pressure_b")
+
 _ABOUT = """{title}
-Inputs are normalised spool commands, -1..1, held over a step; outputs are what the sensors tell at the end of it. \
+Inputs are normalised spool commands, -1..1, held over a step; outputs are the sensors at the end of it, spool \
+positions means over its last sample. \
 Steps are whole multiples of 1/{rate} s. No output depends directly on an input. \
 Needs a 64-bit Python with lhpost6-pin {version} at run time."""
 
@@ -74,7 +78,7 @@ class ShakeTable(Fmi2Slave):
         self.status = 0
         self.trouble = ""
         self._start_time = 0.0
-        self._asked: dict[int, float] = {}  # spool commands by actuator, where the master has set them
+        self._commands: dict[int, float] = {}  # by actuator, where the master has set them
         self._running = False
         self._settings: tuple[str, int, str] | None = None
         self._table: RunningPlant | None = None
@@ -89,14 +93,14 @@ class ShakeTable(Fmi2Slave):
         self._start_time = start_time
 
     def exit_initialization_mode(self) -> None:
-        """Build the plant; with parameters that cannot be it is stopped from the start."""
+        """Build the plant; with invalid parameters it is stopped from the start."""
         self._build()
         self._running = True
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Hold the inputs over step_size [s]; False, which FMI calls discarded, if the plant does not follow.
+        """Hold the inputs over step_size [s]; False (discarded) if the step is refused or the plant stops.
 
-        A step that is no whole number of samples, or not at the plant's own time, is refused; nothing has changed then.
+        A step that is no whole number of samples, or not at the plant's own time, is refused and changes nothing.
         A plant that leaves a stroke or diverges stops for good.
         """
         if self.status or self._table is None:
@@ -107,7 +111,7 @@ class ShakeTable(Fmi2Slave):
             self._tell(str(error), Fmi2Status.discard)
             return False
         command = self._rest.copy()
-        command[list(self._asked)] = list(self._asked.values())
+        command[list(self._commands)] = list(self._commands.values())
         try:
             for _ in range(samples):
                 self._table.advance(command)
@@ -162,7 +166,7 @@ class ShakeTable(Fmi2Slave):
                 f"spool command of {name}, -1..1; from the start what feeds the leaks at rest",
                 Fmi2Causality.input,
                 getter=partial(self._command, i),
-                setter=partial(self._asked.__setitem__, i),
+                setter=partial(self._commands.__setitem__, i),
             )
         for i, (name, unit, about) in enumerate(_outputs(machine)):
             self._real(
@@ -173,11 +177,11 @@ class ShakeTable(Fmi2Slave):
                 initial=Fmi2Initial.calculated,
                 getter=partial(self._value, i),
             )
-        told = {"variability": Fmi2Variability.discrete, "initial": Fmi2Initial.calculated}
+        state = {"variability": Fmi2Variability.discrete, "initial": Fmi2Initial.calculated}
         about = "0 running, 1 stopped: outputs stay as they were before the step that went wrong"
-        self.register_variable(Integer("status", causality=Fmi2Causality.output, description=about, **told))
+        self.register_variable(Integer("status", causality=Fmi2Causality.output, description=about, **state))
         about = "why the plant stopped; empty while it runs"
-        self.register_variable(String("trouble", causality=Fmi2Causality.local, description=about, **told))
+        self.register_variable(String("trouble", causality=Fmi2Causality.local, description=about, **state))
 
     def _real(self, name: str, unit: str, about: str, causality: Fmi2Causality, **others: Any) -> None:
         self._units[name] = unit
@@ -206,7 +210,7 @@ class ShakeTable(Fmi2Slave):
 
     def _command(self, actuator: int) -> float:
         self._build()
-        return self._asked.get(actuator, float(self._rest[actuator]))
+        return self._commands.get(actuator, float(self._rest[actuator]))
 
     def _stop(self, reason: str) -> None:
         self.status, self.trouble = 1, reason
@@ -221,22 +225,12 @@ class ShakeTable(Fmi2Slave):
 
 def _outputs(machine: Machine) -> list[tuple[str, str, str]]:
     """Name, unit and description of every real output, in the order of `_measure`."""
-    found = []
-    legs = [
-        ("actuator_displacement", "m", "length less length in the zero-position"),
-        ("actuator_force", "N", "P_A A_1 - P_B A_2"),
-        ("spool_position", "1", "fourth-stage spool that the ports saw, mean over the last sample"),
-        ("chamber_pressure_a", "Pa", "pressure of chamber A"),
+    labels = {"axis": AXES, **machine.labels}
+    return [
+        (f"{name}_{label}", channel_unit(f"{name}[{label}]"), f"{LAYOUT[name].long_name}, {label}")
+        for name in (*_ACTUATORS, *MOTION)
+        for label in labels[LAYOUT[name].dims[1]]
     ]
-    for channel, unit, about in legs:
-        found += [(f"{channel}_{name}", unit, f"{about}, {name}") for name in machine.actuator_names]
-    found += [(f"chamber_pressure_b_{name}", "Pa", f"pressure of chamber B, {name}") for name in machine.double_acting]
-    for channel, per in (("displacement", ""), ("velocity", "/s"), ("acceleration", "/s2")):
-        for k, axis in enumerate(AXES):
-            unit = ("m" if k < 3 else "rad") + per
-            about = f"{channel} of the platen, {axis}: C in {{s}}, Euler angles"
-            found.append((f"platen_{channel}_{axis}", unit, about))
-    return found
 
 
 def _measure(table: RunningPlant) -> np.ndarray:
@@ -273,8 +267,8 @@ def _samples(time: float, step: float, sample: int) -> int:
         )
     if abs(time * SAMPLE_RATE - sample) > 0.5:
         raise SimulationError(
-            f"a step from {time:.6f} s was asked for, but the plant is at {sample / SAMPLE_RATE:.6f} s; "
-            "it can neither go back nor leave out time"
+            f"a step from {time:.6f} s, but the plant is at {sample / SAMPLE_RATE:.6f} s; it can neither go back nor "
+            "skip time"
         )
     return samples
 

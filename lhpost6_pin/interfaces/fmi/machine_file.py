@@ -44,31 +44,29 @@ def save_machine_file(machine: Machine, folder: Path) -> list[Path]:
 
 
 def load_machine_file(folder: Path) -> tuple[Machine, str]:
-    """Read what `save_machine_file` wrote: the machine, and the version of lhpost6_pin that wrote it."""
-    known = json.loads((folder / MACHINE_FILE).read_text(encoding="utf-8"))
-    quantities = {path: Quantity(**_tuples(entry)) for path, entry in known["quantities"].items()}
+    """Read a machine that `save_machine_file` wrote, and the version of lhpost6_pin that wrote it."""
+    known = json.loads((folder / MACHINE_FILE).read_text(encoding="utf-8"), object_hook=_with_tuples)
     effects = {
-        name: EffectEntry(
-            entry["family"],
-            tuple(entry["components"]),
-            {key: Quantity(**_tuples(value)) for key, value in entry["values"].items()},
-        )
+        name: EffectEntry(entry["family"], entry["components"], _quantities(entry["values"]))
         for name, entry in known["effects"].items()
     }
     specimen = None
-    if "specimen" in known:
-        entry = _tuples(known["specimen"])
+    if entry := known.get("specimen"):
         specimen = Specimen(**{**entry, "urdf": folder / entry["urdf"]})
     machine = build_machine(
-        Parameters(quantities, known["words"], known["origin"], effects),
-        added_effects=tuple(Effect(**_tuples(entry)) for entry in known["own_effects"]),
+        Parameters(_quantities(known["quantities"]), known["words"], known["origin"], effects),
+        added_effects=tuple(Effect(**entry) for entry in known["own_effects"]),
         specimen=specimen,
     )
     return machine, known["lhpost6_pin"]
 
 
-def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of an entry with the lists that JSON made of its tuples as tuples again."""
+def _quantities(entries: Mapping[str, Any]) -> dict[str, Quantity]:
+    return {path: Quantity(**entry) for path, entry in entries.items()}
+
+
+def _with_tuples(entry: dict[str, Any]) -> dict[str, Any]:
+    """Entry with tuples in place of the lists that JSON makes of them."""
 
     def again(value: Any) -> Any:
         return tuple(map(again, value)) if isinstance(value, list) else value

@@ -1,4 +1,4 @@
-"""The link: the plant as a UDP server, and a client for whoever commands it."""
+"""The link: the plant as a UDP server, and a client that commands it."""
 
 from .client import LinkClient, Reading
 from .protocol import Datagram, Kind, LinkMode, PlantState, decode, encode, find_mode

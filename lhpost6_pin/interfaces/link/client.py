@@ -1,4 +1,4 @@
-"""The other end of the link: a client that commands a served plant.
+"""A client that commands a served plant.
 
 Any function of its readings will do:
 
@@ -14,29 +14,27 @@ import secrets
 import select
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...control.plug import Feedback
 from ...control.valves import names_of_valves, per_valve
+from ...core.arrays import Array
 from ...core.errors import LinkError
-from .clock import SECOND, now
+from .clock import SECOND, Histogram, now
 from .protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
 from .server import HOST, PORT
-from .statistics import Histogram
 
 __all__ = ["LinkClient", "Reading"]
 
-Array = NDArray[np.float64]
 
 _LARGEST = 2048  # bytes of a datagram that are read; every frame but a welcome to a huge machine is shorter
 
 
 class Reading(NamedTuple):
-    """What the plant says after a sample."""
+    """Sensors and state of the plant after a sample."""
 
     sample: int
     state: PlantState
@@ -65,12 +63,13 @@ class LinkClient:
             self._sock.setblocking(False)
             found: dict[Kind, Datagram] = {}
 
-            def told_all(frame: Datagram) -> bool:
+            def complete(frame: Datagram) -> bool:
                 found[frame.kind] = frame
-                answers = [found.get(Kind.WELCOME), found.get(Kind.SENSORS)]
-                return None not in answers and len({a.actuators for a in answers if a}) == 1
+                return {Kind.WELCOME, Kind.SENSORS} <= set(found) and (
+                    found[Kind.WELCOME].actuators == found[Kind.SENSORS].actuators
+                )
 
-            self._ask(Datagram(Kind.HELLO, self._session), told_all)
+            self._request(Datagram(Kind.HELLO, self._session), complete)
         except OSError as error:
             self._sock.close()
             raise LinkError(f"{self._where} cannot be reached: {error}") from error
@@ -90,11 +89,11 @@ class LinkClient:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Say goodbye, if that was not done, and close."""
+        """Give the plant back and close."""
         self.close()
 
     def send(self, command: Array) -> None:
-        """Send a command, per actuator (n_actuators,) or per servovalve (n_valves,), -1..1, and wait for nothing."""
+        """Send a command, per actuator (n_actuators,) or per servovalve (n_valves,), -1..1, without waiting."""
         self._put(self._command(command))
 
     def newest(self) -> Reading | None:
@@ -112,25 +111,22 @@ class LinkClient:
         """
         frame = self._command(command)
         if self.mode == LinkMode.LOCK_STEP:
-            asked = frame.sequence
-            self._ask(frame, lambda f: self._take(f) is not None and f.acknowledged == asked)
+            self._request(frame, lambda f: self._take(f) is not None and f.acknowledged == frame.sequence)
             return self.reading
         self._put(frame)
-        deadline = now() + round(self._timeout * self._tries * SECOND)
-        while (left := deadline - now()) > 0:
-            answer = self._get(left / SECOND)
-            if answer is not None and self._take(answer) is not None:
+        for answer in self._frames(self._timeout * self._tries):
+            if self._take(answer) is not None:
                 self.newest()
                 return self.reading
         raise LinkError(self._silence())
 
     def close(self) -> Mapping[str, int]:
-        """Give the plant back; returns the server's counts of this session, or nothing if it does not answer."""
+        """Give the plant back; returns the server's counts of this session, empty if it does not answer."""
         if self._sock.fileno() < 0:
             return {}
         self._tries = min(self._tries, 5)
         try:
-            status = self._ask(Datagram(Kind.BYE, self._session), lambda f: f.kind == Kind.STATUS)
+            status = self._request(Datagram(Kind.BYE, self._session), lambda f: f.kind == Kind.STATUS)
         except LinkError:
             return {}
         finally:
@@ -158,17 +154,22 @@ class LinkClient:
             numbers=values,
         )
 
-    def _ask(self, frame: Datagram, is_answer: Callable[[Datagram], bool]) -> Datagram:
-        """Send a frame until its answer comes, and return that; raises LinkError if none does."""
+    def _request(self, frame: Datagram, is_answer: Callable[[Datagram], bool]) -> Datagram:
+        """Answer to a frame, which is sent again until it comes; raises LinkError if none does."""
         for attempt in range(self._tries):
             self.resent += attempt > 0
             self._put(frame)
-            deadline = now() + round(self._timeout * SECOND)
-            while (left := deadline - now()) > 0:
-                answer = self._get(left / SECOND)
-                if answer is not None and is_answer(answer):
+            for answer in self._frames(self._timeout):
+                if is_answer(answer):
                     return answer
         raise LinkError(self._silence())
+
+    def _frames(self, seconds: float) -> Iterator[Datagram]:
+        """Frames of this session as they arrive within a time [s]."""
+        deadline = now() + round(seconds * SECOND)
+        while (left := deadline - now()) > 0:
+            if (frame := self._get(left / SECOND)) is not None:
+                yield frame
 
     def _silence(self) -> str:
         return (
@@ -179,7 +180,7 @@ class LinkClient:
     def _put(self, frame: Datagram) -> None:
         try:
             self._sock.send(encode(frame._replace(stamp=now())))
-        except (ConnectionError, BlockingIOError):  # nobody there yet, or no room: a lost datagram like any other
+        except (ConnectionError, BlockingIOError):  # no server yet, or no room: a lost datagram like any other
             pass
 
     def _get(self, timeout: float) -> Datagram | None:
@@ -188,7 +189,7 @@ class LinkClient:
             return None
         try:
             frame = decode(self._sock.recv(_LARGEST))
-        except ConnectionError:  # nobody listens there: no reason to ask at once again
+        except ConnectionError:  # no server: no reason to retry at once
             time.sleep(timeout)
             return None
         except LinkError:
@@ -199,7 +200,7 @@ class LinkClient:
         return frame
 
     def _take(self, frame: Datagram) -> Reading | None:
-        """Keep sensors that are newer than the last, or that say that the plant has tripped."""
+        """Keep sensors that are newer than the last, or of a plant that has tripped."""
         if frame.kind != Kind.SENSORS or frame.actuators != len(self.actuators):
             return None
         last, tripped = self.reading, frame.state == PlantState.TRIPPED

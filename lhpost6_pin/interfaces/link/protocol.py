@@ -1,4 +1,4 @@
-"""The link's datagrams, byte by byte: what a controller in any language sends and gets over UDP.
+"""The link's datagrams, byte by byte, for controllers in any language over UDP.
 
 All numbers are little endian, without padding; float64 is IEEE 754 binary64. One frame is one datagram. A frame is a
 header of 48 bytes and a payload whose length follows from `kind`, `actuators` and `valves`.
@@ -50,7 +50,7 @@ What happens
                                    <-   status
 
 In lock-step the plant moves one sample for each new command; the same command again gets the same sensors again, so
-a client that hears nothing sends it again. In real time and free running the plant moves by itself from the first
+a client without an answer sends it again. In real time and free running the plant moves by itself from the first
 command on, takes the newest command at each sample and sends sensors after each. A hello with another session number
 puts the plant at rest again, also a tripped one.
 """
@@ -62,21 +62,30 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...core.arrays import Array
 from ...core.errors import LinkError, UnknownNameError
 
 __all__ = ["COUNTS", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError", "Welcome"]
 __all__ += ["decode", "encode", "find_mode", "is_newer"]
 
-Array = NDArray[np.float64]
 
 MAGIC, VERSION = b"LHP6", 1
-COUNTS = (
-    *("received", "late", "duplicate", "lost", "superseded", "short", "malformed", "foreign"),  # datagrams
-    *("missed_frames", "holds", "missed_deadlines", "samples"),
-)
-"""What a server counts, in the order of a status frame (see `statistics.Counts`)."""
+COUNTS = {
+    "received": "datagrams received",
+    "late": "commands older than one before",
+    "duplicate": "commands received again",
+    "lost": "commands never received",
+    "superseded": "commands replaced by a newer one before the plant took them",
+    "short": "datagrams shorter than their frame",
+    "malformed": "malformed datagrams, or frames that a client may not send",
+    "foreign": "frames of another client or session",
+    "missed_frames": "samples without a new command",
+    "holds": "transitions to safe hold",
+    "missed_deadlines": "samples that ended after the next was due",
+    "samples": "samples of the plant",
+}
+"""Counts of a server with their meaning, in the order of a status frame."""
 
 _HEADER = struct.Struct("<4s6BH3I2Q2I")
 _WELCOME = struct.Struct("<d32s")
@@ -92,7 +101,7 @@ class Kind(IntEnum):
 
 
 class LinkMode(IntEnum):
-    """How the plant's time goes on."""
+    """How the plant's time advances."""
 
     LOCK_STEP, REAL_TIME, FREE = range(3)
 
@@ -103,7 +112,7 @@ class LinkMode(IntEnum):
 
 
 class PlantState(IntEnum):
-    """What the plant does."""
+    """States of the plant."""
 
     WAITING, RUNNING, HOLD, TRIPPED = range(4)
 
@@ -113,7 +122,7 @@ class ShortDatagramError(LinkError):
 
 
 class Welcome(NamedTuple):
-    """What a server says of itself: samples a second [Hz], machine, actuator names, valves of each actuator."""
+    """Content of a welcome: samples a second [Hz], machine, actuator names, valves of each actuator."""
 
     rate: float
     machine: str
@@ -162,18 +171,19 @@ def encode(frame: Datagram) -> bytes:
         payload += b"".join(_ACTUATOR.pack(_cut(n, 15), v) for n, v in zip(names, valves, strict=True))
     else:
         payload = struct.pack(f"<{len(frame.counts)}Q", *frame.counts)
-    if len(payload) != _payload_size(frame.kind, frame.actuators, frame.valves):
-        raise LinkError(
-            f"a {frame.kind.name.lower()} frame of {frame.actuators} actuators and {frame.valves} valves takes "
-            f"{_payload_size(frame.kind, frame.actuators, frame.valves)} bytes of payload, not {len(payload)}"
-        )
-    datagram = bytearray(_packed_header(frame) + payload)
+    size = _payload_size(frame.kind, frame.actuators, frame.valves)
+    if len(payload) != size:
+        counts = f"{frame.actuators} actuators and {frame.valves} valves"
+        raise LinkError(f"a {frame.kind.name.lower()} frame of {counts} takes {size} bytes, not {len(payload)}")
+    head = (frame.kind, frame.mode, frame.state, frame.actuators, frame.valves, _HAS_CRC, frame.session)
+    numbers = (frame.sequence % _WRAP, frame.acknowledged % _WRAP, frame.stamp, frame.echo)
+    datagram = bytearray(_HEADER.pack(MAGIC, VERSION, *head, *numbers, 0, 0) + payload)
     _CRC.pack_into(datagram, _CRC_AT, zlib.crc32(datagram))
     return bytes(datagram)
 
 
 def decode(datagram: bytes) -> Datagram:
-    """Frame of a datagram; raises ShortDatagramError if it ends too early, LinkError for all else that can be wrong."""
+    """Frame of a datagram; raises ShortDatagramError if it ends too early, LinkError for any other fault."""
     if len(datagram) < _HEADER.size:
         raise ShortDatagramError(f"{len(datagram)} bytes are too few for a frame; its header takes {_HEADER.size}")
     magic, version, kind, mode, state, actuators, valves, flags, session, *rest = _HEADER.unpack_from(datagram)
@@ -192,7 +202,7 @@ def decode(datagram: bytes) -> Datagram:
     blank = bytearray(datagram)
     _CRC.pack_into(blank, _CRC_AT, 0)
     if crc != (zlib.crc32(blank) if flags & _HAS_CRC else 0):
-        raise LinkError("the CRC-32 does not fit: the frame was changed on its way")
+        raise LinkError("the CRC-32 does not fit: the frame was corrupted")
     counts = actuators, valves, sequence, acknowledged, stamp, echo
     head = Kind(kind), session, LinkMode(mode), PlantState(state), *counts
     if kind in (Kind.COMMAND, Kind.SENSORS):
@@ -209,26 +219,6 @@ def _payload_size(kind: Kind, actuators: int, valves: int) -> int:
         Kind.SENSORS: 8 * (6 + 2 * actuators),
         Kind.STATUS: 8 * len(COUNTS),
     }.get(kind, 0)
-
-
-def _packed_header(frame: Datagram) -> bytes:
-    return _HEADER.pack(
-        MAGIC,
-        VERSION,
-        frame.kind,
-        frame.mode,
-        frame.state,
-        frame.actuators,
-        frame.valves,
-        _HAS_CRC,
-        frame.session,
-        frame.sequence % _WRAP,
-        frame.acknowledged % _WRAP,
-        frame.stamp,
-        frame.echo,
-        0,
-        0,
-    )
 
 
 def _unpacked_welcome(datagram: bytes, valves: int) -> Welcome:

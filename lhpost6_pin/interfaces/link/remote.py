@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...control.plug import Feedback, start_plugged, step_plugged, wanted_from
 from ...control.valves import valve_counts
+from ...core.arrays import Array
 from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
 from ...data.records import make_record
@@ -22,15 +23,14 @@ from .protocol import LinkMode, PlantState
 
 __all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
 
-Array = NDArray[np.float64]
 _CHUNK = 1024  # samples between two progress reports
 
 
 @dataclass(frozen=True)
 class LinkRun:
-    """What a run over the link leaves: rows of samples (n,), as the controller saw and commanded them.
+    """Result of a run over the link: rows of samples (n,), as the controller received and commanded them.
 
-    A sample that the controller missed repeats the row before it; `answered` says which it did not.
+    A sample that the controller missed repeats the row before it; `answered` is False there.
     """
 
     command: Array  # (n, n_actuators)
@@ -46,49 +46,41 @@ class LinkRun:
 def run_over_link(
     client: LinkClient, plant: Plant, loop: ClosedLoop | PluggedLoop, *, progress: Progress | None = None
 ) -> LinkRun:
-    """Drive the served plant through a motion; `plant` is the one that the controller believes it drives.
+    """Drive the served plant through a motion; `plant` is the controller's model of it.
 
     Each sample's command answers the newest sensors, with the drive of their sample. Ends early if the plant trips.
-    Raises SimulationError for a drive that cannot be, LinkError if the plant is no longer at rest, differs from the
-    server's, or the server falls silent.
+    Raises SimulationError for an impossible drive, LinkError if the plant is no longer at rest, differs from the
+    server's, or the server does not answer.
     """
     _check(client, plant)
     samples = len(loop.drive if isinstance(loop, ClosedLoop) else loop.displacement)
     check_drive(plant, loop, samples)
     step = _stepper(plant, loop)
-    run = LinkRun(
-        command=np.zeros((samples, plant.spools)),
-        displacement=np.zeros((samples, plant.spools)),
-        acceleration=np.zeros((samples, 6)),
-        force=np.zeros((samples, plant.spools)),
-        state=np.zeros(samples, np.int8),
-        answered=np.zeros(samples, np.bool_),
-        tripped=False,
-        seconds=0.0,
-    )
+    rows: dict[str, Array] = {name: np.zeros((samples, plant.spools)) for name in ("command", "displacement", "force")}
+    rows |= {"acceleration": np.zeros((samples, 6)), "state": np.zeros(samples, np.int8)}
+    answered = np.zeros(samples, np.bool_)
     reading, reported, begin = client.reading, 0, 0
     with undisturbed() if client.mode != LinkMode.LOCK_STEP else nullcontext():
         while reading.sample < samples and reading.state != PlantState.TRIPPED:
             at, sensors = reading.sample, reading.sensors
-            command = step(at, sensors)
-            run.command[at], run.displacement[at] = command, sensors.displacement
-            run.acceleration[at], run.force[at] = sensors.acceleration, sensors.force
-            run.state[at], run.answered[at] = reading.state, True
+            rows["command"][at] = command = step(at, sensors)
+            rows["acceleration"][at], rows["displacement"][at] = sensors.acceleration, sensors.displacement
+            rows["force"][at], rows["state"][at], answered[at] = sensors.force, reading.state, True
             begin = begin or now()
             reading = client.exchange(command)
             if progress is not None and at >= reported:
                 progress(at / samples)
                 reported = at + _CHUNK
         seconds = (now() - begin) / SECOND
-    done = int(np.flatnonzero(run.answered)[-1]) + 1 if run.answered.any() else 0
-    last = np.maximum.accumulate(np.where(run.answered, np.arange(samples), 0))[:done]
-    rows = {name: getattr(run, name)[last] for name in ("command", "displacement", "acceleration", "force", "state")}
+    done = int(np.flatnonzero(answered)[-1]) + 1 if answered.any() else 0
+    last = np.maximum.accumulate(np.where(answered, np.arange(samples), 0))[:done]
     tripped = reading.state == PlantState.TRIPPED
-    return LinkRun(**rows, answered=run.answered[:done], tripped=tripped, seconds=seconds)
+    kept: dict[str, Any] = {name: row[last] for name, row in rows.items()}
+    return LinkRun(**kept, answered=answered[:done], tripped=tripped, seconds=seconds)
 
 
 def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> xr.Dataset:
-    """Record of a run over the link: what the controller measured and commanded, and what the plant did of it."""
+    """Record of a run over the link: sensors, commands, and states of the plant."""
     states = " ".join(f"{s.value} {s.name.lower()}" for s in PlantState)
     one = "1 if a command answered these sensors"
     channels: dict[str, Any] = {
@@ -112,7 +104,7 @@ def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> 
 def _check(client: LinkClient, plant: Plant) -> None:
     machine = plant.machine
     if client.reading.sample:
-        raise LinkError("the plant has moved since this client said hello; a run begins at rest: connect once more")
+        raise LinkError("the plant has moved since this client connected; a run begins at rest: connect again")
     if (client.machine, client.actuators) != (machine.name, machine.actuator_names):
         raise LinkError(f"the server's machine is {client.machine}, the controller's {machine.name}; choose --machine")
     if not np.array_equal(client.counts, valve_counts(machine)):

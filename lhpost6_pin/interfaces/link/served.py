@@ -1,8 +1,8 @@
-"""A plant that a remote client commands: what happens on a datagram and at a sample, apart from sockets and clocks.
+"""A plant that a remote client commands: its response to datagrams and samples, without sockets and clocks.
 
 Safe hold. After five samples without a new command, in lock-step after a second of silence, the spools go over to
 those that hold the platen at rest, along a smooth ramp of 0.2 s: twice the period of the softest oil column, so that
-the oil decelerates the platen without a blow. When commands return they are blended in from the spools as they are,
+the oil decelerates the platen without impact. When commands return they are blended in from the spools as they are,
 along a ramp as long as the hold was, at most as long as the one into it: smooth after a long silence, and a link that
 drops out again and again still commands. In lock-step, where time stands still between commands, the plant runs
 through the ramp at once.
@@ -10,28 +10,36 @@ through the ramp at once.
 
 import logging
 from collections.abc import Hashable
-from dataclasses import astuple, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...control.plug import Feedback
 from ...control.valves import flow_curves, per_actuator, valve_counts
+from ...core.arrays import Array
 from ...core.errors import LinkError, SimulationError
 from ...core.names import SAMPLE_RATE
 from ...mechanics.equilibrium import Equilibrium
 from ...mechanics.plant import Plant
 from ...simulation.running import RunningPlant
 from ...simulation.snapshot import EVERY, Watch
-from .clock import SECOND
-from .protocol import Datagram, Kind, LinkMode, PlantState, ShortDatagramError, Welcome, decode, encode, is_newer
-from .statistics import Counts, Histogram
+from .clock import SECOND, Histogram
+from .protocol import (
+    COUNTS,
+    Datagram,
+    Kind,
+    LinkMode,
+    PlantState,
+    ShortDatagramError,
+    Welcome,
+    decode,
+    encode,
+    is_newer,
+)
 
 __all__ = ["MISSED_FRAMES", "PATIENCE", "RAMP", "SESSION", "ServedPlant"]
 
 log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 
 MISSED_FRAMES = 5
 """Samples in a row without a new command after which the plant goes to its safe hold."""
@@ -56,18 +64,18 @@ class ServedPlant:
     def __init__(self, plant: Plant, rest: Equilibrium, mode: LinkMode) -> None:
         """Put the plant at rest and run its first samples, so that all is compiled before a client comes."""
         self.plant, self.mode, self._rest = plant, mode, rest
-        self.counts, self.answer_time = Counts(), Histogram()
+        self.counts, self.answer_time = dict.fromkeys(COUNTS, 0), Histogram()
         self.watcher: Watch | None = None
-        self._owner: Hashable = None  # who has the plant, or had it last
+        self._owner: Hashable = None  # current or last client
         self._taken = False
-        self._session, self._at_hello, self._heard = 0, Counts(), 0
+        self._session, self._at_hello, self._heard = 0, self.counts, 0
         self._valves, self._curves = valve_counts(plant.machine), flow_curves(plant.machine)
         self._width = int(self._valves.sum())
         self._begin()
         for _ in range(8):
             self._move(0)
         self._begin()
-        self.counts = Counts()
+        self.counts = dict.fromkeys(COUNTS, 0)
 
     def _begin(self) -> None:
         """A plant at rest that waits for its first command."""
@@ -91,14 +99,14 @@ class ServedPlant:
 
     def receive(self, datagram: bytes, sender: Hashable, now: int) -> list[bytes]:
         """Take a datagram; returns what to send back to its sender. Never raises."""
-        self.counts.received += 1
+        self.counts["received"] += 1
         try:
             frame = decode(datagram)
         except ShortDatagramError:
-            self.counts.short += 1
+            self.counts["short"] += 1
             return []
         except LinkError as error:
-            self.counts.malformed += 1
+            self.counts["malformed"] += 1
             log.debug("datagram of %s: %s", sender, error)
             return []
         if frame.kind == Kind.HELLO and self.client in (None, sender):
@@ -108,10 +116,10 @@ class ServedPlant:
             self._taken = False
             return [self._status()]
         if not known or not self._taken:
-            self.counts.foreign += 1
+            self.counts["foreign"] += 1
             return []
         if frame.kind != Kind.COMMAND or frame.valves != self._width:
-            self.counts.malformed += 1
+            self.counts["malformed"] += 1
             return []
         self._heard = now
         return self._command(frame, now)
@@ -125,21 +133,21 @@ class ServedPlant:
             self._resume()
         else:
             self._missed += 1
-            self.counts.missed_frames += 1
+            self.counts["missed_frames"] += 1
             if self._missed == MISSED_FRAMES:
                 self._hold()
         return self._move(now)
 
     def watch(self, now: int) -> None:
-        """Look whether the client is still there; to be called now and then."""
+        """Check that the client is still there; to be called repeatedly."""
         silence = (now - self._heard) / SECOND
         if not self._taken:
             return
         if silence > SESSION:
-            log.warning("nothing heard from %s for %g s: its place is free", self._owner, SESSION)
+            log.warning("no datagram from %s for %g s: the plant is free for another client", self._owner, SESSION)
             self._taken = False
         elif self.mode == LinkMode.LOCK_STEP and silence > PATIENCE and self.state == PlantState.RUNNING:
-            self.counts.missed_frames += MISSED_FRAMES
+            self.counts["missed_frames"] += MISSED_FRAMES
             self._hold()
             for _ in range(RAMP):
                 self._move(now)
@@ -149,7 +157,7 @@ class ServedPlant:
         if not self._taken or frame.session != self._session:
             self._begin()
             self._owner, self._taken = sender, True
-            self._session, self._at_hello = frame.session, replace(self.counts)
+            self._session, self._at_hello = frame.session, dict(self.counts)
             log.info("%s has the plant", sender)
         machine = self.plant.machine
         about = Welcome(float(SAMPLE_RATE), machine.name, machine.actuator_names, tuple(map(int, self._valves)))
@@ -159,11 +167,11 @@ class ServedPlant:
         assert frame.numbers is not None
         if not is_newer(frame.sequence, self._newest):
             same = frame.sequence == self._newest
-            self.counts.duplicate += same
-            self.counts.late += not same
+            self.counts["duplicate"] += same
+            self.counts["late"] += not same
             return [self._answer] if same and self._answer and self.mode == LinkMode.LOCK_STEP else []
-        self.counts.lost += (frame.sequence - self._newest - 1) % (1 << 32)
-        self.counts.superseded += self._fresh
+        self.counts["lost"] += (frame.sequence - self._newest - 1) % (1 << 32)
+        self.counts["superseded"] += self._fresh
         self._newest, self._newest_stamp = frame.sequence, frame.stamp
         self._asked = np.clip(per_actuator(frame.numbers, self._valves, self._curves), -1.0, 1.0)
         if frame.echo:
@@ -179,11 +187,11 @@ class ServedPlant:
     def _hold(self) -> None:
         if self.state == PlantState.RUNNING:
             self.state = PlantState.HOLD
-            self.counts.holds += 1
+            self.counts["holds"] += 1
             self._from, self._ramp, self._on_ramp = self.spool, RAMP, 0
 
     def _resume(self) -> None:
-        """Let the newest command act."""
+        """Apply the newest command."""
         self._acted, self._acted_stamp = self._newest, self._newest_stamp
         if self.state == PlantState.HOLD:
             self.state = PlantState.RUNNING
@@ -205,7 +213,7 @@ class ServedPlant:
                 if not np.isfinite(numbers).all():
                     raise SimulationError(f"stopped at {self._table.time:.4f} s: a sensor is not finite")
                 self.sample, self._sensed = self._table.sample, numbers
-                self.counts.samples += 1
+                self.counts["samples"] += 1
             except SimulationError as error:
                 self.state = PlantState.TRIPPED
                 log.warning("tripped: %s", error)
@@ -216,18 +224,12 @@ class ServedPlant:
         return Datagram(kind, self._session, self.mode, self.state, self.plant.spools, self._width)
 
     def _measured(self, now: int) -> bytes:
-        return encode(
-            self._frame(Kind.SENSORS)._replace(
-                sequence=self.sample,
-                acknowledged=self._acted,
-                stamp=now,
-                echo=self._acted_stamp,
-                numbers=self._sensed,
-            )
-        )
+        frame = self._frame(Kind.SENSORS)._replace(sequence=self.sample, acknowledged=self._acted, stamp=now)
+        return encode(frame._replace(echo=self._acted_stamp, numbers=self._sensed))
 
     def _status(self) -> bytes:
-        return encode(self._frame(Kind.STATUS)._replace(counts=astuple(self.counts.since(self._at_hello))))
+        since = tuple(number - self._at_hello[name] for name, number in self.counts.items())
+        return encode(self._frame(Kind.STATUS)._replace(counts=since))
 
 
 def _numbers(sensors: Feedback) -> Array:

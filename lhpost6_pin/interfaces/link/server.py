@@ -6,38 +6,36 @@ import select
 import socket
 import threading
 from contextlib import nullcontext
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
-from .clock import SECOND, now, undisturbed
+from .clock import SECOND, Histogram, now, undisturbed
 from .protocol import LinkMode
 from .served import ServedPlant
-from .statistics import Histogram
 
 __all__ = ["HOST", "PORT", "Timing", "open_socket", "serve"]
 
 log = logging.getLogger(__name__)
 
 HOST, PORT = "127.0.0.1", 46946
-"""Where a plant listens unless told otherwise: on this computer only, at a port of the private range."""
+"""Default address: this computer only, at a port of the private range."""
 
 _IDLE = 0.1  # [s] longest wait before looking at the stop event
-_SPIN = 150_000  # [ns] before a deadline that are spent asking, not sleeping: sleep ends up to 0.1 ms late
+_SPIN = 150_000  # [ns] before a deadline that are spent polling, not sleeping: sleep ends up to 0.1 ms late
 _LARGEST = 2048  # bytes of a datagram that are read; every frame is shorter
 _BURST = 64  # datagrams taken at most before the plant moves on
 
 
-class Timing:
-    """How a plant kept time: lateness of its samples, and how long each took from its deadline's meeting to sending."""
+class Timing(NamedTuple):
+    """Lateness of the samples of a served plant, and the time each took from its deadline to sending."""
 
-    def __init__(self) -> None:
-        """Begin empty."""
-        self.lateness, self.work = Histogram(), Histogram()
+    lateness: Histogram
+    work: Histogram
 
 
 def open_socket(host: str = HOST, port: int = PORT) -> socket.socket:
-    """Socket that listens at an address (port 0: any free one); raises LinkError that says why it cannot."""
+    """Socket that listens at an address (port 0: any free one); raises LinkError if it cannot be bound."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         sock.bind((host, port))
@@ -61,7 +59,7 @@ def serve(
     """
     if seconds is not None and not 0.0 <= seconds < math.inf:
         raise LinkError(f"a plant cannot be served for {seconds:g} s; give a number, zero or more, or leave it out")
-    stop, timing = stop or threading.Event(), Timing()
+    stop, timing = stop or threading.Event(), Timing(Histogram(), Histogram())
     end = None if seconds is None else now() + round(seconds * SECOND)
     begin, sample = 0, -1  # sample: of those due since `begin`; -1: the plant stands
     with undisturbed() if served.mode != LinkMode.LOCK_STEP else nullcontext():
@@ -84,7 +82,7 @@ def serve(
                 ended = now()
                 timing.lateness.add(started - due)
                 timing.work.add(ended - started)
-                served.counts.missed_deadlines += ended > due + SECOND // SAMPLE_RATE
+                served.counts["missed_deadlines"] += ended > due + SECOND // SAMPLE_RATE
         except KeyboardInterrupt:
             log.info("interrupted")
     return timing
@@ -98,7 +96,7 @@ def _tick(sock: socket.socket, served: ServedPlant) -> None:
 
 
 def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
-    """Take what comes until a time [ns], and what has come by then."""
+    """Receive until a time [ns], and what has arrived by then."""
     while (left := due - now()) > 0:
         _listen(sock, served, max(0, left - _SPIN) / SECOND)
     for _ in range(_BURST):
@@ -107,12 +105,12 @@ def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
 
 
 def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
-    """Take one datagram if one comes within a time [s]; False if none did."""
+    """Receive one datagram within a time [s]; False if there was none."""
     if not select.select([sock], [], [], timeout)[0]:
         return False
     try:
         datagram, sender = sock.recvfrom(_LARGEST)
-    except OSError:  # some systems report here that an earlier answer found nobody
+    except OSError:  # some systems report here that an earlier answer could not be delivered
         return True
     for answer in served.receive(datagram, sender, now()):
         _send(sock, answer, sender)
@@ -122,5 +120,5 @@ def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
 def _send(sock: socket.socket, datagram: bytes, receiver: Any) -> None:
     try:
         sock.sendto(datagram, receiver)
-    except OSError as error:  # gone, or no way to get there: a lost datagram like any other
+    except OSError as error:  # unreachable: a lost datagram like any other
         log.debug("nothing sent to %s: %s", receiver, error)

@@ -1,12 +1,11 @@
-"""Signals and their conditioning against closed forms: delays, shifts, derivatives, filters, gaps and integrals."""
+"""Signals and their conditioning against closed forms: delays, shifts, derivatives, filters and integrals."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lhpost6_pin.core.errors import RecordError
-from lhpost6_pin.data.conditioning import fill_gaps, integrate, resolution, without_offset
+from lhpost6_pin.data.conditioning import integrate, resolution
 from lhpost6_pin.data.signals import (
     Band,
     align,
@@ -170,14 +169,6 @@ def test_interpolation_holds_the_ends_outside_the_record_and_refuses_uneven_time
         resample_band_limited(x, uneven, T)
 
 
-@given(st.integers(1, 20000), st.integers(1, 64), st.integers(1, 40))
-def test_a_hold_repeats_each_sample_until_the_next_whatever_the_rate(rate: int, times: int, n: int):
-    x = np.arange(float(n))
-    np.testing.assert_array_equal(hold(x, rate, rate * times), np.repeat(x, times))
-    np.testing.assert_array_equal(hold(np.arange(5.0), 2, 3), [0, 0, 1, 2, 2, 3, 4])
-    np.testing.assert_array_equal(hold(np.stack([x, -x], axis=1), 1, 2)[:, 1], -np.repeat(x, 2))
-
-
 # ---------------------------------------------------------------------------------------------- filters
 def test_the_low_pass_halves_a_wave_at_its_cutoff_and_turns_no_phase():
     for f, gain in ((20.0, 1 / (1 + 0.5**8)), (40.0, 0.5), (80.0, 1 / (1 + 2.0**8))):
@@ -240,42 +231,9 @@ def test_a_band_that_passes_nothing_is_refused(low: float, high: float):
         Band(low, high)
 
 
-def test_what_is_left_of_a_rest_has_no_mean():
-    x = np.stack([np.full(100, 3.0), np.arange(100.0)], axis=1)
-    left = without_offset(x, slice(0, 11))
-    np.testing.assert_allclose(left[:11].mean(axis=0), 0.0, atol=1e-12)
-    np.testing.assert_allclose(left[-1], [0.0, 94.0])
-    with pytest.raises(ValueError, match="no samples"):
-        without_offset(x, slice(0, 0))
-
-
 def test_the_resolution_is_the_smallest_step():
     assert resolution(0.25 * np.round(np.sin(T) / 0.25)) == pytest.approx(0.25)
     assert resolution(np.ones(9)) == 0.0
-
-
-def test_short_gaps_are_filled_from_both_sides():
-    x = np.stack([np.sin(2 * np.pi * 3 * T), np.cos(2 * np.pi * 3 * T)], axis=1)
-    holed = x.copy()
-    holed[100:105, 0] = np.nan
-    holed[2000, 1] = np.inf
-    filled = fill_gaps(holed, DT, 0.02)
-    # a cubic over h = 6 samples: curvature change (w h)^3 / 6 of the amplitude, 2 %, at most; Akima's slopes less
-    np.testing.assert_allclose(filled, x, atol=5e-3)
-    np.testing.assert_array_equal(filled[np.isfinite(holed)], x[np.isfinite(holed)])
-    assert np.isnan(holed[100, 0])  # the original stays as it is
-
-
-@given(st.integers(0, 199), st.integers(1, 60))
-def test_a_gap_is_filled_or_named(first: int, length: int):
-    x = np.linspace(0.0, 1.0, 200)[:, None] * np.ones(2)
-    end = min(first + length, 200)
-    x[first:end, 1] = np.nan
-    if first == 0 or end == 200 or (end - first) > 20:
-        with pytest.raises(RecordError, match=rf"force\[1\]: {end - first} samples missing from sample {first}"):
-            fill_gaps(x, 0.001, 0.020, "force")
-    else:
-        np.testing.assert_allclose(fill_gaps(x, 0.001, 0.020)[:, 1], x[:, 0], atol=1e-12)  # a line stays one
 
 
 @pytest.mark.parametrize(("frequency", "accuracy"), [(5.0, 1e-9), (51.2, 1e-5)])

@@ -27,7 +27,7 @@ from lhpost6_pin.data.importing import (
     make_imported_record,
     save_map,
 )
-from lhpost6_pin.data.importing.channel_units import quantity_unit, si_factor, unit_in_name
+from lhpost6_pin.data.importing.channel_units import si_factor, unit_in_name
 from lhpost6_pin.machine.machine import load_machine
 
 SINGLE = 2.0**-24  # relative: the rounding of a float32

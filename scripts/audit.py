@@ -30,10 +30,9 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report import write_run_report
 from lhpost6_pin.show.tables import machine_rows, report_limits
 from lhpost6_pin.show.viewer import show_record
-from lhpost6_pin.simulation.batch import simulate_many
 from lhpost6_pin.simulation.energy import energy_audit
 from lhpost6_pin.simulation.rehearse import rehearse
-from lhpost6_pin.simulation.simulate import ClosedLoop, Run, simulate
+from lhpost6_pin.simulation.simulate import ClosedLoop, Run, simulate, simulate_many
 
 
 def noise(plant: Plant, seconds: float) -> ClosedLoop:

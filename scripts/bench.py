@@ -32,8 +32,7 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.simulation.batch import simulate_many
-from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate, simulate_many
 
 FIRST_RESULT = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {args!r}; main()"
 

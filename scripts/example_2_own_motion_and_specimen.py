@@ -22,7 +22,8 @@ from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import Target, load_motion, make_target
 from lhpost6_pin.show.viewer import Look, show_record
-from lhpost6_pin.simulation.rehearse import rehearse, target_within_limits
+from lhpost6_pin.simulation.motion_limits import check_motion_limits
+from lhpost6_pin.simulation.rehearse import rehearse
 
 
 def write_pulse(path: Path) -> Path:
@@ -36,7 +37,7 @@ def write_pulse(path: Path) -> Path:
 
 def print_demand(machine: Machine, target: Target) -> None:
     """Print demand over capacity of a target; beyond one, an error with the scale that fits is raised."""
-    checked = target_within_limits(make_plant(machine), target)
+    checked = check_motion_limits(make_plant(machine), target)
     for quantity, demand in checked.utilisation.items():
         governing = max(demand, key=lambda name: demand[name])
         print(f"{quantity}: {100 * demand[governing]:.0f} % of capacity ({governing})")

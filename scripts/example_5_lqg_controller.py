@@ -56,7 +56,8 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report import page
 from lhpost6_pin.show.report.plots import ACHIEVED, RECORDED, TARGET, Row, Trace, time_figure
 from lhpost6_pin.show.report.scales import axis_scale
-from lhpost6_pin.simulation.rehearse import SimulatedTest, rehearse, target_within_limits
+from lhpost6_pin.simulation.motion_limits import check_motion_limits
+from lhpost6_pin.simulation.rehearse import SimulatedTest, rehearse
 
 Array = NDArray[np.float64]
 STEP = 1.0 / SAMPLE_RATE
@@ -331,7 +332,7 @@ def main(
     refuse_folder(out)
     machine = load_machine("lhpost6")
     target = make_target(find_motion(motion), scale=scale, axes=axes)
-    target_within_limits(make_plant(machine), target)
+    check_motion_limits(make_plant(machine), target)
     panel = load_controller(settings)
     tests = {
         "469D": rehearse(machine, target, panel, attrs={"test": motion}),

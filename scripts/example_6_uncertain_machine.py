@@ -26,9 +26,8 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import PlatenMotion
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.simulation.batch import simulate_many
 from lhpost6_pin.simulation.outputs import record_of_run
-from lhpost6_pin.simulation.simulate import ClosedLoop
+from lhpost6_pin.simulation.simulate import ClosedLoop, simulate_many
 
 
 def figures(record: xr.Dataset) -> dict[str, float]:

@@ -12,7 +12,7 @@ from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import leg_displacements
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.simulation.rehearse import target_within_limits
+from lhpost6_pin.simulation.motion_limits import check_motion_limits
 
 
 @pytest.fixture(scope="module")
@@ -93,9 +93,9 @@ def test_actuator_check_finds_what_the_valves_cannot_feed(plant):
     both = make_plant(load_machine().with_params({"horizontal.valves": 2}))
     target = make_target(find_motion("sxh1"), rate=float(SAMPLE_RATE))
     with pytest.raises(OutOfRangeError, match=r"scale that fits is 0.83;.* actuator velocity"):
-        target_within_limits(both, target)
+        check_motion_limits(both, target)
     with pytest.raises(OutOfRangeError, match=r"scale that fits is 0.41"):
-        target_within_limits(plant, target)  # one valve
+        check_motion_limits(plant, target)  # one valve
 
 
 def test_actuator_check_shares_are_rates_over_speeds(plant):

@@ -22,7 +22,8 @@ from machine_cases import PENDULUM, PRACTICE, REFERENCE, STEWART
 import lhpost6_pin
 import lhpost6_pin.motions.library as library
 from lhpost6_pin import cli
-from lhpost6_pin.cli import completion, runs
+from lhpost6_pin.cli import completion, control
+from lhpost6_pin.cli import rehearse as rehearse_commands
 from lhpost6_pin.cli.app import JOBS, command_name
 from lhpost6_pin.control.inverse import InverseFilter, save_inverse
 from lhpost6_pin.core.compiled import cache_folder
@@ -387,8 +388,9 @@ def test_a_file_without_times_says_which_option_gives_them(lhpost6, tmp_path):
 def test_options_that_cannot_be_are_refused_before_anything_is_shown(lhpost6, tmp_path, monkeypatch, options, message):
     target = make_target(find_motion("sine", cycles=1, ramp_cycles=1))
     save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
-    for shown in ("progress_bar", "watched"):
-        monkeypatch.setattr(runs, shown, lambda *_, **__: pytest.fail("something was shown"))
+    shown = ((rehearse_commands, "progress_bar"), (rehearse_commands, "watched"), (control, "progress_bar"))
+    for module, name in shown:
+        monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail("something was shown"))
     for command in (("run", "sine", "--live"), ("replay", "drive.nc"), ("open-loop", PRACTICE)):
         assert refused(lhpost6(*command, *options), message)
 

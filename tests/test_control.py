@@ -277,7 +277,7 @@ def test_the_reset_integrator_stops_at_its_authority(plant, rest):
 
 
 def test_settings_of_another_rate_are_refused(plant, rest):
-    with pytest.raises(ControllerError, match="rate 1024 Hz is not the samples' 2048 Hz"):
+    with pytest.raises(ControllerError, match="rate is 1024 Hz; the rate of samples is 2048 Hz"):
         make_controller(plant, rest, replace(load_controller("lhpost6"), rate=1024.0))
 
 
@@ -288,8 +288,8 @@ def test_arrays_that_do_not_fit_a_controller_are_refused_before_compiled_code_se
         ({"drive": np.zeros((5, 3))}, r"drive is ndarray of shape \(5, 3\); an array of shape \(5, 6\) is needed"),
         ({"drive": np.zeros(6)}, r"drive is ndarray of shape \(6,\)"),
         ({"drive": drive.tolist()}, r"drive is list of shape \(5, 6\); an array"),
-        ({"sample": 5}, "sample 5 is none of the drive's 5"),
-        ({"sample": -1}, "sample -1 is none of the drive's 5"),
+        ({"sample": 5}, "sample 5 of a drive with 5 samples"),
+        ({"sample": -1}, "sample -1 of a drive with 5 samples"),
         ({"memory": np.zeros((3, 3))}, "memory is ndarray"),
         ({"sensors": sensors._replace(force=np.zeros(9))}, r"sensors' force is .* shape \(10,\) is needed"),
     ):

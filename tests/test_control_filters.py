@@ -14,7 +14,7 @@ from lhpost6_pin.control.filters import (
     reference_generator,
     sampled_response,
 )
-from lhpost6_pin.control.valves import flow_curves, per_actuator, per_valve, valve_counts, valve_names
+from lhpost6_pin.control.valves import per_actuator, valve_counts, valve_names
 from lhpost6_pin.laws.orifice import opening, port_flow
 from lhpost6_pin.machine.machine import load_machine
 
@@ -168,18 +168,18 @@ def test_every_notch_is_stable(frequency, bandwidth, depth):
 
 
 ONE, TWO = (load_machine().with_valves(valves) for valves in (1, 2))
-COUNTS, CURVES = valve_counts(TWO), flow_curves(TWO)
+COUNTS, CURVES = valve_counts(TWO), np.array([a.flow_curve for a in TWO.actuators])
 SPOOL = st.floats(-1.0, 1.0)
 
 
 def test_the_table_has_ten_servovalves_or_fourteen():
-    assert valve_names(ONE) == ONE.actuator_names
-    assert valve_names(TWO) == tuple("H1A H1B H2A H2B H3A H3B H4A H4B V1 V2 V3 V4 V5 V6".split())
+    assert valve_names(ONE.actuator_names, valve_counts(ONE)) == ONE.actuator_names
+    assert valve_names(TWO.actuator_names, COUNTS) == tuple("H1A H1B H2A H2B H3A H3B H4A H4B V1 V2 V3 V4 V5 V6".split())
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=10, max_size=10))
 def test_commands_of_actuators_come_back_from_their_valves_to_the_last_bit(command):
-    valves = per_valve(np.array(command), COUNTS)
+    valves = np.repeat(command, COUNTS)
     assert len(valves) == 14 and (valves[0:8:2] == valves[1:8:2]).all()
     assert np.array_equal(per_actuator(valves, COUNTS, CURVES), command)
 

@@ -52,7 +52,7 @@ def test_a_drive_comes_back_from_its_file(path, target):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda d: d.assign_attrs(kind="simulated"), "is no drive file; make one with `lhpost6 iterate`"),
+        (lambda d: d.assign_attrs(kind="simulated"), "is not a drive file; make one with `lhpost6 iterate`"),
         (lambda d: d.isel(axis=slice(0, 3)), "is damaged or incomplete"),
         (lambda d: d.drop_vars("wanted_velocity"), "is damaged or incomplete: .*wanted_velocity"),
         (lambda d: d.assign_attrs(axes=""), "is damaged or incomplete"),

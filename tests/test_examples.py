@@ -133,7 +133,7 @@ def test_the_demonstration_finds_what_it_hides(lhpost6, tmp_path):
         # one draw of noise in ten is outside of a 90 % interval: then not by far
         abs(number["value"] - numbers["leakage"]) < 2 * (number["ci90"][1] - number["ci90"][0])
     )
-    before, after = map(float, re.search(r"ends ([\d.]+) mm .*?\s([\d.]+) mm with", ended.out, re.DOTALL).groups())
+    before, after = map(float, re.search(r"by ([\d.]+) mm .*?\s([\d.]+) mm with", ended.out, re.DOTALL).groups())
     assert after < 0.1 * before
     machine = load_machine()
     assert len(load_campaign(tmp_path / "measured", machine).records) == 3

@@ -62,7 +62,7 @@ def test_the_second_drive_is_the_inverse_of_the_table_and_its_delay(found, table
     told = []
     alone = iterate(load_machine(), strong, found.settings, table=table, most=1, progress=told.append)
     assert np.array_equal(alone.drives, found.drives[:2])
-    assert alone.reason == "1 iterations were asked for" and alone.table is table
+    assert alone.reason == "limit of 1 iterations reached" and alone.table is table
     assert told == sorted(told) and told[-1] == 1.0
     assert 0.0 < table.delay < 0.03 and table.inverse.axes == table.transfer.axes == AXES
     once = iterate(load_machine(), strong, found.settings, table=table, most=0)
@@ -77,7 +77,7 @@ def test_a_run_that_leaves_its_stroke_names_the_iteration(table):
 
 @pytest.mark.parametrize("gain", [0.0, -0.5, 1.5, np.nan])
 def test_a_gain_that_is_none_is_refused(table, strong, gain):
-    with pytest.raises(SimulationError, match="is no gain of a drive's update"):
+    with pytest.raises(SimulationError, match="gain of the drive's update must be above 0"):
         iterate(load_machine(), strong, load_controller("lhpost6"), table=table, gain=gain)
 
 

@@ -48,13 +48,6 @@ def test_a_number_that_was_changed_is_calibrated_and_says_by_whom(tmp_path):
     assert all(again.stated[key] == settings.stated[key] for key in kept)
 
 
-def test_each_number_may_have_a_source_of_its_own(tmp_path):
-    changed = replace(load_controller("untuned"), displacement_gain=(6.0,) * 6, force_cut_in=0.7)
-    again = load_controller(save_controller(changed, tmp_path / "a.toml", changed={"displacement_gain": "a test"}))
-    assert again.stated["feedback.displacement_gain"].source == "a test"
-    assert again.stated["force.force_cut_in"].source == "set by hand"
-
-
 def test_numbers_of_numpy_and_texts_with_quotes_come_back_too(tmp_path):
     said = 'a "quoted"\\path\nand a second line'
     changed = replace(load_controller("untuned"), name=said, master_gain=tuple(np.linspace(0.5, 1.0, 6)))
@@ -112,9 +105,9 @@ def test_a_missing_number_is_named_with_its_file(file, name):
         ("", "[notch_5]", "[notch_6]", r"no place for \[notch_6\]; .* there are notches, numbered from notch_1"),
         ("", "[notch_1]", "[noch_1]", r"no place for \[noch_1\]"),
         ("", "[loop]", "[loop", "not a TOML file"),
-        ("", "balance_gain = {", "balance_gian = {", "force.balance_gian is no .*; did you mean 'force.balan"),
+        ("", "balance_gain = {", "balance_gian = {", "force.balance_gian is not .*; did you mean 'force.balan"),
         ("[force]\n", "", 'lag = { value = 1.0, unit = "s", evidence = "assumed", source = "x" }\n', "force.lag is no"),
-        ("[controller]\n", "", 'comment = "mine"\n', "controller.comment is no setting of a controller"),
+        ("[controller]\n", "", 'comment = "mine"\n', "controller.comment is not a controller setting"),
         ("_high_pass = { value = [", "0.05", "300.0", "high_pass must lie below reference_low_pass"),
         ("depth = { value = [", "0.0", "-1.5", "notch_1.depth is below -1"),
     ],

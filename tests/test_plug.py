@@ -144,7 +144,7 @@ def test_a_controller_that_cannot_be_loaded_is_refused_by_file_and_reason(file, 
         ("import no_such_module", "mine.py cannot be imported: ModuleNotFoundError: .*no_such_module"),
         ("class Mine:\n  def init(", "mine.py cannot be imported: SyntaxError"),
         ("raise SystemExit('left')", "mine.py cannot be imported: SystemExit: left"),
-        ("x = 1", "mine.py has no 'Mine'; it has nothing that can be called"),
+        ("x = 1", "mine.py has no 'Mine'; it has no class or function"),
     ],
 )
 def test_a_file_that_is_no_use_is_refused(file, text, message):

@@ -16,7 +16,8 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.valve_delay import delayed_spools
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.simulation.rehearse import rehearse, replay, target_within_limits
+from lhpost6_pin.simulation.motion_limits import check_motion_limits
+from lhpost6_pin.simulation.rehearse import rehearse, replay
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 pytestmark = pytest.mark.long
@@ -72,8 +73,8 @@ def test_a_zero_target_keeps_the_platen_at_rest_for_ten_seconds(machine):
 def test_a_guided_machine_refuses_what_it_cannot_move_and_says_what_to_choose():
     plant = make_plant(machine_named("uniaxial"))
     with pytest.raises(OutOfRangeError, match=r"uniaxial cannot move in y, z; choose with --axes x"):
-        target_within_limits(plant, make_target(find_motion("ridgecrest"), scale=0.1))
-    summary = target_within_limits(plant, make_target(find_motion("ridgecrest"), scale=0.1, axes="x"))
+        check_motion_limits(plant, make_target(find_motion("ridgecrest"), scale=0.1))
+    summary = check_motion_limits(plant, make_target(find_motion("ridgecrest"), scale=0.1, axes="x"))
     assert summary.utilisation["displacement"]["x"] == pytest.approx(0.1 / 0.596, rel=2e-3)  # three digits of a scale
 
 
@@ -81,18 +82,18 @@ def test_a_guided_machine_refuses_what_it_cannot_move_and_says_what_to_choose():
 def test_the_scale_that_a_refusal_names_fits_and_the_next_does_not(name):
     plant = make_plant(machine_named(name))
     with pytest.raises(OutOfRangeError) as caught:
-        target_within_limits(plant, sine_target(amplitude=5.0))
+        check_motion_limits(plant, sine_target(amplitude=5.0))
     fits = float(re.search(r"scale that fits is ([\d.e+-]*\d)", str(caught.value)).group(1))
-    assert target_within_limits(plant, sine_target(amplitude=5.0, scale=fits)).highest[2] <= 1.0 + 1e-6
+    assert check_motion_limits(plant, sine_target(amplitude=5.0, scale=fits)).highest[2] <= 1.0 + 1e-6
     with pytest.raises(OutOfRangeError):
-        target_within_limits(plant, sine_target(amplitude=5.0, scale=1.01 * fits))
+        check_motion_limits(plant, sine_target(amplitude=5.0, scale=1.01 * fits))
 
 
 def test_two_valves_carry_what_one_cannot():
     target = sine_target(amplitude=0.7, period=2.0)  # 2.2 m/s
     with pytest.raises(OutOfRangeError, match="H1 actuator velocity"):
-        target_within_limits(make_plant(load_machine()), target)
-    target_within_limits(make_plant(load_machine().with_valves(2)), target)
+        check_motion_limits(make_plant(load_machine()), target)
+    check_motion_limits(make_plant(load_machine().with_valves(2)), target)
 
 
 def test_rehearsing_beyond_limits_is_refused_before_anything_runs_unless_asked_for():

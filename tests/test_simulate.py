@@ -19,9 +19,8 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.valve_delay import delayed_spools
-from lhpost6_pin.simulation.batch import simulate_many
 from lhpost6_pin.simulation.rehearse import replay
-from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate, simulate_many
 
 pytestmark = pytest.mark.long
 

@@ -1,26 +1,10 @@
-"""The command line `lhpost6`.
+"""The command line `lhpost6`, a module for each job.
 
 Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the input cannot be used or a file cannot be
 read or written, 130 interrupted.
 """
 
-from . import calibration, campaigns, connect, controllers, data, demo, discovery, forces, look, runs, validation, view
+from . import connect, control, discover, look, measured_data, rehearse
 from .app import app, main, run_script
 
-__all__ = [
-    "app",
-    "calibration",
-    "campaigns",
-    "connect",
-    "controllers",
-    "data",
-    "demo",
-    "discovery",
-    "forces",
-    "look",
-    "main",
-    "run_script",
-    "runs",
-    "validation",
-    "view",
-]
+__all__ = ["app", "connect", "control", "discover", "look", "main", "measured_data", "rehearse", "run_script"]

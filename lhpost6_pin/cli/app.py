@@ -1,13 +1,16 @@
 """The application: commands by job, the entry point, errors without a traceback, output and progress."""
 
 import errno
+import inspect
 import logging
 import os
+import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
+from dataclasses import fields, is_dataclass
+from functools import cache, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,8 +23,8 @@ from ..core.errors import LhpostError, OutOfRangeError
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["JOBS", "app", "command_name", "main", "progress_bar", "run_script", "stderr", "tell"]
-
+__all__ = ["JOBS", "app", "command", "command_name", "main", "print_result", "progress_bar", "repeating_command"]
+__all__ += ["run_script", "stderr"]
 
 JOBS: Mapping[str, tuple[str, ...]] = {
     "Rehearse": ("run", "open-loop", "campaign", "motions"),
@@ -38,8 +41,7 @@ class _Commands(TyperGroup):
     """The commands, grouped by job; `--help` shows no value type for flags, which take none."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        by_job = [name for names in JOBS.values() for name in names if name in self.commands]
-        return by_job + [name for name in self.commands if name not in by_job]
+        return sorted(self.commands, key=[name for names in JOBS.values() for name in names].index)
 
     def get_params(self, ctx: Any) -> list[Any]:
         return _without_kind(super().get_params(ctx))
@@ -83,6 +85,33 @@ def _options(
     pass
 
 
+def command(name: str | None = None) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Register a function as a command; a parameter that is a dataclass becomes one option per field."""
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        parameters: list[inspect.Parameter] = []
+        bundles: dict[str, Any] = {}
+        for parameter in inspect.signature(function).parameters.values():
+            options = [parameter]
+            if is_dataclass(parameter.annotation):
+                bundles[parameter.name] = parameter.annotation
+                options = list(inspect.signature(bundles[parameter.name]).parameters.values())
+            parameters += [option.replace(kind=inspect.Parameter.KEYWORD_ONLY) for option in options]
+
+        @wraps(function)
+        def run(**given: Any) -> None:
+            for name, bundle in bundles.items():
+                given[name] = bundle(**{field.name: given.pop(field.name) for field in fields(bundle)})
+            function(**given)
+
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        app.command(name)(run)
+        return run
+
+    return register
+
+
 def command_name(command: typer.models.CommandInfo) -> str:
     """Name of a registered command on the command line."""
     return command.name or str(getattr(command.callback, "__name__", ""))
@@ -98,14 +127,10 @@ def main() -> None:
         try:
             with _without_traceback(2):
                 app(prog_name="lhpost6")
-        except SystemExit as end:
-            if end.code == _INTERRUPTED:
-                _say_interrupted()
-            raise
-        except Exception:
-            if not _PRESSED:
+        except (SystemExit, Exception) as end:
+            if not (end.code == _INTERRUPTED if isinstance(end, SystemExit) else _PRESSED):
                 raise
-            _say_interrupted()
+            stderr().print("interrupted; no incomplete file is left")
             sys.exit(_INTERRUPTED)
 
 
@@ -125,9 +150,8 @@ def _without_traceback(code: int) -> Iterator[None]:
         _fail(code, type(error).__name__, str(error), **known)
     except OSError as error:  # disk full, no permission, a file where a folder should be
         path = error.filename2 or error.filename  # the second is what a finished file was to be renamed to
-        where = f"cannot read or write {path}" if path else "cannot read or write a file"
-        said = os.strerror(error.errno) if error.errno else error
-        _fail(code, "OSError", f"{where}: {said}{_REMEDIES.get(error.errno or 0, '')}")
+        reason = f"{os.strerror(error.errno)}{_REMEDIES.get(error.errno, '')}" if error.errno else str(error)
+        _fail(code, "OSError", f"cannot read or write {path or 'a file'}: {reason}")
 
 
 @contextmanager
@@ -152,14 +176,10 @@ def _noting_ctrl_c() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _say_interrupted() -> None:
-    stderr().print("interrupted; nothing half-written is left behind")
-
-
 _REMEDIES = dict.fromkeys(
     (errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "; make room, or choose another folder with --out"
 ) | {errno.EROFS: "; choose another folder with --out"}
-"""By error number: how to get results written after all."""
+"""Remedies by error number."""
 
 _PRESSED: list[int] = []
 """Signals received from Ctrl-C since the command began."""
@@ -187,48 +207,41 @@ def stderr() -> "Console":
     return Console(stderr=True, soft_wrap=True)
 
 
-def tell(
-    as_json: bool,
-    entries: Callable[[], Mapping[str, Any]],
-    show: Callable[[], None],
-    files: Sequence[Path] = (),
+def print_result(
+    json: bool, entries: Callable[[], Mapping[str, Any]], show: Callable[[], None], files: Sequence[Path] = ()
 ) -> None:
-    """Print a result and the files written: as JSON alone, or by `show`."""
-    from ..core.jsonable import as_json as written
+    """Print a result and the files written: its entries as JSON alone, or by `show`."""
+    from ..core.jsonable import as_json
 
-    if as_json:
-        typer.echo(written({**entries(), "files": files} if files else entries()))
+    if json:
+        typer.echo(as_json({**entries(), "files": files} if files else entries()))
         return
     show()
     for path in files:
         typer.echo(f"wrote {path}")
 
 
+def repeating_command() -> str:
+    """Command line that repeats this run."""
+    return shlex.join(["lhpost6", *sys.argv[1:]])
+
+
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     """A progress bar with remaining time on stderr; yields a function of the completed fraction."""
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as rich
 
-    name = TextColumn("{task.description}", markup=False)
-    with Progress(
-        name, BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=stderr()
-    ) as bar:
+    columns = (rich.BarColumn(), rich.TaskProgressColumn(), rich.TimeElapsedColumn(), rich.TimeRemainingColumn())
+    with rich.Progress(rich.TextColumn("{task.description}", markup=False), *columns, console=stderr()) as bar:
         task = bar.add_task(title, total=1.0)
 
         def advance(share: float) -> None:
-            if _PRESSED:  # and was swallowed
+            if _PRESSED:  # and the exception was discarded
                 raise KeyboardInterrupt
             bar.update(task, completed=share)
 
         try:
             yield advance
         except LhpostError:
-            bar.live.transient = not bar.tasks[task].completed  # nothing was begun: no bar is left above the error
+            bar.live.transient = not bar.tasks[task].completed  # no bar above an error before the start
             raise

@@ -7,22 +7,12 @@ from collections.abc import Callable, Iterable
 
 import typer
 
-from ..core.files import models_folder, read_toml, shipped
-from ..core.names import AXES, ENGINES, SCHEMES
+from ..core.files import models_folder, read_toml
 
-__all__ = [
-    "complete_axis",
-    "complete_controller",
-    "complete_engine",
-    "complete_machine",
-    "complete_motion",
-    "complete_scheme",
-    "complete_sensors",
-    "complete_specimen",
-]
+__all__ = ["complete_motion", "completing"]
 
 
-def _completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+def completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
     """Function that lists the names beginning with an incomplete word."""
 
     def complete(incomplete: str) -> list[str]:
@@ -43,18 +33,9 @@ def _motion_names() -> list[str]:
     return list(dict.fromkeys([*records, *(name for name in tests if name != "processing")]))
 
 
-_motion = _completing(_motion_names)
+_motion = completing(_motion_names)
 
 
 def complete_motion(ctx: typer.Context, incomplete: str) -> list[str]:
     """Motions; after the first word only files are valid, which the shell completes itself."""
     return [] if ctx.params.get("motion") else _motion(incomplete)
-
-
-complete_axis = _completing(lambda: AXES)
-complete_controller = _completing(lambda: shipped("controllers"))
-complete_engine = _completing(lambda: ENGINES)
-complete_machine = _completing(shipped)
-complete_scheme = _completing(lambda: SCHEMES)
-complete_sensors = _completing(lambda: shipped("sensors"))
-complete_specimen = _completing(lambda: shipped("specimens", ".urdf"))

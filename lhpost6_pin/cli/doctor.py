@@ -3,9 +3,10 @@
 import platform
 import shutil
 import time
+from collections.abc import Mapping
+from contextlib import suppress
 from importlib import metadata, util
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -15,7 +16,7 @@ from .. import __version__
 from ..core.compiled import cache_folder
 from ..core.files import models_folder
 
-__all__ = ["Examined", "examine", "print_doctor"]
+__all__ = ["examine", "print_doctor"]
 
 _REQUIRED = [
     *("pin", "numpy", "scipy", "numba", "xarray", "h5netcdf", "h5py", "typer", "rich", "plotly", "joblib"),
@@ -28,54 +29,45 @@ _OPTIONAL = {
 }
 
 
-class Examined(NamedTuple):
-    """State of an installation."""
-
-    version: str
-    python: str
-    required: dict[str, str | None]  # version by package; None: missing
-    optional: dict[str, bool]  # whether installed
-    browser: str | None
-    machine_files: Path
-    compiled_code: Path | None  # None: not kept between runs
-    first_step: float  # time until it is done [s]
-    compiled_now: bool  # for that step
-
-
-def examine() -> Examined:
+def examine() -> dict[str, Any]:
     """Collect versions, cache and optional dependencies; times one model step."""
-    required: dict[str, str | None] = {}
-    for name in _REQUIRED:
-        try:
-            required[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            required[name] = None
-    optional = {module: util.find_spec(module) is not None for module in _OPTIONAL}
-    browser = next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None)
-    folders = models_folder(), cache_folder()
-    return Examined(__version__, platform.python_version(), required, optional, browser, *folders, *_time_first_step())
+    versions: dict[str, str | None] = dict.fromkeys(_REQUIRED)  # None: missing
+    for name in versions:
+        with suppress(metadata.PackageNotFoundError):
+            versions[name] = metadata.version(name)
+    seconds, compiled_now = _time_first_step()
+    return {
+        "version": __version__,
+        "python": platform.python_version(),
+        "required": versions,
+        "optional": {module: util.find_spec(module) is not None for module in _OPTIONAL},
+        "browser": next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None),
+        "machine_files": models_folder(),
+        "compiled_code": cache_folder(),  # None: not kept between runs
+        "first_step": seconds,
+        "compiled_now": compiled_now,
+    }
 
 
-def print_doctor(found: Examined) -> None:
+def print_doctor(found: Mapping[str, Any]) -> None:
     """Print the state of an installation."""
-    console = Console()
-    state = Column("state", overflow="fold")  # a path is of no use cut off
-    table = Table("part", state, title=f"lhpost6_pin {found.version}, Python {found.python}")
-    for name, version in found.required.items():
+    console, kept = Console(), found["compiled_code"]
+    state = Column("state", overflow="fold")  # no path is cut
+    table = Table("part", state, title=f"lhpost6_pin {found['version']}, Python {found['python']}")
+    for name, version in found["required"].items():
         table.add_row(name, version or "[red]missing[/]")
-    for module, there in found.optional.items():
-        table.add_row(module, "there" if there else escape(f"not installed; {_OPTIONAL[module]}"))
-    table.add_row("browser", found.browser or "none found; reports and views are HTML files")
-    table.add_row("machine files", escape(str(found.machine_files)))
-    kept = found.compiled_code
+    for module, there in found["optional"].items():
+        table.add_row(module, "installed" if there else escape(f"not installed; {_OPTIONAL[module]}"))
+    table.add_row("browser", found["browser"] or "none found; reports and views are HTML files")
+    table.add_row("machine files", escape(str(found["machine_files"])))
     table.add_row("compiled code", escape(str(kept)) if kept else "[yellow]not kept: every run compiles anew[/]")
     console.print(table)
-    word = "compiled now; the next run loads it" if found.compiled_now else "loaded from the cache"
-    console.print(f"first model step after {found.first_step:.1f} s: {word if kept else 'compiled in memory'}")
+    word = "compiled now; the next run loads it" if found["compiled_now"] else "loaded from the cache"
+    console.print(f"first model step after {found['first_step']:.1f} s: {word if kept else 'compiled in memory'}")
 
 
 def _time_first_step() -> tuple[float, bool]:
-    """Seconds until the first model step is done, and whether anything was compiled for it."""
+    """Seconds to the end of the first model step, and whether anything was compiled for it."""
     begin = time.perf_counter()
     from ..machine.machine import load_machine
     from ..mechanics.equilibrium import find_equilibrium

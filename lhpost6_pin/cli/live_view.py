@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,41 +11,49 @@ if TYPE_CHECKING:
     from ..machine.machine import Machine
     from ..simulation.snapshot import Watch
 
-__all__ = ["Amplify", "Change", "Live", "NoOpen", "show_address", "watched"]
+__all__ = ["LiveOptions", "NoOpen", "ViewOptions", "show_address", "watched"]
 
-Amplify = Annotated[float, typer.Option(help="Factor that enlarges the motion.")]
-Change = Annotated[
-    bool, typer.Option("--force-change", help="Show force change from the static value (weight, preload).")
-]
-Live = Annotated[bool, typer.Option("--live", help="Show the table in a browser as it moves, in real time at most.")]
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the address of the page; do not open a browser.")]
 
 PATIENCE = 20.0
 """Longest wait [s] for a viewer to connect before a run begins."""
 
 
+@dataclass(frozen=True)
+class ViewOptions:
+    """Options of a view in a browser."""
+
+    amplify: Annotated[float, typer.Option(help="Factor that enlarges the motion.")] = 1.0
+    force_change: Annotated[
+        bool, typer.Option("--force-change", help="Show force change from the static value (weight, preload).")
+    ] = False
+    no_open: NoOpen = False
+
+
+@dataclass(frozen=True)
+class LiveOptions(ViewOptions):
+    """Options of a view of a running plant."""
+
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the table in a browser as it moves, in real time at most.")
+    ] = False
+
+
 @contextmanager
 def watched(
-    live: bool,
-    table: "Machine",
-    title: str,
-    *,
-    amplify: float,
-    change: bool,
-    open_it: bool,
-    err: bool = False,
-    apart: bool = False,
+    options: LiveOptions, table: "Machine", title: str, *, err: bool = False, apart: bool = False
 ) -> "Iterator[Watch | None]":
-    """Yield the function that shows a running plant in a browser, or None if not `live`.
+    """Yield the function that shows a running plant in a browser, or None unless a live view was chosen.
 
     With `apart` the view runs in another process and delays nothing; else the run waits for a viewer to connect.
     """
-    if not live:
+    if not options.live:
         yield None
         return
     from ..show.viewer import LiveView, Look, view_apart
 
-    look, what = Look(amplify=amplify, change=change), f"{title} on this computer only"
+    look = Look(amplify=options.amplify, change=options.force_change)
+    what, open_it = f"{title} on this computer only", not options.no_open
     if apart:
         with view_apart(table, title, look) as (url, show):
             show_address(url, what, open_it, err)
@@ -63,4 +72,4 @@ def show_address(url: str, what: str, open_it: bool, err: bool = False) -> None:
 
     typer.echo(f"{url} shows {what}", err=err)
     if open_it and not webbrowser.open(url):
-        typer.echo("no browser could be opened here: open this address in one", err=True)
+        typer.echo("no browser found on this computer; open this address in a browser", err=True)

@@ -1,7 +1,7 @@
-"""The controller's linear filters, in continuous time and as the matrices of one sample.
+"""The controller's linear filters, in continuous time and as sampled matrices.
 
-Reference generator, by mode: what the drive d is, and xr, vr, ar, jr from it, each the derivative of the one before
-(in acceleration mode jr is a filtered derivative).
+Reference generator, by mode: from the drive d follow xr, vr, ar, jr, each the derivative of the preceding one (in
+acceleration mode jr is a filtered derivative).
 
     acceleration   xr = d / (s^2 + 2 zeta w s + w^2): a second-order high-pass, integrated twice; jr = s ar / (1 + s/w2)
     velocity       xr = L(s) d / (s + w): a high-pass of first order, integrated; L a low-pass of third order
@@ -13,20 +13,21 @@ Feedback generator: xf = L xs + H as / s^2, vf = s xf, af = s^2 xf with L + H = 
 
 the lowest order whose three outputs are all proper. Notch: N = 1 + d B s / (s^2 + B s + w0^2).
 
-Low-passes are Bessel filters: what they pass they delay as a whole. Inputs are taken as straight between samples
-(first-order hold), but for a generator with a low-pass: by the bilinear transform, so that each output stays the
-derivative of the one before at all frequencies. Notches by the bilinear transform that is exact at w0.
+Low-passes are Bessel filters, whose delay is constant in their pass band. Inputs are interpolated linearly between
+samples (first-order hold), except for generators with a low-pass, which are discretised by the bilinear transform so
+that each output remains the derivative of the preceding one at all frequencies. Notches are discretised by the bilinear
+transform that is exact at w0.
 """
 
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..core.arrays import Array, Complex
 
 __all__ = ["MODES", "NOTCHES", "drive_for"]
 __all__ += ["feedback_generator", "notch_section", "reference_generator", "sampled_response"]
 
-Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array]
 
 MODES = ("acceleration", "velocity", "displacement")
@@ -36,9 +37,9 @@ NOTCHES = 5
 """Notches of each degree of freedom."""
 
 
-@cache  # tuning asks for the same ones again and again; the arrays are read only
+@cache  # tuning needs the same ones many times; the arrays are read only
 def reference_generator(mode: str, high_pass: float, damping: float, low_pass: float, rate: float) -> Matrices:
-    """Sampled matrices a (4, 4), b (4,), c (4, 4), d (4,) of a mode; corners [Hz] as the mode uses them (see above)."""
+    """Sampled matrices a (4, 4), b (4,), c (4, 4), d (4,) of a mode, with its corners [Hz] (see above)."""
     w, w2 = 2.0 * np.pi * high_pass, 2.0 * np.pi * low_pass
     a, b, c, d = np.zeros((4, 4)), np.zeros((4, 1)), np.zeros((4, 4)), np.zeros((4, 1))
     if mode == "acceleration":  # states: xr, vr, low-passed ar; one is not needed
@@ -66,9 +67,9 @@ def reference_generator(mode: str, high_pass: float, damping: float, low_pass: f
 def drive_for(
     mode: str, displacement: Array, velocity: Array, acceleration: Array, high_pass: Array, damping: Array
 ) -> Array:
-    """Drive (n, 6) whose reference is the given motion, (n, 6) each: what the generator's high-pass takes is added.
+    """Drive (n, 6) whose reference is the given motion, (n, 6) each; it compensates the generator's high-pass.
 
-    Low-passes are not undone: in velocity and displacement mode the reference comes late by their delay.
+    Low-passes are not compensated: in velocity and displacement mode the reference lags by their delay.
     """
     w = 2.0 * np.pi * np.asarray(high_pass)
     if mode == "acceleration":
@@ -76,7 +77,7 @@ def drive_for(
     return velocity + w * displacement if mode == "velocity" else displacement.copy()
 
 
-def sampled_response(matrices: Matrices, frequency: Array, rate: float) -> NDArray[np.complex128]:
+def sampled_response(matrices: Matrices, frequency: Array, rate: float) -> Complex:
     """Frequency response (m, outputs, inputs) of sampled matrices at `frequency` (m,) [Hz]; one input may be flat."""
     a, b, c, d = (np.asarray(x) for x in matrices)
     b, d = b.reshape(len(b), -1), d.reshape(len(d), -1)

@@ -1,8 +1,7 @@
 """Adaptive inverse control: the stable, band-limited inverse of a measured table, as a filter.
 
-The drive that makes a table with the transfer function T follow a reference r is T⁻¹ r. Here T⁻¹ is a finite
-impulse response, so it is stable whatever the table; it looks ahead by the table's delay, so it is centred and
-acts on a whole record at once.
+A table with the transfer function T follows a reference r if its drive is T⁻¹ r. Here T⁻¹ is a finite impulse
+response, which is always stable; it anticipates the delay of the table, so it is centred and applied to a whole record.
 """
 
 from collections.abc import Mapping
@@ -14,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..core.files import write_whole
 from ..core.names import AXES
@@ -23,8 +23,6 @@ from ..machine.parameters import LARGEST
 
 __all__ = ["InverseFilter", "apply_inverse", "load_inverse", "make_inverse", "save_inverse"]
 
-Array = NDArray[np.float64]
-
 DOUBTFUL, TRUSTED = 0.4, 0.8  # coherence up to which an axis counts as not measured, and from which as measured
 TAPER = 2 ** (1 / 3)  # a third of an octave: from full inverse to nothing above the band
 SHORT = 2 ** (1 / 8)  # an eighth of an octave: from full correction to nothing, within the band
@@ -32,18 +30,13 @@ SHORT = 2 ** (1 / 8)  # an eighth of an octave: from full correction to nothing,
 
 @dataclass(frozen=True)
 class InverseFilter:
-    """Impulse response from reference to drive; tap `len(taps) // 2` acts at once, those before it look ahead."""
+    """Impulse response from reference to drive; tap `len(taps) // 2` is that of zero lag, earlier ones anticipate."""
 
     taps: Array  # (odd, n, n) [drive / reference] per sample, rows drives, columns references
     rate: float  # [Hz]
     band: tuple[float, float]  # [Hz] where it inverts; unit gain below, nothing above
     axes: tuple[str, ...]  # (n,) names of the axes it acts on
     made_with: Mapping[str, str] = field(default_factory=dict)  # machine, controller and so on (`drives`)
-
-    @property
-    def delay(self) -> float:
-        """Lag of the centre tap [s], by which a causal use of the taps is late."""
-        return len(self.taps) // 2 / self.rate
 
 
 def make_inverse(
@@ -57,19 +50,19 @@ def make_inverse(
 ) -> InverseFilter:
     """Inverse of a square transfer function between `low` and `high` [Hz].
 
-    Each output k first has its delay tau_k removed. From `low` / 2 to `low` its row of T fades from unity,
-    the same axis alone, to what was measured; it fades back wherever the coherence falls from 0.8 to 0.4. So where
-    nothing is known the drive is the reference advanced by tau_k, and the gain at 0 Hz is exactly one. Singular
-    values of that matrix below `floor` are raised to it, which bounds the gain at 1 / `floor` and leaves the
-    inverse exact elsewhere. From `high` to a third of an octave above the drive fades to nothing.
+    First the delay tau_k of each output k is removed. From `low` / 2 to `low` its row of T is blended from unity on the
+    same axis to the measured one; it is blended back where the coherence falls from 0.8 to 0.4. Thus, without
+    information, the drive is the reference advanced by tau_k, and the gain at 0 Hz is exactly one. Singular values of
+    that matrix below `floor` are raised to it, which bounds the gain at 1 / `floor` and leaves the inverse exact
+    elsewhere. From `high` to a third of an octave above, the drive is reduced to zero.
 
-    An inverse that `corrects` a drive by what an error asks for must do nothing where it does not know: where the
-    coherence of an axis falls from 0.8 to 0.4 its error fades out, and so does every error over the eighth of an octave
-    below `high`. Repeated corrections there would build up oscillations.
+    An inverse that `corrects` a drive for an error must be zero without information, since repeated corrections would
+    build up oscillations: the error of an axis is faded out where its coherence falls from 0.8 to 0.4, and that of all
+    axes over the eighth of an octave below `high`.
 
-    Parameters: `rate` [Hz] of the filter, `length` [s] of the impulse response, features narrower than about
-    2 / `length` [Hz] are smoothed. Raises `ValueError` for a transfer function that is not square or does not
-    reach from `low` / 2 to a third of an octave above `high`, and for a rate too low for that.
+    Parameters: `rate` [Hz] of the filter, `length` [s] of the impulse response; features narrower than about
+    2 / `length` [Hz] are smoothed. Raises `ValueError` for a transfer function that is not square or does not extend
+    from `low` / 2 to a third of an octave above `high`, and for too low a rate.
     """
     from scipy import fft
 
@@ -83,7 +76,7 @@ def make_inverse(
             "longer segment"
         )
     half = round(length * rate / 2)
-    grid = fft.rfftfreq(4 * half, 1 / rate)  # twice as long as the filter: what does not fit must not fold back
+    grid = fft.rfftfreq(4 * half, 1 / rate)  # twice as long as the filter, against aliasing in time
     level, delays = _level(transfer, low, high, grid)
     U, s, Vh = np.linalg.svd(level)
     inverse = (Vh.conj().swapaxes(1, 2) / np.maximum(s, floor)[:, None, :]) @ U.conj().swapaxes(1, 2)
@@ -92,14 +85,14 @@ def make_inverse(
     inverse *= 1 - _rise(np.log2(np.maximum(grid, low) / stop), 0, np.log2(fade))[:, None, None]
     if corrects:
         known = np.array([np.interp(grid, transfer.frequency, c) for c in transfer.coherence.T]).T
-        known[grid < low] = 1.0  # there the axis alone, at unit gain
+        known[grid < low] = 1.0  # unit gain, uncoupled
         inverse *= _rise(known, DOUBTFUL, TRUSTED)[:, None, :]
     taps = np.roll(fft.irfft(inverse, 4 * half, axis=0), half, axis=0)[: 2 * half + 1]
     return InverseFilter(_windowed(taps), float(rate), (float(low), float(high)), transfer.axes)
 
 
 def _level(transfer: Transfer, low: float, high: float, grid: Array) -> tuple[NDArray[Any], Array]:
-    """Transfer function without its delays, unity where it is not known, on a grid; and the delays [s]."""
+    """Transfer function without its delays on a grid, unity where it is unknown; and the delays [s]."""
     from scipy.interpolate import CubicSpline
 
     f, n = transfer.frequency, len(transfer.axes)
@@ -115,7 +108,7 @@ def _level(transfer: Transfer, low: float, high: float, grid: Array) -> tuple[ND
 
 
 def _windowed(taps: Array) -> Array:
-    """Taps faded to zero over the outer quarter at each end, then corrected to unit gain at 0 Hz."""
+    """Taps tapered to zero over the outer quarter at each end, then corrected to unit gain at 0 Hz."""
     from scipy.signal.windows import tukey
 
     window = tukey(len(taps), 0.5)[:, None, None]
@@ -131,8 +124,8 @@ def _rise(x: ArrayLike, start: float, stop: float) -> Array:
 def apply_inverse(inverse: InverseFilter, signal: ArrayLike) -> Array:
     """Drive for a reference of all six axes, (n, 6) to (n, 6), sampled at the filter's rate, without its delay.
 
-    Axes that the filter does not have pass unchanged. The signal counts as zero outside the record, so it should
-    start and end at rest near zero. Raises `ValueError` for another shape or a sample that is not finite.
+    Axes without a filter pass unchanged. The signal is zero outside the record, so it should start and end at rest near
+    zero. Raises `ValueError` for a wrong shape or a sample that is not finite.
     """
     from scipy import fft
 
@@ -150,7 +143,7 @@ def apply_inverse(inverse: InverseFilter, signal: ArrayLike) -> Array:
 
 # ---------------------------------------------------------------------------------------------- disk
 def save_inverse(inverse: InverseFilter, path: Path | str) -> None:
-    """Write an inverse whole or not at all, as netCDF-4."""
+    """Write an inverse as netCDF-4, whole or not at all."""
     data = xr.Dataset(
         {"inverse_taps": (("tap", "drive_axis", "reference_axis"), inverse.taps)},
         {"drive_axis": list(inverse.axes), "reference_axis": list(inverse.axes)},
@@ -161,7 +154,7 @@ def save_inverse(inverse: InverseFilter, path: Path | str) -> None:
 
 
 def load_inverse(path: Path | str) -> InverseFilter:
-    """Read an inverse that `save_inverse` wrote. Raises `RecordError`, naming the file, if it is none."""
+    """Read an inverse written by `save_inverse`; raises `RecordError`, naming the file, for any other content."""
     data = open_record(path)
     if str(data.attrs.get("kind")) != "inverse":
         raise RecordError(f"{path}: is not a saved inverse; make one with `lhpost6 iterate`")

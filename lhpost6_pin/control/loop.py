@@ -1,17 +1,17 @@
 """Three-variable control, one compiled step at the controller's rate.
 
-Per degree of freedom a velocity is asked for (report, Chapter 5),
+The velocity command of each degree of freedom is (report, Chapter 5)
 
     u = Km N1..N5 [ Kxf xr + Kvf vr + Kaf ar + Kjf jr + Kx (xr - xf) + Kv (vr - vf) + Ka (ar - af)
                     + sat(Ki int (xr - xf)) - KF HP(f) ]
 
-xr, vr, ar, jr come from the reference generator, xf, vf, af from the feedback generator (`filters`). The feedback
-generator takes the displacement xs, which follows from the actuators' by forward kinematics (one Gauss-Newton step a
-sample), and the acceleration as of the platen. f is the actuators' force on that degree of freedom, HP a first-order
-high-pass, N five notches. The actuators' rates follow by the kinematic Jacobian (Eq. 3-33) at the xs of the sample
-before, which the step begins with. In the directions of force that do not move the platen a velocity lets internal
-forces decay. Each rate becomes a spool by the inverse of the valve's flow curve (Eq. 4-2) and its unloaded speed; an
-opening at rest feeds the leak.
+xr, vr, ar, jr are outputs of the reference generator, xf, vf, af of the feedback generator (`filters`). Inputs of the
+feedback generator are the displacement xs, computed from those of the actuators by forward kinematics (one Gauss-Newton
+step per sample), and the acceleration as of the platen. f is the actuators' force on that degree of freedom, HP a
+first-order high-pass, N five notches. The actuator velocities follow by the kinematic Jacobian (Eq. 3-33) at the xs of
+the preceding sample. In the null space of the motion an added velocity reduces internal forces. The spool command is
+the inverse of the valve's flow curve (Eq. 4-2) at the actuator velocity over its unloaded velocity; an opening at rest
+supplies the leakage.
 
 For sine tests a canceller adds harmonics to the drive before the reference generator (`sine`).
 """
@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled, compiled_inline, compiled_views
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
@@ -33,8 +34,6 @@ from .filters import NOTCHES
 
 __all__ = ["ACTUATOR", "AXIS", "CANCELLER", "MEMORY_ROWS", "ControlTables", "Feedback", "control_packed"]
 __all__ += ["control_sample", "control_step", "pack_control", "sense", "sense_packed"]
-
-Array = NDArray[np.float64]
 
 AXIS = np.dtype(
     [
@@ -50,7 +49,7 @@ AXIS = np.dtype(
         ("force_gain", np.float64),  # KF [m/s/N, rad/s/(N m)]
         ("high_pass", np.float64),  # pole of the force high-pass per sample
         ("master_gain", np.float64),  # Km [1]
-        ("generator_a", np.float64, (4, 4)),  # reference generator: x' = a x + b d, (xr vr ar jr) = c x + d d
+        ("generator_a", np.float64, (4, 4)),  # reference generator: x+ = a x + b u, (xr vr ar jr) = c x + d u
         ("generator_b", np.float64, 4),
         ("generator_c", np.float64, (4, 4)),
         ("generator_d", np.float64, 4),
@@ -59,7 +58,7 @@ AXIS = np.dtype(
         ("feedback_c", np.float64, (3, 3)),
         ("feedback_d", np.float64, (3, 2)),
         ("notch", np.float64, (NOTCHES, 5)),  # b0 b1 b2 a1 a2 of each second-order section
-        ("notches", np.float64),  # how many of them act
+        ("notches", np.float64),  # number of active sections
     ]
 )
 """Table row of a free axis."""
@@ -78,11 +77,11 @@ ACTUATOR = np.dtype(
 
 CANCELLER = np.dtype(
     [
-        ("axis", np.float64),  # place among the free axes
+        ("axis", np.float64),  # index among the free axes
         ("turn", np.float64),  # phase per sample [rad]
         ("cosine", np.float64),  # of the phase of the path from drive to feedback at this frequency
         ("sine", np.float64),
-        ("rate", np.float64),  # adaptation per sample over that path's gain
+        ("rate", np.float64),  # adaptation per sample over the gain of that path
     ]
 )
 """Table row of a sine canceller: one harmonic of one axis."""
@@ -91,15 +90,15 @@ CANCELLER = np.dtype(
 class ControlTables(NamedTuple):
     """Tables of a controller; treat the arrays as read only."""
 
-    packed: Array  # all that follow, one behind the other
-    axis: NDArray[np.void]  # AXIS, one row a free axis
+    packed: Array  # all the following, concatenated
+    axis: NDArray[np.void]  # AXIS, one row per free axis
     actuator: NDArray[np.void]  # ACTUATOR
     balance: Array  # (n_actuators, n_actuators) leg rate [m/s] per force [N] in the null space of the motion
     canceller: NDArray[np.void]  # CANCELLER, empty but in sine tests
 
 
 class Feedback(NamedTuple):
-    """What the table gives its controller at one sample; a run fills the same arrays each time: copy what you keep."""
+    """Sensors at one sample. A run reuses the same arrays for every sample: copy what must be kept."""
 
     displacement: Array  # (n_actuators,) from the zero-position [m]
     acceleration: Array  # (6,) of C in {s} and Euler angles [m/s2, rad/s2]
@@ -109,7 +108,7 @@ class Feedback(NamedTuple):
 def pack_control(
     axis: NDArray[np.void], actuator: NDArray[np.void], balance: Array, canceller: NDArray[np.void]
 ) -> ControlTables:
-    """Tables of a controller, with all of them packed."""
+    """Tables of a controller, also packed into one array."""
     parts = [np.ascontiguousarray(x) for x in (axis, actuator, balance, canceller)]
     sizes = np.array([len(axis), len(actuator), len(canceller)], float)
     packed = np.concatenate([sizes, *(x.view(float).ravel() for x in parts)])
@@ -121,7 +120,7 @@ _AXIS_SIZE, _ACTUATOR_SIZE, _CANCELLER_SIZE = (d.itemsize // 8 for d in (AXIS, A
 
 @compiled_views
 def unpack_control(packed):
-    """Controller's tables from `ControlTables.packed`."""
+    """Tables of a controller from `ControlTables.packed`."""
     axes, n, cancellers = int(packed[0]), int(packed[1]), int(packed[2])
     actuator = 3 + _AXIS_SIZE * axes
     balance = actuator + _ACTUATOR_SIZE * n
@@ -138,9 +137,9 @@ def unpack_control(packed):
 _POSE, _RESET, _FORCE, _HIGH_PASSED, _CLIPPED = range(5)
 _GENERATOR, _FEEDBACK, _NOTCH = 5, 9, 12
 MEMORY_ROWS = _NOTCH + 2 * NOTCHES
-"""Rows of the memory: pose estimate, reset integral, force of the last sample, its high-passed value, how many commands
-the last sample clipped, states of the reference generator (4), of the feedback generator (3) and of the notches (2
-each); then two weights a canceller."""
+"""Rows of the memory: pose estimate, reset integral, force at the last sample, its high-passed value, number of clipped
+commands at the last sample, states of the reference generator (4), of the feedback generator (3) and of the notches (2
+each); then two weights per canceller."""
 
 
 @compiled_inline
@@ -186,10 +185,10 @@ def compose(row, displacement, acceleration, state, k, out):
 
 @compiled_inline
 def cancel(canceller, sample, a, error, level, weights):
-    """Correction of the drive of free axis a at a sample, whose weights (n, ...) learn from the error by LMS.
+    """Correction of the drive of free axis a at a sample; updates the weights (n, ...) by least mean squares (LMS).
 
-    Each row adds level (w_c cos(theta) + w_s sin(theta)); its weights move against the gradient of the squared error,
-    seen through the path from drive to feedback.
+    Each row adds level (w_c cos(theta) + w_s sin(theta)); its weights follow the negative gradient of the squared
+    error, with the phase of the path from drive to feedback.
     """
     correction = 0.0
     for h in range(canceller.size):
@@ -207,10 +206,10 @@ def cancel(canceller, sample, a, error, level, weights):
 def control_step(sample, drive, feedback, tables, control, memory, command):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
-    drive (n, 6 or 13): what goes into the reference generators, in their mode's quantity; a canceller reads the wanted
-    acceleration from columns 6 to 11 and from column 12 the level, 0 to 1, at which it acts. It does not learn while
-    commands are clipped. feedback (`Feedback`), tables the plant's, control the controller's (`ControlTables`).
-    Commands beyond their limit are clipped to it. Returns how many.
+    drive (n, 6 or 13): input of the reference generators, in the quantity of their mode; for cancellers columns 6 to 11
+    hold the wanted acceleration and column 12 their level, 0 to 1. Cancellers do not learn while commands are clipped.
+    feedback (`Feedback`), tables of the plant, control of the controller (`ControlTables`). Commands beyond their limit
+    are clipped to it; returns their number.
     """
     legs, body, axes = tables.legs, tables.body, tables.axes
     axis, actuator, balance, canceller = control.axis, control.actuator, control.balance, control.canceller
@@ -226,39 +225,39 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
     B = np.empty((ports, 6))
     K = np.empty((legs.size, 6))
     frame = np.empty((8, 3))
-    asked = np.empty(4)
-    met = np.empty(3)
+    reference = np.empty(4)
+    measured = np.empty(3)
     leg_jacobian(pose, legs, body, s, J, B, frame, K)
     gauss_newton_step(displacement, s, K, axes, pose)
     rate = np.zeros(n)
     for a in range(axes.size):
         k = axes[a]
         row = axis[a]
-        compose(row, pose[k], acceleration[k], memory[_FEEDBACK:], a, met)
+        compose(row, pose[k], acceleration[k], memory[_FEEDBACK:], a, measured)
         wanted = drive[sample, k]
         if canceller.size > 0:
             level = drive[sample, 12]
-            learnt = level * (drive[sample, 6 + k] - met[2]) if memory[_CLIPPED, 0] == 0.0 else 0.0
-            wanted += cancel(canceller, sample, a, learnt, level, memory[MEMORY_ROWS:])
-        generate(row, wanted, memory[_GENERATOR:], a, asked)
+            scaled_error = level * (drive[sample, 6 + k] - measured[2]) if memory[_CLIPPED, 0] == 0.0 else 0.0
+            wanted += cancel(canceller, sample, a, scaled_error, level, memory[MEMORY_ROWS:])
+        generate(row, wanted, memory[_GENERATOR:], a, reference)
         total = 0.0
         for i in range(n):
             total += K[i, k] * (force[i] - actuator[i].force)
         passed = row.high_pass * (memory[_HIGH_PASSED, a] + total - memory[_FORCE, a])
         memory[_FORCE, a] = total
         memory[_HIGH_PASSED, a] = passed
-        error = asked[0] - met[0]
+        error = reference[0] - measured[0]
         reset = memory[_RESET, a] + row.reset_gain * error
         reset = min(row.reset_limit, max(-row.reset_limit, reset))
         memory[_RESET, a] = reset
         speed = (
-            row.displacement_feedforward * asked[0]
-            + row.velocity_feedforward * asked[1]
-            + row.acceleration_feedforward * asked[2]
-            + row.jerk_feedforward * asked[3]
+            row.displacement_feedforward * reference[0]
+            + row.velocity_feedforward * reference[1]
+            + row.acceleration_feedforward * reference[2]
+            + row.jerk_feedforward * reference[3]
             + row.displacement_gain * error
-            + row.velocity_gain * (asked[1] - met[1])
-            + row.acceleration_gain * (asked[2] - met[2])
+            + row.velocity_gain * (reference[1] - measured[1])
+            + row.acceleration_gain * (reference[2] - measured[2])
             + reset
             - row.force_gain * passed
         )
@@ -276,7 +275,7 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
         for j in range(n):
             rate[i] -= balance[i, j] * (force[j] - actuator[j].force)
         row = actuator[i]
-        # the opening's sign says which orifices open, and so the speed at full opening; the leak asks for its share
+        # the sign of the opening selects the orifices, and so the velocity at full opening; the bias feeds the leakage
         flow = rate[i] + row.bias * (row.extend if row.bias >= 0.0 else row.retract)
         spool = spool_for_opening(flow / (row.extend if flow >= 0.0 else row.retract), row.flow_curve)
         if abs(spool) > row.limit:
@@ -289,7 +288,7 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
 
 @compiled
 def sense(tables, ws, feedback):
-    """Fill what the sensors of a running plant give its controller, `Feedback`, from its workspace."""
+    """Fill the sensors (`Feedback`) of a running plant from its workspace."""
     for i in range(tables.actuators.size):
         feedback.displacement[i] = ws.port[S, i]
         feedback.force[i] = ws.force[tables.actuators[i], 0]
@@ -298,9 +297,9 @@ def sense(tables, ws, feedback):
 
 @compiled
 def control_sample(sample, drive, tables, ws, control, memory, command, window):
-    """One controller sample of a run: measure, command, and the delayed spools of its model steps.
+    """One controller sample of a run: sensors, command, and the delayed spools of its model steps.
 
-    Fills row `sample` of command (n, n_actuators) and window (n_steps, n_actuators). Returns how many commands were
+    Fills row `sample` of command (n, n_actuators) and window (n_steps, n_actuators). Returns the number of commands
     clipped.
     """
     n = tables.actuators.size
@@ -311,7 +310,7 @@ def control_sample(sample, drive, tables, ws, control, memory, command, window):
     return clipped
 
 
-# Called once a sample from Python: these take tables and workspace packed, which are cheaper to hand over.
+# Called once per sample from Python, with tables and workspace packed: a single array is cheaper to pass.
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""The plug point: what a user's own controller looks like, and how one is found by file and name.
+"""The interface of a user's own controller, and loading one by file and name.
 
     class Mine:
         def init(self, plant, rest):
@@ -13,26 +13,25 @@
 import importlib.util
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..core.arrays import Array
 from ..core.errors import ControllerError, LhpostError
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant
 from .loop import Feedback
 
 __all__ = ["Feedback", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
-__all__ += ["start_plugged", "step_plugged", "wanted_from"]
-
-Array = NDArray[np.float64]
+__all__ += ["start_plugged"]
 
 
 class Wanted(NamedTuple):
-    """What is wanted of the platen at one sample: motion of C in {s} and Euler angles, (6,) each, read only."""
+    """Target at one sample: motion of C in {s} and Euler angles, (6,) each, read only."""
 
     displacement: Array
     velocity: Array
@@ -40,7 +39,7 @@ class Wanted(NamedTuple):
 
 
 class UserController(Protocol):
-    """A controller at 2048 Hz. It may keep its state in `memory`, so that one object serves many runs."""
+    """A controller at 2048 Hz. It may hold its state in `memory`, so that one object serves many runs."""
 
     def init(self, plant: Plant, rest: Equilibrium) -> Any:
         """Memory of one run of a plant that rests in the zero-position."""
@@ -50,7 +49,7 @@ class UserController(Protocol):
 
 
 def is_plugged(name: str) -> bool:
-    """True if a name given for a controller means a Python file and a class or function in it, not settings."""
+    """Whether the name of a controller is a class or function in a Python file rather than settings."""
     return ".py:" in name or name.endswith(".py")
 
 
@@ -69,7 +68,7 @@ def load_plugged(name: str) -> UserController:
     if spec is None or spec.loader is None:
         raise ControllerError(f"{path} cannot be imported as Python")
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses and pickle look their module up there
+    sys.modules[spec.name] = module  # dataclasses and pickle look up modules there
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever a user's file raises
@@ -77,7 +76,7 @@ def load_plugged(name: str) -> UserController:
         raise ControllerError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
     if not hasattr(module, attribute):
         names = [n for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == module.__name__]
-        raise ControllerError(f"{path} has no {attribute!r}; it has {', '.join(names) or 'nothing that can be called'}")
+        raise ControllerError(f"{path} has no {attribute!r}; it has {', '.join(names) or 'no class or function'}")
     try:
         controller = getattr(module, attribute)()
     except (Exception, SystemExit) as error:  # likewise
@@ -88,44 +87,39 @@ def load_plugged(name: str) -> UserController:
     return controller
 
 
-def wanted_from(displacement: Array, velocity: Array, acceleration: Array) -> Callable[[int], Wanted]:
-    """Function that gives what is wanted at a sample of a motion, (n, 6) each, that no controller can change."""
-    motion = [values.view() for values in (displacement, velocity, acceleration)]
-    for values in motion:
-        values.flags.writeable = False
-    return lambda sample: Wanted(*(values[sample] for values in motion))
+def start_plugged(
+    controller: UserController, plant: Plant, rest: Equilibrium, motion: Sequence[Array]
+) -> Callable[[int, Feedback], Array]:
+    """Start a user's controller; return its command (n_actuators,) by sample and sensors.
 
-
-def start_plugged(controller: UserController, plant: Plant, rest: Equilibrium) -> Any:
-    """Memory of a user's controller for one run; raises ControllerError where its init does."""
-    try:
-        return controller.init(plant, rest)
-    except LhpostError:  # it says itself what is wrong
-        raise
-    except (Exception, SystemExit) as error:  # whatever a user's code raises
-        raise _failed(controller, "init", "", error) from error
-
-
-def step_plugged(controller: UserController, memory: Any, sample: int, wanted: Wanted, sensors: Feedback) -> Array:
-    """Command (n_actuators,) of a user's controller at a sample, as finite numbers.
-
-    Raises ControllerError naming the controller, the sample and the actuator where there is none.
+    motion: target displacement, velocity and acceleration (n, 6) of C and Euler angles, which the controller sees
+    through read-only views. Raises ControllerError, now or later, naming the controller, the sample and the actuator
+    where it fails or returns no finite numbers.
     """
+    views = [values.view() for values in motion]
+    for values in views:
+        values.flags.writeable = False
+    memory = _call(controller, "init", "", plant, rest)
+
+    def command(sample: int, sensors: Feedback) -> Array:
+        wanted = Wanted(*(values[sample] for values in views))
+        given = _call(controller, "step", f" at sample {sample}", memory, wanted, sensors)
+        return checked_command(controller, given, sample, plant.spools)
+
+    return command
+
+
+def _call(controller: UserController, method: str, when: str, *arguments: Any) -> Any:
+    """Result of a user's method; an exception becomes a ControllerError with the line of the file that raised it."""
     try:
-        command = controller.step(memory, wanted, sensors)
+        return getattr(controller, method)(*arguments)
     except LhpostError:
         raise
-    except (Exception, SystemExit) as error:  # likewise
-        raise _failed(controller, "step", f" at sample {sample}", error) from error
-    return checked_command(controller, command, sample, sensors.displacement.size)
-
-
-def _failed(controller: UserController, method: str, when: str, error: BaseException) -> ControllerError:
-    """What a user's method raised, with the line of the file where it did."""
-    lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
-    where = f" ({lines[-1].filename}, line {lines[-1].lineno})" if lines else ""
-    name = type(controller).__name__
-    return ControllerError(f"{name}.{method} failed{when}: {type(error).__name__}: {error}{where}")
+    except (Exception, SystemExit) as error:  # whatever a user's code raises
+        lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
+        where = f" ({lines[-1].filename}, line {lines[-1].lineno})" if lines else ""
+        what = f"{type(error).__name__}: {error}{where}"
+        raise ControllerError(f"{type(controller).__name__}.{method} failed{when}: {what}") from error
 
 
 def checked_command(controller: UserController, command: ArrayLike, sample: int, spools: int) -> Array:

@@ -1,7 +1,6 @@
-"""Controller settings: what a panel holds, in TOML."""
+"""Controller settings, those of a panel, in TOML."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -29,7 +28,7 @@ class Notch:
 
 @dataclass(frozen=True)
 class ControllerSettings:
-    """Three-variable control, force feedback and force balance (`loop`, `filters`)."""
+    """Settings of three-variable control, force feedback and force balance (`loop`, `filters`)."""
 
     name: str
     mode: str
@@ -56,15 +55,16 @@ class ControllerSettings:
     balance_gain: float = quantity_field("1/s", bound="nonnegative")
 
 
+_GAINS = tuple(f"{name}_gain" for name in ("displacement", "velocity", "acceleration", "reset"))
 _SECTIONS = {
     "loop": ("rate", "spool_limit", "master_gain"),
     "reference": ("reference_high_pass", "reference_damping", "reference_low_pass"),
     "feedforward": tuple(f"{x}_feedforward" for x in ("displacement", "velocity", "acceleration", "jerk")),
-    "feedback": ("crossover", *(f"{x}_gain" for x in ("displacement", "velocity", "acceleration", "reset"))),
+    "feedback": ("crossover", *_GAINS, "reset_limit"),
     "force": ("force_damping", "force_cut_in", "balance_gain"),
 }
-_SECTIONS["feedback"] += ("reset_limit",)
 """Sections of a panel's file and their quantities, in order."""
+_NOTCH = tuple(f.name for f in fields(Notch))
 
 
 def load_controller(name_or_path: str | Path) -> ControllerSettings:
@@ -89,12 +89,12 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
             f"{stated.origin}: no place for [{wrong[0]}]; besides {', '.join(_SECTIONS)} there are notches, numbered "
             f"from notch_1 without a gap, {NOTCHES} at most"
         )
-    known = {f"{section}.{key}" for section, keys in _SECTIONS.items() for key in keys}
-    known |= {f"{name}.{f.name}" for name in names for f in fields(Notch)} | {"controller.name", "controller.mode"}
+    every = {**_SECTIONS, **dict.fromkeys(names, _NOTCH), "controller": ("name", "mode")}
+    known = {f"{section}.{key}" for section, keys in every.items() for key in keys}
     stray = sorted({*stated, *stated.words} - known)
     if stray:
         own = [key for key in sorted(known) if key.split(".")[0] == stray[0].split(".")[0]]
-        raise ParameterError(f"{stated.origin}: {stray[0]} is no setting of a controller; {instead_of(stray[0], own)}")
+        raise ParameterError(f"{stated.origin}: {stray[0]} is not a controller setting; {instead_of(stray[0], own)}")
     for missing in sorted(known - {*stated, *stated.words, "controller.name"}):
         raise ParameterError(f"{stated.origin}: {missing} is missing")
     notches = tuple(build_section(Notch, stated, (name,)) for name in names)
@@ -121,11 +121,10 @@ def load_controller(name_or_path: str | Path) -> ControllerSettings:
     return settings
 
 
-def save_controller(settings: ControllerSettings, path: Path, changed: Mapping[str, str] | str) -> Path:
+def save_controller(settings: ControllerSettings, path: Path, changed: str) -> Path:
     """Write settings as a panel's file, whole or not at all.
 
-    A number that is as it was read keeps its evidence and source; any other is `calibrated`, with `changed` as its
-    source, for all or by name.
+    A number that equals the one read keeps its evidence and source; any other is `calibrated`, with source `changed`.
     """
     lines = [
         "# Settings of a three-variable controller; lists are per degree of freedom, x y z roll pitch yaw.",
@@ -134,25 +133,23 @@ def save_controller(settings: ControllerSettings, path: Path, changed: Mapping[s
         f"name = {_text(settings.name)}",
         f"mode = {_text(settings.mode)}",
     ]
-    for section, names in _SECTIONS.items():
-        lines += ["", f"[{section}]"]
-        lines += [_line(settings, settings.stated, f"{section}.{name}", changed) for name in names]
-    for k, notch in enumerate(settings.notches, 1):
-        lines += ["", f"[notch_{k}]"]
-        lines += [_line(notch, settings.stated, f"notch_{k}.{f.name}", changed) for f in fields(Notch)]
+    holders: dict[str, Any] = dict.fromkeys(_SECTIONS, settings)
+    holders |= {f"notch_{k}": notch for k, notch in enumerate(settings.notches, 1)}
+    for section, holder in holders.items():
+        names = _SECTIONS.get(section, _NOTCH)
+        lines += ["", f"[{section}]", *(_line(holder, settings.stated, f"{section}.{n}", changed) for n in names)]
     with write_whole(path) as beside:
         beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
 
-def _line(holder: Any, stated: Parameters, key: str, changed: Mapping[str, str] | str) -> str:
+def _line(holder: Any, stated: Parameters, key: str, changed: str) -> str:
     name = key.split(".")[1]
     value = getattr(holder, name)
     unit = next(f.metadata["unit"] for f in fields(holder) if f.name == name)
     as_read = stated[key] if key in stated else None
     if as_read is None or as_read.value != value:
-        source = changed if isinstance(changed, str) else changed.get(name, "set by hand")
-        as_read = Quantity(value, unit, "calibrated", source)
+        as_read = Quantity(value, unit, "calibrated", changed)
     numbers = list(map(float, value)) if isinstance(value, tuple) else float(value)
     texts = ", ".join(f"{k} = {_text(getattr(as_read, k))}" for k in ("unit", "evidence", "source"))
     return f"{name} = {{ value = {numbers!r}, {texts} }}"

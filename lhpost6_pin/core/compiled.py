@@ -1,10 +1,9 @@
 """The `compiled` decorator: numba with a disk cache that is private, always fresh and optional.
 
-The cache folder is keyed by the text of every module with a compiled function, of those whose constants they import,
-and by the versions of numba and Python, so an edit never meets stale machine code, not even in a function that calls
-the edited one; an edit of other modules, an error message say, leaves the key as it is. It belongs to one
-user (numba's cache is pickles: reading another user's would run his code). Where none can be written, functions
-compile in memory and a warning says so.
+The cache folder is keyed by the text of every module with a compiled function and of those whose constants it imports,
+and by the versions of numba and Python: an edit of these, or of a function that they call, invalidates the cache; an
+edit of any other module does not. The folder belongs to one user, because numba's cache consists of pickles, and
+reading another user's would execute his code. Without a writable folder, functions compile in memory, with a warning.
 """
 
 import hashlib
@@ -16,11 +15,14 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+
+from .files import refuse_folder
 
 __all__ = ["cache_folder", "compiled", "compiled_inline", "compiled_views"]
 
@@ -29,14 +31,14 @@ log = logging.getLogger(__name__)
 _F = TypeVar("_F", bound=Callable[..., Any])
 _CONSTANT_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 _KEEP = 4
-"""Cache folders of older sources that are kept, newest first."""
+"""Number of cache folders of older sources that are kept, newest first."""
 _ROOM = 50e6
-"""Bytes that must be free where compiled code is kept: four times what all of it takes."""
+"""Free bytes required for the cache: four times its full size."""
 
 
 @cache
 def source_key() -> str:
-    """Digest of the source that compiled code is made of, and of the compiler's and interpreter's versions."""
+    """Digest of the sources of compiled code and of the versions of compiler and interpreter."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for source in sorted(_compiled_sources(package)):
@@ -64,22 +66,20 @@ def _compiled_sources(package: Path) -> set[Path]:
 
 @cache
 def cache_folder() -> Path | None:
-    """Folder that holds compiled code for this source, or None where nothing private can be written.
+    """Folder of the compiled code of this source, or None where no private folder can be written.
 
     Tried in turn: $LHPOST6_CACHE_DIR, $XDG_CACHE_HOME, ~/.cache, and a folder named after the user in the
     temporary directory.
     """
     for base in _candidates():
         folder = base / source_key()
-        try:
+        with suppress(OSError):
             base.mkdir(parents=True, exist_ok=True, mode=0o700)  # in two steps: parents=True gives the mode to the last
             folder.mkdir(exist_ok=True, mode=0o700)
-            if not (_private(base) and _writable(folder) and shutil.disk_usage(folder).free > _ROOM):
-                continue
-        except OSError:
-            continue
-        _drop_old(base, folder)
-        return folder
+            refuse_folder(folder)
+            if _private(base) and shutil.disk_usage(folder).free > _ROOM:
+                _drop_old(base, folder)
+                return folder
     log.warning(
         "no private folder with 50 MB free for compiled code can be written: this run compiles anew (about half a "
         "minute); set LHPOST6_CACHE_DIR to a folder of your own to keep it"
@@ -90,24 +90,23 @@ def cache_folder() -> Path | None:
 def compiled(function: _F) -> _F:
     """Compile a function with numba (no Python objects, GIL released), cached on disk.
 
-    Multiply-adds may fuse and divisions become products with a reciprocal: rounding differs from ``.py_func``'s.
-
-    The pure Python original stays at ``.py_func`` and is the reference in tests.
+    Multiply-adds may fuse and divisions become products with a reciprocal, so rounding differs from that of the pure
+    Python original, ``.py_func``, which is the reference in tests.
     """
     return _jit(function)
 
 
 def compiled_inline(function: _F) -> _F:
-    """As `compiled`, and put into every compiled caller: for pieces of a step, numbers out and no array made.
+    """As `compiled`, inlined in every compiled caller: for parts of a step that return numbers and make no array.
 
-    An array is seven words to pass: handing a dozen to a function called once a step costs as much as its work. Nor are
-    references counted, which costs as much again: the caller holds the arrays, so none may be returned.
+    An array argument is seven words: to pass a dozen of them once a step costs as much as the work of the function, and
+    so does counting references; the caller holds the arrays, so none may be returned.
     """
     return _jit(function, forceinline=True, _nrt=False)
 
 
 def compiled_views(function: _F) -> _F:
-    """As `compiled`, and put into every compiled caller: for a function that returns views of the arrays it takes."""
+    """As `compiled`, inlined in every compiled caller: for a function that returns views of its array arguments."""
     return _jit(function, forceinline=True)
 
 
@@ -116,12 +115,8 @@ def _jit(function: _F, **more: bool) -> _F:
     config = cast(Any, numba.config)
     before = config.CACHE_DIR
     config.CACHE_DIR = "" if folder is None else str(folder)
-    options: Any = {
-        "error_model": "numpy",
-        "nogil": True,
-        "fastmath": {"contract", "nsz", "arcp"},
-        **more,
-    }
+    fastmath = {"contract", "nsz", "arcp"}
+    options: Any = {"error_model": "numpy", "nogil": True, "fastmath": fastmath, **more}
     try:
         return cast(_F, numba.njit(cache=folder is not None, **options)(function))
     finally:
@@ -151,16 +146,8 @@ def _private(folder: Path) -> bool:
     return stat.S_ISDIR(info.st_mode) and info.st_uid == os.getuid() and not info.st_mode & others
 
 
-def _writable(folder: Path) -> bool:
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
-
-
 def _drop_old(base: Path, current: Path) -> None:
-    """Remove the caches of sources long gone, so that a developer's folder does not grow without end."""
+    """Remove the caches of old sources, so that a developer's folder does not grow without bound."""
     others = [p for p in base.iterdir() if p.is_dir() and p != current]
     for old in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[_KEEP:]:
         shutil.rmtree(old, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""The console that tables are printed on."""
+"""The console for tables."""
 
 from rich.console import Console
 

@@ -1,4 +1,4 @@
-"""Errors that a user can act on: each message names the file, channel or key and says what to do."""
+"""Errors that a user can correct: each message names the file, channel or key and the remedy."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -18,7 +18,7 @@ __all__ = [
 ]
 
 _FEW = 12
-"""So many names are listed even where the one that was meant is likely among the nearest."""
+"""Up to this number, all valid names are listed even beside near matches."""
 
 
 class LhpostError(Exception):
@@ -30,7 +30,7 @@ class ParameterError(LhpostError):
 
 
 class ControllerError(LhpostError):
-    """A user's own controller cannot be loaded, or returned no command; the message names it and the sample."""
+    """A user's own controller cannot be loaded or returned no command; the message names it and the sample."""
 
 
 class LinkError(LhpostError):
@@ -38,38 +38,38 @@ class LinkError(LhpostError):
 
 
 class RecordError(LhpostError):
-    """A test record cannot be read or lacks what was asked of it; the message names file, channel and sample."""
+    """A test record cannot be read or lacks a channel; the message names file, channel and sample."""
 
 
 class MotionError(LhpostError):
-    """A ground-motion file or description cannot be understood; the message names file and line."""
+    """A ground-motion file or description is invalid; the message names file and line."""
 
 
 class OutOfRangeError(LhpostError):
-    """A motion asks for more than the machine can give; the message says which limit and the scale that fits."""
+    """A motion exceeds the capacity of the machine; the message names the limit and the largest scale that fits."""
 
     def __init__(self, message: str, largest_scale: float | None = None) -> None:
-        """Keep the scale that would fit, where one is known."""
+        """`largest_scale`: the scale that fits, if known."""
         super().__init__(message)
         self.largest_scale = largest_scale
 
 
 class SimulationError(LhpostError):
-    """A run cannot be started as asked, or it diverged; the message names time and component."""
+    """The options or drive of a run are invalid, or the run diverged; the message names time and component."""
 
 
 class UnknownNameError(LhpostError):
-    """A name is not one of those that exist; the message says which are near, and which are valid."""
+    """A name does not exist; the message lists near matches and valid names."""
 
     def __init__(self, kind: str, name: str, valid: Sequence[str], listing: str = "") -> None:
-        """Say that `name` is no `kind`, and what to write `instead_of` it."""
+        """`kind` and `name` as in "no motion named 'x'"; `valid` and `listing` as for `instead_of`."""
         super().__init__(f"no {kind} named {name!r}; {instead_of(name, sorted(valid), listing)}")
 
 
 def instead_of(name: str, valid: Sequence[str], listing: str = "") -> str:
-    """Say what to write instead of a name that is not `valid`: the nearest ones, and all unless they are many.
+    """Valid names in place of an unknown one, for a message: the nearest ones, and all unless they are many.
 
-    `listing` says where many are listed, as in "`lhpost6 motions` lists them".
+    `listing` refers to a list of many names, as in "`lhpost6 motions` lists them".
     """
     if not valid:
         return "there are none"
@@ -80,7 +80,7 @@ def instead_of(name: str, valid: Sequence[str], listing: str = "") -> str:
 
 
 def meant(name: str, valid: Sequence[str]) -> str:
-    """Ask whether one of the `valid` names nearest to this one was meant; "" where none is near."""
+    """Question for a message, "did you mean ...? ", with the `valid` names nearest to this one; "" if none is near."""
     spelled = {known.lower(): known for known in valid}
     near = [repr(spelled[known]) for known in get_close_matches(name.lower(), spelled)]
     return f"did you mean {' or '.join(near)}? " if near else ""

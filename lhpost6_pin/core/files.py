@@ -1,4 +1,4 @@
-"""Where shipped data lives, reading TOML, and writing files whole or not at all."""
+"""Shipped data, reading TOML, and atomic writing of files."""
 
 import errno
 import os
@@ -27,7 +27,7 @@ def shipped(folder: str = "", suffix: str = ".toml") -> dict[str, Path]:
 
 
 def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") -> Path:
-    """File of the shipped data by name; raises UnknownNameError for a `kind`, in words, that is not there."""
+    """File of the shipped data by name; raises UnknownNameError, in which `kind` names the kind of file."""
     known = shipped(folder, suffix)
     if name not in known:
         raise UnknownNameError(kind, name, list(known))
@@ -35,7 +35,7 @@ def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") 
 
 
 def read_toml(path: "Path | str") -> dict[str, Any]:
-    """Content of a TOML file; raises OSError, or ValueError that says what is wrong with it."""
+    """Content of a TOML file; raises OSError, or ValueError naming the key or line."""
     try:
         tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         _refuse_long_numbers(tree, "")
@@ -45,7 +45,7 @@ def read_toml(path: "Path | str") -> dict[str, Any]:
 
 
 def _refuse_long_numbers(value: object, key: str) -> None:
-    """TOML's whole numbers have 64 bits; Python's have no end, and the longest cannot even be put in a message."""
+    """Raise ValueError for whole numbers beyond TOML's 64 bits; Python reads longer ones, but cannot print them all."""
     if isinstance(value, dict):
         for name, item in value.items():
             _refuse_long_numbers(item, f"{key}.{name}".lstrip("."))
@@ -57,14 +57,14 @@ def _refuse_long_numbers(value: object, key: str) -> None:
 
 
 def reason_of(error: Exception) -> str:
-    """What is wrong with a file, as the system says it, without Python's number of the error."""
+    """Message of the operating system for a failed file operation, without Python's error number."""
     return getattr(error, "strerror", None) or str(error)
 
 
 def refuse_folder(folder: "Path | str") -> None:
-    """Raise OSError naming the path that stands in the way if no file could be written below `folder`.
+    """Raise OSError naming the path in the way if no file can be written below `folder`; leaves nothing on disk.
 
-    Nothing is left on disk: a long computation can ask first and make the folder when it has something to put there.
+    A long computation checks its folder first and makes it with the first result.
     """
     path = Path(folder).absolute()
     with suppress(FileNotFoundError, NotADirectoryError):
@@ -73,7 +73,7 @@ def refuse_folder(folder: "Path | str") -> None:
     reason = 0 if nearest.is_dir() else errno.ENOTDIR
     if not reason:
         try:
-            tempfile.TemporaryFile(dir=nearest).close()  # permissions alone do not tell: /proc takes no files of root's
+            tempfile.TemporaryFile(dir=nearest).close()  # permissions do not suffice: /proc takes no files of root's
         except OSError as error:
             reason = errno.EACCES if error.errno == errno.ENOENT else error.errno or errno.EACCES
     if reason:
@@ -84,7 +84,7 @@ def refuse_folder(folder: "Path | str") -> None:
 def write_whole(path: "Path | str") -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` only if the block succeeds.
 
-    An interrupted or failed write leaves whatever stood at `path` before, never half a file.
+    An interrupted or failed write leaves the previous file, never an incomplete one.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -98,7 +98,7 @@ def write_whole(path: "Path | str") -> Iterator[Path]:
         beside.chmod(0o666 & ~umask)  # mkstemp makes private files; results get the ordinary permissions
         beside.replace(target)
     except OSError as error:
-        if error.errno and error.filename is None:  # a disk that is full does not say whose
+        if error.errno and error.filename is None:  # the error of a full disk names no file
             error.filename = str(target)
         raise
     finally:

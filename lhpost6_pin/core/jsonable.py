@@ -1,4 +1,4 @@
-"""Values as JSON can state them."""
+"""Conversion of results to JSON."""
 
 import json
 import math

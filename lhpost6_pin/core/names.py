@@ -1,4 +1,4 @@
-"""Names and the sample rate that every module shares."""
+"""Names of axes, schemes and engines, and the sample rate."""
 
 __all__ = ["AXES", "ENGINES", "SAMPLE_RATE", "SCHEMES"]
 

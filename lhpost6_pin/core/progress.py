@@ -1,4 +1,4 @@
-"""Progress of long work: functions that are told the share done, 0 to 1."""
+"""Progress of a long computation: functions that take the completed fraction, 0 to 1."""
 
 from collections.abc import Callable
 from typing import TypeAlias
@@ -9,5 +9,5 @@ Progress: TypeAlias = Callable[[float], None]
 
 
 def between(report: Progress, first: float, last: float) -> Progress:
-    """Progress of a part of the work, which runs from the share `first` to `last` of the whole."""
-    return lambda share: report(first + (last - first) * share)
+    """Progress of a part of the work, which covers the fractions `first` to `last` of the whole."""
+    return lambda fraction: report(first + (last - first) * fraction)

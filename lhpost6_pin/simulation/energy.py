@@ -1,4 +1,4 @@
-"""The energy audit of a run: where the energy goes.
+"""The energy audit of a run: inflow, storage, dissipation and delivery of energy, effect by effect.
 
     audit = energy_audit(run)
     audit.power[:, audit.entry("created.thrust_direction")]   # [W]
@@ -7,16 +7,16 @@ Energy, per effect:  inflow = change of stored + dissipated + delivered
 and for the platen:  delivered + created = change of kinetic + gravity (+ dissipated in a specimen's joints)
 
 inflow      oil through the valves' orifices, h(P) Q per chamber
-stored      compressed oil, nitrogen (where the law has a potential); kinetic energy and weight
-dissipated  leak from chamber to chamber, and all the work of laws without a potential: seals, pads, viscous
+stored      compressed oil, nitrogen (laws with a potential); kinetic energy and weight
+dissipated  leakage between chambers, and all work of laws without a potential: seals, pads, viscous
 delivered   force times port rate, to the platen
-created     three terms of the report's equations that conserve no energy; zero in a machine with normal thrust,
-            one mass in all directions and no pad friction:
-            `thrust_direction`  f (B - J) v of bearing legs: Eq. 4-23 pushes along the vertical, their rate (3-27)
-                                is power-consistent with the platen's normal
+created     three terms of the report's equations that do not conserve energy; zero in a machine with normal thrust,
+            equal mass in all directions and no pad friction:
+            `thrust_direction`  f (B - J) v of actuators with bearings: the force of Eq. 4-23 is vertical, their
+                                velocity (3-27) is power-consistent with the platen's normal
             `directional_mass`  -v . M (omega x v) of Eq. 4-26
-            `pad_reaction`      f (B - J) v of pads: slip is relative to the rising plate, Eq. 4-24 leaves its
-                                share of the force with the ground
+            `pad_reaction`      f (B - J) v of pads: slip is relative to the moving platen, but Eq. 4-24 applies
+                                part of the force to the ground
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from ..core.compiled import compiled
 from ..effects.actuator import oil_power
@@ -38,12 +37,12 @@ from .simulate import Run
 if TYPE_CHECKING:
     import xarray as xr
 
+from ..core.arrays import Array
+
 __all__ = ["CREATED", "Audit", "energy_audit", "row_power"]
 
-Array = NDArray[np.float64]
-
 CREATED = ("thrust_direction", "directional_mass", "pad_reaction")
-"""The known terms of the report's equations that create (or destroy) energy."""
+"""Terms of the report's equations that create or destroy energy."""
 
 
 @dataclass(frozen=True)
@@ -56,25 +55,22 @@ class Audit:
     energy: Array  # (n, k) since the start [J]: change of a stored entry, else the integral of power
 
     def entry(self, name: str) -> int:
-        """Number of an entry; raises UnknownNameError that lists the names."""
+        """Index of an entry; raises UnknownNameError that lists the names."""
         return number_of("energy entry", name, self.entries)
 
     def total(self, kind: str, *names: str) -> Array:
         """Energy (n,) [J] of all entries of a kind, or of those named; an absent one counts as zero."""
-        wanted = [
-            i
-            for i, entry in enumerate(self.entries)
-            if entry.split(".")[0] == kind and (not names or entry.split(".")[1] in names)
-        ]
+        split = [entry.split(".") for entry in self.entries]
+        wanted = [i for i, (k, name) in enumerate(split) if k == kind and (not names or name in names)]
         return self.energy[:, wanted].sum(axis=1)
 
     @property
     def residual(self) -> Array:
-        """Energy that the entries do not explain (n,) [J]: inflow + created - stored - dissipated."""
+        """Error of the balance (n,) [J]: inflow + created - stored - dissipated."""
         return self.total("inflow") + self.total("created") - self.total("stored") - self.total("dissipated")
 
     def effect_residual(self, effect: str) -> Array:
-        """Energy of one effect that its entries do not explain (n,) [J]."""
+        """Error of the balance of one effect (n,) [J]: inflow - stored - dissipated - delivered."""
         number_of("effect", effect, [e.split(".")[1] for e in self.entries if e.startswith("delivered.")])
         spent = sum(self.total(kind, effect) for kind in ("stored", "dissipated", "delivered"))
         return self.total("inflow", effect) - spent
@@ -98,30 +94,29 @@ class Audit:
 
 
 def energy_audit(run: Run) -> Audit:
-    """Energy that each effect takes in, stores, dissipates and delivers, and what the equations create.
+    """Inflow, stored, dissipated and delivered energy of each effect, and energy created by the equations.
 
-    Flows are integrated by the trapezoidal rule over recorded samples: record every sample where the residual
-    matters. Valve flow jumps with the spool: it is integrated with the mean spool of each interval, known where the
-    loop is closed and where an open loop holds its spools over a sample.
+    Powers are integrated by the trapezoidal rule over recorded samples: record every sample where the residual
+    matters. Valve flow jumps with the spool: it is integrated with the mean spool of each interval, which is known in
+    closed loop and for spools held over a sample.
     """
     plant = run.plant
     names = [e.name for e in plant.machine.effects]
     n = len(run.time)
     flows = np.zeros((n, len(names), 5))
     created = np.zeros((n, len(CREATED)))
-    spool = np.ascontiguousarray(run.spool)  # over the interval after each sample; before it, that of the last one
+    spool = np.ascontiguousarray(run.spool)  # of the interval after each sample
     before = np.concatenate([spool[:1], spool[:-1]])
     _powers(*history_of(run), (before, spool), flows, created)
     inflow, inflow_before, dissipated, delivered, stored = np.moveaxis(flows, 2, 0)
     dt = 1.0 / run.rate
-    entries, powers, energies = [], [], []
+    found: dict[str, tuple[Array, Array]] = {}  # power and energy by entry
 
     def add(entry: str, power: Array, energy: Array | None = None, power_before: Array | None = None) -> None:
-        entries.append(entry)
-        powers.append(power)
-        energies.append(
-            _integral(power, power if power_before is None else power_before, dt) if energy is None else energy
-        )
+        if energy is None:  # the power jumps at samples: power_before holds its values before each
+            before = power if power_before is None else power_before
+            energy = np.concatenate([[0.0], np.cumsum(0.5 * dt * (power[:-1] + before[1:]))])
+        found[entry] = power, energy
 
     laws = [LAWS[e.law] for e in plant.machine.effects]
     for i, (name, law) in enumerate(zip(names, laws, strict=True)):
@@ -140,19 +135,12 @@ def energy_audit(run: Run) -> Audit:
         add("dissipated.specimen_joints", run.v[:, joints] ** 2 @ plant.model.damping[joints])
     for i, name in enumerate(CREATED):
         add(f"created.{name}", created[:, i])
-    return Audit(run.time, tuple(entries), np.stack(powers, axis=1), np.stack(energies, axis=1))
-
-
-def _integral(after: Array, before: Array, dt: float) -> Array:
-    """Integral from the first sample of a power that jumps at samples, from its values on both sides of each."""
-    out = np.zeros(len(after))
-    np.cumsum(0.5 * dt * (after[:-1] + before[1:]), out=out[1:])
-    return out
+    return Audit(run.time, tuple(found), *(np.stack(values, axis=1) for values in zip(*found.values(), strict=True)))
 
 
 @compiled
 def row_power(row, s, z, work, spool, supply):
-    """Inflow and dissipated power [W] and stored energy [J] of one row that does `work` [W] on its ports."""
+    """Inflow and dissipated power [W] and stored energy [J] of one row that delivers the power `work` [W]."""
     if row.law == HYDRAULIC:
         high, low = supply_pressures(supply, z)
         return oil_power(row, s[row.port], z, spool[row.spool], high, low)
@@ -164,8 +152,8 @@ def row_power(row, s, z, work, spool, supply):
 def _powers(q, v, z, tables, ws, spools, flows, created):
     """Fill flows (n, n_effects, 5) and created (n, 3), in the order of CREATED [W].
 
-    spools holds those just before and just after each sample. Flows: inflow after and before it, dissipated,
-    delivered [W], stored [J].
+    spools: positions before and after each sample. Flows: inflow after and before it, dissipated, delivered [W],
+    stored [J].
     """
     port, force, rows, JB = ws.port, ws.force, tables.rows, ws.JB
     spool_before, spool = spools

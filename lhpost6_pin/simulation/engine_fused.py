@@ -1,50 +1,37 @@
 """The fused engine: the whole run in one compiled loop, for fits, ensembles and long records.
 
-It calls the same stages as the per-step engine; only the rigid-body algebra is its own (a platen without articulated
-specimen), and Pinocchio is its oracle.
+Its stages are those of the per-step engine; its rigid-body algebra is its own (a platen without articulated specimen),
+tested against Pinocchio.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..control.loop import control_sample
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..mechanics.forward_dynamics import platen_acceleration
-from ..mechanics.schemes import (
-    DQ,
-    TAU,
-    V_SEEN,
-    A,
-    V,
-    dexp_inverse,
-    kick,
-    open_step,
-    rates_stage,
-    staggered_stage,
-)
+from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
 from ..mechanics.spatial import integrate
 
 __all__ = ["Log", "Signals", "Span", "run_fused"]
 
-Array = NDArray[np.float64]
-
 
 class Span(NamedTuple):
-    """The samples that one call runs, and how."""
+    """Samples of one call, scheme and steps."""
 
     scheme: int  # 0 semi_implicit, 1 euler, 2 rk4
     first: int  # controller samples first..last (exclusive)
     last: int
-    steps: int  # model steps a sample
+    steps: int  # model steps per sample
     dt: float  # of one [s]
-    closed: bool  # the controller drives; else recorded spools
-    every: int  # so many samples a row of the log
+    closed: bool  # loop closed by the controller; else recorded spools
+    every: int  # samples per row of the log
 
 
 class Signals(NamedTuple):
-    """What drives a run, and what it commands."""
+    """Inputs of a run, and its commands."""
 
     drive: Array  # (n, columns) of the controller's reference generators, closed loop
     memory: Array  # of the controller
@@ -53,7 +40,7 @@ class Signals(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What a run leaves, one row a recorded sample."""
+    """Results of a run, one row per recorded sample."""
 
     q: Array  # (n, nq)
     v: Array  # (n, nv)
@@ -132,7 +119,7 @@ def _rk4_step(dt, tables, ws, spool):
 
 @compiled
 def run_fused(span, tables, ws, control, signals, log):
-    """Run the samples of a span; tables and ws are the plant's, control the controller's.
+    """Run the samples of a span with tables and workspace of the plant and tables of the controller.
 
     Returns (status, samples done, commands clipped).
     """
@@ -146,7 +133,7 @@ def run_fused(span, tables, ws, control, signals, log):
         open_step(motion, dt)
     for sample in range(span.first, span.last):
         if span.closed:
-            if span.scheme != 0:  # the other schemes leave the ports of their last stage behind
+            if span.scheme != 0:  # the other schemes leave the ports of their last stage
                 motion[V_SEEN] = motion[V]
                 rates_stage(q, ws.z, tables, ws, window[0])
                 _accelerate(tables, ws, motion[A])

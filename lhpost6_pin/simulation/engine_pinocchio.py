@@ -1,6 +1,6 @@
-"""The per-step engine: compiled stages around pin.aba and pin.integrate. The default, and the fused engine's oracle.
+"""The per-step engine: compiled stages around pin.aba and pin.integrate; the default, and the fused engine's oracle.
 
-It assumes nothing of the number of velocities: specimen joints ride in the same model and the same ABA.
+Joints of a specimen are part of the same model and the same ABA.
 """
 
 from collections.abc import Callable
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..mechanics.derivatives import rates_at
 from ..mechanics.plant import Plant
@@ -19,19 +19,18 @@ from ..mechanics.workspace import Workspace, unpack_workspace
 
 __all__ = ["Stepper", "make_stepper"]
 
-Array = NDArray[np.float64]
 Stepper = Callable[[Workspace, Array], int]
 """Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
 
 
 def make_stepper(plant: Plant, scheme: str, dt: float) -> Stepper:
-    """Return the stepper of a scheme for steps of dt [s]; call `evaluate_derivatives` on the workspace first."""
+    """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand."""
     return {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}[scheme](plant, dt)
 
 
 @compiled
 def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
-    """`staggered_stage` with tables and workspace packed, which are cheaper to hand over."""
+    """`staggered_stage` with tables and workspace packed, which are cheaper to pass."""
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
 
@@ -42,7 +41,7 @@ def _semi_implicit(plant: Plant, dt: float) -> Stepper:
     def advance(ws: Workspace, spool: Array) -> int:
         motion, buffer = ws.motion, ws.buffer
         dq, v_seen, tau = motion[DQ], motion[V_SEEN], motion[TAU]
-        open_step(motion, dt)  # after a kick this changes nothing
+        open_step(motion, dt)  # no change after a kick
         q, status = ws.q, 0
         for held in spool:
             q = integrate(model, q, dq)
@@ -76,7 +75,7 @@ def _euler(plant: Plant, dt: float) -> Stepper:
 
 
 def _local_rate(model: Any, n_platen: int, q0: Array, q: Array, moved: Array, v: Array) -> Array:
-    """Rate of the local coordinates `moved` from q0 to q whose pose moves with v.
+    """Rate of the local coordinates `moved` from q0 to q at the velocity v.
 
     The platen's six by `dexp_inverse`: pin.dDifference loses eight digits at steps of 1e-4 to 5e-3 rad (4.1.0).
     """

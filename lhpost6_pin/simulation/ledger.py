@@ -1,10 +1,10 @@
-"""The force ledger of a run: who pushes the platen.
+"""The force ledger of a run: force and wrench of every effect on the platen.
 
     ledger = force_ledger(run)
     ledger.force[:, ledger.row("actuators_4_way.H1")]         # [N]
     ledger.wrench[:, ledger.effect("pad_friction")]           # (n, 6) at C in {c}
 
-It evaluates the run's states with the stages that the engines run; a specimen with joints is pin.rnea's.
+It evaluates the states of the run with the stages of the engines; a specimen with joints by pin.rnea.
 Inertia = sum of all effects and the weight (Eqs. 4-24 to 4-26), each as a wrench on the platen at C.
 """
 
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from ..core.compiled import compiled, compiled_inline
 from ..core.errors import UnknownNameError
@@ -31,20 +30,20 @@ from .simulate import Run
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Ledger", "States", "add_at_c", "add_row_at_c", "force_ledger", "number_of", "history_of"]
+from ..core.arrays import Array
 
-Array = NDArray[np.float64]
+__all__ = ["Ledger", "States", "add_at_c", "add_row_at_c", "force_ledger", "number_of", "history_of"]
 
 WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 class States(NamedTuple):
-    """States of a plant over time, wherever they come from; n samples."""
+    """States of a plant over time, simulated or measured; n samples."""
 
     plant: Plant
     time: Array  # (n,) [s]
     q: Array  # (n, nq)
-    v: Array  # (n, nv), as forces see it
+    v: Array  # (n, nv), at which forces are evaluated
     a: Array  # (n, nv)
     z: Array  # (n, n_states)
 
@@ -62,15 +61,15 @@ class Ledger:
 
     @property
     def residual(self) -> Array:
-        """Inertia less the sum of all effects (n, 6) [N, N m]: the integrator's, not the physics'."""
+        """Inertia minus the sum of all effects (n, 6) [N, N m]: the error of the integrator."""
         return self.inertia - self.wrench.sum(axis=1)
 
     def row(self, name: str) -> int:
-        """Number of a row of `force`; raises UnknownNameError that lists the names."""
+        """Index of a row of `force`; raises UnknownNameError that lists the names."""
         return number_of("force", name, self.rows)
 
     def effect(self, name: str) -> int:
-        """Number of an effect in `wrench`; raises UnknownNameError that lists the names."""
+        """Index of an effect in `wrench`; raises UnknownNameError that lists the names."""
         return number_of("effect", name, self.effects)
 
     def at(self, sample: int) -> dict[str, pin.Force]:
@@ -81,23 +80,17 @@ class Ledger:
         """Lay out as a dataset with dims time, row, effect, axis and units."""
         import xarray as xr
 
-        data = xr.Dataset(
-            {
-                "force": (("time", "row"), self.force, {"units": "N, N m", "long_name": "force on the port"}),
-                "wrench": (
-                    ("time", "effect", "axis"),
-                    self.wrench,
-                    {"units": "N, N m", "long_name": "wrench on the platen at C in {c}"},
-                ),
-                "inertia": (
-                    ("time", "axis"),
-                    self.inertia,
-                    {"units": "N, N m", "long_name": "inertial wrench at C in {c}"},
-                ),
-            },
-            {"row": list(self.rows), "effect": list(self.effects), "axis": list(WRENCH_AXES)},
-        )
-        return data.assign_coords(time=("time", self.time, {"units": "s"}))
+        contents = {
+            "force": (("row",), self.force, "force on the port"),
+            "wrench": (("effect", "axis"), self.wrench, "wrench on the platen at C in {c}"),
+            "inertia": (("axis",), self.inertia, "inertial wrench at C in {c}"),
+        }
+        data = {
+            name: (("time", *dims), values, {"units": "N, N m", "long_name": about})
+            for name, (dims, values, about) in contents.items()
+        }
+        coords = {"row": list(self.rows), "effect": list(self.effects), "axis": list(WRENCH_AXES)}
+        return xr.Dataset(data, coords).assign_coords(time=("time", self.time, {"units": "s"}))
 
 
 def force_ledger(run: "Run | States") -> Ledger:
@@ -119,7 +112,7 @@ def force_ledger(run: "Run | States") -> Ledger:
         guides[:, plant.axes] = 0.0
         wrench = np.concatenate([wrench, guides[:, None]], axis=1)
         names.append("guides")
-    # a law on several ports has as many columns
+    # a law on several ports has one row for each
     used = [(i, k) for i, row in enumerate(plant.rows) for k in range(len(PORTS)) if row[PORTS[k]] >= 0]
     rows = [f"{names[plant.rows[i]['effect']]}.{plant.ports[plant.rows[i][PORTS[k]]]}" for i, k in used]
     force = by_row[:, [i for i, _ in used], [k for _, k in used]]
@@ -127,14 +120,14 @@ def force_ledger(run: "Run | States") -> Ledger:
 
 
 def number_of(kind: str, name: str, valid: Sequence[str]) -> int:
-    """Place of a name among the valid ones; raises UnknownNameError that lists them."""
+    """Index of a name among the valid ones; raises UnknownNameError that lists them."""
     if name not in valid:
         raise UnknownNameError(kind, name, list(valid))
     return list(valid).index(name)
 
 
 def history_of(run: "Run | States") -> tuple[Array, Array, Array, Tables, Workspace]:
-    """States q, v, z of a run, the plant's tables and a workspace, as the compiled loops below take them."""
+    """States q, v, z of a run, the plant's tables and a workspace, as arguments of compiled loops over a run."""
     plant = run.plant
     q, v, z = (np.ascontiguousarray(x) for x in (run.q, run.v, run.z))
     return q, v, z, plant.tables, make_workspace(plant, plant.zero_state())

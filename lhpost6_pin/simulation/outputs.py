@@ -1,12 +1,12 @@
-"""What a run hands out: its record, in the layout that measured tests have, too."""
+"""The record of a run, in the layout of measured tests."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
@@ -18,15 +18,12 @@ from .simulate import Run
 
 __all__ = ["record_of_run"]
 
-Array = NDArray[np.float64]
-
 
 def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | None = None) -> xr.Dataset:
     """Record of a simulated test.
 
-    attrs are global attributes beside those that follow from the run (`test`, `title`, ...); reference, if any, is what
-    was asked for at the run's samples, with its velocity and acceleration as extra variables. Beyond the layout it
-    holds the hidden friction states and the joints of an articulated specimen.
+    attrs: further global attributes (`test`, `title`, ...). reference: target at the run's samples, if any; its
+    velocity and acceleration are extra variables, as are hidden states and the joints of an articulated specimen.
     """
     plant, machine = run.plant, run.plant.machine
     motion = platen_motion(plant, run.q, run.v, run.a)
@@ -34,10 +31,9 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     rows = plant.rows[plant.tables.actuators]
     states = rows["state"]
     ahead = np.zeros((len(run.z), plant.spools))
-    rod_travels(rows, run.z, ahead)  # a stroke is measured between barrel and rod
+    rod_travels(rows, run.z, ahead)  # displacement is measured between barrel and rod
     double = np.array([name in machine.double_acting for name in machine.actuator_names])
-    pressure_a = run.z[:, states]
-    pressure_b = run.z[:, states[double] + 1]
+    pressure_a, pressure_b = run.z[:, states], run.z[:, states[double] + 1]
     channels: dict[str, Any] = {
         "platen_displacement": motion.displacement,
         "platen_velocity": motion.velocity,
@@ -46,7 +42,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         "actuator_force": oil_force(machine, pressure_a, pressure_b),
         "chamber_pressure_a": pressure_a,
         "spool_position": run.spool,
-        "supply_pressure": _supply_pressure(run),
+        "supply_pressure": plant.supply.pressure - _supply_droop(run),
     }
     labels = machine.labels
     if double.any():
@@ -85,23 +81,22 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     return make_record(run.time, channels, labels, {**facts, **attrs})
 
 
-def _supply_pressure(run: Run) -> Array:
+def _supply_droop(run: Run) -> Array:
+    """Fall of the supply pressure with the flow drawn (n,) [Pa]."""
     supply = run.plant.supply
-    drawn = run.z[:, int(supply.drawn)] if supply.drawn >= 0.0 else np.zeros(len(run.time))
-    return supply.pressure - supply.droop * drawn
+    return supply.droop * run.z[:, int(supply.drawn)] if supply.drawn >= 0.0 else np.zeros(len(run.time))
 
 
 def _hidden_states(run: Run) -> dict[str, Any]:
-    """Friction states as extra variables, by effect, with their ports as coordinate-like names in `states`."""
-    found: dict[str, Any] = {}
+    """Hidden states without pressures as extra variables, by effect; attribute `states` names their columns."""
+    columns: dict[str, list[int]] = {}
     names = run.plant.states
-    for effect in dict.fromkeys(name.split(".")[0] for name in names):
-        columns = [i for i, name in enumerate(names) if name.startswith(f"{effect}.") and "pressure" not in name]
-        if columns:
-            about = {
-                "units": "1",
-                "long_name": f"hidden states of {effect}",
-                "states": " ".join(names[i].split(".", 1)[1] for i in columns),
-            }
-            found[f"hidden_{effect}"] = (("time", f"{effect}_state"), run.z[:, columns], about)
+    for i, name in enumerate(names):
+        if "pressure" not in name:
+            columns.setdefault(name.split(".")[0], []).append(i)
+    found: dict[str, Any] = {}
+    for effect, own in columns.items():
+        states = " ".join(names[i].split(".", 1)[1] for i in own)
+        about = {"units": "1", "long_name": f"hidden states of {effect}", "states": states}
+        found[f"hidden_{effect}"] = (("time", f"{effect}_state"), run.z[:, own], about)
     return found

@@ -1,4 +1,4 @@
-"""Two things to do with a machine: rehearse a motion in closed loop, and replay a record's spools in open loop."""
+"""Simulated tests of a machine: a motion rehearsed in closed loop, or a record's spools replayed in open loop."""
 
 import math
 from collections.abc import Mapping
@@ -7,27 +7,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from ..control import ControllerSettings, make_controller
 from ..control.inverse import InverseFilter, apply_inverse
 from ..control.plug import UserController
-from ..core.errors import OutOfRangeError, SimulationError
-from ..core.names import AXES, SAMPLE_RATE
+from ..core.arrays import Array
+from ..core.errors import SimulationError
+from ..core.names import SAMPLE_RATE
+from ..core.progress import Progress
 from ..data.records import require
 from ..data.signals import resample_band_limited
 from ..machine.machine import Machine
-from ..mechanics.capacity import make_actuator_check
-from ..mechanics.equilibrium import find_equilibrium
+from ..mechanics.equilibrium import Equilibrium, find_equilibrium
 from ..mechanics.plant import Plant, State, make_plant
 from ..mechanics.pose import PlatenMotion
-from ..motions import LimitsSummary, MotionLimits, Target, check_limits
+from ..motions import Target
+from .motion_limits import check_motion_limits
 from .outputs import record_of_run
-from .simulate import ClosedLoop, Drive, OpenLoop, PluggedLoop, Progress, Run, simulate
+from .simulate import ClosedLoop, OpenLoop, PluggedLoop, Run, simulate
 
-__all__ = ["SimulatedTest", "rehearse", "replay", "target_within_limits"]
-
-Array = NDArray[np.float64]
+__all__ = ["SimulatedTest", "loop_for", "rehearse", "replay"]
 
 
 class SimulatedTest(NamedTuple):
@@ -35,27 +34,6 @@ class SimulatedTest(NamedTuple):
 
     run: Run
     record: xr.Dataset
-
-
-def target_within_limits(plant: Plant, target: Target) -> LimitsSummary:
-    """Utilisation of the machine by a target: Table 2.2's limits, strokes, valve flow.
-
-    Raises OutOfRangeError that names each limit exceeded and the scale that fits; for a guided machine also where the
-    target moves an axis that the machine has not.
-    """
-    limits, axes = plant.machine.limits, plant.axes
-    blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
-    if blocked:
-        name, free = plant.machine.name, ",".join(AXES[k] for k in axes)
-        raise OutOfRangeError(
-            f"{target.reference.motion}: {name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
-        )
-
-    def six(values: tuple[float, ...]) -> Array:
-        return np.array([values[k] if k in axes else math.inf for k in range(6)])
-
-    bounds = MotionLimits(six(limits.displacement), six(limits.velocity), six(limits.acceleration))
-    return check_limits(target, bounds, make_actuator_check(plant))
 
 
 def rehearse(
@@ -73,31 +51,20 @@ def rehearse(
 ) -> SimulatedTest:
     """Reproduce a target in closed loop from rest; options go to `simulate` (scheme, steps_per_second, engine).
 
-    settings are the 469D's, or a user's own controller. The 469D takes the drive that its reference generators turn
-    into the target, or what adaptive inverse control makes of that with `inverse`, or a `drive` (n, 6) given as such.
+    settings are those of the 469D, or a user's own controller. The drive of the 469D is a given `drive` (n, 6), or that
+    of the target, conditioned by adaptive inverse control with `inverse`.
 
-    Raises OutOfRangeError if the target is more than the machine can give, unless `beyond_limits` asks to try all the
-    same; SimulationError for options that cannot be.
+    Raises OutOfRangeError if the target exceeds the capacity of the machine, unless `beyond_limits`; SimulationError
+    for invalid options.
     """
     plant = make_plant(machine)
     if not beyond_limits:
-        target_within_limits(plant, target)
-    rest = find_equilibrium(plant)
-    motion = (target.displacement, target.velocity, target.acceleration)
-    loop: Drive
-    if isinstance(settings, ControllerSettings):
-        controller = make_controller(plant, rest, settings)
-        drive = controller.drive_for(*motion) if drive is None else drive
-        loop = ClosedLoop(controller, drive if inverse is None else apply_inverse(inverse, drive), rest)
-    elif drive is not None or inverse is not None:
-        raise SimulationError(
-            "a drive or an inverse goes into the 469D's reference generators, which a controller of your own has not"
-        )
-    else:
-        loop = PluggedLoop(settings, *motion, rest)
+        check_motion_limits(plant, target)
+    loop = loop_for(plant, find_equilibrium(plant), settings, target, drive, inverse)
     run = simulate(plant, loop, samples=len(target.time), record_every=record_every, progress=progress, **options)
     run = _usable(run)
-    asked = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
+    motion = (target.displacement, target.velocity, target.acceleration)
+    reference = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
     name = settings.name if isinstance(settings, ControllerSettings) else type(settings).__name__
     facts = {
         "controller": name,
@@ -105,7 +72,28 @@ def rehearse(
         "motion": target.reference.motion,
         "source": target.reference.source,
     }
-    return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, asked))
+    return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, reference))
+
+
+def loop_for(
+    plant: Plant,
+    rest: Equilibrium,
+    settings: ControllerSettings | UserController,
+    target: Target,
+    drive: Array | None = None,
+    inverse: InverseFilter | None = None,
+) -> ClosedLoop | PluggedLoop:
+    """Closed loop from rest on a target, of the 469D or of a user's own controller; see `rehearse`."""
+    motion = (target.displacement, target.velocity, target.acceleration)
+    if isinstance(settings, ControllerSettings):
+        controller = make_controller(plant, rest, settings)
+        drive = controller.drive_for(*motion) if drive is None else drive
+        return ClosedLoop(controller, drive if inverse is None else apply_inverse(inverse, drive), rest)
+    if drive is not None or inverse is not None:
+        raise SimulationError(
+            "a drive or an inverse is an input of the 469D's reference generators; a controller of your own has none"
+        )
+    return PluggedLoop(settings, *motion, rest)
 
 
 def replay(
@@ -116,11 +104,11 @@ def replay(
     progress: Progress | None = None,
     **options: Any,
 ) -> SimulatedTest:
-    """Drive the plant with a record's spool positions, from rest with its first sample's pressures.
+    """Drive the plant with a record's spool positions, from rest with the pressures of its first sample.
 
-    A simulated record at the controller's rate is held over each sample (as it was made); any other is band-limited
-    and interpolated smoothly to the model's steps. Raises RecordError naming missing channels, or a specimen
-    that the record was made with and the machine has not.
+    The spools of a simulated record at the controller's rate are held over each sample (as they were); those of any
+    other are interpolated, band-limited, to the model steps. Raises RecordError naming missing channels, or the
+    specimen of the record if the machine has none.
     """
     require(record, "spool_position", "chamber_pressure_a")
     machine = machine.as_tested(record.attrs, "the record")
@@ -136,7 +124,7 @@ def replay(
         spool, samples = recorded, len(recorded)
     else:
         t_old = np.arange(len(recorded)) / rate
-        samples = math.floor(t_old[-1] * SAMPLE_RATE + 1e-6)  # a rounding error must not cost a sample
+        samples = math.floor(t_old[-1] * SAMPLE_RATE + 1e-6)  # no sample is lost to rounding
         middle = (np.arange(samples * (steps // SAMPLE_RATE)) + 0.5) / steps
         spool = resample_band_limited(recorded, t_old, np.minimum(middle, t_old[-1]))
     run = simulate(plant, OpenLoop(spool, _start(plant, record)), samples=samples, progress=progress, **options)
@@ -145,9 +133,9 @@ def replay(
 
 
 def _usable(run: Run) -> Run:
-    """The run up to its last sample that is finite throughout: one that diverged may end in numbers that are not.
+    """The run up to its first sample with a number that is not finite, as in a diverged run.
 
-    Raises SimulationError with the run's trouble if not even two samples are left to make a record of.
+    Raises SimulationError with the run's trouble if fewer than two samples, the least of a record, remain.
     """
     arrays = (run.q, run.v, run.a, run.z, run.spool)
     finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in arrays])

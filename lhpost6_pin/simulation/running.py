@@ -1,17 +1,17 @@
-"""A plant that runs sample by sample, for whoever commands it from outside: a link, an FMU, an experiment in Python.
+"""A plant that runs sample by sample under commands from outside: a link, an FMU, an experiment in Python.
 
     table = RunningPlant(plant, rest)
     for sample in range(n):
         table.advance(command(table.sensors()))
 
-The same compiled stages, in the same order, as a run of `simulate` in the Pinocchio engine: equal to the last bit.
+The compiled stages and their order are those of `simulate` with the Pinocchio engine: results are equal bit by bit.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..control.loop import sense_packed
 from ..control.plug import Feedback
+from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE, SCHEMES
 from ..mechanics.derivatives import evaluate_derivatives
@@ -26,13 +26,11 @@ from .snapshot import Snapshot, take_snapshot
 
 __all__ = ["RunningPlant"]
 
-Array = NDArray[np.float64]
-
 
 class RunningPlant:
-    """A plant at rest in the zero-position that takes one command a sample.
+    """A plant, initially at rest in the zero-position, that takes one command per sample.
 
-    Attributes: plant; sample, how many commands it has taken; clipped, how many spool values were beyond full stroke.
+    Attributes: plant; sample, number of commands taken; clipped, number of spool values beyond full stroke.
     """
 
     def __init__(
@@ -43,7 +41,7 @@ class RunningPlant:
         scheme: str = SCHEMES[0],
         steps_per_second: int = 4 * SAMPLE_RATE,
     ) -> None:
-        """Start at rest; raises what `schemes.steps_a_sample` does."""
+        """Start at rest; raises as `schemes.steps_a_sample` does."""
         steps = steps_a_sample(scheme, steps_per_second)
         self.plant, self.scheme, self.steps_per_second = plant, scheme, steps_per_second
         self.sample = self.clipped = 0
@@ -66,36 +64,36 @@ class RunningPlant:
 
     @property
     def spool(self) -> Array:
-        """Spool positions (n_actuators,) that the ports saw last, mean over the sample."""
+        """Spool positions (n_actuators,) after the valve delay, mean over the last sample."""
         return np.asarray(self._window.mean(axis=0))
 
     def sensors(self) -> Feedback:
         """Feedback at the next sample, in new arrays."""
         ws, plant = self._ws, self.plant
-        if self.scheme != SCHEMES[0]:  # the other schemes leave the ports of their last stage behind
+        if self.scheme != SCHEMES[0]:  # the other schemes leave the ports of their last stage
             evaluate_derivatives(plant, ws, self._window[0])
         found = Feedback(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
         sense_packed(plant.tables.packed, ws.buffer, *found)
         return found
 
     def snapshot(self) -> Snapshot:
-        """What can be seen of the plant now."""
+        """Snapshot of the plant at the next sample."""
         return take_snapshot(self.plant, self._ws, self.time)
 
     def advance(self, command: Array) -> None:
-        """Take the command (n_actuators,) of this sample, -1..1, and go on to the next.
+        """Apply the command (n_actuators,) of this sample, -1..1, and advance to the next.
 
-        Raises SimulationError for a command that is not finite, and where a leg leaves its stroke or the run diverges.
+        Raises SimulationError for a command that is not finite, if an actuator or strut leaves its stroke, and if the
+        run diverges.
         """
         command = np.asarray(command, float)
         if command.shape != (self.plant.spools,) or not np.isfinite(command).all():
             raise SimulationError(f"a command is {self.plant.spools} finite spool values; got {command}")
         self.clipped += int(np.count_nonzero(np.abs(command) > 1.0))
-        if self.sample == 0:  # what came before the first command was the same
-            self._history[:] = self._window[:] = np.clip(command, -1.0, 1.0)
-        else:
-            self._history[:-1] = self._history[1:]
-            self._history[-1] = np.clip(command, -1.0, 1.0)
+        self._history[:-1] = self._history[1:]
+        self._history[-1] = np.clip(command, -1.0, 1.0)
+        if self.sample == 0:  # commands before the first one were equal to it
+            self._history[:] = self._window[:] = self._history[-1]
         first = self.sample - len(self._history) + 1
         delayed_spools(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
         status = self._advance(self._ws, self._window)

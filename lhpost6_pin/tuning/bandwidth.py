@@ -1,4 +1,4 @@
-"""What limits the band in which an axis follows its reference."""
+"""Bandwidth limitation of an axis: the cause that ends the band in which it follows its reference."""
 
 import numpy as np
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..control import ControllerSettings
+from ..core.arrays import Complex, Mask
 from ..data.transfer import Transfer
 
 __all__ = ["FEEDFORWARD", "FeedforwardFit", "best_delay"]
@@ -17,7 +17,7 @@ FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "jerk_feedfor
 class FeedforwardFit:
     """Least-squares fit of the feed-forward gains of one axis to its measured response.
 
-    Kvf is fitted in the low band, where the table integrates the command; the other terms (1 Kaf, 2 Kjf) then over the
+    Kvf is fitted in the low band, where the table integrates the command; then the other terms (1 Kaf, 2 Kjf) over the
     whole band, so that an oil column within the band does not affect Kvf.
     """
 
@@ -29,7 +29,7 @@ class FeedforwardFit:
         bands: tuple[tuple[float, float], tuple[float, float]],
         terms: tuple[int, ...],
     ) -> None:
-        """Response of axis `k` with the given settings; `bands` [Hz] of Kvf and of the other `terms`."""
+        """Fit the response of axis `k` with the given settings; `bands` [Hz] of Kvf and of the other `terms`."""
         f = transfer.frequency
         self.bands, self.terms = [(f >= low) & (f <= high) for low, high in bands], terms
         self.s = 2j * np.pi * f
@@ -47,12 +47,10 @@ class FeedforwardFit:
         error = (self.plant * (self.fixed + self._ahead(found)) - np.exp(-self.s * delay)) * self.weight
         return found, float(np.linalg.norm(error[inside]) / np.linalg.norm(self.weight[inside]))
 
-    def _ahead(self, gains: Sequence[float]) -> NDArray[np.complex128]:
+    def _ahead(self, gains: Sequence[float]) -> Complex:
         return np.asarray(sum(g * self.s ** (n + 1) for n, g in enumerate(gains)))
 
-    def _solve(
-        self, gains: Sequence[float], terms: tuple[int, ...], inside: NDArray[np.bool_], delay: float
-    ) -> list[float]:
+    def _solve(self, gains: Sequence[float], terms: tuple[int, ...], inside: Mask, delay: float) -> list[float]:
         """Gains with those of `terms` fitted."""
         out = [0.0 if n in terms else g for n, g in enumerate(gains)]
         if not terms:

@@ -1,32 +1,29 @@
-"""The table under white noise: its transfer function from reference to feedback, with the coherence.
+"""Response of the table under white noise: transfer function from reference to feedback, with coherence.
 
-    transfer = identify(plant, rest, controller, noise_target(plant, ("x",)), ("x",))
+    transfer = identify(controller, rest, noise_target(("x",)), ("x",), segment=8.0)
 
-Signals are accelerations of C and Euler angles: what went into the reference generators (the reference that the drive
-is made for), and what the platen did.
+Signals are accelerations of C and Euler angles: the reference of the drive, and the achieved motion of the platen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from types import SimpleNamespace
 
-import numpy as np
-from numpy.typing import NDArray
+from joblib import Parallel, delayed
 
 from ..control import Controller
+from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.files import models_folder
 from ..core.names import AXES, SAMPLE_RATE
 from ..data.transfer import Transfer, estimate_transfer
 from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.equilibrium import Equilibrium
-from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..motions import GroundMotion, Target, find_motion, make_target
-from ..simulation.batch import simulate_many
-from ..simulation.simulate import ClosedLoop, simulate
+from ..simulation.simulate import ClosedLoop, fastest_engine, simulate
 
-__all__ = ["identify", "noise_target", "run_noise", "tuning_numbers"]
-
-Array = NDArray[np.float64]
+__all__ = ["identify", "identify_axes", "noise_target", "run_noise", "section", "tuning_numbers"]
 
 
 def tuning_numbers() -> Parameters:
@@ -34,61 +31,71 @@ def tuning_numbers() -> Parameters:
     return load_parameters(models_folder() / "procedures" / "tuning.toml")
 
 
+def section(numbers: Parameters, name: str) -> SimpleNamespace:
+    """Numbers of a section as attributes."""
+    keys = (path.partition(".") for path in numbers)
+    return SimpleNamespace(**{key: numbers.number(f"{name}.{key}") for first, _, key in keys if first == name})
+
+
 def noise_target(axes: Sequence[str], seed: int = 1, *, slow: bool = False, duration: float | None = None) -> Target:
     """White noise on the axes named, independent on each; `slow` adds a part below its band, and lasts longer.
 
     Level, band and duration [s] are those of `tuning.toml`. Different seeds draw different noise.
     """
-    numbers = tuning_numbers()
-    low, high = numbers.number("noise.low"), numbers.number("noise.high")
+    numbers = section(tuning_numbers(), "noise")
+    low, high = numbers.low, numbers.high
     if duration is None:
-        duration = numbers.number("noise.slow_duration" if slow else "noise.duration")
+        duration = numbers.slow_duration if slow else numbers.duration
 
-    def drawn(level: str, low: float, high: float, seed: int) -> GroundMotion:
-        rms = numbers.number(f"noise.{level}")
-        turning = rms / numbers.number("noise.rotation_radius")
+    def drawn(rms: float, low: float, high: float, seed: int) -> GroundMotion:
+        turning = rms / numbers.rotation_radius
         options = {"rms": rms, "rotation_rms": turning, "low": low, "high": high, "duration": duration, "seed": seed}
         return find_motion("white-noise", six_axis=True, **options)
 
-    noise = drawn("rms", low, high, seed)
-    lowest = low
+    noise, lowest = drawn(numbers.rms, low, high, seed), low
     if slow:
-        lowest = numbers.number("noise.slow_low")
-        below = drawn("slow_rms", lowest, low, seed + 1000)
-        noise = GroundMotion(
-            "white-noise", noise.time_step, noise.samples + below.samples, noise.quantity, noise.source
-        )
+        lowest = numbers.slow_low
+        below = drawn(numbers.slow_rms, lowest, low, seed + 1000)
+        noise = replace(noise, samples=noise.samples + below.samples)
     return make_target(noise, axes=",".join(axes), high_pass=lowest / 4, low_pass=2 * high)
 
 
-def run_noise(
-    plant: Plant, rest: Equilibrium, controllers: Sequence[Controller], targets: Sequence[Target]
-) -> list[Array]:
-    """Acceleration (n, 6) of C and Euler angles under each target with its controller; all at once over threads.
+def run_noise(controller: Controller, rest: Equilibrium, target: Target) -> Array:
+    """Acceleration (n, 6) of C and Euler angles under a target.
 
-    Raises SimulationError if a run does not last: noise is small, so a run that stops is an unstable loop.
+    Raises SimulationError if the run stops early: noise is small, so the loop is unstable.
     """
-    drives = [
-        ClosedLoop(c, c.drive_for(t.displacement, t.velocity, t.acceleration), rest)
-        for c, t in zip(controllers, targets, strict=True)
-    ]
-    samples = len(targets[0].time)
-    if plant.articulated:
-        runs = [simulate(plant, drive, samples=samples) for drive in drives]
-    else:
-        runs = simulate_many([(plant, drive) for drive in drives], samples=samples)
-    for run in runs:
-        if run.trouble:
-            raise SimulationError(f"white noise: {run.trouble}; the loop is unstable, lower its gains")
-    return [platen_motion(plant, run.q, run.v, run.a).acceleration for run in runs]
+    plant = controller.plant
+    drive = controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(drive), engine=fastest_engine(plant))
+    if run.trouble:
+        raise SimulationError(f"white noise: {run.trouble}; the loop is unstable, lower its gains")
+    return platen_motion(plant, run.q, run.v, run.a).acceleration
 
 
 def identify(
-    plant: Plant, rest: Equilibrium, controller: Controller, target: Target, axes: Sequence[str], segment: float
+    controller: Controller, rest: Equilibrium, target: Target, axes: Sequence[str], segment: float
 ) -> Transfer:
     """Transfer function (m, k, k) of the k axes named from one run in which all of them move; segment [s]."""
-    (achieved,) = run_noise(plant, rest, [controller], [target])
+    achieved = run_noise(controller, rest, target)
     columns = [AXES.index(name) for name in axes]
     return estimate_transfer(
         target.acceleration[:, columns], achieved[:, columns], float(SAMPLE_RATE), segment=segment, axes=tuple(axes)
     )
+
+
+def identify_axes(
+    controllers: Sequence[Controller], rest: Equilibrium, noise: Callable[[str], Target], segment: float
+) -> list[list[Transfer]]:
+    """Response of each free axis, alone, to its own `noise`, with each of the controllers of one plant.
+
+    In parallel over threads; targets and runs of an axis are discarded before the next, since long ones fill memory.
+    """
+    plant = controllers[0].plant
+
+    def one(axis: str) -> list[Transfer]:
+        target = noise(axis)
+        return [identify(controller, rest, target, (axis,), segment) for controller in controllers]
+
+    threads = 1 if plant.articulated else -1  # the engine of free joints holds the interpreter
+    return list(Parallel(n_jobs=threads, prefer="threads")(delayed(one)(AXES[k]) for k in plant.axes))

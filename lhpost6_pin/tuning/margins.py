@@ -1,9 +1,9 @@
 """The controlled table as a linear system: loop gains, margins, and the response expected of settings.
 
-The plant is linearised at rest without dry friction, which is how it is least damped: large motion slides through it.
-Per degree of freedom the controller asks for a velocity u; the plant answers with a displacement X u of C and Euler
-angles and a force F u of the actuators on that degree of freedom, through valve delay and sample hold. The feedback
-generator's outputs are the displacement and its derivatives. So with Kx, Kv, ... as in `control.loop`
+The plant is linearised at rest without dry friction, where its damping is least: friction slides in large motion. The
+velocity command u of each degree of freedom causes, through valve delay and sample hold, a displacement X u of C and
+Euler angles and a force F u of the actuators on that degree of freedom. Outputs of the feedback generator are the
+displacement and its derivatives. With Kx, Kv, ... as in `control.loop`
 
     L = Km N [ (Kx + Kv s + Ka s^2 + Ki/s) X + KF HP F ]
     T = X (1 + L)^-1 Km N (Kxf + Kvf s + Kaf s^2 + Kjf s^3 + Kx + Kv s + Ka s^2 + Ki/s)
@@ -12,28 +12,27 @@ generator's outputs are the displacement and its derivatives. So with Kx, Kv, ..
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..control import Controller
+from ..core.arrays import Array, Complex
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import opening
+from ..machine.machine import Machine
 from ..mechanics.equilibrium import find_equilibrium
 from ..mechanics.linearize import SPOOL_STEP, linearize
 from ..mechanics.plant import make_plant
 
 __all__ = ["LoopModel", "Margin", "expected_response", "loop_gain", "make_loop_model", "margins"]
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+__all__ += ["without_dry_friction"]
 
 FREQUENCIES = np.geomspace(0.05, 400.0, 4000)
-"""Where loops are judged [Hz]: from below the reset integrator's corner to far above the stiffest oil column, dense
+"""Frequencies of loops [Hz]: from below the corner of the reset integrator to far above the stiffest oil column, dense
 enough for a resonance of 0.5 % damping."""
 
 
 @dataclass(frozen=True)
 class LoopModel:
-    """What the table answers to a velocity asked for on each free axis, at `frequency` (m,) [Hz]."""
+    """Response of the table to the velocity command of each free axis, at `frequency` (m,) [Hz]."""
 
     frequency: Array
     displacement: Complex  # (m, n, n) of C and Euler angles [m, rad per m/s, rad/s]
@@ -42,28 +41,30 @@ class LoopModel:
 
 @dataclass(frozen=True)
 class Margin:
-    """How far one axis is from instability while the others stay closed."""
+    """Stability margins of one axis, the loops of the others closed."""
 
     gain: float  # factor on the axis's master gain at which the loop becomes unstable; inf if none does
-    gain_frequency: float  # where that happens [Hz]
-    phase: float  # lag that would make it unstable [rad]; inf if the loop never reaches gain one
+    gain_frequency: float  # of that instability [Hz]
+    phase: float  # lag at which the loop becomes unstable [rad]; inf if the loop never reaches gain one
     phase_frequency: float
 
 
+def without_dry_friction(machine: Machine) -> Machine:
+    """Machine without the friction of seals and pads."""
+    friction = [n for n in machine.parameters if n.endswith((".seal_friction", ".pad_friction"))]
+    return machine.with_params(dict.fromkeys(friction, 0.0))
+
+
 def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> LoopModel:
-    """Linear answer of a controller's plant to the velocities that it asks for, its force balance closed."""
-    nominal = controller.plant
-    machine = nominal.machine
-    kinds = {c.kind for c in machine.components}
-    friction = [f"{k}.{n}" for k in kinds for n in ("seal_friction", "pad_friction")]
-    plant = make_plant(machine.with_params({name: 0.0 for name in friction if name in machine.parameters}))
+    """Linear response of a controller's plant to its velocity commands, its force balance closed."""
+    plant = make_plant(without_dry_friction(controller.plant.machine))
     rest = find_equilibrium(plant)
     linear = linearize(plant, rest.state, rest.spool)
     nv, axes = linear.nv, plant.axes
     oil = (2 * nv + i for i, name in enumerate(plant.states) if "pressure" in name or "flow" in name)
     keep = [*range(2 * nv), *oil]
     a, b = linear.A[np.ix_(keep, keep)], linear.B[keep]
-    # spool per leg rate: the controller inverts the flow curve about the opening at rest
+    # spool per actuator velocity: the controller inverts the flow curve about the opening at rest
     actuators = plant.actuators
     for i, valve in enumerate(controller.actuator):
         curve, at = float(actuators.flow_curve[i]), float(rest.spool[i])
@@ -81,52 +82,46 @@ def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> L
     s = 2j * np.pi * frequency[:, None, None]
     hold = (1.0 - np.exp(-s / SAMPLE_RATE)) / (s / SAMPLE_RATE)
     late = np.exp(-s * plant.delays) / (1.0 + s * plant.lags) * hold  # (m, 1, n_actuators)
-    states = np.linalg.solve(s * np.eye(len(keep)) - a, b * late)  # per leg rate
+    states = np.linalg.solve(s * np.eye(len(keep)) - a, b * late)  # per actuator velocity
     force = to_force @ states
     legs = controller.jacobian[:, axes]
     rate = np.linalg.solve(np.eye(plant.spools) + controller.balance @ force, legs.astype(complex))
-    displacement, felt = to_c @ states @ rate, legs.T @ (force @ rate)
-    return LoopModel(frequency, np.asarray(displacement, np.complex128), np.asarray(felt, np.complex128))
+    displacement, on_axes = to_c @ states @ rate, legs.T @ (force @ rate)
+    return LoopModel(frequency, np.asarray(displacement, np.complex128), np.asarray(on_axes, np.complex128))
 
 
 def loop_gain(model: LoopModel, controller: Controller) -> Complex:
-    """L (m, n, n) of the free axes: what comes back of a velocity asked for, sign reversed."""
-    s = 2j * np.pi * model.frequency
+    """Loop gain L (m, n, n) of the free axes: the returned part of a velocity command, sign reversed."""
+    back = np.exp(-2j * np.pi * model.frequency / SAMPLE_RATE)[:, None]
     rows = controller.axis
-    passed = (1.0 - np.exp(-s / SAMPLE_RATE))[:, None] / (1.0 / rows["high_pass"] - np.exp(-s / SAMPLE_RATE)[:, None])
+    passed = (1.0 - back) / (1.0 / rows["high_pass"] - back)
     shape = _shaping(model, controller)[:, :, None]
     feedback = _displacement_feedback(model, controller)[:, :, None]
     return shape * (feedback * model.displacement + (rows["force_gain"] * passed)[:, :, None] * model.force)
 
 
 def expected_response(model: LoopModel, controller: Controller) -> Complex:
-    """T (m, n, n), reference to feedback, of the linear system."""
+    """Response T (m, n, n), reference to feedback, of the linear system."""
     s = 2j * np.pi * model.frequency[:, None]
-    rows = controller.axis
-    ahead = (
-        rows["displacement_feedforward"]
-        + rows["velocity_feedforward"] * s
-        + rows["acceleration_feedforward"] * s**2
-        + rows["jerk_feedforward"] * s**3
-    )
-    asked = _shaping(model, controller) * (ahead + _displacement_feedback(model, controller))
-    n = len(rows)
-    inner = np.linalg.solve(np.eye(n) + loop_gain(model, controller), asked[:, :, None] * np.eye(n))
-    return model.displacement @ inner
+    names = ("displacement", "velocity", "acceleration", "jerk")
+    ahead = sum(controller.axis[f"{name}_feedforward"] * s**k for k, name in enumerate(names))
+    command = _shaping(model, controller) * (ahead + _displacement_feedback(model, controller))
+    one = np.eye(len(controller.axis))
+    return model.displacement @ np.linalg.solve(one + loop_gain(model, controller), command[:, :, None] * one)
 
 
 def margins(model: LoopModel, controller: Controller, below: float = np.inf) -> tuple[Margin, ...]:
-    """Gain and phase margin of each free axis, the others closed; of a loop that is stable as it is.
+    """Gain and phase margin of each free axis, the others closed, of a loop that is stable.
 
     Phase margins count where the loop crosses gain one at a frequency up to `below` [Hz].
     """
     inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(model, controller))
-    alone = 1.0 / np.einsum("mkk->mk", inner) - 1.0  # what an axis sees of itself around its own loop, others closed
+    alone = 1.0 / np.einsum("mkk->mk", inner) - 1.0  # loop gain of an axis, others closed
     return tuple(_margin(model.frequency, loop, below) for loop in alone.T)
 
 
 def _margin(frequency: Array, loop: Complex, below: float = np.inf) -> Margin:
-    """Smallest margins of a scalar loop: where it crosses the negative real axis inside, and the unit circle."""
+    """Smallest margins of a scalar loop: at crossings of the negative real axis within, and of, the unit circle."""
     if not loop.any():
         return Margin(np.inf, np.nan, np.inf, np.nan)
     turn, size = np.unwrap(np.angle(loop)), np.log(np.abs(loop))
@@ -161,6 +156,5 @@ def _displacement_feedback(model: LoopModel, controller: Controller) -> Complex:
     """Kx + Kv s + Ka s^2 + Ki/s, (m, n)."""
     s = 2j * np.pi * model.frequency[:, None]
     rows = controller.axis
-    reset = rows["reset_gain"] / (1.0 - np.exp(-s / SAMPLE_RATE))
-    gains = rows["displacement_gain"] + rows["velocity_gain"] * s + rows["acceleration_gain"] * s**2
-    return np.asarray(gains + reset)
+    gains = sum(rows[f"{name}_gain"] * s**k for k, name in enumerate(("displacement", "velocity", "acceleration")))
+    return np.asarray(gains + rows["reset_gain"] / (1.0 - np.exp(-s / SAMPLE_RATE)))

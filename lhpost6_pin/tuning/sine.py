@@ -1,52 +1,48 @@
 """Sine tests: amplitude-phase control of the fundamental, adaptive harmonic cancellation of the rest.
 
-Both are the same least-mean-squares law, one canceller per multiple h of the fundamental. It adds to the drive
+Both obey the same least-mean-squares law, with one canceller per multiple h of the fundamental. It adds to the drive
 
     c(t) = w_c cos(h w t) + w_s sin(h w t),   (w_c, w_s)' = (2 / (tau |T|)) e (cos, sin)(h w t + arg T),
 
-at the level of the sine's envelope, as e is; e = wanted - achieved acceleration (af), T the response from drive to
-acceleration at that frequency: that of the reference generator, then from reference to feedback, from the linear model
-(`margins`). Nothing is learnt while spool commands are clipped. The fundamental's canceller (APC) brings amplitude and
-phase to what is wanted; the others (AHC) take out what friction, valve flow and geometry add.
+scaled, as is e, by the envelope of the sine; e = wanted - achieved acceleration (af), T the response from drive to
+acceleration at that frequency: that of the reference generator times that from reference to feedback, from the linear
+model (`margins`). Weights are constant while spool commands are clipped. The canceller of the fundamental corrects
+amplitude and phase (APC); the others cancel the harmonics due to friction, valve flow and geometry (AHC).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..control import Controller, ControllerSettings, make_controller
+from ..control import Controller, ControllerSettings, controlled
 from ..control.filters import sampled_response
 from ..control.loop import CANCELLER
+from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE
+from ..core.progress import Progress
 from ..data.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
 from ..machine.machine import Machine
-from ..mechanics.equilibrium import find_equilibrium
-from ..mechanics.plant import Plant, make_plant
+from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..motions import Target, find_motion, make_target, motion_options, smooth_step
 from ..simulation.simulate import ClosedLoop, Run, fastest_engine, simulate
-from .identify import tuning_numbers
+from .identify import section, tuning_numbers
 from .margins import expected_response, make_loop_model
 
 __all__ = ["SineResult", "SineTest", "axis_row", "sine_target", "sine_test", "with_cancellers"]
 
-Array = NDArray[np.float64]
-Progress = Callable[[float], None]
-
 
 @dataclass(frozen=True)
 class SineResult:
-    """How well a sine was reproduced on its axis, over the last full cycles."""
+    """Reproduction of a sine on its axis, over the last full cycles."""
 
     run: Run
-    displacement: Harmonics  # achieved, all multiples within the table's band
+    displacement: Harmonics  # achieved, all multiples within the band of the table
     acceleration: Harmonics
     amplitude_error: float  # of the displacement's fundamental [1]
-    phase_error: float  # of the same [rad], negative where it is late
+    phase_error: float  # of the same [rad], negative for a lag
     distortion: float  # total harmonic distortion of the acceleration [1]
     distortion_displacement: float
     peak_spool: float  # largest command [1]
@@ -54,7 +50,7 @@ class SineResult:
 
 @dataclass(frozen=True)
 class SineTest:
-    """A sine as the three-variable controller alone reproduces it, and with APC and AHC."""
+    """A sine reproduced by the three-variable controller alone, and with APC and AHC."""
 
     settings: ControllerSettings
     target: Target
@@ -67,7 +63,7 @@ class SineTest:
 
 
 def axis_row(plant: Plant, axis: str) -> int:
-    """Number of an axis among those free; raises SimulationError that names these if it is none of them."""
+    """Index of an axis among the free ones; raises SimulationError, with their names, for any other."""
     free = [AXES[k] for k in plant.axes]
     if axis not in free:
         raise SimulationError(f"{plant.machine.name} cannot move in {axis}; choose --axis from {', '.join(free)}")
@@ -79,8 +75,8 @@ def with_cancellers(
 ) -> Controller:
     """Controller with cancellers of the first `count` multiples of a frequency [Hz] on one axis; constant in [s].
 
-    Raises SimulationError for an axis that the machine has not, and in another mode than acceleration: there the
-    generator differentiates what cancellers add, and above their harmonics the loop through them becomes unstable.
+    Raises SimulationError for an axis that is not free, and in other modes than acceleration: there the generator
+    differentiates the output of the cancellers, and the loop through them becomes unstable above their harmonics.
     """
     mode = controller.settings.mode
     if mode != "acceleration":
@@ -104,23 +100,23 @@ def with_cancellers(
 
 
 def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, Array, slice]:
-    """Target of a sine long enough for cancellers to learn, its level 0 to 1 (n,), and the samples to judge it by.
+    """Target of a sine long enough for cancellers to converge, its envelope 0 to 1 (n,), and the samples evaluated.
 
     Raises SimulationError for a frequency outside the band in which the table is tuned, MotionError for no amplitude.
     """
-    numbers = tuning_numbers()
-    low, high = numbers.number("noise.slow_low"), numbers.number("feedforward_targets.high")
+    parameters = tuning_numbers()
+    numbers = section(parameters, "sine")
+    low, high = parameters.number("noise.slow_low"), parameters.number("feedforward_targets.high")
     if not low <= frequency <= high:
         raise SimulationError(
             f"a sine of {frequency:g} Hz lies outside the table's band; choose a frequency from {low:g} to {high:g} Hz"
         )
-    cycles = int(numbers.number("sine.measured_cycles"))
-    settle = numbers.number("sine.settling") * numbers.number("sine.time_constant")
+    cycles = int(numbers.measured_cycles)
     ramp = next(int(o.default) for o in motion_options("sine") if o.name == "ramp_cycles")
-    whole = int(np.ceil(settle * frequency)) + cycles
+    whole = int(np.ceil(numbers.settling * numbers.time_constant * frequency)) + cycles
     motion = find_motion("sine", axis=axis, amplitude=amplitude, period=1.0 / frequency, cycles=whole, ramp_cycles=ramp)
     target = make_target(motion, axes=axis)
-    periods = (target.time + target.reference.start) * frequency  # since the sine begins
+    periods = (target.time + target.reference.start) * frequency  # since the start of the sine
     level = smooth_step(periods / ramp)[0] * smooth_step((whole + 2 * ramp - periods) / ramp)[0]
     first = int(np.searchsorted(periods, ramp + whole - cycles))
     return target, level, slice(first, first + int(np.ceil(cycles / frequency * SAMPLE_RATE)))
@@ -140,40 +136,40 @@ def sine_test(
 
     Raises SimulationError if a run does not last.
     """
-    numbers = tuning_numbers()
-    report = progress or (lambda share: None)
-    plant = make_plant(machine)
-    rest = find_equilibrium(plant)
-    alone = make_controller(plant, rest, settings)
+    parameters = tuning_numbers()
+    numbers = section(parameters, "sine")
+    plant, rest, alone = controlled(machine, settings)
     target, level, measured = sine_target(axis, amplitude, frequency)
-    counted = int(numbers.number("feedforward_targets.high") / frequency)
-    count = min(int(numbers.number("sine.harmonics")), counted)
-    learning = with_cancellers(alone, axis, frequency, count, numbers.number("sine.time_constant"))
+    counted = int(parameters.number("feedforward_targets.high") / frequency)
+    count = min(int(numbers.harmonics), counted)
+    adaptive = with_cancellers(alone, axis, frequency, count, numbers.time_constant)
     wanted = alone.drive_for(target.displacement, target.velocity, target.acceleration)
     options = {"engine": fastest_engine(plant), **options}
     found = []
-    learnt_from = np.column_stack([wanted, target.acceleration, level])
-    for n, (controller, drive) in enumerate(((alone, wanted), (learning, learnt_from))):
+    extended = np.column_stack([wanted, target.acceleration, level])
+    for n, (controller, drive) in enumerate(((alone, wanted), (adaptive, extended))):
         run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
         if run.trouble:
             raise SimulationError(f"{'with' if n else 'without'} cancellers {run.trouble}")
-        found.append(_judged(run, target, AXES.index(axis), frequency, measured, counted))
-        report((n + 1) / 2)
+        found.append(_evaluate(run, target, AXES.index(axis), frequency, measured, counted))
+        if progress is not None:
+            progress((n + 1) / 2)
     return SineTest(settings, target, axis, amplitude, frequency, measured, *found)
 
 
-def _judged(run: Run, target: Target, k: int, frequency: float, measured: slice, count: int) -> SineResult:
+def _evaluate(run: Run, target: Target, k: int, frequency: float, measured: slice, count: int) -> SineResult:
     motion = platen_motion(run.plant, run.q, run.v, run.a)
-    asked = harmonics(target.displacement[measured, k], float(SAMPLE_RATE), frequency, 1)
-    moved = harmonics(motion.displacement[measured, k], float(SAMPLE_RATE), frequency, count)
-    felt = harmonics(motion.acceleration[measured, k], float(SAMPLE_RATE), frequency, count)
+    wanted, displacement, acceleration = (
+        harmonics(values[measured, k], float(SAMPLE_RATE), frequency, multiples)
+        for values, multiples in ((target.displacement, 1), (motion.displacement, count), (motion.acceleration, count))
+    )
     return SineResult(
-        run,
-        moved,
-        felt,
-        float(moved.amplitude[0] / asked.amplitude[0] - 1.0),
-        phase_between(asked, moved),
-        total_harmonic_distortion(felt),
-        total_harmonic_distortion(moved),
-        float(np.abs(run.command).max()) if run.command is not None else 0.0,
+        run=run,
+        displacement=displacement,
+        acceleration=acceleration,
+        amplitude_error=float(displacement.amplitude[0] / wanted.amplitude[0] - 1.0),
+        phase_error=phase_between(wanted, displacement),
+        distortion=total_harmonic_distortion(acceleration),
+        distortion_displacement=total_harmonic_distortion(displacement),
+        peak_spool=run.peak_command,
     )

@@ -20,7 +20,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from ...control.plug import Feedback
-from ...control.valves import names_of_valves, per_valve
+from ...control.valves import valve_names
 from ...core.arrays import Array
 from ...core.errors import LinkError
 from .clock import SECOND, Histogram, now
@@ -81,7 +81,7 @@ class LinkClient:
         self.mode, self.rate = found[Kind.WELCOME].mode, welcome.rate
         self.machine, self.actuators = welcome.machine, welcome.actuators
         self.counts = np.array(welcome.valves, np.int64)
-        self.valves = names_of_valves(self.actuators, self.counts)
+        self.valves = valve_names(self.actuators, self.counts)
         self.reading = self._read(found[Kind.SENSORS])
 
     def __enter__(self) -> Self:
@@ -136,7 +136,7 @@ class LinkClient:
     def _command(self, command: Array) -> Datagram:
         values = np.asarray(command, float)
         if values.shape == self.counts.shape:
-            values = per_valve(values, self.counts)
+            values = np.repeat(values, self.counts)
         elif values.shape != (len(self.valves),):
             raise LinkError(
                 f"a command of shape {values.shape}; {self.machine} has {len(self.actuators)} actuators and "

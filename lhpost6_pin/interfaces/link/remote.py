@@ -9,14 +9,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ...control.plug import Feedback, start_plugged, step_plugged, wanted_from
+from ...control.plug import Feedback, start_plugged
 from ...control.valves import valve_counts
 from ...core.arrays import Array
 from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
+from ...core.progress import Progress
 from ...data.records import make_record
 from ...mechanics.plant import Plant
-from ...simulation.simulate import ClosedLoop, PluggedLoop, Progress, check_drive
+from ...simulation.simulate import ClosedLoop, PluggedLoop, check_closed_loop
 from .client import LinkClient
 from .clock import SECOND, now, undisturbed
 from .protocol import LinkMode, PlantState
@@ -54,7 +55,7 @@ def run_over_link(
     """
     _check(client, plant)
     samples = len(loop.drive if isinstance(loop, ClosedLoop) else loop.displacement)
-    check_drive(plant, loop, samples)
+    check_closed_loop(plant, loop, samples)
     step = _stepper(plant, loop)
     rows: dict[str, Array] = {name: np.zeros((samples, plant.spools)) for name in ("command", "displacement", "force")}
     rows |= {"acceleration": np.zeros((samples, 6)), "state": np.zeros(samples, np.int8)}
@@ -121,11 +122,5 @@ def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Fee
     if isinstance(loop, ClosedLoop):
         memory = loop.controller.init()
         return lambda sample, sensors: loop.controller.step(memory, sample, loop.drive, sensors)
-    users = loop.controller
-    wanted = wanted_from(loop.displacement, loop.velocity, loop.acceleration)
-    own = start_plugged(users, plant, loop.rest)
-
-    def plugged(sample: int, sensors: Feedback) -> Array:
-        return np.clip(step_plugged(users, own, sample, wanted(sample), sensors), -1.0, 1.0)
-
-    return plugged
+    command = start_plugged(loop.controller, plant, loop.rest, (loop.displacement, loop.velocity, loop.acceleration))
+    return lambda sample, sensors: np.clip(command(sample, sensors), -1.0, 1.0)

@@ -14,7 +14,7 @@ from collections.abc import Hashable
 import numpy as np
 
 from ...control.plug import Feedback
-from ...control.valves import flow_curves, per_actuator, valve_counts
+from ...control.valves import per_actuator, valve_counts
 from ...core.arrays import Array
 from ...core.errors import LinkError, SimulationError
 from ...core.names import SAMPLE_RATE
@@ -69,7 +69,7 @@ class ServedPlant:
         self._owner: Hashable = None  # current or last client
         self._taken = False
         self._session, self._at_hello, self._heard = 0, self.counts, 0
-        self._valves, self._curves = valve_counts(plant.machine), flow_curves(plant.machine)
+        self._valves, self._curves = valve_counts(plant.machine), plant.actuators.flow_curve
         self._width = int(self._valves.sum())
         self._begin()
         for _ in range(8):

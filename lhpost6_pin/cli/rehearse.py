@@ -1,0 +1,192 @@
+"""Commands that run the virtual table: run, open-loop, campaign; and the motions that it can run."""
+
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..core.errors import ParameterError, RecordError, SimulationError
+from ..core.names import SAMPLE_RATE
+from . import options as opt
+from .app import command, print_result, progress_bar, repeating_command
+from .completion import complete_motion
+from .live_view import LiveOptions, watched
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..simulation.rehearse import SimulatedTest
+
+log = logging.getLogger(__name__)
+
+__all__ = ["campaign", "motions", "open_loop", "run", "save_run"]
+
+
+@command()
+def run(
+    motion: opt.MotionOptions,
+    steps: opt.StepOptions,
+    machine: opt.SpecimenOptions,
+    view: LiveOptions,
+    out: opt.Out = None,
+    controller: opt.ControllerName = None,
+    aic: Annotated[
+        Path | None, typer.Option(help="Condition the drive with this inverse (inverse.nc of `lhpost6 iterate`).")
+    ] = None,
+    valves: opt.Valves = 0,
+    beyond: opt.Beyond = False,
+    record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
+    json: opt.Json = False,
+) -> None:
+    """Run a motion in closed loop on the virtual table; writes record.nc and report.html."""
+    from ..control import ControllerSettings
+    from ..control.inverse import load_inverse
+    from ..simulation.rehearse import rehearse
+    from ..tuning.drives import check_circumstances
+
+    if record_rate < 1 or SAMPLE_RATE % record_rate:
+        raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
+    table = machine.load(valves)
+    chosen = opt.find_controller(controller, table)
+    options = steps.checked(table, own_controller=not isinstance(chosen, ControllerSettings))
+    inverse = load_inverse(aic) if aic else None
+    if inverse is not None:
+        if not isinstance(chosen, ControllerSettings):
+            raise SimulationError(f"--aic is for the 469D's drive, which --controller {controller} does without")
+        check_circumstances(str(aic), inverse.made_with, table, chosen.name)
+    target = motion.target(table, beyond)
+    name = target.reference.motion.replace("/", "_")
+    folder = opt.folder_for(out, name)
+    title = f"{name} at scale {motion.scale:g} on {table.name}"
+    with watched(view, table, title, err=json) as watch, progress_bar(f"{name} on {table.name}") as progress:
+        test = rehearse(
+            table,
+            target,
+            chosen,
+            attrs={"test": name, "title": title},
+            inverse=inverse,
+            record_every=SAMPLE_RATE // record_rate,
+            beyond_limits=True,
+            progress=progress,
+            watch=watch,
+            **options,
+        )
+    save_run(test, folder, json)
+
+
+@command("open-loop")
+def open_loop(
+    record: Annotated[Path, typer.Argument(help="Record whose spool positions drive the plant.")],
+    steps: opt.StepOptions,
+    machine: opt.SpecimenOptions,
+    out: opt.Out = None,
+    json: opt.Json = False,
+) -> None:
+    """Drive the plant in open loop with recorded spool positions, from the recorded pressures; writes record.nc."""
+    from ..data.records import load_record
+    from ..simulation.rehearse import replay
+
+    table = machine.load()
+    options = steps.checked(table)
+    measured = load_record(record, table.labels)
+    test = opt.record_name(record, measured.attrs)
+    name = f"{test}_open_loop"
+    if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():
+        raise RecordError(f"{record} would be replaced by its own replay; choose another folder with --out")
+    folder = opt.folder_for(out, name)
+    attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
+    with progress_bar(f"{name} on {table.name}") as progress:
+        simulated = replay(table, measured, attrs=attrs, progress=progress, **options)
+    save_run(simulated, folder, json, against=measured)
+
+
+@command()
+def campaign(
+    machine: opt.SpecimenOptions,
+    out: opt.Out = None,
+    controller: opt.SettingsName = None,
+    sensors: opt.SensorsName = "lhpost6",
+    tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
+    scale: Annotated[float, typer.Option(help="Scale factor of all motions, e.g. for a smaller table.")] = 1.0,
+    errors: Annotated[bool, typer.Option(help="Draw random gains, offsets and skews of the sensors.")] = True,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of sensor noise and sensor errors.")] = 0,
+    json: opt.Json = False,
+) -> None:
+    """Simulate a campaign of tests, recorded through sensors with noise and errors: to plan a real one."""
+    from ..data.campaign import save_campaign
+    from ..data.sensors import load_sensors
+    from ..simulation.simulated_campaign import simulate_campaign
+
+    table = machine.load()
+    settings, known = opt.find_settings(controller, table), load_sensors(sensors)
+    chosen = tuple(word.strip() for word in tests.split(",")) if tests is not None else None
+    if chosen is not None and len(set(chosen)) < len(chosen):
+        raise ParameterError(f"--tests {tests}: names a test twice")
+    folder = opt.folder_for(out, "campaign")
+    if any(folder.glob("*.nc")):
+        raise ParameterError(f"--out {folder}: holds records already, which would count as tests; name another folder")
+    name = folder.resolve().name
+    with progress_bar(f"a campaign on {table.name}") as progress:
+        made = simulate_campaign(
+            table, settings, known, seed=seed, errors=errors, tests=chosen, scale=scale, name=name, progress=progress
+        )
+    entries = {"campaign": name, "tests": [str(record.attrs["test"]) for record in made.records]}
+    print_result(json, lambda: entries, lambda: None, save_campaign(made, folder))
+
+
+@command()
+def motions(
+    name: Annotated[
+        str | None, typer.Argument(help="A motion, to print its options.", autocompletion=complete_motion)
+    ] = None,
+    json: opt.Json = False,
+) -> None:
+    """List ground motions and tests by name."""
+    from ..show.results import motion_entries
+    from ..show.tables import print_motions
+
+    print_result(json, lambda: motion_entries(name), lambda: print_motions(name))
+
+
+def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Dataset | None" = None) -> None:
+    """Write the record and, unless it is compared `against` a measured test, the report; print a summary.
+
+    Raises typer.Exit if the run stopped on the way.
+    """
+    from ..data.records import save_record
+    from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
+    from ..show.results import run_entries
+    from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
+
+    done, record = test
+    files, summary = [folder / "record.nc"], None
+    save_record(record, files[0])
+    beyond = joints_beyond(done.plant, done.time, done.q)
+    for warning in beyond:
+        log.warning("%s", warning)
+    if against is None:
+        from ..show.report import write_run_report
+
+        files.append(folder / "report.html")
+        summary = write_run_report(
+            record,
+            files[1],
+            limits=report_limits(done.plant),
+            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond],
+            command=repeating_command(),
+            machine_table=machine_rows(done.plant.machine),
+        )
+    compared = [] if against is None else compare(against, record)
+
+    def show() -> None:
+        if compared:
+            print_comparison(compared)
+        print_run(done, summary)
+
+    def entries() -> dict[str, Any]:
+        return run_entries(done, summary) | ({} if against is None else {"against_record": compared})
+
+    print_result(json, entries, show, files)
+    if done.trouble:
+        raise typer.Exit(1)

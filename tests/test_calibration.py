@@ -306,7 +306,7 @@ def seen(machine, sensors, campaign) -> list[MeasuredTest]:
 
 @pytest.fixture(scope="module")
 def problem(machine, sensors, seen) -> Problem:
-    return Problem(machine, seen[:1], seen[1:], sensors, COMPARISON)
+    return Problem(machine, seen[:1], seen[1:], sensors, COMPARISON, again=[seen[1:2]])
 
 
 def assert_slopes(problem: Problem, chosen: list[int]) -> list[np.ndarray]:
@@ -337,7 +337,7 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
 
 def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
     soft = -2.0 * problem.prior * (np.array(problem.names) == "hydraulics.bulk_modulus")
-    stiff, now = (problem.noise_at(seen[1:], x)[0] for x in (np.zeros(len(soft)), soft))
+    stiff, now = (problem.noise_at(x)[0] for x in (np.zeros(len(soft)), soft))
     share = soft[problem.names.index("hydraulics.bulk_modulus")]
     factor = (1.0 + share) ** -2  # of power: that of L A / beta squared
     bands = slice(2, None)  # below, other noise than that of the pressures' rates counts
@@ -377,10 +377,10 @@ def test_the_surprise_of_what_is_left_falls_as_least_squares_over_its_power():
 
 def test_slopes_of_twins_keep_up_with_what_they_share(machine, sensors, seen):
     """After a frugal search that has moved what twins share, their slopes still add up to that of it."""
-    ready = Problem(machine, seen[:1], seen[1:], sensors, COMPARISON)
+    ready = Problem(machine, seen[:1], seen[1:], sensors, COMPARISON, again=[seen[1:2]])
     ready = ready.with_machine(machine, (*ready.parameters, *scatter_parameters(machine, 0.05, 3.0)))
-    numbers, more = discovery_numbers()[1], [ready.with_tests(seen[1:2])]
-    found = solve(ready, more, numbers, np.zeros(len(ready.prior)), lambda share: None, frugal=True)
+    numbers = discovery_numbers()[1]
+    found = solve(ready, numbers, np.zeros(len(ready.prior)), lambda share: None, frugal=True)
     grown = dict(zip(ready.names, 1.0 + found.at, strict=True))
     assert abs(grown["horizontal.seal_friction"] - 1.0) > 0.1  # it was turned by 0.3
     slopes = {n: grown[n] * j for n, j in zip(ready.names, found.normal.slope[0], strict=True) if "seal_friction" in n}
@@ -403,7 +403,7 @@ def test_a_step_that_goes_too_far_is_taken_back(problem, seen, monkeypatch):
 
     monkeypatch.setattr(fit, "bounded_step", too_far)
     start = np.zeros(len(problem.prior))
-    found = fit.solve(problem, [problem.with_tests(seen[1:2])], numbers, start, lambda share: None, frugal=True)
+    found = fit.solve(problem, numbers, start, lambda share: None, frugal=True)
     before, after = (fit.objective(problem, problem.whitened(x), x) for x in (start, found.x))
     assert after < before + fit.OVERSHOT
 
@@ -454,7 +454,7 @@ def test_what_the_first_test_lacks_is_named_too_and_no_test_at_all_is_refused(ma
     first, second = campaign.records
     with pytest.raises(RecordError, match="TX has no strut_pressure, which other tests have"):
         calibrate(machine, [first.drop_vars("strut_pressure"), second], sensors)
-    with pytest.raises(RecordError, match="no record to calibrate by"):
+    with pytest.raises(RecordError, match="the campaign has no records"):
         calibrate(machine, [], sensors)
 
 

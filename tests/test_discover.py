@@ -19,18 +19,16 @@ from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
 from lhpost6_pin.discovery.add_effects import _fit_jointly
 from lhpost6_pin.discovery.candidate_columns import columns_of
-from lhpost6_pin.discovery.candidates import Candidate, list_candidates, with_background, with_other_form
+from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.formula import sparse_formula
 from lhpost6_pin.discovery.linearisation import Linearisation, linearise
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
-from lhpost6_pin.discovery.pairs import score_pairs
-from lhpost6_pin.discovery.releases import block_of, list_releases
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, with_residual_function
-from lhpost6_pin.discovery.scores import Background, Block, Score, less_noise, make_block, score
-from lhpost6_pin.discovery.screening import _by_rank
+from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
+from lhpost6_pin.discovery.screening import _by_rank, score_pairs
 from lhpost6_pin.discovery.search import _pruned, _without
 from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Scored
 from lhpost6_pin.discovery.verdict import reject_effects
@@ -39,8 +37,8 @@ from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table
 from lhpost6_pin.identification.calibration import calibration_numbers
-from lhpost6_pin.identification.calibration.prepare import PreparedProblem, prepare_problem
-from lhpost6_pin.identification.calibration.problem import OperatingPoint
+from lhpost6_pin.identification.calibration.prepare import prepare_problem
+from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
 from lhpost6_pin.identification.calibration.whitened_residuals import real_bins
 from lhpost6_pin.laws.supply import Supply
@@ -83,7 +81,7 @@ def rubbing(machine: Machine, sensors: SensorSet) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def ready(machine: Machine, sensors: SensorSet, rubbing: Campaign) -> PreparedProblem:
+def ready(machine: Machine, sensors: SensorSet, rubbing: Campaign) -> Problem:
     """Two of its tests made ready."""
     return prepare_problem(machine, rubbing.records[::2], sensors, calibration_numbers())
 
@@ -121,7 +119,7 @@ def candidate(family: str, *components: str, **shape: float) -> Candidate:
     [("stribeck_friction", ("H1", "V2")), ("local_viscous", ("H3", "S1")), ("piston_leakage", ("H2", "V5"))],
 )
 def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, family, components):
-    problem = ready.problem
+    problem = ready
     base = OperatingPoint(problem, np.zeros(len(problem.prior)))
     alone = [candidate(family, c) for c in components]
     (columns, _), parts = columns_of(problem, base, [*alone, candidate(family, *components)])
@@ -290,7 +288,7 @@ def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
 
 
 def test_what_is_left_is_said_to_be_where_it_is(ready):
-    problem, random = ready.problem, np.random.default_rng(4)
+    problem, random = ready, np.random.default_rng(4)
     shapes = [(len(f), sum(problem.widths)) for f in problem.frequency]
     rest = [random.normal(size=(*s, 2)) @ [1.0, 1.0j] / np.sqrt(2.0) for s in shapes]
     column = int(np.flatnonzero(problem.rows("flow", 2))[0])
@@ -312,20 +310,20 @@ def test_every_number_of_a_candidate_can_move_in_a_fit(machine):
 
 
 def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_be_set_free(ready):
-    released = {c.release: c.family.name for c in list_releases(ready.problem)}
-    held = {u.name for u in ready.problem.unknowns if u.kind == "delay" and u.column >= 0}  # less than a sample
-    motion = held | {u.name for u in ready.problem.unknowns if u.channel.startswith("platen")}
-    assert {u.name for u in ready.problem.unknowns} - motion <= set(released)
+    released = {c.release: c.family.name for c in list_releases(ready)}
+    held = {u.name for u in ready.unknowns if u.kind == "delay" and u.column >= 0}  # less than a sample
+    motion = held | {u.name for u in ready.unknowns if u.channel.startswith("platen")}
+    assert {u.name for u in ready.unknowns} - motion <= set(released)
     assert motion and not motion & set(released)  # those are asked of each other
     assert released["gain actuator_force[H2]"] == "pressure_sensor_error"
     assert released["delay spool_position"] == "channel_delay"
     assert released["hydraulics.bulk_modulus"] == "entrained_air"
-    free = ready.problem.with_free("hydraulics.bulk_modulus", 4.0)
+    free = ready.with_free("hydraulics.bulk_modulus", 4.0)
     assert "hydraulics.bulk_modulus" not in {c.release for c in list_releases(free)}
     i = free.names.index("hydraulics.bulk_modulus")
-    assert free.prior[i] == 4.0 * ready.problem.prior[i]
-    assert np.array_equal(np.delete(free.prior, i), np.delete(ready.problem.prior, i))
-    assert np.array_equal(free.step, ready.problem.step)
+    assert free.prior[i] == 4.0 * ready.prior[i]
+    assert np.array_equal(np.delete(free.prior, i), np.delete(ready.prior, i))
+    assert np.array_equal(free.step, ready.step)
 
 
 def test_friction_of_another_form_is_noise_and_a_background(machine):
@@ -443,7 +441,7 @@ def test_the_verdict_goes_through_json_and_the_model_through_toml(found, tmp_pat
 
 def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
     """Gain and offset of one channel: what a sensor shows is (1 + gain) true + offset."""
-    unknowns = ready.problem.unknowns
+    unknowns = ready.unknowns
     names = [u.name for u in unknowns]
     values = np.zeros(len(unknowns))
     values[names.index("gain chamber_pressure_b[H2]")] = 0.01
@@ -451,7 +449,7 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
     record = rubbing.records[0]
     clean = corrected_record(record, unknowns, values)
     column = clean["chamber_pressure_b"].values[:, 1]
-    np.testing.assert_allclose(1.01 * (column + 2e4), record["chamber_pressure_b"].values[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(1.01 * column + 2e4, record["chamber_pressure_b"].values[:, 1], rtol=1e-12)
     np.testing.assert_array_equal(clean["chamber_pressure_a"], record["chamber_pressure_a"])
 
 

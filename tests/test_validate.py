@@ -17,10 +17,9 @@ from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.data.signals import Band, align, resample_band_limited
 from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, metrics, validate
-from lhpost6_pin.identification.validation.metrics import validation_numbers
 from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
-from lhpost6_pin.identification.validation.resonance import find_peak
-from lhpost6_pin.identification.validation.valve_agreement import find_valves
+from lhpost6_pin.identification.validation.prepare_tests import validation_numbers
+from lhpost6_pin.identification.validation.spectra import find_peak, find_valves
 from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report.validate_report import write_validate_report

@@ -8,15 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.arrays import Array, Mask
+from ..core.arrays import Array
 from ..core.progress import Progress, between
 from ..identification.calibration.free_parameters import FreeParameter
-from ..identification.calibration.prepare import PreparedProblem
 from ..identification.calibration.problem import Problem
 from .acceptance import gate, squares_by_column
 from .candidates import Candidate
 from .linearisation import Linearisation
-from .pairs import score_pairs
+from .screening import score_pairs
 from .search_state import AddedEffect, FittedCandidate, Scored, Search, best_per_family, fitted_machine
 
 __all__ = ["add_effect", "refined", "with_candidate"]
@@ -117,7 +116,7 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
 
 def refined(found: Search, progress: Progress) -> Search:
     """The search with all derivatives evaluated again."""
-    return found.solved(found.prepared, found.solution.x, progress)
+    return found.solved(found.problem, found.solution.x, progress)
 
 
 def _fit_jointly(found: Search, one: Scored, progress: Progress) -> Search:
@@ -146,28 +145,22 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -
     """
     problem, candidate, start = found.problem, one.candidate, found.solution.at
     if candidate.release:
-        sort = "known" if problem.names.index(candidate.release) < len(problem.parameters) else "sensor"
-        prepared = found.prepared.with_free(candidate.release, found.numbers.number(f"fit.{sort}_free"))
+        kind = "known" if problem.names.index(candidate.release) < len(problem.parameters) else "sensor"
+        problem = problem.with_free(candidate.release, found.numbers.number(f"fit.{kind}_free"))
     else:
-        low, high = candidate.bounds
-        amplitudes = tuple(float(a) for a in np.clip(one.score.amplitude, low, high))
+        amplitudes = tuple(np.clip(one.score.amplitude, *candidate.bounds).tolist())
         own = candidate.fit_parameters(amplitudes, found.numbers)
-        prepared, start = with_candidate(found, candidate, amplitudes, own, start)
-    near = _near(prepared.problem, candidate)
-    return found.solved(prepared, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
+        problem, start = with_candidate(problem, candidate, amplitudes, own, start)
+    # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
+    flows = [*(k.shows_in == ("flow",) for k in problem.parameters), *(u.alone[1] >= 0 for u in problem.unknowns)]
+    near = np.array(flows) & ("flow" in candidate.family.shows_in)
+    return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
 
 
 def with_candidate(
-    found: Search, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[FreeParameter], x: Array
-) -> tuple[PreparedProblem, Array]:
-    """Tests with a candidate in the machine and its parameters in the fit; and x (p,) with zeros for these."""
-    problem = found.problem
-    parameters = (*problem.parameters, *own)
-    prepared = found.prepared.with_machine(candidate.on(problem.machine, amplitudes), parameters)
-    return prepared, np.insert(x, len(problem.parameters), np.zeros(len(own)))
-
-
-def _near(problem: Problem, candidate: Candidate) -> Mask:
-    """Unknowns (p,) whose derivatives change much with an effect: for one of the oil, those of oil and valves."""
-    flows = [k.shows_in == ("flow",) for k in problem.parameters]
-    return np.array([*flows, *(u.alone[1] >= 0 for u in problem.unknowns)]) & ("flow" in candidate.family.shows_in)
+    problem: Problem, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[FreeParameter], x: Array
+) -> tuple[Problem, Array]:
+    """The problem with a candidate in the machine and its parameters in the fit; and x (p,) with zeros for these."""
+    machine = candidate.on(problem.machine, amplitudes)
+    more = problem.with_machine(machine, (*problem.parameters, *own))
+    return more, np.insert(x, len(problem.parameters), np.zeros(len(own)))

@@ -13,8 +13,8 @@ from ..core.arrays import Array, Complex
 from ..effects.registry import LAWS
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
+from ..identification.residual_kernels import row_wrenches
 from ..identification.residuals import RESIDUALS, Residuals, follow
-from ..identification.wrench_residuals import row_wrenches
 from ..machine.machine import Machine
 from ..mechanics.plant import make_plant
 from .candidates import Candidate

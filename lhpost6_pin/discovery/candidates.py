@@ -6,13 +6,32 @@ from itertools import product
 import numpy as np
 
 from ..core.arrays import Array
+from ..data.channels import LAYOUT
 from ..identification.calibration import FreeParameter
+from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
-from ..machine.library import Family, Shape, families
+from ..machine.library import Family, Shape, families, find_family
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 
-__all__ = ["Candidate", "first_shape", "list_candidates", "with_background", "with_other_form", "with_warm_oil"]
+__all__ = ["Candidate", "first_shape", "list_candidates", "list_releases", "with_background", "with_other_form"]
+__all__ += ["with_warm_oil"]
+
+
+_PARAMETER = {
+    "flow": "flow_curve_error",
+    "flow_curve": "flow_curve_error",
+    "bulk_modulus": "entrained_air",
+    "chamber_a": "dead_volume",
+    "chamber_b": "dead_volume",
+    "leakage": "piston_leakage",
+    "viscous": "local_viscous",
+    "pad_friction": "bearing_friction",
+    "polytropic_index": "gas_heat_transfer",
+    "mass": "added_mass",
+    "inertia": "inertia_coupling",
+}
+"""Families that parameters far from their priors are attributed to."""
 
 
 @dataclass(frozen=True)
@@ -146,3 +165,25 @@ def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
             shape = tuple(zip(names, values, strict=True))
             found.append(tuple(Candidate(family, group, shape) for group in family.groups(machine)))
     return tuple(group for group in found if group)
+
+
+def list_releases(problem: Problem) -> tuple[Candidate, ...]:
+    """All parameters and sensor errors that are not released yet and correspond to a family of the library.
+
+    In a refit parameters stay within a few prior deviations, and sensor errors within their ranges: a missing effect
+    must not bias them. One that is far outside is identified like an effect, by the gain of its release.
+    """
+    found = []
+    for parameter in problem.parameters:
+        section, _, name = parameter.name.partition(".")
+        family = "" if parameter.of else _PARAMETER.get(name.split(".")[-1].split("[")[0], "")
+        if family and parameter.name not in problem.free:
+            where = tuple(c.name for c in problem.machine.components if c.kind == section) or (section,)
+            found.append(Candidate(find_family(family), where, (), parameter.name))
+    for unknown in problem.unknowns:  # those of the platen's motion were cross-checked before
+        if unknown.name in problem.free or (unknown.kind == "delay" and unknown.column >= 0):
+            continue
+        if unknown.kind == "delay" or LAYOUT[unknown.channel].role == "sensor":
+            family = "channel_delay" if unknown.kind == "delay" else LAYOUT[unknown.channel].fault
+            found.append(Candidate(find_family(family), (unknown.name,), (), unknown.name))
+    return tuple(found)

@@ -18,7 +18,8 @@ from ..data.sensors import SensorSet
 from ..identification.calibration import calibration_numbers
 from ..identification.calibration.free_parameters import plan_parameters, scatter_parameters
 from ..identification.calibration.normal_equations import NormalEquations
-from ..identification.calibration.prepare import PreparedProblem, prepare_problem
+from ..identification.calibration.prepare import prepare_problem
+from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
@@ -96,15 +97,14 @@ def discover(
     begun = checkpoint.read()
     if begun is None:
         others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
-        prepared = prepare_problem(
+        problem = prepare_problem(
             *(machine, records, sensors, calibration),
             kinds=RESIDUALS, others=others, preload=preload, seed=seed, jobs=jobs,
         )  # fmt: skip
         report(0.1)
         part = between(report, 0.1, 0.38)
-        begun = _begin(prepared, held, numbers, calibration, hold_one_out=hold_out is None, progress=part)
-        with_play = with_lost_motion(begun.search, lost, between(report, 0.38, 0.4))
-        begun = begun._replace(search=with_play)
+        begun = _begin(problem, held, numbers, calibration, hold_one_out=hold_out is None, progress=part)
+        begun = begun._replace(search=with_lost_motion(begun.search, lost, between(report, 0.38, 0.4)))
         checkpoint.write(begun)
     machine, held = begun.machine, begun.held
     found, linear = search(
@@ -146,7 +146,7 @@ def discover(
 
 
 def _begin(
-    prepared: PreparedProblem,
+    problem: Problem,
     held: tuple[int, ...],
     numbers: Parameters,
     calibration: Parameters,
@@ -155,18 +155,17 @@ def _begin(
     progress: Progress,
 ) -> SearchCheckpoint:
     """Refit all parameters to the tests that are not held out, nor, if `hold_one_out`, the least informative one."""
-    machine = prepared.problem.machine
+    machine = problem.machine
     identical = scatter_parameters(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
     whole, forms = with_background(machine, numbers.number("scatter.spread"))
-    parameters = (*prepared.problem.parameters, *plan_parameters(machine), *identical, *forms)
-    used = [i for i in range(len(prepared.problem.tests)) if i not in held]
-    prepared = prepared.with_machine(whole, parameters).only(used)
-    start = np.zeros(len(prepared.problem.prior))
-    first = NormalEquations(prepared.problem, start, between(progress, 0.0, 0.3))
+    parameters = (*problem.parameters, *plan_parameters(machine), *identical, *forms)
+    used = [i for i in range(len(problem.tests)) if i not in held]
+    problem = problem.with_machine(whole, parameters).only(used)
+    first = NormalEquations(problem, np.zeros(len(problem.prior)), between(progress, 0.0, 0.3))
     if hold_one_out and len(used) > FEWEST:
         held = (used.pop(_least_informative(first)),)
-        prepared, first = prepared.only(used), first.only(used)
-    return SearchCheckpoint(machine, held, refit(prepared, first, numbers, calibration, between(progress, 0.3, 1.0)))
+        problem, first = problem.only(used), first.only(used)
+    return SearchCheckpoint(machine, held, refit(problem, first, numbers, calibration, between(progress, 0.3, 1.0)))
 
 
 def discovery_numbers() -> tuple[Parameters, Parameters]:

@@ -24,11 +24,12 @@ class Linearisation(NamedTuple):
     replicas: tuple[tuple[Problem, OperatingPoint], ...]  # the same with more noise
 
 
-def linearise(solution: Solution, calibration: Parameters, replicas: Sequence[Problem] = ()) -> Linearisation:
-    """Background about a solution, with replicas of its problem where candidates are screened."""
+def linearise(solution: Solution, calibration: Parameters, *, replicas: bool = False) -> Linearisation:
+    """Background about a solution, with replicas of its problem if candidates are to be screened."""
     problem, at = solution.normal.problem, solution.at
     background = _background(problem, solution.normal, at, calibration)
-    return Linearisation(OperatingPoint(problem, at), background, tuple((r, OperatingPoint(r, at)) for r in replicas))
+    more = tuple((r, OperatingPoint(r, at)) for r in problem.replicas) if replicas else ()
+    return Linearisation(OperatingPoint(problem, at), background, more)
 
 
 def _background(problem: Problem, normal: NormalEquations, x: Array, calibration: Parameters) -> Background:

@@ -1,8 +1,8 @@
 """Play identified from actuator lengths, before the library is searched.
 
-Play shows most clearly in a length sensor on the rod, compared with the platen's pose: the rod changes sides with the
-sign of its force. Lengths are regressed on that sign jointly with the errors of sensors and geometry, each with its
-prior. The estimate is the prior of the play in the search.
+Play is clearest in a length sensor on the rod, compared with the platen's pose: the rod changes sides with the sign of
+its force. Lengths are regressed on that sign jointly with the errors of sensors and geometry, each with its prior. The
+estimate is the prior of the play in the search.
 """
 
 from collections.abc import Sequence
@@ -109,7 +109,7 @@ def _with_play(found: Search, group: Sequence[LostMotion], progress: Progress) -
         replace(parameter, sd=sd) if parameter.name.endswith(".half_play") else parameter
         for parameter in candidate.fit_parameters((size,), found.numbers)
     )
-    more = found.solved(*with_candidate(found, candidate, (size,), own, found.solution.x), progress)
+    more = found.solved(*with_candidate(found.problem, candidate, (size,), own, found.solution.x), progress)
     gain = sum(one.gain for one in group)
     contest = (FittedCandidate(candidate, 0.0, fitted_machine(more.solution)),)
     fall = squares_by_column(found.residual) - squares_by_column(more.residual)

@@ -1,8 +1,8 @@
 """The next test: which of a menu would discriminate between two families that explain a campaign equally well.
 
-The machine with the one effect runs every test of `models/procedures/next_test.toml` in closed loop. The residual of
-the machine with the other effect, all parameters and that effect refitted, is the log-likelihood by which it would
-discriminate: its expected margin, to first order.
+Every test of `models/procedures/next_test.toml` is simulated in closed loop on the machine with the one effect. Its
+expected margin is the log-likelihood by which the machine with the other effect fails to explain it, all parameters and
+that effect refitted, to first order.
 """
 
 from dataclasses import dataclass, replace
@@ -58,14 +58,14 @@ def _trial(
     numbers: Parameters,
     test: str,
 ) -> NextTest:
-    """Run a test on the machine with the one effect, and explain it by that with the other."""
+    """Simulate a test on the machine with the one effect, and fit it with the other."""
     names = one.candidate.family.named, rival.candidate.family.named
     quiet = replace(sensors, noise={})
     try:
         run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
         return NextTest(test, names, float("nan"), informative=False)
-    problem = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1).problem
+    problem = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1)
     problem = problem.with_machine(problem.machine, (*problem.parameters, *_own_parameters(rival, numbers)))
     margin = _margin(NormalEquations(problem, np.zeros(len(problem.prior)), lambda share: None))
     return NextTest(test, names, margin, informative=margin >= numbers.number("accept.apart"))

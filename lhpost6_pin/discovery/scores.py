@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration.whitened_residuals import real_bins
 
-__all__ = ["Background", "Block", "Score", "less_noise", "make_block", "score"]
+__all__ = ["Background", "Block", "Score", "block_of", "less_noise", "make_block", "score"]
 
 Columns = Sequence[Complex]
 
@@ -97,6 +97,12 @@ def make_block(background: Background, columns: Sequence[Complex]) -> Block:
         own.append(c.T @ c)
         side.append(c.T @ rest)
     return Block(np.array(cross), np.array(own), np.array(side))
+
+
+def block_of(background: Background, place: int) -> Block:
+    """Block of one unknown of the background, repeated without its prior."""
+    cross = background.matrix[:, :, place : place + 1]
+    return Block(cross, cross[:, place : place + 1], background.side[:, place : place + 1])
 
 
 def less_noise(background: Background, block: Block, columns: Sequence[Complex], noisy: Sequence[Columns]) -> Block:

@@ -1,23 +1,30 @@
-"""A round of screening: every candidate of the library scored beside the background, and whether it may be added."""
+"""Screening: every candidate of the library scored beside the background, alone and in pairs.
+
+A search adds one effect after the other. Two effects pass only together if each leaves much of the other's residual
+unexplained; and one of a wrong form may substitute for two, so that neither is added after it.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
+from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.progress import Progress
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..machine.library import Family
-from .acceptance import Lowered, Reweighting, refusal
+from .acceptance import Lowered, Reweighting, gate, refusal
 from .candidate_columns import Columns, columns_of, side_by_side
-from .candidates import Candidate, list_candidates
+from .candidates import Candidate, list_candidates, list_releases
 from .linearisation import Linearisation
-from .releases import block_of, list_releases
-from .scores import Background, Block, Score, less_noise, make_block, score
+from .scores import Background, Block, Score, block_of, less_noise, make_block, score
 from .search_state import Round, Scored, Search
 
-__all__ = ["screen"]
+__all__ = ["CandidatePair", "screen", "score_pairs"]
 
 
 BATCH = 8
@@ -111,3 +118,53 @@ def _found_there(found: Search, candidate: Candidate) -> float:
 def _of_unknown(background: Background, place: int, amplitude: Array) -> list[Array]:
     """Real bins (n,) of every test that an unknown of the background explains."""
     return [slope[:, place] * amplitude for slope in background.slope]
+
+
+class CandidatePair(NamedTuple):
+    """Two candidates together."""
+
+    places: tuple[int, int]  # among the candidates
+    gain: float  # of log-likelihood, the residual reweighted
+    amplitudes: tuple[Array, Array]
+    refused: str  # why they may not be added; empty if they may be
+
+
+def score_pairs(found: Search, linear: Linearisation, candidates: Sequence[Candidate]) -> list[CandidatePair]:
+    """All pairs of candidates at the present solution of a search, by falling gain."""
+    problem, background, numbers = found.problem, linear.background, found.numbers
+    weigh = Reweighting(found, background)
+    ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
+    columns = _all_columns(problem, linear.base, candidates)
+    block = make_block(background, columns)
+    if linear.replicas:
+        noisy = [_all_columns(again, there, candidates) for again, there in linear.replicas]
+        block = less_noise(background, block, columns, noisy)
+    low, high = (np.concatenate(x) for x in zip(*(c.bounds for c in candidates), strict=True))
+    spread, whole = np.concatenate([c.spread(numbers) for c in candidates]), np.eye(ends[-1])
+
+    def scored(*places: int) -> tuple[NDArray[np.intp], Score]:
+        """Amplitudes of some candidates together, and their score."""
+        k = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in places])
+        return k, score(background, block.select(whole[:, k]), low[k], high[k], spread[k])
+
+    alone = [scored(i)[1].gain for i in range(len(candidates))]
+    pairs = []
+    for i, j in combinations(range(len(candidates)), 2):
+        k, one = scored(i, j)
+        less = weigh.lowered(background.explained([c[..., k] for c in columns], one.amplitude), one)
+        families = candidates[i].family, candidates[j].family
+        why = refusal(families, one, less, numbers)
+        if any(one.gain - alone[m] < gate(f, numbers) for f, m in zip(families, (j, i), strict=True)):
+            why = "one of them explains as much"
+        count = len(candidates[i].amplitudes)
+        pairs.append(CandidatePair((i, j), less.gain, (one.amplitude[:count], one.amplitude[count:]), why))
+    return sorted(pairs, key=lambda pair: -pair.gain)
+
+
+def _all_columns(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
+    """Columns (m, c, k) of every test, those of all candidates' amplitudes."""
+    each = []
+    for candidate in candidates:
+        columns, (part,) = columns_of(problem, base, [candidate])
+        each.append([c @ part for c in columns])
+    return side_by_side(each)

@@ -10,7 +10,6 @@ from ..core.arrays import Array, Complex
 from ..core.progress import Progress
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
-from ..identification.calibration.prepare import PreparedProblem
 from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
@@ -87,7 +86,7 @@ class Round:
 class Search:
     """A search at its current solution."""
 
-    prepared: PreparedProblem
+    problem: Problem  # with the effects added
     solution: Solution
     refit: Solution  # without any effect
     numbers: Parameters  # of `models/procedures/discovery.toml`
@@ -95,23 +94,18 @@ class Search:
     added: tuple[AddedEffect, ...] = ()
     rounds: tuple[Round, ...] = ()
 
-    def solved(self, prepared: PreparedProblem, start: Array, progress: Progress, **how: Any) -> "Search":
-        """The search with another problem solved from `start` (p,); `how` are options of `solve`.
+    def solved(self, problem: Problem, start: Array, progress: Progress, **options: Any) -> "Search":
+        """The search with another problem solved from `start` (p,), by `options` of `solve`.
 
         Derivatives by unknowns that both problems share are reused.
         """
-        rest = self.calibration, start, progress, self.solution.normal
-        solution = solve(prepared.problem, prepared.replicas, *rest, frugal=True, **how)
-        return replace(self, prepared=prepared, solution=solution)
+        known = self.solution.normal
+        solution = solve(problem, self.calibration, start, progress, known, frugal=True, **options)
+        return replace(self, problem=problem, solution=solution)
 
     def with_effect(self, effect: AddedEffect) -> "Search":
         """The search with one more effect in its list."""
         return replace(self, added=(*self.added, effect))
-
-    @property
-    def problem(self) -> Problem:
-        """The problem with the effects added."""
-        return self.prepared.problem
 
     @property
     def residual(self) -> list[Complex]:

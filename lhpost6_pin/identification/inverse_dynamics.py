@@ -3,14 +3,15 @@
     found = inverse_dynamics(plant, time, motion, actuator_force, strut_pressure)
     found.residual                          # (n, 6) [N, N m] required less measured actuator wrench, at C in {c}
 
-From the motion of C and the Euler angles follow the platen's twist and its rate in {b} (Eqs. 3-11, 3-18) and with them
-inertia (Eq. 4-26), weight, struts (Eq. 4-8), friction and viscous forces (Eqs. 4-9 to 4-19). What then balances the
-inertia is the wrench that the actuators must have given; what they did give is measured.
+From the motion of C and the Euler angles follow the platen's twist and its rate in {b} (Eqs. 3-11, 3-18), and with them
+inertia (Eq. 4-26), weight, struts (Eq. 4-8), friction and viscous forces (Eqs. 4-9 to 4-19). The rest of the inertia
+is the required actuator wrench, compared with the measured one.
 
-Hidden friction states are marched along the motion by the simulation's own step rule, `evaluate.advance_states`: so
-a noise-free run recorded at every model step comes apart to rounding: no integrator hides in the residual.
+Hidden friction states are marched along the motion by the simulation's own step rule, `evaluate.advance_states`: the
+residual of a noise-free run recorded at every model step is rounding, free of integration errors.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,20 +24,20 @@ from ..effects.evaluate import advance_states
 from ..effects.registry import LAWS, actuator_rows, law_of
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
-from ..mechanics.pose import PlantMotion, PlatenMotion, plant_motion
+from ..mechanics.pose import PlatenMotion, plant_motion
 from ..mechanics.schemes import pose_stage
 from ..mechanics.workspace import make_workspace
 from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
 
-__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "seen_velocity", "with_loads"]
+__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "with_loads"]
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """A motion taken apart; n samples, wrenches on the platen at C in {c}: fx fy fz mx my mz [N, N m]."""
+    """Forces behind a motion; n samples, wrenches on the platen at C in {c}: fx fy fz mx my mz [N, N m]."""
 
     states: States
-    ledger: Ledger  # of the model's effects; actuators are zero: what they give is measured
+    ledger: Ledger  # of the model's effects; actuators are zero, since their forces are measured
     component: tuple[str, ...]  # (k,) components whose force was measured: actuators, then struts
     component_force: Array  # (n, k) measured force along each [N], positive where it lengthens it
     component_wrench: Array  # (n, k, 6) the same on the platen
@@ -44,12 +45,12 @@ class Decomposition:
 
     @property
     def required(self) -> Array:
-        """Wrench that the actuators must have given (n, 6): inertia less all other effects of the model."""
+        """Required actuator wrench (n, 6): inertia less all other effects of the model."""
         return self.ledger.residual
 
     @property
     def measured(self) -> Array:
-        """Wrench that the actuators gave (n, 6), as measured."""
+        """Measured actuator wrench (n, 6)."""
         return np.asarray(self.component_wrench[:, : self.actuators].sum(axis=1))
 
     @property
@@ -59,8 +60,8 @@ class Decomposition:
 
     @property
     def struts(self) -> Array:
-        """Wrench of the struts (n, 6), of the model (Eq. 4-8), with what effects do to their gas."""
-        return self._of(*(e.name for e in self.states.plant.machine.effects if LAWS[e.law].acts_on_gas))
+        """Wrench of the struts (n, 6), of the model (Eq. 4-8), with effects on their gas."""
+        return self._of(e.name for e in self.states.plant.machine.effects if LAWS[e.law].acts_on_gas)
 
     @property
     def struts_measured(self) -> Array | None:
@@ -71,23 +72,20 @@ class Decomposition:
 
     @property
     def dissipative(self) -> Array:
-        """Friction and viscous wrench of the model (n, 6), with all that effects add beside oil and gas."""
+        """Friction and viscous wrench of the model (n, 6), with all effects but those of oil and gas."""
         effects = self.states.plant.machine.effects
-        return self._of(*(e.name for e in effects if not (LAWS[e.law].acts_on_gas or LAWS[e.law].takes_spool)))
+        return self._of(e.name for e in effects if not (LAWS[e.law].acts_on_gas or LAWS[e.law].takes_spool))
 
     @property
     def dissipative_measured(self) -> Array:
         """The same from measured forces: inertia less weight, actuators and struts (the model's without pressures)."""
         struts = self.struts if self.struts_measured is None else self.struts_measured
-        return self.ledger.inertia - self._of("gravity") - self.measured - struts
+        return self.ledger.inertia - self._of(["gravity"]) - self.measured - struts
 
-    def _of(self, *effects: str) -> Array:
-        """Sum of their wrenches; one that makes no force has none."""
-        total = np.zeros_like(self.ledger.inertia)
-        for effect in effects:
-            if effect in self.ledger.effects:
-                total += self.ledger.wrench[:, self.ledger.effect(effect)]
-        return total
+    def _of(self, effects: Iterable[str]) -> Array:
+        """Sum of the wrenches (n, 6) of those effects that make a force."""
+        columns = [self.ledger.effect(effect) for effect in effects if effect in self.ledger.effects]
+        return np.asarray(self.ledger.wrench[:, columns].sum(axis=1))
 
 
 def inverse_dynamics(
@@ -100,16 +98,16 @@ def inverse_dynamics(
     path: Array | None = None,
     model_step: bool = False,
 ) -> Decomposition:
-    """Take a motion of C and Euler angles apart, friction states starting at rest.
+    """Forces behind a motion of C and Euler angles, friction states starting at rest.
 
     time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
-    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). model_step says that
-    the samples are the model steps of a semi-implicit run; forces then see the velocity that they saw there.
+    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). model_step: the
+    samples are steps of a semi-implicit run, whose forces see the last step's velocity (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
     if plant.model.nv != plant.axes.size:
         raise SimulationError(
-            "inverse dynamics takes a platen with a rigid specimen at most: what its joints do is not measured; "
+            "inverse dynamics takes a platen with a rigid specimen at most: the motion of its joints is not measured; "
             "lock them (--locked)"
         )
     t = np.asarray(time, float)
@@ -117,7 +115,7 @@ def inverse_dynamics(
     moved = plant_motion(plant, motion)
     along = moved if path is None else plant_motion(plant, motion._replace(displacement=path))
     z = march_states(plant, ports_along(plant, along), dt)
-    v = seen_velocity(moved, dt) if model_step else moved.v
+    v = np.vstack([moved.v[:1], moved.v[:-1] + dt * moved.a[:-1]]) if model_step else moved.v
     states = States(plant, t, moved.q, v, moved.a, z)
     measured = [np.asarray(actuator_force, float)]
     names = list(plant.machine.actuator_names)
@@ -132,9 +130,9 @@ def inverse_dynamics(
 
 
 def with_loads(plant: Plant, z: Array, actuator_force: Array) -> Array:
-    """Hidden states (n, n_states) that hold measured actuator forces (n, n_actuators) [N] for friction that feels them.
+    """Hidden states (n, n_states) with measured actuator forces (n, n_actuators) [N], for friction under load.
 
-    Each force stands as pressure in chamber A, with none in B. Where nothing feels them z comes back as it is.
+    Each force is set as pressure in chamber A, with none in B. Without such friction z is returned as it is.
     """
     if not any(law_of(row).feels_load for row in plant.rows):
         return z
@@ -150,14 +148,6 @@ def _without_oil(ledger: Ledger, plant: Plant) -> Ledger:
     force[:, [row.split(".")[0] in oil for row in ledger.rows]] = 0.0
     wrench[:, [effect in oil for effect in ledger.effects]] = 0.0
     return replace(ledger, force=force, wrench=wrench)
-
-
-def seen_velocity(motion: PlantMotion, dt: float) -> Array:
-    """Velocity (n, nv) that forces saw at each model step of a semi-implicit run: the last step's, extrapolated.
-
-    See `schemes.staggered_stage`.
-    """
-    return np.vstack([motion.v[:1], motion.v[:-1] + dt * motion.a[:-1]])
 
 
 def march_states(

@@ -1,19 +1,19 @@
-"""From records to what identification works on: aligned channels, one fused motion with its shares, actuator forces.
+"""Preparation of measured records: aligned channels, one fused motion with its shares, actuator forces.
 
-Decomposition, validation, calibration and discovery take this one road. Where they differ is a policy: which delays
-between groups of channels are taken out beforehand, and from what they are estimated.
+Decomposition, validation, calibration and discovery share this road. They differ by a policy: which delays between
+groups of channels are removed beforehand, and from which tests they are estimated.
 
-    AS_RECORDED   no delay is taken out
-    EACH_TEST     every delay that redundant channels show, by the test itself                              (decompose)
-    SIGNIFICANT   delays of the whole campaign that stand out of their standard errors                       (validate)
-    CALIBRATION   delays of the whole campaign, but not that of the struts' gas: heat that leaves it would pass for a
-                  delay of its pressure; actuator lengths stay out of the motion, as the geometry behind them is to be
+    AS_RECORDED   none
+    EACH_TEST     all that redundant channels show, test by test                                            (decompose)
+    SIGNIFICANT   those of the whole campaign that exceed their standard errors                              (validate)
+    CALIBRATION   those of the whole campaign, except of the struts' gas, where loss of heat would be mistaken for a
+                  delay; actuator lengths are excluded from the motion, since the geometry behind them is
                   calibrated                                                                  (calibrate and discover)
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -31,31 +31,31 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
-__all__ += ["actuator_forces", "find_delays", "oil_forces", "check_usable", "prepare", "prepare_test", "source_of"]
+__all__ += ["actuator_forces", "find_delays", "oil_forces", "check_usable", "prepare_test", "source_of"]
 
 
 class Policy(NamedTuple):
-    """What is done to records before they are compared with a model."""
+    """How records are prepared before they are compared with a model."""
 
-    align: Literal["none", "each test", "campaign"]
-    significance: float = 0.0  # delays below so many standard errors are left in
-    as_recorded: tuple[str, ...] = ()  # groups of channels whose delay is left in
-    lengths: bool = True  # whether actuator lengths take part in the platen's motion
-    shares: bool = False  # whether each channel's share in the motion is found
-    rate: float = np.inf  # records faster than this are thinned to near above it [Hz]
+    align: bool  # whether delays are removed that redundant channels show
+    significance: float = 0.0  # delays below so many standard errors are kept
+    as_recorded: tuple[str, ...] = ()  # groups of channels whose delay is kept
+    lengths: bool = True  # whether the platen's motion is fused from actuator lengths, too
+    shares: bool = False  # whether each channel's share in the motion is determined
+    rate: float = np.inf  # faster records are decimated to the next rate above [Hz]
     band: Band | None = None  # of a motion without accelerometers; by default the sensors' own
     pressure_cutoff: float | None = None  # up to which pressures are differentiated [Hz]; None: they are not
 
 
-AS_RECORDED = Policy("none")
-EACH_TEST = Policy("each test")
-SIGNIFICANT = Policy("campaign", significance=3.0)
-CALIBRATION = Policy("campaign", as_recorded=("strut_pressure",), lengths=False, shares=True)
+AS_RECORDED = Policy(align=False)
+EACH_TEST = Policy(align=True)
+SIGNIFICANT = Policy(align=True, significance=3.0)
+CALIBRATION = Policy(align=True, as_recorded=("strut_pressure",), lengths=False, shares=True)
 
 
 @dataclass(frozen=True)
 class MeasuredTest:
-    """A measured test ready for residuals; n samples. What was not measured is missing from `channels`."""
+    """A measured test prepared for residuals; n samples, `channels` as far as measured."""
 
     name: str
     dt: float  # [s]
@@ -94,7 +94,7 @@ def _chambers(channels: Mapping[str, Array]) -> Array | None:
 
 
 def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
-    """Forces (n, n_actuators) [N]: measured, else of the chamber pressures; None where neither is there."""
+    """Forces (n, n_actuators) [N]: measured, else of the chamber pressures; None without either."""
     force = channels.get("actuator_force")
     return oil_forces(machine, channels) if force is None else force
 
@@ -129,26 +129,17 @@ def source_of(record: xr.Dataset) -> str:
     return str(record.encoding.get("source", "the record"))
 
 
-def prepare(
-    plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet | None, policy: Policy
-) -> tuple[MeasuredTest, ...]:
-    """The tests of a campaign by a policy; raises what `prepare_test` does."""
-    return tuple(prepare_test(plant, r, sensors, policy) for r in align_records(plant, records, policy))
-
-
 def align_records(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> list[xr.Dataset]:
-    """Records of a campaign with the channels that a policy uses, its delays taken out."""
+    """Records of a campaign with the channels that a policy uses, its delays removed."""
     if not policy.lengths:
         records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
-    if policy.align == "each test":
-        return [align_record(r, find_delays(plant, [r], policy)) for r in records]
     delays = find_delays(plant, records, policy)
     return [align_record(r, delays) for r in records]
 
 
 def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> dict[str, Delay]:
-    """Delays that a policy takes out of these records, by group of channels."""
-    if policy.align == "none":
+    """Delays that a policy removes from these records, by group of channels."""
+    if not policy.align:
         return {}
     return {
         group: delay
@@ -159,11 +150,11 @@ def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> 
 
 
 def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, policy: Policy) -> MeasuredTest:
-    """A test from its aligned record: thinned, its motion fused once. Without sensors the motion is the record's own.
+    """A test from its aligned record: decimated, its motion fused. Without sensors the motion is the record's own.
 
     Raises RecordError for a record without platen motion, or with a channel of it that is not finite.
     """
-    record = _thinned(record, policy.rate)
+    record = _decimated(record, policy.rate)
     dt = sample_interval(record)
     columns = {n: record[n].values for n, c in LAYOUT.items() if n in record and c.residuals and c.role != "motion"}
     channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}
@@ -179,8 +170,8 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, record)
 
 
-def _thinned(record: xr.Dataset, rate: float) -> xr.Dataset:
-    """The record at a whole fraction of its rate, as near above `rate` [Hz] as can be, without what would fold."""
+def _decimated(record: xr.Dataset, rate: float) -> xr.Dataset:
+    """The record at the smallest whole fraction of its rate that is above `rate` [Hz], filtered against aliasing."""
     dt = sample_interval(record)
     every = int(1.0 / (rate * dt) + 1e-6)
     if every < 2:

@@ -4,11 +4,11 @@
     flow     L A / beta dP/dt + A dL/dt - Q, per chamber [m3/s]                              (Eqs. 4-2 to 4-5)
     gas      ln P/P_0 + n ln(1 + dL/L_c0), per strut [1]                                     (Eq. 4-7)
     force    measured actuator force less P_A A_1 - P_B A_2 [N]                              (Eq. 4-6)
-    servo    measured spool position less what its command gives, late by the valve [1]      (Section 4.1.2)
+    servo    measured spool position less its command, delayed by the valve [1]              (Section 4.1.2)
     supply   measured supply pressure less the model's, which flow may lower [Pa]
 
-All are zero where the model is right and sensors are perfect. The laws are those of the simulation, called by the same
-tables; accelerations come from the fused engine's forward dynamics, whose oracle is Pinocchio.
+All are zero where the model is right and sensors are perfect. The laws are those of the simulation, evaluated by the
+same kernels.
 """
 
 from typing import NamedTuple
@@ -25,9 +25,8 @@ from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import plant_motion
 from ..mechanics.required_wrench import require_alike, required_wrench
 from .inverse_dynamics import march_states, with_loads
-from .oil_residuals import MeasuredOil, oil_misses
 from .prepare import MeasuredTest, actuator_forces, oil_forces
-from .wrench_residuals import wrench_residual
+from .residual_kernels import MeasuredOil, oil_residuals, wrench_residual
 
 __all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow"]
 
@@ -68,8 +67,8 @@ def follow(
     What does not differ from the `known` path of the same motion with another plant is reused. start (n_states,) are
     the friction states at the start of the test, if not zero.
     """
-    there: dict[tuple[object, ...], Array] = {}
-    before: dict[tuple[object, ...], slice] = {}
+    there: dict[tuple[object, ...], Array] = {}  # states by what they depend on
+    before: dict[tuple[object, ...], slice] = {}  # places in the known path
     if known is None or _geometry(known[0]) != _geometry(plant):
         moved = plant_motion(plant, test.motion)
         along = ports = ports_along(plant, moved)
@@ -134,40 +133,36 @@ def evaluate_residuals(
 
     path is that of `follow`, if it is known. Raises RecordError naming the sample where a leg is out of its stroke.
     """
-    n, machine = test.samples, plant.machine
+    machine, measured = plant.machine, test.channels
     path = path or follow(plant, test)
-    measured = test.channels
-    force = actuator_forces(machine, measured)
-    wrench = np.zeros((n, 0))
+    force, oil = actuator_forces(machine, measured), oil_forces(machine, measured)
+    wrench = gas = by_cell = servo = np.zeros((test.samples, 0))
     if "wrench" in only and force is not None:
         wrench = wrench_residual(plant, path.ports, path.required, with_loads(plant, path.z, force), force)
-    flow, supplied = _of_oil(plant, test, path, only)
-    gas = np.zeros((n, 0))
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
         gas = np.log(measured["strut_pressure"] / strut_pressures(machine, length) / gas_ratio(plant, path.z))
-    by_cell, servo = np.zeros((n, 0)), np.zeros((n, 0))
-    oil = oil_forces(machine, measured)
     if "force" in only and oil is not None and "actuator_force" in measured:
         by_cell = measured["actuator_force"] - oil
     if "servo" in only and {"spool_position", "spool_command"} <= measured.keys():
         servo = measured["spool_position"] - due_spools(plant, measured["spool_command"], test.dt)
-    return Residuals(wrench, flow, gas, by_cell, servo, supplied)
+    flow, supply = _of_oil(plant, test, path, only)
+    return Residuals(wrench, flow, gas, by_cell, servo, supply)
 
 
 def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
     """Residuals `flow` and `supply`."""
-    n, double = test.samples, np.isin(plant.machine.actuator_names, plant.machine.double_acting)
+    n, none = test.samples, np.zeros((test.samples, 0))
     supply = test.channels.get("supply_pressure") if "supply" in only else None
-    none = np.zeros((n, 0))
-    spool = test.channels.get("spool_position")
-    if test.pressure is None or test.pressure_rate is None or spool is None or ("flow" not in only and supply is None):
+    pressure, rate, spool = test.pressure, test.pressure_rate, test.channels.get("spool_position")
+    if pressure is None or rate is None or spool is None or ("flow" not in only and supply is None):
         return none, none
-    flow = np.zeros((n, plant.spools + int(double.sum()))) if "flow" in only else none
+    double = np.isin(plant.machine.actuator_names, plant.machine.double_acting)
     chamber = np.full((plant.spools, 2), -1)
     chamber[:, 0] = np.arange(plant.spools)
     chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
-    drooped, rows = np.zeros(n), plant.rows[actuator_rows(plant.rows)]
-    oil = MeasuredOil(chamber, test.pressure, test.pressure_rate, spool, test.dt)
-    oil_misses(rows, plant.supply, oil, path.ports, np.zeros(len(plant.states)), drooped, flow)
+    flow = np.zeros((n, int(chamber.max()) + 1)) if "flow" in only else none
+    drooped, oil = np.zeros(n), MeasuredOil(chamber, pressure, rate, spool, test.dt)
+    rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
+    oil_residuals(rows, plant.supply, oil, path.ports, z, drooped, flow)
     return flow, none if supply is None else supply - drooped[:, None]

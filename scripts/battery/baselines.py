@@ -21,10 +21,9 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
     `correlation` takes the candidate most like the raw residual, and always has one. `e_sindy` bags sequentially
     thresholded least squares of pysindy over the best candidate of each family; families in at least half the bags.
     """
-    ready = prepare_problem(machine, records, sensors, calibration_numbers(), seed=seed, jobs=1)
-    problem = ready.problem
+    problem = prepare_problem(machine, records, sensors, calibration_numbers(), seed=seed, jobs=1)
     base = OperatingPoint(problem, np.zeros(len(problem.prior)))
-    rest = np.concatenate([r.ravel() for r in problem.rest(base)])
+    rest = np.concatenate([r.ravel() for r in problem.residual(base)])
     best: dict[str, tuple[float, np.ndarray]] = {}
     for group in list_candidates(base.plant.machine):
         columns, parts = columns_of(problem, base, group)

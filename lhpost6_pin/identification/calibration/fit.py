@@ -2,13 +2,12 @@
 
     minimise  2 sum |W r(x)|^2 + sum (x / prior)^2
 
-r are the residuals in the frequency domain (real and imaginary parts, hence the 2 for unit power), W whitens the noise
-that sensors leave in them. The derivatives J of r are noisy, too, since every term of an equation is measured: plain
-least squares would be biased towards zero (errors in variables). The contributions of noise to J^T r and J^T J, known
-from simulated draws, are subtracted (corrected normal equations, Fuller: Measurement Error Models, Wiley 1987,
-chapter 3). Where the final residual exceeds noise (in a column of a test, in a band), the excess counts as noise: it is
-weighed less, and predicted deviations grow. The inverse of the normal matrix is the predicted covariance, with a floor
-under its deviations.
+r are the residuals in the frequency domain (real and imaginary parts, hence the 2 for unit power), W whitens their
+sensor noise. The derivatives J of r are noisy, too, since every term of an equation is measured: plain least squares
+would be biased towards zero (errors in variables). The contributions of noise to J^T r and J^T J, known from simulated
+draws, are subtracted (corrected normal equations, Fuller: Measurement Error Models, Wiley 1987, chapter 3). Where the
+final residual exceeds noise (in a column of a test, in a band), the excess counts as noise: it is weighed less, and
+predicted deviations grow. The inverse of the normal matrix is the predicted covariance, with a floor on its deviations.
 """
 
 from collections.abc import Sequence
@@ -58,17 +57,13 @@ def calibrate(
     machine has not; that lacks platen_displacement, or both forces and pressures; that differs from the others in its
     channels; that is too short or too slowly sampled. SimulationError for a specimen with joints.
     """
-    numbers = calibration_numbers()
-    report = progress or (lambda share: None)
-    prepared = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
-    problem = prepared.problem
+    numbers, report = calibration_numbers(), progress or (lambda share: None)
+    problem = prepare_problem(machine, records, sensors, numbers, seed=seed, jobs=jobs)
     report(0.1)
-    found = solve(problem, prepared.replicas, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
-    normal, x = found.normal, found.x
-    floor = numbers.number("fit.floor") * problem.prior
-    covariance = np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64)
-    draws = prepared.noisy[: int(numbers.number("simulation.draws")) * len(records)]
-    simulated = by_simulation(problem, draws, x, numbers, between(report, 0.8, 1.0))
+    found = solve(problem, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
+    normal, floor = found.normal, numbers.number("fit.floor") * problem.prior
+    draws = problem.noisy[: int(numbers.number("simulation.draws")) * len(records)]
+    simulated = by_simulation(problem, draws, found.x, numbers, between(report, 0.8, 1.0))
     report(1.0)
     return Calibration(
         machine=problem.machine,
@@ -77,8 +72,8 @@ def calibrate(
         parameters=problem.parameters,
         unknowns=problem.unknowns,
         prior=problem.prior,
-        estimate=x,
-        covariance=covariance,
+        estimate=found.x,
+        covariance=np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64),
         alone=np.hypot(normal.alone(problem.prior), floor),
         subsets=(*_subsets(problem, normal, found.at, floor, numbers), *([simulated] if simulated else [])),
         misfit_before=found.misfit_before,
@@ -103,7 +98,6 @@ class Solution(NamedTuple):
 
 def solve(
     problem: Problem,
-    replicas: Sequence[Problem],
     numbers: Parameters,
     start: Array,
     progress: Progress,
@@ -130,11 +124,10 @@ def solve(
     bias: NoiseBias | None = None
     normal: NormalEquations | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
-    least = np.inf
-    converged = False
-    shares = np.linspace(0.0, 1.0, rounds + len(replicas) + 1)
+    least, converged, replicas = np.inf, False, len(problem.again)
+    shares = np.linspace(0.0, 1.0, rounds + replicas + 1)
     for done in range(1, rounds + 1):
-        part = done - 1 if done == 1 else done - 1 + len(replicas)
+        part = done - 1 if done == 1 else done - 1 + replicas
         share = between(progress, shares[part], shares[part + 1])
         if normal is None:
             normal = first or NormalEquations(problem, x, share, known, None if settled else fresh | again)
@@ -147,8 +140,8 @@ def solve(
             )
             normal = NormalEquations(problem, x, share, normal, again if renewed else np.zeros_like(again))
         if done == (1 if frugal else 2):  # near enough to the solution, and kept from there on
-            parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(len(replicas))]
-            bias = NoiseBias(normal, replicas, x, parts, known)
+            parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(replicas)]
+            bias = NoiseBias(normal, x, parts, known)
         if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
         value = objective(problem, normal.residual, x)
@@ -176,11 +169,8 @@ def solve(
 
 def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:
     """Negative log-likelihood and log-prior."""
-    pairs = zip(rest, problem.frequency, strict=True)
-    likely = sum(
-        float(negative_log_likelihood(*mean_squares(problem.whitener, np.abs(r) ** 2, f)).sum()) for r, f in pairs
-    )
-    return likely + 0.5 * float(np.sum((x / problem.prior) ** 2))
+    means = (mean_squares(problem.whitener, np.abs(r) ** 2, f) for r, f in zip(rest, problem.frequency, strict=True))
+    return sum(float(negative_log_likelihood(*m).sum()) for m in means) + 0.5 * float(np.sum((x / problem.prior) ** 2))
 
 
 def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
@@ -198,15 +188,13 @@ def _subsets(
 ) -> tuple[Subset, ...]:
     """Estimates from the wrench along each axis, flows of each kind of actuator, and gas law alone, about x (p,).
 
-    Whitening mixes columns with those before them; the order of `RESIDUALS` keeps wrench and flow apart from the rest.
+    Whitening mixes columns with those before them; by the order of `RESIDUALS`, wrench and flow depend on no others.
     """
-    machine = problem.machine
-    names, double = machine.actuator_names, machine.double_acting
     groups = [(f"wrench, {axis}", problem.rows("wrench", k)) for k, axis in enumerate(AXES)]
-    for kind in dict.fromkeys(a.kind for a in machine.actuators):
-        places = [i for i, a in enumerate(machine.actuators) if a.kind == kind]
-        places += [len(names) + double.index(names[i]) for i in places if names[i] in double]
-        groups.append((f"flow, {kind}", problem.rows("flow", *places)))
+    flow, kinds = problem.rows("flow"), [a.kind for a in problem.machine.actuators]
+    for kind in dict.fromkeys(kinds):
+        own = [problem.rows_of_actuator(i) for i, k in enumerate(kinds) if k == kind]
+        groups.append((f"flow, {kind}", flow & np.any(own, axis=0)))
     groups.append(("gas law", problem.rows("gas")))
     found = []
     for name, columns in groups:

@@ -30,13 +30,12 @@ class NormalEquations:
 
         Derivatives by unknowns of `known` are reused, except those to evaluate `again` (p,).
         """
-        self.problem = problem
-        base = OperatingPoint(problem, x)
+        self.problem, base = problem, OperatingPoint(problem, x)
         self.residual = problem.residual(base)
         shared, fresh = _shared(problem, known, again)
         before = [] if known is None else known.slope
-        found = problem.slopes(base, fresh, report)
-        self.slope: list[list[Complex]] = _together(found, before, shared)  # (m, c) by test and unknown
+        self.slope: list[list[Complex]]  # (m, c) by test and unknown
+        self.slope = _together(problem.slopes(base, fresh, report), before, shared)
         self.power = [np.ones(r.shape) for r in self.residual]
         self.bias: NoiseBias | None = None
 
@@ -88,32 +87,24 @@ class NormalEquations:
 
     def alone(self, prior: Array) -> Array:
         """Predicted deviations (n_tests, p) from each test by itself."""
-        found = []
-        for t in range(len(self.residual)):
-            matrix = positive(self.of([t])[0], prior) + np.diag(prior**-2.0)
-            found.append(np.sqrt(np.diag(np.linalg.inv(matrix))))
-        return np.array(found)
+        matrices = [positive(self.of([t])[0], prior) + np.diag(prior**-2.0) for t in range(len(self.residual))]
+        return np.array([np.sqrt(np.diag(np.linalg.inv(m))) for m in matrices])
 
 
 class NoiseBias:
     """Bias of the normal equations by noise: the mean product of its changes in slopes and residuals."""
 
     def __init__(
-        self,
-        normal: NormalEquations,
-        replicas: Sequence[Problem],
-        x: Array,
-        reports: Sequence[Progress],
-        known: NormalEquations | None = None,
+        self, normal: NormalEquations, x: Array, reports: Sequence[Progress], known: NormalEquations | None = None
     ) -> None:
-        """Evaluate the same at x for every replica, each with more noise in the tests.
+        """Evaluate the same at x for every replica of the problem, each with more noise in the tests.
 
         Changes of derivatives by unknowns of `known`, which is corrected, are reused.
         """
         shared, fresh = _shared(normal.problem, known)
         self.residual: list[list[Complex]] = []  # by replica and test
         self.slope: list[list[list[Complex]]] = []
-        for i, (replica, report) in enumerate(zip(replicas, reports, strict=True)):
+        for i, (replica, report) in enumerate(zip(normal.problem.replicas, reports, strict=True)):
             base = OperatingPoint(replica, x)
             self.residual.append([r - r0 for r, r0 in zip(replica.residual(base), normal.residual, strict=True)])
             noisy = zip(replica.slopes(base, fresh, report), normal.slope, strict=True)

@@ -1,13 +1,11 @@
-"""A campaign made ready to be fitted: aligned, fused, with noisier copies of every test."""
+"""Preparation of a campaign for a fit: checked, aligned, fused, with noisier copies of every test."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import xarray as xr
 
-from ...core.arrays import Array
 from ...core.errors import RecordError, SimulationError
 from ...data.channels import calibrated_channels, channel_name
 from ...data.layout_faults import layout_faults
@@ -16,45 +14,10 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
 from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
-from .free_parameters import FreeParameter
 from .problem import KINDS, Problem, ResidualBands
 from .whitened_residuals import spectrum_of
 
-__all__ = ["PreparedProblem", "policy_of", "prepare_problem"]
-
-
-@dataclass(frozen=True)
-class PreparedProblem:
-    """A problem, and the same tests with more noise."""
-
-    problem: Problem
-    replicas: tuple[Problem, ...]  # each with all tests once more
-    noisy: tuple[MeasuredTest, ...]  # the tests in order, as often as the whitener has draws
-
-    def only(self, places: Sequence[int]) -> "PreparedProblem":
-        """The same with some of the tests."""
-        count = len(self.problem.tests)
-        noisy = tuple(t for i, t in enumerate(self.noisy) if i % count in places)
-        return PreparedProblem(self.problem.only(places), tuple(r.only(places) for r in self.replicas), noisy)
-
-    def scaled(self, scale: Array) -> "PreparedProblem":
-        """The same with whitened residuals (t, b, c) times larger."""
-        return self._each(lambda problem: problem.scaled(scale))
-
-    def with_machine(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "PreparedProblem":
-        """The same tests and noise with another machine, or other parameters."""
-        return self._each(lambda problem: problem.with_machine(machine, parameters))
-
-    def with_free(self, name: str, share: float) -> "PreparedProblem":
-        """The same with one more unknown free of its prior."""
-        return self._each(lambda problem: problem.with_free(name, share))
-
-    def without_free(self, name: str) -> "PreparedProblem":
-        """The same with an unknown's prior as stated again."""
-        return self._each(lambda problem: problem.without_free(name))
-
-    def _each(self, change: Callable[[Problem], Problem]) -> "PreparedProblem":
-        return PreparedProblem(change(self.problem), tuple(map(change, self.replicas)), self.noisy)
+__all__ = ["policy_of", "prepare_problem"]
 
 
 def prepare_problem(
@@ -68,36 +31,31 @@ def prepare_problem(
     preload: float = 0.0,
     seed: int = 0,
     jobs: int = -1,
-) -> PreparedProblem:
-    """Make a campaign ready; `numbers` are those of `models/procedures/calibration.toml`. Raises what `calibrate` does.
+) -> Problem:
+    """The least-squares problem of a campaign; `numbers` are those of `models/procedures/calibration.toml`.
 
-    others are what the machine may as well be, for all that is known: by how much they differ is noise, and so is what
-    friction may hold when a test begins, a share `preload` of it. Deterministic for a seed (of the simulated noise).
+    `others` and `preload` are sources of noise (`Problem`). Deterministic for a seed (of the simulated noise). Raises
+    what `calibrate` does.
     """
-    comparison = ResidualBands(
-        bands=numbers.vector("comparison.bands"),
-        edge=numbers.number("comparison.edge"),
-        step=numbers.number("fit.step"),
-    )
+    n = numbers.number
+    comparison = ResidualBands(numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"))
     _refuse(machine, records, comparison)
     machine = machine.as_tested(records[0].attrs, "the first test")
     plant = make_plant(machine)
     policy = policy_of(numbers)
     records = align_records(plant, records, policy)
     rng = np.random.default_rng(seed)
-    draws, again = int(numbers.number("fit.draws")), int(numbers.number("fit.corrections"))
 
-    def noisier(policy: Policy) -> list[MeasuredTest]:
+    def drawn(policy: Policy) -> list[MeasuredTest]:
         return [prepare_test(plant, add_noise(r, sensors, rng), sensors, policy) for r in records]
 
     tests = [prepare_test(plant, r, sensors, policy) for r in records]
-    noisy = [test for _ in range(draws) for test in noisier(policy._replace(shares=False))]
-    more = [noisier(policy) for _ in range(again)]
-    problem = Problem(
-        machine, tests, noisy, sensors, comparison, jobs=jobs, kinds=kinds, others=others(machine), preload=preload
-    )
-    replicas = tuple(problem.with_tests(tests) for tests in more)
-    return PreparedProblem(problem, replicas, tuple(noisy))
+    noisy = [test for _ in range(int(n("fit.draws"))) for test in drawn(policy._replace(shares=False))]
+    again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
+    return Problem(
+        *(machine, tests, noisy, sensors, comparison),
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload,
+    )  # fmt: skip
 
 
 def policy_of(numbers: Parameters) -> Policy:
@@ -107,9 +65,9 @@ def policy_of(numbers: Parameters) -> Policy:
 
 
 def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: ResidualBands) -> None:
-    """Raise what `calibrate` says, naming the test."""
+    """Raise the errors that `calibrate` lists, naming the test."""
     if not records:
-        raise RecordError("no record to calibrate by")
+        raise RecordError("the campaign has no records")
     if make_plant(machine).articulated:
         raise SimulationError("calibration takes a platen with a rigid specimen at most; lock its joints (--locked)")
     names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
@@ -121,12 +79,12 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
         _refuse_short(test, record, comparison)
         if lacking := [c for c in calibrated_channels() if c not in record and any(c in other for other in records)]:
             what = f"{test} has no {', '.join(lacking)}, which other tests have"
-            raise RecordError(f"{what}; take that test out of the campaign, or the channel out of all")
+            raise RecordError(f"{what}; remove that test from the campaign, or the channel from all tests")
 
 
 def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> None:
     if "platen_displacement" not in record:
-        why = "lengths do not replace it, as the geometry behind them is to be calibrated"
+        why = "lengths do not replace it, since the geometry behind them is calibrated"
         raise RecordError(f"{test}: has no platen_displacement; {why}")
     if "actuator_force" not in record and "chamber_pressure_a" not in record:
         raise RecordError(f"{test}: has neither actuator_force nor chamber_pressure_a; give one of them or both")
@@ -136,7 +94,7 @@ def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> N
         below = np.argwhere(record["strut_pressure"].values <= 0.0)
         for sample, column in below[:1]:
             what = f"{channel_name(record['strut_pressure'], int(column))} is not above zero at sample {sample}"
-            raise RecordError(f"{test}: {what}; give absolute pressures, or take the channel out of all tests")
+            raise RecordError(f"{test}: {what}; give absolute pressures, or remove the channel from all tests")
 
 
 def _refuse_short(test: str, record: xr.Dataset, comparison: ResidualBands) -> None:
@@ -149,4 +107,4 @@ def _refuse_short(test: str, record: xr.Dataset, comparison: ResidualBands) -> N
     for low, high in pairwise(bands):
         if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
             what = f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
-            raise RecordError(f"{test}: {what}; take it out of the campaign")
+            raise RecordError(f"{test}: {what}; remove it from the campaign")

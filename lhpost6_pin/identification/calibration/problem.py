@@ -44,12 +44,12 @@ class ResidualBands(NamedTuple):
 class EvaluationGroup(NamedTuple):
     """Unknowns that act on different rows, so that one evaluation gives all their derivatives."""
 
-    members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut whose rows it acts on; -1: all rows
-    residuals: tuple[str, ...]  # kinds that it shows in
+    members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut on whose rows it acts; -1: on all rows
+    residuals: tuple[str, ...]  # kinds that depend on it
 
 
 class Problem:
-    """Tests, unknowns with their priors, and the whitener of the sensors' noise."""
+    """Tests and their noisier copies, unknowns with their priors, and the whitener of the sensors' noise."""
 
     def __init__(
         self,
@@ -59,18 +59,21 @@ class Problem:
         sensors: SensorSet,
         comparison: ResidualBands,
         *,
+        again: Sequence[Sequence[MeasuredTest]] = (),
         jobs: int = -1,
         kinds: tuple[str, ...] = KINDS,
         others: Sequence[Machine] = (),
         preload: float = 0.0,
     ) -> None:
-        """Prepare the problem; `noisy` are draws of the tests in order, any number of times, each with more noise.
+        """Prepare the problem; all tests have the same channels.
 
-        Noise also has the differences of residuals between equally plausible machines (`others`), and friction's state
-        at the start of a test, of which a share `preload` of the force is unknown. All tests have the same channels.
-        Raises RecordError where they are too short together.
+        noisy are draws of the tests in order, any number of times, each with more noise; the whitener is made from
+        them. `again` are further draws of all tests, for the correction of derivatives. Noise also includes the
+        differences of residuals between equally plausible machines (`others`), and friction's state at the start of a
+        test, of which a share `preload` of the force is unknown. Raises RecordError if they are too short together.
         """
         self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
+        self.noisy, self.again = tuple(noisy), tuple(map(tuple, again))
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.present = frozenset(tests[0].channels)
         self.unknowns = tuple(u for u in unknowns if set(residuals_of(u.channel, self.present)) & set(kinds))
@@ -80,11 +83,11 @@ class Problem:
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
-        noise = self._noise(plant, noisy, clean)
+        noise = self._noise(plant, clean)
         instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
         for found, test, base in zip(noise, tests, clean, strict=True):
-            # friction's state is known no better than by the difference between the raw and the smoothed path; that
-            # weighs as much as all draws together, and so do the initial state and each of the other machines
+            # friction's state is uncertain by the difference between the raw and the smoothed path; that weighs as
+            # much as all draws together, and so do the initial state and each of the other machines
             more = [evaluate_residuals(plant, replace(test, path=None), kinds)]
             if preload > 0.0:
                 held = follow(plant, test, start=_held(plant, preload, rng))
@@ -119,18 +122,21 @@ class Problem:
         """The same tests and noise with another machine, or other parameters."""
         return self._with()._set(machine, parameters)
 
-    def with_free(self, name: str, share: float) -> "Problem":
-        """The same with one more unknown released: its prior deviation is `share` times the stated one."""
-        return self._with(free={**self.free, name: share})._set(self.machine, self.parameters)
-
-    def without_free(self, name: str) -> "Problem":
-        """The same with an unknown's prior as stated again."""
-        free = {other: share for other, share in self.free.items() if other != name}
+    def with_free(self, name: str, share: float | None) -> "Problem":
+        """The same with an unknown's prior deviation `share` times the stated one; None: as stated."""
+        free = {other: known for other, known in self.free.items() if other != name}
+        if share is not None:
+            free[name] = share
         return self._with(free=free)._set(self.machine, self.parameters)
 
     def with_tests(self, tests: Sequence[MeasuredTest]) -> "Problem":
         """The same problem and weights with another draw of the same tests."""
         return self._with(tests=tuple(tests))
+
+    @property
+    def replicas(self) -> tuple["Problem", ...]:
+        """The same problem with each further draw of the tests."""
+        return tuple(map(self.with_tests, self.again))
 
     def scaled(self, scale: Array) -> "Problem":
         """The same problem, its whitened residuals scaled by test and band (t, b, c)."""
@@ -140,24 +146,26 @@ class Problem:
         """The same problem with some of its tests; noise is weighed as with all."""
         return self._with(
             tests=tuple(self.tests[t] for t in places),
+            noisy=tuple(t for i, t in enumerate(self.noisy) if i % len(self.tests) in places),
+            again=tuple(tuple(draw[t] for t in places) for draw in self.again),
             frequency=[self.frequency[t] for t in places],
             whitener=self.whitener._replace(factor=self.whitener.factor[list(places)]),
         )
 
-    def noise_at(self, noisy: Sequence[MeasuredTest], x: Array) -> Array:
-        """Mean squares (t, b, c) of whitened noise with the unknowns at x; `noisy` as when the problem was made."""
+    def noise_at(self, x: Array) -> Array:
+        """Mean squares (t, b, c) of whitened noise with the unknowns at x."""
         plant = self.plant_at(x)
-        noise = self._noise(plant, noisy, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
+        noise = self._noise(plant, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
         found = np.zeros((len(self.tests), len(self.whitener.edges) - 1, sum(self.widths)))
         for t, (draws, f) in enumerate(zip(noise, self.frequency, strict=True)):
             squares = np.mean([np.abs(self._whitened(t, bins)) ** 2 for bins in draws], axis=0)
             found[t, np.unique(self.whitener.band(f))] = mean_squares(self.whitener, squares, f)[0]
         return found
 
-    def _noise(self, plant: Plant, noisy: Sequence[MeasuredTest], clean: Sequence[Residuals]) -> list[list[Complex]]:
+    def _noise(self, plant: Plant, clean: Sequence[Residuals]) -> list[list[Complex]]:
         """Change of the bins (m, c) of every test with each draw of noise."""
         found: list[list[Complex]] = [[] for _ in clean]
-        for i, test in enumerate(noisy):
+        for i, test in enumerate(self.noisy):
             at = i % len(clean)
             found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0])
         return found
@@ -211,7 +219,7 @@ class Problem:
         out = []
         for i, place in group.members:
             if free[i]:
-                rows = np.ones(sum(self.widths), bool)
+                rows: Mask | bool = True
                 if place >= 0:
                     rows = self.rows("gas", place) if group.residuals == ("gas",) else self.rows_of_actuator(place)
                 slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
@@ -244,14 +252,11 @@ class Problem:
         """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
         c = self.comparison
         bins, f = spectrum_of(residuals.stacked(), dt, c.bands[0], c.bands[-1], c.edge)
-        if bins.shape[1] == sum(self.widths):
+        given = np.repeat([part.shape[1] > 0 for part in residuals], self.widths)
+        if given.all():
             return bins, f
-        out = np.zeros((len(f), sum(self.widths)), np.complex128)
-        at = 0
-        for kind, part in zip(RESIDUALS, residuals, strict=True):
-            if part.shape[1]:
-                out[:, self.rows(kind)] = bins[:, at : at + part.shape[1]]
-                at += part.shape[1]
+        out = np.zeros((len(f), len(given)), np.complex128)
+        out[:, given] = bins
         return out, f
 
     def rows_of_actuator(self, place: int) -> Mask:
@@ -286,7 +291,7 @@ class OperatingPoint:
 
 
 def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
-    """Largest travel of the legs of each kind either way, with a margin [m]."""
+    """Largest travel of the actuators and struts of each kind in either direction, with a margin [m]."""
     moved = [np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests]
     kinds = [c.kind for c in plant.machine.components]
     most = np.max(moved, axis=0)

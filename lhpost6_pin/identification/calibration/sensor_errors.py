@@ -2,11 +2,11 @@
 
     measured(t) = (1 + gain) true(t - delay) + offset
 
-Commands are held for a sample of the controller, and the valves' delay is no whole number of samples: each spool of a
-record may be up to half such a sample early or late, in addition to the delay of the group.
+Commands are held for a sample of the controller, while the valves' delay is not a multiple of it: each spool of a
+record may be up to half such a sample early or late, in addition to the delay of its group.
 
 Displacement, velocity and acceleration of the platen are fused into one motion; each channel's gain acts on its share
-in it, to first order. Their skews have been removed; delays of the others are relative to the platen's motion.
+of the motion, to first order. Skews between them have been removed; other delays are relative to the platen's motion.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ class SensorUnknown:
     column: int  # of the channel; -1 for the delay of a whole group
     sd: float  # of the prior, about zero
     unit: str
-    alone: tuple[str, int]  # evaluated together: unknowns of one `alone[0]` act on different rows, marked by alone[1]
+    alone: tuple[str, int]  # unknowns of one alone[0] act on different rows (alone[1]) and are evaluated together
 
 
 def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:
@@ -90,52 +90,49 @@ def _together(machine: Machine, kind: str, name: str, i: int, label: str, presen
 
 def corrected(test: MeasuredTest, unknowns: tuple[SensorUnknown, ...], values: Array) -> MeasuredTest:
     """The test corrected for sensor errors `values` (one per unknown); channels without error are not copied."""
-    off = [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
-    channels, rates = dict(test.channels), dict(test.rates)
-    for tables in (channels, rates):
-        for name in tables.keys() & {u.channel for u, _ in off if u.kind != "delay"}:
-            tables[name] = tables[name].copy()
-    for unknown, value in sorted(off, key=lambda one: one[0].kind != "offset"):
-        if unknown.kind == "offset":
-            channels[unknown.channel][:, unknown.column] -= value
-        elif unknown.kind == "gain" and unknown.channel not in test.share:
-            for table in (channels, rates):
-                if unknown.channel in table:
-                    table[unknown.channel][:, unknown.column] /= 1.0 + value
-    for name, delay in _late(off, {name: x.shape[1] for name, x in channels.items()}).items():
-        for table in (channels, rates):
-            if name in table:
-                table[name] = align(table[name], delay, test.dt)
-    platen = [(u, v) for u, v in off if u.channel in test.share]
+    wrong = _nonzero(unknowns, values)
+    own = [(u, v) for u, v in wrong if u.channel not in test.share]
+    channels = _true(test.channels, own, test.dt)
+    rates = _true(test.rates, [(u, v) for u, v in own if u.kind != "offset"], test.dt)
     motion, path = test.motion, test.path
-    if platen:
+    if len(own) < len(wrong):
         motion = PlatenMotion(*(x.copy() for x in motion))
         path = None if path is None else path.copy()
-        for unknown, value in platen:
-            k, part, shares = unknown.column, value / (1.0 + value), test.share[unknown.channel]
-            for moved, share in zip(motion, shares, strict=True):
-                moved[:, k] -= part * share[:, k]
-            if path is not None:
-                path[:, k] -= part * shares.displacement[:, k]
+        for unknown, value in wrong:
+            if unknown.channel in test.share:
+                k, part, shares = unknown.column, value / (1.0 + value), test.share[unknown.channel]
+                for moved, share in zip(motion, shares, strict=True):
+                    moved[:, k] -= part * share[:, k]
+                if path is not None:
+                    path[:, k] -= part * shares.displacement[:, k]
     return replace(test, motion=motion, path=path, channels=channels, rates=rates)
 
 
 def corrected_record(record: xr.Dataset, unknowns: tuple[SensorUnknown, ...], errors: Array) -> xr.Dataset:
     """A record corrected for sensor errors, one per unknown."""
     out = record.copy(deep=True)
-    off = [(u, float(v)) for u, v in zip(unknowns, errors, strict=True) if v != 0.0]
-    columns = {str(name): int(np.prod(x.shape[1:])) for name, x in out.items()}
-    for channel, delay in _late(off, columns).items():
-        out[channel].values[:] = align(out[channel].values, delay, sample_interval(record))
-    for unknown, value in off:
-        if unknown.kind == "delay" or unknown.channel not in out:
-            continue
-        values = out[unknown.channel].values
-        column = values[:, unknown.column] if values.ndim > 1 else values
-        if unknown.kind == "gain":
-            column /= 1.0 + value
-        else:
-            column -= value
+    columns = {str(name): x.values.reshape(len(x), -1) for name, x in out.items() if "time" in x.dims}
+    for name, values in _true(columns, _nonzero(unknowns, errors), sample_interval(record)).items():
+        out[name].values[:] = values.reshape(out[name].shape)
+    return out
+
+
+def _nonzero(unknowns: Sequence[SensorUnknown], values: Array) -> list[tuple[SensorUnknown, float]]:
+    return [(u, float(v)) for u, v in zip(unknowns, values, strict=True) if v != 0.0]
+
+
+def _true(columns: Mapping[str, Array], wrong: Sequence[tuple[SensorUnknown, float]], dt: float) -> dict[str, Array]:
+    """Channels (n, k) without these errors: offset, then gain, then delay; those that have none are not copied."""
+    out = dict(columns)
+    for name in out.keys() & {u.channel for u, _ in wrong if u.kind != "delay"}:
+        out[name] = out[name].copy()
+    for unknown, value in sorted(wrong, key=lambda one: one[0].kind != "offset"):
+        if unknown.kind == "offset" and unknown.channel in out:
+            out[unknown.channel][:, unknown.column] -= value
+        elif unknown.kind == "gain" and unknown.channel in out:
+            out[unknown.channel][:, unknown.column] /= 1.0 + value
+    for name, delay in _late(wrong, {name: x.shape[1] for name, x in out.items()}).items():
+        out[name] = align(out[name], delay, dt)
     return out
 
 

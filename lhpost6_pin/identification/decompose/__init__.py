@@ -4,13 +4,12 @@
     agreement = find_agreement(found)                       # RRMSE per axis; the residual against noise and calibration
     save_ledger(found, "ledger.nc")
 
-`record` prepares a record and calls `inverse_dynamics`; `agreement` compares; `dataset` writes.
+`record` prepares a record and calls `inverse_dynamics`; `agreement` compares; `dataset` adds power and energy.
 """
 
 from .agreement import Level, Match, WrenchAgreement, find_agreement
-from .dataset import ledger_dataset, save_ledger
+from .dataset import Work, find_work, ledger_dataset, save_ledger
 from .record import ComparisonBand, Decomposed, decompose_numbers, decompose_record
-from .work import Work, find_work
 
 __all__ = ["WrenchAgreement", "ComparisonBand", "Decomposed", "Level", "Match", "Work", "decompose_numbers"]
 __all__ += ["decompose_record", "find_agreement", "find_work", "ledger_dataset", "save_ledger"]

@@ -3,14 +3,11 @@
 The residual is the required less the measured actuator wrench. Its mean and standard deviation are compared with those
 expected from:
 
-    noise       another draw of the sensors' noise, added to the record and decomposed again
-    sensors     gains and offsets of forces through the legs' wrenches; the skew between forces and motion times the
-                rate of the wrench; a gain of each axis's motion, through the model. Each at one standard deviation,
-                independent of each other
-    parameters  every stated uncertainty of the platen's numbers and of the kinds of actuators and struts, one by one,
-                at one standard deviation, without geometry
+    noise       a second draw of the sensors' noise, added to the record, which is decomposed again
+    sensors     gains and offsets of force sensors; the skew between forces and motion; a gain of each axis's motion
+    parameters  uncertain numbers of the platen and of each kind of actuator and strut, without geometry
 
-Linear propagation: changes of the residual by each error, added in squares.
+Errors are propagated linearly, each at one standard deviation, as independent: their effects add in squares.
 """
 
 from collections.abc import Iterator
@@ -23,13 +20,12 @@ from ...core.arrays import Array
 from ...data.alignment import phase_delay
 from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band, correlation, differentiate, peak_ratio, rrmse
-from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import leg_wrenches
 from ..prepare import AS_RECORDED, prepare_test
 from ..residuals import evaluate_residuals, follow
-from .record import Decomposed, decompose_numbers, take_apart
+from .record import Decomposed, decompose_numbers, decompose_test
 
 __all__ = ["WrenchAgreement", "Explanation", "Level", "Match", "find_agreement"]
 
@@ -93,50 +89,39 @@ class WrenchAgreement:
         by_sensors = np.hypot(noise, self.coverage * sensors)
         by_all = np.hypot(by_sensors, self.coverage * parameters)
         tiny = 1e-9 * self.noise.max()  # an axis in which a guided platen cannot move
-
-        def of_axis(k: int) -> Explanation:
-            if found[k] <= max(noise[k], tiny):
-                return "noise"
-            if found[k] <= by_sensors[k]:
-                return "sensors"
-            return "parameters" if found[k] <= by_all[k] else "nothing"
-
-        return tuple(of_axis(k) for k in range(6))
+        enough = [found <= most for most in (np.maximum(noise, tiny), by_sensors, by_all)]
+        return tuple(np.select(enough, ["noise", "sensors", "parameters"], "nothing").tolist())
 
 
 def find_agreement(found: Decomposed, *, seed: int = 0) -> WrenchAgreement:
     """Compare forces, and the residual with that expected from noise (drawn from seed), sensors and parameters."""
-    numbers = decompose_numbers()
-    forces = found.forces
-    struts = forces.struts_measured
-    required = numbers.number("judgement.correlation")
-
-    def match(measured: Array, modelled: Array) -> Match:
-        return _match(measured, modelled, found.dt, found.comparison.band, required)
-
-    sensors = found.sensors
-    none = np.zeros(6)
+    numbers, forces, sensors = decompose_numbers(), found.forces, found.sensors
+    required, struts = numbers.number("judgement.correlation"), forces.struts_measured
+    noise, none = np.zeros(6), Level(np.zeros(6), np.zeros(6))
+    if sensors is not None:
+        noise = _noise(found, sensors, np.random.default_rng(seed))
     return WrenchAgreement(
-        actuators=match(forces.measured, forces.required),
-        struts=None if struts is None else match(struts, forces.struts),
-        dissipative=match(forces.dissipative_measured, forces.dissipative),
+        actuators=_match(found, forces.measured, forces.required, required),
+        struts=None if struts is None else _match(found, struts, forces.struts, required),
+        dissipative=_match(found, forces.dissipative_measured, forces.dissipative, required),
         residual=_level(forces.residual),
-        noise=none if sensors is None else _noise(found, sensors, np.random.default_rng(seed)),
-        sensors=Level(none, none) if sensors is None else _summed(found, _by_sensors(found, sensors)),
-        parameters=Level(none, none) if sensors is None else _summed(found, _by_parameters(found)),
+        noise=noise,
+        sensors=none if sensors is None else _summed(found, _by_sensors(found, sensors)),
+        parameters=none if sensors is None else _summed(found, _by_parameters(found)),
         noise_range=0.0 if sensors is None else sensors.noise_range,
         coverage=numbers.number("judgement.coverage"),
     )
 
 
-def _match(measured: Array, modelled: Array, dt: float, band: Band, required: float) -> Match:
-    correlated = correlation(measured, modelled)
+def _match(found: Decomposed, measured: Array, modelled: Array, required: float) -> Match:
+    """Agreement of forces; their delay where the correlation of what varies is at least `required`."""
+    band, dt = found.comparison.band, found.dt
     varying = rrmse(measured - measured.mean(axis=0), modelled - modelled.mean(axis=0))
     moving = Band(band.high / 16, band.high, band.order)  # above the window's lobe
-    late, error = phase_delay(measured, modelled, dt, moving)
     known = correlation(moving.apply(measured, dt), moving.apply(modelled, dt)) >= required
-    late, error = (np.where(known, x, np.nan) for x in (late, error))
-    return Match(rrmse(measured, modelled), varying, peak_ratio(measured, modelled), correlated, late, error)
+    late, error = (np.where(known, x, np.nan) for x in phase_delay(measured, modelled, dt, moving))
+    ratio, correlated = peak_ratio(measured, modelled), correlation(measured, modelled)
+    return Match(rrmse(measured, modelled), varying, ratio, correlated, late, error)
 
 
 def _level(x: Array) -> Level:
@@ -144,34 +129,36 @@ def _level(x: Array) -> Level:
 
 
 def _summed(found: Decomposed, changes: Iterator[Array]) -> Level:
-    """Sum in squares of the levels of changes (n, 6) of the residual, each filtered and cut as the residual was."""
+    """Sum in squares of the levels of changes (n, 6) of the residual."""
     total = np.zeros((2, 6))
     for change in changes:
-        total += np.square(_level(found.comparison.band.apply(change, found.dt)[found.inside]))
+        total += np.square(_level(found.compared(change)))
     return Level(*np.sqrt(total))
 
 
 def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Array:
+    """Standard deviation (6,) of the residual's change by a second draw of noise."""
     policy = AS_RECORDED._replace(band=found.comparison.band)
-    noisier, _ = take_apart(
-        found.plant, prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors, policy)
-    )
-    change = noisier.residual - found.whole.residual
-    return np.asarray(found.comparison.band.apply(change, found.dt)[found.inside].std(axis=0))
+    noisier = prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors, policy)
+    change = decompose_test(found.plant, noisier)[0].residual - found.whole.residual
+    return np.asarray(found.compared(change).std(axis=0))
 
 
 def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each calibration error."""
-    whole, record, machine = found.whole, found.record, found.plant.machine
-    count = whole.actuators
-    unit = leg_wrenches(found.plant, whole.states.q, np.ones((len(whole.states.time), count)))
-    if "actuator_force" in record:
-        group, oil = "actuator_force", [("actuator_force", k, 1.0, whole.component_force[:, k]) for k in range(count)]
-    else:
-        group, oil = "chamber_pressure", list(_pressures(machine, found))
-    for channel, k, area, values in oil:
-        yield unit[:, k] * (area * sensors.gain_sd(channel) * values[:, None])
-        yield unit[:, k] * (area * sensors.offset_sd(channel))
+    whole, record = found.whole, found.record
+    unit = leg_wrenches(found.plant, whole.states.q, np.ones((len(whole.states.time), whole.actuators)))
+    group = "actuator_force" if "actuator_force" in record else "chamber_pressure"
+    for k, actuator in enumerate(found.plant.machine.actuators):
+        columns = [("actuator_force", 1.0, whole.component_force[:, k])]
+        if group == "chamber_pressure":
+            columns = [("chamber_pressure_a", actuator.area_a, record["chamber_pressure_a"].values[:, k])]
+            if actuator.area_b is not None:
+                values = record["chamber_pressure_b"].sel(horizontal=actuator.name).values
+                columns.append(("chamber_pressure_b", actuator.area_b, values))
+        for channel, area, values in columns:
+            yield unit[:, k] * (area * sensors.gain_sd(channel) * values[:, None])
+            yield unit[:, k] * (area * sensors.offset_sd(channel))
     skew = np.hypot(sensors.delay_sd(group), sensors.delay_sd("platen_displacement"))
     yield skew * differentiate(whole.measured, found.dt, sensors.band.high)
     used = [name for name in ("actuator_displacement", "platen_displacement", "platen_acceleration") if name in record]
@@ -184,19 +171,10 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
         yield evaluate_residuals(found.plant, other, ("wrench",)).wrench - whole.residual
 
 
-def _pressures(machine: Machine, found: Decomposed) -> Iterator[tuple[str, int, float, Array]]:
-    """Channel, actuator, area and values of every chamber's pressure."""
-    for k, actuator in enumerate(machine.actuators):
-        yield "chamber_pressure_a", k, actuator.area_a, found.record["chamber_pressure_a"].values[:, k]
-        if actuator.area_b is not None:
-            values = found.record["chamber_pressure_b"].sel(horizontal=actuator.name).values
-            yield "chamber_pressure_b", k, actuator.area_b, values
-
-
 def _by_parameters(found: Decomposed) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each number of the platen and the kinds."""
     machine, measured = found.plant.machine, found.test
-    as_it_is = follow(found.plant, measured)
+    nominal = follow(found.plant, measured)
     sections = {"platen", *(c.kind for c in machine.components)}
     for path, quantity in machine.parameters.items():
         section, _, name = path.partition(".")
@@ -208,5 +186,5 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
             shifted[k] += sd
             value = shifted.tolist() if isinstance(quantity.value, tuple) else float(shifted[0])
             plant = make_plant(machine.with_params({path: value}))
-            moved = follow(plant, measured, (found.plant, as_it_is))
+            moved = follow(plant, measured, (found.plant, nominal))
             yield evaluate_residuals(plant, measured, ("wrench",), path=moved).wrench - found.whole.residual

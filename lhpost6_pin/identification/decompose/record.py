@@ -1,9 +1,8 @@
 """Decomposition of a record into forces by inverse dynamics, and the band in which they are compared.
 
 A simulated record without noise is used as it is. In a measured one, groups of channels are aligned by redundant
-channels and the platen's motion is fused from all its sensors, since noise of the raw displacement would reduce the
-modelled friction. Friction follows the motion in the sensors' whole band; forces are then filtered for comparison, and
-their edges cut.
+channels, and the platen's motion is fused from all its sensors: noise of the raw displacement would reduce the modelled
+friction. Friction follows the motion in the sensors' whole band; forces are then filtered, and their edges cut.
 """
 
 from collections.abc import Mapping
@@ -37,14 +36,14 @@ from ..prepare import (
     source_of,
 )
 
-__all__ = ["ComparisonBand", "Decomposed", "decompose_numbers", "decompose_record", "filtered", "take_apart"]
+__all__ = ["ComparisonBand", "Decomposed", "decompose_numbers", "decompose_record", "decompose_test"]
 
 
 class ComparisonBand(NamedTuple):
     """How forces are compared."""
 
     band: Band
-    edge: float  # left out at both ends [s]
+    edge: float  # cut off at both ends [s]
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,8 @@ class Decomposed:
     comparison: ComparisonBand
     whole: Decomposition
     forces: Decomposition  # filtered, edges cut; its states are those of `whole`, cut
-    motion: PlatenMotion  # the same
+    motion: PlatenMotion  # filtered and cut alike
+    inside: slice  # samples of `whole` that are compared
     delays: Mapping[str, Delay]  # removed, by group
     notes: tuple[str, ...]  # sources of motion and forces
 
@@ -80,11 +80,9 @@ class Decomposed:
         """Sample interval [s]."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
-    @property
-    def inside(self) -> slice:
-        """Samples of `whole` that are compared."""
-        cut = (len(self.whole.states.time) - len(self.time)) // 2
-        return slice(cut, cut + len(self.time))
+    def compared(self, values: Array) -> Array:
+        """Values (n, ...) at all samples, filtered and cut as `forces` are."""
+        return np.asarray(self.comparison.band.apply(values, self.dt)[self.inside])
 
 
 def decompose_numbers() -> Parameters:
@@ -107,101 +105,91 @@ def decompose_record(
     short; SimulationError for a specimen with joints.
     """
     check_usable(machine, record)
-    comparison = _comparison(cutoff)
-    if (rate := 1.0 / sample_interval(record)) <= comparison.band.high:
+    numbers, dt, plant = decompose_numbers(), sample_interval(record), make_plant(machine)
+    high = numbers.number("comparison.cutoff") if cutoff is None else cutoff
+    if not high > 0.0:
+        raise RecordError(f"the cutoff must be above zero (got {high:g} Hz)")
+    if 1.0 / dt <= high:
         raise RecordError(
-            f"{source_of(record)}: {rate:g} samples per second are too few to compare forces up "
-            f"to {comparison.band.high:g} Hz; lower the cutoff"
+            f"{source_of(record)}: {1.0 / dt:g} samples per second are too few to compare forces up "
+            f"to {high:g} Hz; lower the cutoff"
         )
-    plant = make_plant(machine)
+    band = Band(high=high, order=int(numbers.number("comparison.order")))
+    comparison = ComparisonBand(band, numbers.number("comparison.edge"))
     policy = AS_RECORDED
-    if not is_measured(record):
+    if is_measured(record):
+        sensors, policy = sensors or load_sensors(), EACH_TEST if align else AS_RECORDED
+    else:
         require(record, *MOTION)
         sensors = None
-    else:
-        sensors = load_sensors() if sensors is None else sensors
-        policy = EACH_TEST if align else AS_RECORDED
     delays = find_delays(plant, [record], policy)
-    test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=comparison.band))
-    whole, notes = take_apart(plant, test)
+    test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=band))
+    whole, notes = decompose_test(plant, test)
     if delays:
-        taken = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
-        notes = (*notes, f"Skews removed: {taken}.")
+        removed = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
+        notes = (*notes, f"Skews removed: {removed}.")
     n, cut = test.samples, round(comparison.edge / test.dt)
     if n - 2 * cut < 4 * cut:
         raise RecordError(
             f"{source_of(record)}: {n * test.dt:.3g} s are too short; {comparison.edge:g} s at each end are cut off"
         )
-    forces, motion = filtered(whole, test.motion, comparison.band, test.dt, slice(cut, n - cut))
-    return Decomposed(test, sensors, comparison, whole, forces, motion, delays, notes)
+    inside = slice(cut, n - cut)
+    forces, motion = _filtered(whole, test.motion, band, test.dt, inside)
+    return Decomposed(test, sensors, comparison, whole, forces, motion, inside, delays, notes)
 
 
-def take_apart(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[str, ...]]:
+def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[str, ...]]:
     """Inverse dynamics of a test, and notes on the sources of its forces and motion."""
     record, force = test.record, actuator_forces(plant.machine, test.channels)
     if force is None:
         if "chamber_pressure_a" in test.channels:
             require(record, "chamber_pressure_b")
-        what = "has neither actuator_force nor chamber_pressure_a; forces come from one of them"
-        raise RecordError(f"{source_of(record)}: {what}")
+        raise RecordError(
+            f"{source_of(record)}: has neither actuator_force nor chamber_pressure_a; forces come from one of them"
+        )
     by_pressures = "Actuator forces from their chamber pressures, P_A A_1 − P_B A_2."
-    words = ["Actuator forces as measured." if "actuator_force" in test.channels else by_pressures]
+    notes = ["Actuator forces as measured." if "actuator_force" in test.channels else by_pressures]
     struts = test.channels.get("strut_pressure") if plant.machine.struts else None
     if plant.machine.struts and struts is None:
-        words.append("Strut pressures were not measured: struts as modelled.")
-    at_steps = not test.used and _at_model_step(record)
+        notes.append("Strut pressures were not measured: struts as modelled.")
+    at_steps = not test.used and _at_model_steps(record)
     if test.used:
-        words.append(f"Platen motion fused from {', '.join(test.used)}.")
+        notes.append(f"Platen motion fused from {', '.join(test.used)}.")
     else:
-        words.append(
-            "Simulated without noise: the platen's motion is the record's own"
-            + (", at the model's steps; forces use the velocity of the step." if at_steps else ".")
-        )
-    time, path = record["time"].values, test.path
-    found = inverse_dynamics(plant, time, test.motion, force, struts, path=path, model_step=at_steps)
-    return found, tuple(words)
+        step = ", at the model's steps; forces use the velocity of the step." if at_steps else "."
+        notes.append(f"Simulated without noise: the platen's motion is the record's own{step}")
+    time = record["time"].values
+    found = inverse_dynamics(plant, time, test.motion, force, struts, path=test.path, model_step=at_steps)
+    return found, tuple(notes)
 
 
-def filtered(
+def _filtered(
     found: Decomposition, motion: PlatenMotion, band: Band, dt: float, inside: slice
 ) -> tuple[Decomposition, PlatenMotion]:
     """Forces and motion in a band, samples `inside` of them; hidden states and coordinates are cut only."""
 
-    def seen(x: Array) -> Array:
+    def part(x: Array) -> Array:
         return np.asarray(band.apply(x, dt)[inside])
 
-    states = found.states._replace(
-        **{name: getattr(found.states, name)[inside] for name in ("time", "q", "v", "a", "z")}
-    )
-    ledger = replace(
-        found.ledger,
-        time=found.ledger.time[inside],
-        force=seen(found.ledger.force),
-        wrench=seen(found.ledger.wrench),
-        inertia=seen(found.ledger.inertia),
-    )
-    cut = replace(
+    states, ledger = found.states, found.ledger
+    cut = {name: getattr(states, name)[inside] for name in ("time", "q", "v", "a", "z")}
+    forces = replace(
         found,
-        states=states,
-        ledger=ledger,
-        component_force=seen(found.component_force),
-        component_wrench=seen(found.component_wrench),
+        states=states._replace(**cut),
+        ledger=replace(
+            ledger,
+            time=ledger.time[inside],
+            force=part(ledger.force),
+            wrench=part(ledger.wrench),
+            inertia=part(ledger.inertia),
+        ),
+        component_force=part(found.component_force),
+        component_wrench=part(found.component_wrench),
     )
-    return cut, PlatenMotion(*map(seen, motion))
+    return forces, PlatenMotion(*map(part, motion))
 
 
-# ---------------------------------------------------------------------------------------------- helpers
-def _comparison(cutoff: float | None) -> ComparisonBand:
-    numbers = decompose_numbers()
-    high = numbers.number("comparison.cutoff") if cutoff is None else cutoff
-    if not high > 0.0:
-        raise RecordError(f"the cutoff must be above zero (got {high:g} Hz)")
-    return ComparisonBand(
-        Band(high=high, order=int(numbers.number("comparison.order"))), numbers.number("comparison.edge")
-    )
-
-
-def _at_model_step(record: xr.Dataset) -> bool:
+def _at_model_steps(record: xr.Dataset) -> bool:
     """Whether the samples of a simulated record are the steps of a semi-implicit run."""
     rate = 1.0 / sample_interval(record)
     steps = float(record.attrs.get("steps_per_second", np.nan))

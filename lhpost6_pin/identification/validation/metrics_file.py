@@ -6,11 +6,9 @@ from typing import Any
 
 from ...core.files import write_whole
 from ...core.jsonable import as_json
-from .band_spectra import Spectrum
 from .phases import PHASES, Phase
-from .resonance import Peak, Resonance
+from .spectra import Peak, Resonance, Spectrum, Valves
 from .validate import Validation
-from .valve_agreement import Valves
 
 __all__ = ["metrics", "save_metrics"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from ...core.arrays import Array, Mask
 from ...data.channels import LAYOUT, channel_unit
 from ...data.signals import align, correlation, delay, drift_rate, peak_ratio, rrmse
-from .metrics import Numbers
+from .prepare_tests import Numbers
 
 __all__ = ["MOTIONS", "ColumnAgreement", "ComparedQuantity", "agree", "unit_of"]
 

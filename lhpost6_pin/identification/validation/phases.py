@@ -9,20 +9,27 @@ Each phase engages more of the model: platen, struts and friction; then the oil;
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+import numpy as np
+import xarray as xr
+
+from ...control import ControllerSettings, load_controller
 from ...core.arrays import Array
-from ...core.errors import LhpostError
-from ...core.names import AXES
+from ...core.errors import LhpostError, RecordError
+from ...core.files import shipped
+from ...core.names import AXES, SAMPLE_RATE
+from ...data.records import require
+from ...data.signals import differentiate, resample_band_limited
+from ...motions import Reference, Target
 from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
-from ..decompose.record import take_apart
-from .band_spectra import Spectrum, estimate_spectrum
-from .closed_loop import Lag, drive_of, settings_of
-from .metrics import ComparisonBasis
+from ...tuning.drives import load_drive
+from ..decompose.record import decompose_test
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
-from .prepare_tests import PreparedTest, wrench_calibration
-from .resonance import Resonance
-from .simulated_phases import SimulatedComparison
+from .prepare_tests import ComparisonBasis, PreparedTest, wrench_calibration
+from .simulated_phases import Lag, SimulatedComparison
+from .spectra import Resonance, Spectrum, estimate_spectrum
 
 __all__ = ["PHASES", "Phase", "run_phase"]
 
@@ -73,7 +80,7 @@ def run_phase(number: int, test: PreparedTest, basis: ComparisonBasis) -> Phase:
 def _inverse_dynamics(test: PreparedTest, basis: ComparisonBasis) -> Phase:
     numbers, axes = basis.numbers, test.plant.axes
     columns = tuple(AXES[k] for k in axes)
-    (found, notes), (again, _) = (take_apart(test.plant, one) for one in (test.test, test.again))
+    (found, notes), (again, _) = (decompose_test(test.plant, one) for one in (test.test, test.again))
     calibration = wrench_calibration(test, basis.sensors)[axes]
     pairs = []
     for quantity, *sides in _SIDES:
@@ -97,8 +104,8 @@ def _open_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
 
 
 def _closed_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
-    settings, note = settings_of(test.test.record, basis.settings)
-    target, drive = drive_of(test.test.record, settings, basis.numbers.number("reference.high"))
+    settings, note = _settings_of(test.test.record, basis.settings)
+    target, drive = _drive_of(test.test.record, settings, basis.numbers.number("reference.high"))
     engine = fastest_engine(test.plant)
     ran = rehearse(test.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
     both = SimulatedComparison(test, ran, None, basis)
@@ -118,3 +125,45 @@ def _of_run(
     moving = {a.column for a in found if a.quantity == "acceleration" and a.moves}
     shown = tuple(r for r in both.resonances() if r.column in moving)
     return Phase(number, test.name, both.time, tuple(pairs), found, both.spectrum(), shown, notes=tuple(both.notes))
+
+
+def _settings_of(record: xr.Dataset, given: ControllerSettings | None) -> tuple[ControllerSettings, str]:
+    """Given settings, else the shipped ones that the record's attribute `controller` names; and a note on which.
+
+    Raises RecordError where neither is known.
+    """
+    name = record.attrs.get("controller")
+    loop = "closed loop with the controller"
+    if given is not None and name != given.name:
+        named = "no controller" if name is None else f"“{name}”"
+        return given, f"{loop} given, “{given.name}”; the record names {named}: settings may differ"
+    known = ((file, load_controller(file)) for file in shipped("controllers"))
+    settings = given or next((s for file, s in known if name in (file, s.name)), None)
+    if settings is None:
+        named = "no controller" if name is None else f"the controller {name!r}, which is not shipped"
+        raise RecordError(f"the record names {named}; give its settings as a TOML file with --controller")
+    return settings, f"{loop} that the record names, “{settings.name}”"
+
+
+def _drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:
+    """Target at the controller's rate, and the drive (n, 6) if the test replayed one.
+
+    Velocity and acceleration of the reference are those stored, else low-passed derivatives up to `high` [Hz]. Raises
+    RecordError without reference_displacement, or for a drive file that is missing or of another mode.
+    """
+    if "drive" in record.attrs:
+        found = load_drive(Path(str(record.attrs["drive"])))
+        if found.mode != settings.mode:
+            raise RecordError(f"{record.attrs['drive']} is for {found.mode} mode; {settings.name} has {settings.mode}")
+        return found.target, found.values
+    require(record, "reference_displacement")
+    time = record["time"].values - float(record["time"][0])
+    dt = float(time[-1]) / (len(time) - 1)
+    clock = np.arange(int(time[-1] * SAMPLE_RATE + 1e-6) + 1) / SAMPLE_RATE
+    motion = [record["reference_displacement"].values]
+    for name in ("reference_velocity", "reference_acceleration"):
+        motion.append(record[name].values if name in record else differentiate(motion[-1], dt, high))
+    x, v, a = (resample_band_limited(values, time, clock) for values in motion)
+    axes = tuple((axis, axis) for axis in AXES)
+    name = str(record.attrs.get("test", "test"))
+    return Target(clock, x, v, a, Reference(name, "reference of the record", 1.0, axes, 0.0, high, 0.0)), None

@@ -1,33 +1,89 @@
-"""A test made ready to be compared: its platen motion and actuator forces, and a second draw of the sensors' noise.
+"""A test prepared for comparison: its platen motion and actuator forces, and a second draw of the sensors' noise.
 
-What sensors leave in a difference is not derived but drawn: the stated noise is added to the record once more, and
-what that changes has the noise's size, through every filter and formula that the test itself goes through.
+The noise of a difference is drawn, not derived: the stated noise is added to the record once more, and the resulting
+change of the difference has the noise's size, through the same filters and formulas as the test itself.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from ...control import ControllerSettings
 from ...core.arrays import Array
+from ...core.files import models_folder
 from ...data.records import require
 from ...data.sensors import SensorSet, add_noise
+from ...data.signals import Band
 from ...machine.machine import Machine
+from ...machine.parameters import Parameters, load_parameters
+from ...mechanics.linearize import OilColumnMode
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion, plant_motion
 from ..inverse_dynamics import leg_wrenches
 from ..prepare import AS_RECORDED, MeasuredTest, check_usable, prepare_test
-from .metrics import ComparisonBasis, Numbers
 
-__all__ = ["PreparedTest", "prepare", "too_short", "total_wrench", "wrench_calibration"]
-
+__all__ = ["ComparisonBasis", "Numbers", "PreparedTest", "prepare", "too_short", "total_wrench", "validation_numbers"]
+__all__ += ["wrench_calibration"]
 
 SEED = 1  # of the second draw of noise: results repeat
 
 
 @dataclass(frozen=True)
+class Numbers:
+    """Numbers of `models/procedures/validate.toml`."""
+
+    stated: Parameters
+
+    def number(self, path: str) -> float:
+        """Number at a path of the file."""
+        return self.stated.number(path)
+
+    @property
+    def band(self) -> Band:
+        """Filter of all that is compared."""
+        return Band(high=self.number("comparison.high"), order=int(self.number("comparison.order")))
+
+    @property
+    def edge(self) -> float:
+        """Length cut off at both ends of a test [s]."""
+        return self.number("comparison.edge")
+
+    @property
+    def longest_delay(self) -> float:
+        """Longest delay that is sought between model and measurement [s]."""
+        return self.number("comparison.longest_delay")
+
+    @property
+    def bands(self) -> tuple[float, ...]:
+        """Edges of the bands of spectra [Hz]."""
+        return self.stated.vector("spectra.edges")
+
+    @property
+    def shortest(self) -> float:
+        """Length of the shortest test that can be compared [s], by the longest delay and the edges."""
+        return 8 * self.longest_delay + 4 * self.edge
+
+
+class ComparisonBasis(NamedTuple):
+    """References by which all tests of a campaign are compared."""
+
+    sensors: SensorSet
+    numbers: Numbers
+    modes: Sequence[OilColumnMode]  # oil columns of the linear model
+    settings: ControllerSettings | None  # in place of those that records name
+
+
+def validation_numbers() -> Numbers:
+    """Read `models/procedures/validate.toml`."""
+    return Numbers(load_parameters(models_folder() / "procedures" / "validate.toml"))
+
+
+@dataclass(frozen=True)
 class PreparedTest:
-    """A test, ready to be compared with the model of its machine."""
+    """A test, prepared for comparison with the model of its machine."""
 
     name: str
     plant: Plant  # with the servovalves that were open
@@ -47,12 +103,12 @@ class PreparedTest:
 
 
 def too_short(seconds: float, numbers: Numbers) -> str:
-    """What to say of a test that is too short to be compared."""
+    """Message on a test that is too short to be compared."""
     return f"{seconds:.3g} s are too short to compare; {numbers.shortest:.3g} s are needed"
 
 
 def prepare(machine: Machine, record: xr.Dataset, basis: ComparisonBasis) -> PreparedTest:
-    """Make an aligned record ready; raises RecordError naming the channels without which there is no platen motion."""
+    """Prepare an aligned record; raises RecordError naming the channels without which there is no platen motion."""
     require(record, "time")
     table, sensors = machine.as_tested(record.attrs, "the test"), basis.sensors
     check_usable(table, record)
@@ -70,10 +126,7 @@ def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
 
 
 def wrench_calibration(test: PreparedTest, sensors: SensorSet) -> Array:
-    """Standard deviation (6,) that gains and offsets of force sensors leave in the mean of the measured wrench at C.
-
-    nan where forces were not measured.
-    """
+    """Standard deviation (6,) of the measured wrench's mean at C by gains and offsets of force sensors; nan without."""
     force = test.test.channels.get("actuator_force")
     if force is None:
         return np.full(6, np.nan)

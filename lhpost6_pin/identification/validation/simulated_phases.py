@@ -1,6 +1,7 @@
 """A simulated run in open or closed loop, compared with the test that it repeats."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,14 +12,19 @@ from ...data.signals import Band, delay, resample_band_limited
 from ...mechanics.pose import PlatenMotion
 from ...simulation.rehearse import SimulatedTest
 from ..prepare import actuator_forces
-from .band_spectra import Spectrum, estimate_spectrum
-from .closed_loop import Lag
-from .metrics import ComparisonBasis
 from .phase_agreement import MOTIONS, ComparedQuantity
-from .prepare_tests import PreparedTest, too_short, total_wrench, wrench_calibration
-from .resonance import Resonance, estimate_response, find_resonances
+from .prepare_tests import ComparisonBasis, PreparedTest, too_short, total_wrench, wrench_calibration
+from .spectra import Resonance, Spectrum, estimate_response, estimate_spectrum, find_resonances
 
-__all__ = ["SimulatedComparison"]
+__all__ = ["Lag", "SimulatedComparison"]
+
+
+class Lag(NamedTuple):
+    """Delay of one axis behind the target, of measurement and model [s]."""
+
+    column: str
+    measured: float
+    model: float
 
 
 class SimulatedComparison:

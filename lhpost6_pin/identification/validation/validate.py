@@ -21,10 +21,9 @@ from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
 from ..prepare import SIGNIFICANT, find_delays
-from .metrics import ComparisonBasis, Numbers, validation_numbers
 from .phases import PHASES, Phase, run_phase
-from .prepare_tests import prepare, too_short
-from .valve_agreement import Valves, find_valves
+from .prepare_tests import ComparisonBasis, Numbers, prepare, too_short, validation_numbers
+from .spectra import Valves, find_valves
 
 __all__ = ["Validation", "validate"]
 
@@ -39,7 +38,7 @@ class Validation:
     machine: Machine
     sensors: SensorSet
     numbers: Numbers
-    skews: Mapping[str, Delay]  # between channel groups, taken out of all records
+    skews: Mapping[str, Delay]  # between channel groups, removed from all records
     valves: Valves | None  # delays of spools behind their commands; None where either was not recorded
     phases: tuple[Phase, ...]  # test by test
 

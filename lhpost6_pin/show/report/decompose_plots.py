@@ -8,7 +8,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.names import AXES
 from ...identification.decompose import Decomposed, Work, WrenchAgreement
-from ...identification.decompose.work import delivered_by
+from ...identification.decompose.dataset import delivered_by
 from .force_grid import SIX_ROWS, force_grid
 from .page import Block, Figure, details
 from .plots import ACHIEVED, TARGET, VERMILLION, Row, Trace, palette, palette_traces, time_figure

@@ -1,7 +1,8 @@
-"""Mass balance of chambers along a measured test, sample by sample: the compiled part of the residual `flow`.
+"""Residuals sample by sample, the compiled part: wrenches on the platen, and the mass balance of chambers.
 
-Pressures and spools are measured; what else the oil remembers, flow through lines and from the supply, is marched along
-them by the simulation's kernels.
+Wrenches are at B in platen axes on the platen's free axes until they are summed; results are at C in {c}. Of the oil,
+pressures and spools are measured; flow through lines and from the supply is marched along them by the simulation's
+kernels.
 """
 
 from typing import NamedTuple
@@ -12,12 +13,65 @@ from numpy.typing import NDArray
 from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..effects.actuator import advance_line, start_line, supplied
+from ..effects.evaluate import apply_forces
+from ..effects.registry import PORTS
 from ..effects.supply import close_supply, flows_exchanged, shared_states, steady_supply, supply_pressures
 from ..effects.views import view_hydraulic
 from ..laws.hydraulic import leak_flows, oil_modulus, rod_travel, rod_velocity
 from ..laws.supply import varies
+from ..mechanics.plant import Plant
+from ..mechanics.port_path import PortPath
+from ..simulation.ledger import add_at_c, add_row_at_c
 
-__all__ = ["MeasuredOil", "oil_misses"]
+__all__ = ["MeasuredOil", "oil_residuals", "row_wrenches", "wrench_residual"]
+
+
+def wrench_residual(plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array) -> Array:
+    """Required wrench (n, 6) at C in {c} less that of the plant's laws and of measured forces [N, N m].
+
+    required is that of `required_wrench`, z (n, n_states) hidden states, measured (n, n_actuators) forces [N].
+    """
+    rows = plant.rows[plant.rows["spool"] < 0]
+    out = np.zeros((len(z), 6))
+    _residual(rows, plant.tables, ports, required, z, np.ascontiguousarray(measured), out)
+    return out
+
+
+@compiled
+def _residual(rows, tables, ports, required, z, measured, out):
+    s, axes, column = ports.s, tables.axes, ports.column
+    force, port_force = np.zeros((rows.size, len(PORTS))), np.zeros(s.shape[1])
+    frame, rest = np.zeros((8, 3)), np.zeros((1, 6))
+    for k in range(s.shape[0]):
+        apply_forces(rows, s[k], ports.rate[k], z[k], force, port_force)
+        for i in range(measured.shape[1]):
+            port_force[i] += measured[k, i]
+        for j in range(axes.size):
+            given = 0.0
+            for i in range(port_force.size):
+                given += column[k, i, axes[j]] * port_force[i]
+            rest[0, axes[j]] = required[k, axes[j]] - given
+        frame[:3] = ports.turn[k]
+        add_at_c(1.0, rest, 0, tables.body[0].rho_c, frame, out[k])
+
+
+def row_wrenches(plant: Plant, ports: PortPath, z: Array, rows: NDArray[np.void]) -> Array:
+    """Wrenches (n, k, 6) at C in {c} [N, N m] of k rows of the plant's effects that take no spool."""
+    out = np.zeros((len(z), len(rows), 6))
+    _row_wrenches(np.ascontiguousarray(rows), plant.body, ports, z, out)
+    return out
+
+
+@compiled
+def _row_wrenches(rows, body, ports, z, out):
+    s = ports.s
+    force, port_force = np.zeros((rows.size, len(PORTS))), np.zeros(s.shape[1])
+    frame, rho = np.zeros((8, 3)), body[0].rho_c
+    for k in range(s.shape[0]):
+        apply_forces(rows, s[k], ports.rate[k], z[k], force, port_force)
+        frame[:3] = ports.turn[k]
+        for i in range(rows.size):
+            add_row_at_c(force[i], ports.column[k], rows[i], rho, frame, out[k, i])
 
 
 class MeasuredOil(NamedTuple):
@@ -31,7 +85,7 @@ class MeasuredOil(NamedTuple):
 
 
 @compiled
-def oil_misses(rows, supply, oil, ports, z, drooped, flow):
+def oil_residuals(rows, supply, oil, ports, z, drooped, flow):
     """Fill drooped (n,), the supply's pressure [Pa], and flow (n, n_chambers) [m3/s], which may have no columns.
 
     rows are the actuators', oil is `MeasuredOil`, ports the path of the ports, z (n_states,) scratch.
@@ -43,12 +97,12 @@ def oil_misses(rows, supply, oil, ports, z, drooped, flow):
         if flow.shape[1] > 0:
             for i in range(rows.size):
                 at, speed = ports.s[k, rows[i].port], ports.rate[k, rows[i].port]
-                _flow_misses(k, rows[i], oil, (high, low), (at, speed), z, flow[k])
+                _flow_residuals(k, rows[i], oil, (high, low), (at, speed), z, flow[k])
 
 
 @compiled
 def _follow_supply(k, rows, oil, supply, z, last):
-    """Put the oil of sample k into z (n_states,), pressures as measured; returns supply and return pressure [Pa].
+    """Set the oil of sample k in z (n_states,), pressures as measured; returns supply and return pressure [Pa].
 
     last (4,) keeps the supply's flows for the next sample.
     """
@@ -67,7 +121,7 @@ def _follow_supply(k, rows, oil, supply, z, last):
 
 
 @compiled
-def _flow_misses(k, row, oil, supply, rod, z, flow):
+def _flow_residuals(k, row, oil, supply, rod, z, flow):
     """Fill a row's chambers in flow (n_chambers,): V / beta dP/dt + A dL/dt - Q [m3/s].
 
     supply holds its two pressures [Pa], rod its actuator's elongation [m] and velocity [m/s].

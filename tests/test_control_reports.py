@@ -216,7 +216,7 @@ def test_a_sine_off_its_goals_says_which(tmp_path, sine, changes, level, said):
 
 def test_errors_too_small_to_matter_are_rounded_with_their_sign(tmp_path, sine):
     after = replace(sine.after, amplitude_error=6.9e-6, phase_error=-1e-5, distortion_displacement=6.6e-7)
-    words = Reader(write_sine_report(replace(sine, after=after), tmp_path / "s.html")).words
+    words = Reader(write_sine_report(replace(sine, after=after), tmp_path / "s.html")).words.replace("\xa0", " ")
     assert "amplitude error is +0.001 % and the phase error 0.00°" in words
     assert "< 0.0001 %" in words
 

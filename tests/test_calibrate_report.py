@@ -17,8 +17,8 @@ from lhpost6_pin.identification.calibration.calibration_summary import (
     cut_strokes,
 )
 from lhpost6_pin.identification.calibration.override import save_override
+from lhpost6_pin.identification.calibration.result import changed_parameters, contradictions, out_of_range, verdict_on
 from lhpost6_pin.identification.calibration.sensor_errors import SensorUnknown
-from lhpost6_pin.identification.calibration.verdicts import changed_parameters, contradictions, out_of_range, verdict_on
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report import write_calibrate_report

@@ -17,22 +17,19 @@ from lhpost6_pin.data.campaign import Campaign, save_campaign
 from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
-from lhpost6_pin.discovery.add_effects import _fit_jointly
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.formula import sparse_formula
-from lhpost6_pin.discovery.linearisation import Linearisation, linearise
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
-from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, with_residual_function
+from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import _by_rank, score_pairs
-from lhpost6_pin.discovery.search import _pruned, _without
-from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Scored
+from lhpost6_pin.discovery.search import _fit_jointly, _pruned, _without
+from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
 from lhpost6_pin.discovery.verdict import reject_effects
-from lhpost6_pin.discovery.verdict_summary import summary
+from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table

@@ -1,4 +1,4 @@
-"""Discovery: where a model and measured tests disagree, the name of what is missing, and the proof."""
+"""Discovery: identification of effects that a model lacks, validated on held-out tests."""
 
 from .discover import Discovery, discover
 from .verdict import EffectFinding, Estimate, Verdict

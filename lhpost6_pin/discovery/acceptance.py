@@ -32,7 +32,7 @@ class Reweighting:
     """Log-likelihood of the residual with and without a candidate, each weighed by its own power."""
 
     def __init__(self, found: Search, background: Background) -> None:
-        """Of a search, about the solution that `background` belongs to."""
+        """Of a search, about the solution of `background`."""
         self.problem, self.background = found.refit.normal.problem, background
         self.first = squares_by_column(found.refit.normal.residual)
         self.doubt, self.much = found.numbers.number("accept.doubt"), found.numbers.number("accept.gain")

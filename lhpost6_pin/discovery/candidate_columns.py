@@ -14,7 +14,7 @@ from ..effects.registry import LAWS
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
 from ..identification.residual_kernels import row_wrenches
-from ..identification.residuals import RESIDUALS, Residuals, follow
+from ..identification.residuals import RESIDUALS, follow
 from ..machine.machine import Machine
 from ..mechanics.plant import make_plant
 from .candidates import Candidate
@@ -61,7 +61,7 @@ def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate)
 
 
 def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
-    """Wrench of each candidate's force, all in one machine; the actuators give so much less."""
+    """Wrench of each candidate's force, all in one machine; it reduces the required actuator wrench."""
     size = candidates[0].amplitudes[0].typical
     machine: Machine = base.plant.machine
     known = len(machine.effects)
@@ -75,13 +75,9 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         force = test.channels.get("actuator_force")
         z = path.z if force is None else with_loads(plant, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
-        changes = []
-        for i in range(len(candidates)):
-            own = wrench[:, rows["effect"] == known + i].sum(axis=1)
-            change = Residuals(-own / size, *(np.zeros((test.samples, 0)) for _ in RESIDUALS[1:]))
-            changes.append(problem.bins(change, test.dt)[0])
-        found.append(np.stack(changes, axis=-1))
-    return _whitened(problem, found)
+        own = [wrench[:, rows["effect"] == known + i].sum(axis=1) for i in range(len(candidates))]
+        found.append(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size))
+    return found
 
 
 def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Columns:
@@ -94,7 +90,4 @@ def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Col
 
 
 def _whitened(problem: Problem, bins: Sequence[Complex]) -> Columns:
-    return [
-        problem.whitener.apply(t, np.asarray(b, np.complex128), f)
-        for t, (b, f) in enumerate(zip(bins, problem.frequency, strict=True))
-    ]
+    return [problem.whitener.apply(t, b, f) for t, (b, f) in enumerate(zip(bins, problem.frequency, strict=True))]

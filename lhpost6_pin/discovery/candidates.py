@@ -109,7 +109,7 @@ class Candidate:
 
 
 def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[FreeParameter, ...]]:
-    """The machine with the library's effects of the background, at zero, alike for each kind; and their parameters.
+    """The machine with the library's effects of the background, at zero, one of each for a kind; and their parameters.
 
     spread is the standard deviation of an amplitude in typical ones.
     """

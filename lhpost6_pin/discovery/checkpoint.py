@@ -2,7 +2,6 @@
 
 import hashlib
 import logging
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +10,6 @@ import joblib
 
 from .. import __version__
 from ..core.files import write_whole
-from ..data.sensors import SensorSet
 from ..machine.machine import Machine
 from ..machine.machine_toml import machine_toml
 from .search_state import Search
@@ -55,20 +53,12 @@ class Checkpoint:
             self.path.unlink(missing_ok=True)
 
 
-def make_checkpoint(
-    folder: Path | None,
-    machine: Machine,
-    sensors: SensorSet,
-    hashes: Mapping[str, str],
-    hold_out: Sequence[str] | None,
-    seed: int,
-) -> Checkpoint:
-    """A checkpoint in a folder for a search with these inputs, named by their hash.
+def make_checkpoint(folder: Path | None, machine: Machine, *inputs: object) -> Checkpoint:
+    """A checkpoint in a folder for a search with a machine and other inputs, named by the hash of their `repr`.
 
     An effect made by hand cannot be hashed: a machine with one gets a checkpoint without a path.
     """
     if folder is None or machine.own_effects:
         return Checkpoint(None)
-    inputs = (__version__, machine_toml(machine), repr(machine.specimen), repr(sensors), dict(hashes), hold_out, seed)
-    digest = hashlib.sha256(repr(inputs).encode()).hexdigest()
-    return Checkpoint(folder / f".unfinished-{digest[:16]}.joblib")
+    known = repr((__version__, machine_toml(machine), machine.specimen, *inputs))
+    return Checkpoint(folder / f".unfinished-{hashlib.sha256(known.encode()).hexdigest()[:16]}.joblib")

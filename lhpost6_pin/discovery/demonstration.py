@@ -3,23 +3,22 @@
 The hidden effect and the tests are those of `models/procedures/demo.toml`; the search is that of `discover`.
 """
 
-from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from ..control import load_controller
+from ..core.progress import Progress
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
 from ..machine.machine import Machine
 from ..simulation.rehearse import replay
 from ..simulation.simulated_campaign import load_procedure, simulate_campaign
-from . import Discovery, discover
+from .discover import discover
 
 __all__ = ["EARTHQUAKE", "OpenLoops", "hidden_effect", "measured_tests", "open_loops", "searched"]
-
-Progress = Callable[[float], None]
 
 PROCEDURE = "demo"
 EARTHQUAKE = "EQ"
@@ -54,19 +53,8 @@ def measured_tests(machine: Machine, sensors: SensorSet, *, seed: int, progress:
     return simulate_campaign(table, settings, sensors, seed=seed, name="demo", procedure=PROCEDURE, progress=progress)
 
 
-def searched(
-    machine: Machine,
-    tests: Campaign,
-    sensors: SensorSet,
-    *,
-    seed: int,
-    jobs: int = -1,
-    progress: Progress | None = None,
-) -> Discovery:
-    """Result of the search, given the machine without the effect; see `discover`."""
-    return discover(
-        machine, tests, sensors, hold_out=[EARTHQUAKE], phases=(1, 2), seed=seed, jobs=jobs, progress=progress
-    )
+searched = partial(discover, hold_out=[EARTHQUAKE], phases=(1, 2))
+"""Result of the search, given the machine without the effect; see `discover`."""
 
 
 def open_loops(machine: Machine, found: Machine, tests: Campaign) -> OpenLoops:

@@ -3,7 +3,6 @@
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +26,11 @@ from ..mechanics.plant import make_plant
 from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
 from .held_out import Proof, prove
-from .linearisation import linearise
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
 from .search import refit, search
-from .search_state import Search, fitted_machine
+from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
 from .verdict import Verdict, judge
 
@@ -52,7 +50,6 @@ class Discovery:
     held_out: tuple[str, ...]  # tests that were not
     verdict: Verdict
     search: Search
-    residual_functions: tuple[ResidualFunction, ...]
     proof: Proof | None  # None where no test was held out
     next_tests: tuple[NextTest, ...]  # simulated: tests that would discriminate between rivals
     numbers: Parameters
@@ -73,19 +70,18 @@ def discover(
     unfinished: Path | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
-    """Find what a machine's model lacks to explain a campaign.
+    """Identify the effects that a machine's model lacks to explain a campaign.
 
     hold_out are tests for validation, not searched; None: with more than three tests, the least informative one. phases
-    are those of that validation. Deterministic for a seed (of the simulated noise), whatever the number of `jobs`
+    are those of that validation. Deterministic for a seed (of the simulated noise), independent of the number of `jobs`
     (threads; -1: one a core). `propose` simulates tests that would discriminate between rivals where the verdict is
     ambiguous. The folder `unfinished` holds a checkpoint until the search ends; an interrupted search with the same
     inputs resumes from it and reaches the same verdict.
 
-    Raises UnknownNameError for a test that the campaign has not; RecordError where no test is left to search; and what
-    `calibrate` raises.
+    Raises UnknownNameError for a test that is not in the campaign; RecordError where no test is left to search; and
+    what `calibrate` raises.
     """
-    report = progress or (lambda share: None)
-    numbers, calibration = discovery_numbers()
+    report, (numbers, calibration) = progress or (lambda share: None), discovery_numbers()
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     plant = make_plant(machine)
     lost = lost_motion(plant, campaign.records, sensors, numbers)
@@ -96,11 +92,15 @@ def discover(
     checkpoint = make_checkpoint(unfinished, machine, sensors, hashes, hold_out, seed)
     begun = checkpoint.read()
     if begun is None:
-        others, preload = partial(_others, numbers=numbers), numbers.number("scatter.preload")
+        n = numbers.number
         problem = prepare_problem(
             *(machine, records, sensors, calibration),
-            kinds=RESIDUALS, others=others, preload=preload, seed=seed, jobs=jobs,
-        )  # fmt: skip
+            kinds=RESIDUALS,
+            others=lambda m: (with_other_form(m, n("scatter.form")), with_warm_oil(m, n("scatter.drift"))),
+            preload=n("scatter.preload"),
+            seed=seed,
+            jobs=jobs,
+        )
         report(0.1)
         part = between(report, 0.1, 0.38)
         begun = _begin(problem, held, numbers, calibration, hold_one_out=hold_out is None, progress=part)
@@ -111,23 +111,21 @@ def discover(
         begun.search, lambda one: checkpoint.write(begun._replace(search=one)), between(report, 0.4, 0.75)
     )
     misfit = found.misfit("wrench")
-    left = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
-    instead: tuple[ResidualFunction, ...] = ()
+    beside = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
+    replacing: tuple[ResidualFunction, ...] = ()
     forces = any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added)
     if forces and misfit > numbers.number("accept.settled"):  # else no function could fit far better
-        instead = fit_residual_functions(found, linearise(found.refit, calibration))
+        replacing = fit_residual_functions(found, linearise(found.refit, calibration))
     report(0.8)
-    proof = None
-    if held:
-        part = between(report, 0.8, 0.95)
-        proof = prove(machine, found, [records[i] for i in held], sensors, phases=phases, jobs=jobs, progress=part)
-    verdict = judge(found, left, instead, faults)
+    out, part = [records[i] for i in held], between(report, 0.8, 0.95)
+    proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
+    verdict = judge(found, beside, replacing, faults)
     ambiguous = propose and verdict.word == "ambiguous"
     tests = next_tests(found, load_controller("lhpost6"), sensors) if ambiguous else ()
     checkpoint.remove()
     report(1.0)
     function = verdict.residual_function
-    fitted = fitted_machine(found.refit if any(function is one for one in instead) else found.solution)
+    fitted = fitted_machine(found.refit if any(function is one for one in replacing) else found.solution)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
@@ -136,7 +134,6 @@ def discover(
         held_out=tuple(names[i] for i in held),
         verdict=verdict,
         search=found,
-        residual_functions=left,
         proof=proof,
         next_tests=tests,
         numbers=numbers,
@@ -175,14 +172,8 @@ def discovery_numbers() -> tuple[Parameters, Parameters]:
     return numbers, replace(common, quantities={**common.quantities, **own})
 
 
-def _others(machine: Machine, numbers: Parameters) -> tuple[Machine, ...]:
-    """Equally plausible machines: with friction of another form, or with oil warmer in one test than in others."""
-    form, drift = numbers.number("scatter.form"), numbers.number("scatter.drift")
-    return with_other_form(machine, form), with_warm_oil(machine, drift)
-
-
 def _held_out(names: Sequence[str], wanted: Sequence[str] | None) -> tuple[int, ...]:
-    """Places of the tests that are to be held out."""
+    """Places of the tests to hold out."""
     for name in wanted or ():
         if name not in names:
             raise UnknownNameError("test of the campaign", name, list(names))
@@ -193,7 +184,7 @@ def _held_out(names: Sequence[str], wanted: Sequence[str] | None) -> tuple[int, 
 
 
 def _least_informative(first: NormalEquations) -> int:
-    """The test without which the others are most informative on the machine's parameters, whatever it measured."""
+    """The test whose removal leaves the most information on the machine's parameters."""
     count = len(first.problem.parameters)
     prior = first.problem.prior[:count]
     own = [first.of([t])[0][:count, :count] * np.outer(prior, prior) for t in range(len(first.residual))]

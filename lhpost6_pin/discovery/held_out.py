@@ -5,16 +5,18 @@ of a phase of a test is the RMS, over all columns that move, of the model's erro
 noise, so that noise alone gives one (the floor); closure = (refitted - after) / (refitted - floor).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from ..core.progress import Progress
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
 from ..identification.calibration.sensor_errors import corrected_record
-from ..identification.validation import PHASES, Phase, Validation, validate
+from ..identification.validation import PHASES, Phase, validate
 from ..machine.machine import Machine
 from .search_state import Search, fitted_machine
 
@@ -47,14 +49,10 @@ class Gap:
         return (self.refitted - self.after) / open_ if open_ > 0.1 else float("nan")
 
 
-@dataclass(frozen=True)
-class Proof:
-    """Gaps on held-out tests, and the validations that they come from."""
+class Proof(NamedTuple):
+    """Validation on held-out tests."""
 
     gaps: tuple[Gap, ...]
-    delivered: Validation
-    refitted: Validation
-    after: Validation
 
 
 def prove(
@@ -65,22 +63,17 @@ def prove(
     *,
     phases: Sequence[int],
     jobs: int,
-    progress: Callable[[float], None],
+    progress: Progress,
 ) -> Proof:
     """Validate the three models on held-out records; `machine` is the one delivered."""
-    first = found.refit.normal.problem
-    count = len(first.parameters)
-    before, after = fitted_machine(found.refit), fitted_machine(found.solution)
-    errors = found.refit.x[count:], found.solution.x[len(found.problem.parameters) :]
-    models = (
-        (machine, list(records)),
-        (before, [corrected_record(r, first.unknowns, errors[0]) for r in records]),
-        (after, [corrected_record(r, first.unknowns, errors[1]) for r in records]),
-    )
+    models = [(machine, list(records))]
+    for solution in (found.refit, found.solution):
+        problem = solution.normal.problem
+        errors = solution.x[len(problem.parameters) :]
+        models.append((fitted_machine(solution), [corrected_record(r, problem.unknowns, errors) for r in records]))
     done = []
     for i, (model, some) in enumerate(models):
-        campaign = Campaign("held out", tuple(some))
-        done.append(validate(model, campaign, sensors=sensors, phases=phases, jobs=jobs, progress=None))
+        done.append(validate(model, Campaign("held out", tuple(some)), sensors=sensors, phases=phases, jobs=jobs))
         progress((i + 1) / len(models))
     gaps = []
     for test in done[0].tests:
@@ -88,7 +81,7 @@ def prove(
             sizes = [_size(v.phase(test, number)) for v in done]
             if np.all(np.isfinite(sizes)):
                 gaps.append(Gap(PHASES[number], test, *sizes))
-    return Proof(tuple(gaps), *done)
+    return Proof(tuple(gaps))
 
 
 def _size(phase: Phase | None) -> float:

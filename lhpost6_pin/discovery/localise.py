@@ -38,17 +38,18 @@ def gap_map(problem: Problem, residual: Sequence[Complex]) -> list[list[Spot]]:
     """Of every column of a problem's residuals its spots by rising frequency; `residual` by test (m, c)."""
     edges = problem.whitener.edges
     bands = list(pairwise(float(edges[k]) for k in (*_GROUPS, len(edges) - 1)))
-    ends = [*(high for _, high in bands[:-1]), np.inf]
-    inside = [[(f >= low) & (f < end) for f in problem.frequency] for (low, _), end in zip(bands, ends, strict=True)]
+    starts, f = [low for low, _ in bands], np.concatenate(problem.frequency)
+    group = np.searchsorted(starts, f, side="right") - 1
+    squares = np.abs(np.concatenate(residual)) ** 2
     found = []
     for kind in RESIDUALS:
         columns = np.flatnonzero(problem.rows(kind))
         for label, column in zip(_labels(problem.machine, kind), columns.tolist(), strict=False):
             spots = []
-            for band, tests in zip(bands, inside, strict=True):
-                squares = np.concatenate([np.abs(r[i, column]) ** 2 for r, i in zip(residual, tests, strict=True)])
-                mean = float(squares.mean()) if squares.size else float("nan")
-                spots.append(Spot(kind, label, band, mean, float(np.sum(squares - 1.0))))
+            for k, band in enumerate(bands):
+                own = squares[group == k, column]
+                mean = float(own.mean()) if own.size else float("nan")
+                spots.append(Spot(kind, label, band, mean, float(np.sum(own - 1.0))))
             found.append(spots)
     return found
 

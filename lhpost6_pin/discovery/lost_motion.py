@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
-from ..core.progress import Progress, between
+from ..core.progress import Progress, split
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import SensorComparison, loose_lengths
 from ..data.sensors import SensorSet
@@ -21,8 +21,8 @@ from ..machine.library import find_family
 from ..machine.parameters import Parameters
 from ..mechanics.plant import Plant
 from .acceptance import squares_by_column
-from .add_effects import with_candidate
 from .candidates import Candidate, first_shape
+from .search import with_candidate
 from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
 __all__ = ["LostMotion", "lost_motion", "with_lost_motion"]
@@ -84,8 +84,8 @@ def _play(parts: Sequence[tuple[SensorComparison, Array]]) -> tuple[float, float
 def with_lost_motion(found: Search, lost: Sequence[LostMotion], progress: Progress) -> Search:
     """The search with the play identified from lengths; one common value where all actuators have similar play."""
     groups = _groups(lost, found)
-    for i, group in enumerate(groups):
-        found = _with_play(found, group, between(progress, i / len(groups), (i + 1) / len(groups)))
+    for group, part in zip(groups, split(progress, len(groups)), strict=True):
+        found = _with_play(found, group, part)
     progress(1.0)
     return found
 

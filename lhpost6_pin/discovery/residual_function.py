@@ -3,6 +3,9 @@
 A force along a leg, or common to all legs of a kind, that is a piecewise linear function of position or velocity, of a
 fading memory of positions or of the travel since, is fitted jointly like a candidate. If it gains, also in
 cross-validation, an effect acts on those legs that the library does not contain.
+
+The function is also stated as a sparse formula, a sum of a few simple forms of x over its largest value, so that every
+coefficient has the function's own unit. Forms are added one by one while Schwarz's criterion falls.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,31 +15,41 @@ from typing import Literal
 import numpy as np
 
 from ..core.arrays import Array, Complex
-from ..identification.calibration.problem import Problem
-from ..identification.calibration.whitened_residuals import spectrum_of
 from ..identification.inverse_dynamics import leg_wrenches
-from ..identification.prepare import MeasuredTest
 from ..laws.lines import filter_shares
 from ..laws.tabulated import NODES
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.pose import leg_displacements, plant_motion
 from .acceptance import Reweighting
-from .formula import Formula, sparse_formula
-from .linearisation import Linearisation
 from .scores import make_block, score
-from .search_state import Search
+from .search_state import Linearisation, Search
 
-__all__ = ["ResidualFunction", "fit_residual_functions", "with_residual_function"]
+__all__ = ["Formula", "ResidualFunction", "fit_residual_functions", "sparse_formula", "with_residual_function"]
 
 State = Literal["position", "velocity", "recent travel", "past position"]
+Form = tuple[Array, tuple[str, ...]]
 
+_MOST = 3  # forms of a formula
+_SHORTEST = 4.0  # values in a wave, at least
 _FAMILY: dict[State, str] = {
     "position": "unnamed_by_position",
     "velocity": "unnamed_by_speed",
     "recent travel": "unnamed_by_memory",
     "past position": "unnamed_by_memory",
 }
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Sum of coefficient times form, and the share of the values' variance that it explains."""
+
+    terms: tuple[tuple[float, str], ...]
+    share: float
+
+    def text(self, unit: str) -> str:
+        """As one line, such as ``1.2e+04 N sin(2 pi x / 0.08 m)``."""
+        return " + ".join(f"{size:.3g} {unit} {form}".rstrip() for size, form in self.terms)
 
 
 @dataclass(frozen=True)
@@ -109,8 +122,8 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
             nodes = np.linspace(low, high, NODES)
             each = [
                 [
-                    _whitened(problem, t, test, -unit[:, i, :, None] * _hats(x[:, i], nodes)[:, None, :])
-                    for t, ((test, _, unit), x) in enumerate(zip(tests, along, strict=True))
+                    problem.of_wrench(t, -unit[:, i, :, None] * _hats(x[:, i], nodes)[:, None, :])
+                    for t, ((_, _, unit), x) in enumerate(zip(tests, along, strict=True))
                 ]
                 for i in members
             ]
@@ -121,7 +134,7 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
 
 
 def _states(numbers: Parameters) -> Iterator[tuple[State, float]]:
-    """States of legs, with the time constants of those with a memory."""
+    """States of legs, with the time constants of those with memory."""
     yield "position", 0.0
     yield "velocity", 0.0
     for memory in numbers.vector("left.memories"):
@@ -149,11 +162,54 @@ def _hats(x: Array, nodes: Array) -> Array:
     return np.asarray(np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) / step))
 
 
-def _whitened(problem: Problem, t: int, test: MeasuredTest, wrench: Array) -> Complex:
-    """Columns (m, c, k) of wrenches (n, 6, k)."""
-    n, axes, count = wrench.shape
-    c = problem.comparison
-    bins, f = spectrum_of(wrench.reshape(n, -1), test.dt, c.bands[0], c.bands[-1], c.edge)
-    out = np.zeros((len(f), sum(problem.widths), count), np.complex128)
-    out[:, problem.rows("wrench")] = bins.reshape(len(f), axes, count)
-    return problem.whitener.apply(t, out, f)
+def sparse_formula(x: Array, value: Array, sd: Array, unit: str) -> Formula:
+    """Formula of values (n,) with deviations sd (n,) at x (n,), which has a unit."""
+    weight = 1.0 / np.maximum(sd, 1e-12 * np.abs(value).max() + 1e-300)
+    forms = _forms(x, unit)
+    chosen: list[Form] = []
+    best, squares, size = _fit(chosen, value, weight)
+    while len(chosen) < _MOST:
+        i = min(range(len(forms)), key=lambda i: _fit([*chosen, forms[i]], value, weight)[0])
+        trial = _fit([*chosen, forms[i]], value, weight)
+        if trial[0] >= best:
+            break
+        best, squares, size = trial
+        chosen.append(forms.pop(i))
+    labels = [label for _, names in chosen for label in names]
+    middle = np.average(value, weights=weight**2)
+    whole = float(np.sum((weight * (value - middle)) ** 2))
+    share = 1.0 - squares / whole if whole > 0.0 else 0.0
+    return Formula(tuple(zip(map(float, size), labels, strict=True)), max(0.0, share))
+
+
+def _forms(x: Array, unit: str) -> list[Form]:
+    """Columns (n, 1 or 2) and their names."""
+    most = float(np.abs(x).max())
+    z, at = x / most, f"(x / {most:.3g} {unit})"
+    found: list[Form] = [
+        (np.ones((len(x), 1)), ("",)),
+        (z[:, None], (at,)),
+        ((z * np.abs(z))[:, None], (f"{at} |{at[1:-1]}|",)),
+        ((z**3)[:, None], (f"{at}^3",)),
+        (np.abs(z)[:, None], (f"|{at[1:-1]}|",)),
+        (np.sign(z)[:, None], ("sgn x",)),
+        (np.tanh(10.0 * z)[:, None], (f"tanh(10 x / {most:.3g} {unit})",)),
+    ]
+    span = float(np.ptp(x))
+    for length in span / np.arange(1.0, (len(x) - 1) / _SHORTEST + 0.01, 0.25):
+        turn = 2.0 * np.pi * x / length
+        names = tuple(f"{wave}(2 pi x / {length:.3g} {unit})" for wave in ("sin", "cos"))
+        found.append((np.column_stack([np.sin(turn), np.cos(turn)]), names))
+    return found
+
+
+def _fit(forms: Sequence[Form], value: Array, weight: Array) -> tuple[float, float, Array]:
+    """Schwarz's criterion (deviations known up to a common factor), weighted sum of squared residuals, coefficients."""
+    squares = float(np.sum((weight * value) ** 2))
+    size: Array = np.zeros(0)
+    if forms:
+        a = np.hstack([columns for columns, _ in forms])
+        size, *_ = np.linalg.lstsq(a * weight[:, None], value * weight, rcond=None)
+        squares = float(np.sum((weight * (value - a @ size)) ** 2))
+    count = len(value)
+    return count * np.log(max(squares, 1e-300) / count) + len(size) * np.log(count), squares, size

@@ -1,8 +1,7 @@
 """Scores of candidates: the gain of each, with all parameters and sensor errors refitted, to first order.
 
-The background are the residuals' derivatives by parameters, sensor errors and the scatter of identical components. The
-gain is the log-likelihood that a candidate adds to a refit without it; `held_out` is its gain in cross-validation, on
-each test with its amplitudes fitted on the others.
+The background are the derivatives of the residuals by parameters, sensor errors and the scatter of identical
+components. The gain is the log-likelihood that a candidate adds to a refit without it.
 """
 
 from collections.abc import Sequence
@@ -40,9 +39,9 @@ class Block:
 
 @dataclass(frozen=True)
 class Background:
-    """Normal equations of everything that is refitted in every comparison, by test; x in units of the priors.
+    """Normal equations of all that is refitted in every comparison, by test; x in units of the priors.
 
-    Bins are real here: real parts, then imaginary parts, times the root of two over that of the remaining power.
+    Bins are real: real parts, then imaginary parts, times the root of two over that of the remaining power.
     """
 
     slope: Sequence[Array]  # (n, p) of every test
@@ -51,7 +50,7 @@ class Background:
     matrix: Array  # (t, p, p)
     side: Array  # (t, p)
     place: Array  # (p,) of the solution, in units of the priors
-    inward: Array  # (p,) +1 at its lower bound, -1 at its upper: it may only move that way; else zero
+    inward: Array  # (p,) direction in which an unknown at its bound may move, +1 or -1; else zero
     noise: Sequence[tuple[Sequence[Array], Sequence[Array]]] = ()  # by replica, test: changes of slope, of rest
 
     @property
@@ -78,7 +77,7 @@ class Background:
         """Without a candidate: gain of the unknowns at a bound, of all tests and without each (1 + t,); change (p,)."""
         tests, p, none = len(self.matrix), len(self.place), np.zeros(0)
         empty = Block(np.zeros((tests, p, 0)), np.zeros((tests, 0, 0)), np.zeros((tests, 0)))
-        profiles = [_profile(self, empty, none, without) for without in range(-1, tests)]
+        profiles = [_Profile(self, empty, none, without) for without in range(-1, tests)]
         best = [one.best(none, none) for one in profiles]
         gains = np.array([one.gain(theta) for one, theta in zip(profiles, best, strict=True)])
         return gains, profiles[0].change(best[0])
@@ -141,18 +140,18 @@ def score(background: Background, block: Block, low: Array, high: Array, spread:
     over the background and the amplitudes: the gain of all tests less that of the others, less half the logarithm by
     which the test narrows the amplitudes. An effect excited in one test alone loses little there, a contradiction much.
     """
-    whole, still = _profile(background, block, spread, -1), background.still[0]
+    whole, still = _Profile(background, block, spread, -1), background.still[0]
     theta = whole.best(low, high)
     gain = whole.gain(theta) - float(still[0])
     held_out = []
     for t in range(len(block.own) if gain > WORTH else 0):
-        others = _profile(background, block, spread, t)
+        others = _Profile(background, block, spread, t)
         narrowed = 0.5 * (whole.information - others.information)
         without = others.gain(others.best(low, high)) - float(still[1 + t])
         held_out.append(gain - without - narrowed)
-    count = len(low)
-    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:count, :count], hermitian=True)), 0.0))
-    return Score(gain, theta[:count], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta))
+    q = len(low)
+    sd = np.sqrt(np.maximum(np.diag(np.linalg.pinv(whole.schur[:q, :q], hermitian=True)), 0.0))
+    return Score(gain, theta[:q], sd, np.array(held_out or [0.0] * len(block.own)), whole.change(theta))
 
 
 class _Summed(NamedTuple):
@@ -167,26 +166,33 @@ class _Summed(NamedTuple):
     own: Array  # (f, f), free unknowns eliminated
 
 
-class _Profile(NamedTuple):
+class _Profile:
     """Log-likelihood over a candidate's amplitudes and the unknowns at a bound, theta (q + f,), the rest eliminated."""
 
-    schur: Array  # (q + f, q + f), priors in it
-    side: Array  # (q + f,)
-    factor: tuple[Array, bool]  # of the background
-    right: Array  # (p,)
-    cross: Array  # (p, q + f)
-    inward: Array  # (p,)
+    def __init__(self, background: Background, block: Block, spread: Array, without: int) -> None:
+        """Of all tests but one, or of all (-1)."""
+        self.summed, self.inward = background.summed[without + 1], background.inward
+        some, bound = self.summed, self.inward != 0.0
+        candidate = block.cross[some.keep].sum(axis=0)
+        cross = candidate * background.free[:, None]
+        through = cho_solve(some.factor, cross)
+        own = block.own[some.keep].sum(axis=0) - cross.T @ through + np.diag(spread**-2.0)
+        between = candidate[bound] - some.through.T @ cross
+        gone = np.hstack([through, some.through])
+        self.schur = np.block([[own, between.T], [between, some.own]])  # (q + f, q + f), priors in it
+        self.side = np.concatenate([block.side[some.keep].sum(axis=0), some.side]) - gone.T @ some.right  # (q + f,)
+        self.cross = np.hstack([cross, some.cross])  # (p, q + f)
+        self.count = len(spread)  # q
 
     def best(self, low: Array, high: Array) -> Array:
         """Optimum: amplitudes between low and high (q,), unknowns at a bound moved inward or not at all."""
-        count = len(low)
-        way = self.inward[self.inward != 0.0]
+        q, way = self.count, self.inward[self.inward != 0.0]
         theta = np.zeros(len(self.side))
-        inverse = np.linalg.pinv(self.schur[:count, :count], rcond=1e-10, hermitian=True)
-        theta[:count] = np.clip(-inverse @ self.side[:count], low, high)
-        slope = (self.side + self.schur @ theta)[count:]
+        inverse = np.linalg.pinv(self.schur[:q, :q], rcond=1e-10, hermitian=True)
+        theta[:q] = np.clip(-inverse @ self.side[:q], low, high)
+        slope = (self.side + self.schur @ theta)[q:]
         own = np.maximum(np.diag(self.schur), 1e-12)  # rounding, where the background explains a column
-        if not np.any((slope * way < 0.0) & (0.5 * slope**2 > WORTH * own[count:])):
+        if not np.any((slope * way < 0.0) & (0.5 * slope**2 > WORTH * own[q:])):
             return theta
         scale = 1.0 / np.sqrt(own)
         least = np.concatenate([low, np.where(way > 0.0, 0.0, -np.inf)]) / scale
@@ -205,26 +211,10 @@ class _Profile(NamedTuple):
     @property
     def information(self) -> float:
         """Logarithm of the determinant of the amplitudes' normal matrix."""
-        count = len(self.side) - int(np.count_nonzero(self.inward))
-        return float(np.linalg.slogdet(self.schur[:count, :count])[1])
+        return float(np.linalg.slogdet(self.schur[: self.count, : self.count])[1])
 
     def change(self, theta: Array) -> Array:
         """Change of the background (p,) with theta."""
-        moved = -cho_solve(self.factor, self.right + self.cross @ theta)
-        bound = self.inward != 0.0
-        moved[bound] = theta[len(theta) - np.count_nonzero(bound) :]
+        moved = -cho_solve(self.summed.factor, self.summed.right + self.cross @ theta)
+        moved[self.inward != 0.0] = theta[self.count :]
         return np.asarray(moved)
-
-
-def _profile(background: Background, block: Block, spread: Array, without: int) -> _Profile:
-    """Profile of all tests but one, or of all (-1)."""
-    some, bound = background.summed[without + 1], background.inward != 0.0
-    candidate = block.cross[some.keep].sum(axis=0)
-    cross = candidate * background.free[:, None]
-    through = cho_solve(some.factor, cross)
-    own = block.own[some.keep].sum(axis=0) - cross.T @ through + np.diag(spread**-2.0)
-    between = candidate[bound] - some.through.T @ cross
-    schur = np.block([[own, between.T], [between, some.own]])
-    side = np.concatenate([block.side[some.keep].sum(axis=0), some.side])
-    both, gone = np.hstack([cross, some.cross]), np.hstack([through, some.through])
-    return _Profile(schur, side - gone.T @ some.right, some.factor, some.right, both, background.inward)

@@ -4,8 +4,7 @@ A search adds one effect after the other. Two effects pass only together if each
 unexplained; and one of a wrong form may substitute for two, so that neither is added after it.
 """
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -16,13 +15,11 @@ from numpy.typing import NDArray
 from ..core.arrays import Array
 from ..core.progress import Progress
 from ..identification.calibration.problem import OperatingPoint, Problem
-from ..machine.library import Family
 from .acceptance import Lowered, Reweighting, gate, refusal
 from .candidate_columns import Columns, columns_of, side_by_side
 from .candidates import Candidate, list_candidates, list_releases
-from .linearisation import Linearisation
-from .scores import Background, Block, Score, block_of, less_noise, make_block, score
-from .search_state import Round, Scored, Search
+from .scores import Block, Score, block_of, less_noise, make_block, score
+from .search_state import Linearisation, Round, Scored, Search
 
 __all__ = ["CandidatePair", "screen", "score_pairs"]
 
@@ -40,8 +37,8 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     misfit = float(sum(np.sum(np.abs(r) ** 2) for r in residual) / sum(r.size for r in residual))
     weigh, look = Reweighting(found, background), numbers.number("accept.look")
 
-    def judged(candidate: Candidate, one: Score, explained: Callable[[], Sequence[Array]]) -> Scored:
-        less = weigh.lowered(explained(), one) if one.gain >= look else Lowered(one.gain, 0.0, 0.0, 0.0)
+    def judged(candidate: Candidate, one: Score, explained: Sequence[Array]) -> Scored:
+        less = weigh.lowered(explained, one) if explained else Lowered(one.gain, 0.0, 0.0, 0.0)
         why = refusal([candidate.family], one, less, numbers)
         if not why and less.gain < numbers.number("accept.again") * _found_there(found, candidate):
             why = "may be due to the form of an effect added there"
@@ -57,7 +54,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
             noisy = [columns_of(again, there, group)[0] for again, there in linear.replicas]
             ones = scores(less_noise(background, block, columns, noisy))
         return [
-            judged(candidate, one, partial(background.explained, columns, part @ one.amplitude))
+            judged(candidate, one, background.explained(columns, part @ one.amplitude) if one.gain >= look else [])
             for candidate, part, one in zip(group, parts, ones, strict=True)
         ]
 
@@ -74,12 +71,12 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
         ]
 
     scored: list[Scored] = []
-    free = np.full(1, np.inf)
+    free, spread = np.full(1, np.inf), np.full(1, numbers.number("fit.sensor_free"))
     for candidate in list_releases(problem):
         place = problem.names.index(candidate.release)
-        spread = np.full(1, numbers.number("fit.sensor_free"))
         one = score(background, block_of(background, place), -free, free, spread)
-        scored.append(judged(candidate, one, partial(_of_unknown, background, place, one.amplitude)))
+        explained = [slope[:, place] * one.amplitude for slope in background.slope] if one.gain >= look else []
+        scored.append(judged(candidate, one, explained))
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
         batches = [groups[i : i + BATCH] for i in range(0, len(groups), BATCH)]
         for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
@@ -105,19 +102,13 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
 
 def _found_there(found: Search, candidate: Candidate) -> float:
     """Largest gain of an effect added on the same components that shows in the same residuals or is often confused."""
-    one = candidate.family
-
-    def alike(other: Family) -> bool:
-        named = one.named in other.confused_with or other.named in one.confused_with
-        return named or bool(set(one.shows_in) & set(other.shows_in))
-
-    same = [a for a in found.added if a.candidate.components == candidate.components]
-    return max((a.gain for a in same if alike(a.candidate.family)), default=0.0)
-
-
-def _of_unknown(background: Background, place: int, amplitude: Array) -> list[Array]:
-    """Real bins (n,) of every test that an unknown of the background explains."""
-    return [slope[:, place] * amplitude for slope in background.slope]
+    one, gain = candidate.family, 0.0
+    for added in found.added:
+        other = added.candidate.family
+        confused = one.named in other.confused_with or other.named in one.confused_with
+        if added.candidate.components == candidate.components and (confused or set(one.shows_in) & set(other.shows_in)):
+            gain = max(gain, added.gain)
+    return gain
 
 
 class CandidatePair(NamedTuple):

@@ -1,8 +1,8 @@
-"""State of a search: scored candidates, rounds of screening, effects added, and the joint solution."""
+"""State of a search: candidates with scores, rounds of screening, effects added, the joint solution, linearised."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,14 +10,17 @@ from ..core.arrays import Array, Complex
 from ..core.progress import Progress
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
-from ..identification.calibration.problem import Problem
+from ..identification.calibration.normal_equations import bounds_of, positive
+from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.whitened_residuals import real_bins, real_rows
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from .candidates import Candidate
-from .scores import Score
+from .scores import Background, Score
 
-__all__ = ["AddedEffect", "FittedCandidate", "Round", "Scored", "Search", "best_per_family", "fitted_machine"]
+__all__ = ["AddedEffect", "FittedCandidate", "Linearisation", "Round", "Scored", "Search", "best_per_family"]
+__all__ += ["fitted_machine", "linearise"]
 
 
 @dataclass(frozen=True)
@@ -131,3 +134,39 @@ def fitted_machine(solution: Solution) -> Machine:
     """The machine of a solution, all numbers as fitted: with its effects, or as refitted without any."""
     problem = solution.normal.problem
     return with_parameters(problem.machine, problem.parameters, solution.x[: len(problem.parameters)])
+
+
+class Linearisation(NamedTuple):
+    """A solution of a search, linearised."""
+
+    base: OperatingPoint
+    background: Background  # that is refitted in every comparison
+    replicas: tuple[tuple[Problem, OperatingPoint], ...]  # the same with more noise
+
+
+def linearise(solution: Solution, calibration: Parameters, *, replicas: bool = False) -> Linearisation:
+    """The background about a solution, corrected for noise; with replicas if candidates are to be screened.
+
+    An unknown at its bound may only move inward.
+    """
+    normal, x = solution.normal, solution.at
+    problem, prior, root = normal.problem, normal.problem.prior, [np.sqrt(power) for power in normal.power]
+
+    def slopes(every: Sequence[Sequence[Complex]]) -> list[Array]:
+        """Real rows (n, p) of every test's derivatives (m, c), in units of the priors."""
+        return [(real_rows(own, w) * prior[:, None]).T for own, w in zip(every, root, strict=True)]
+
+    def rests(every: Sequence[Complex]) -> list[Array]:
+        return [real_bins(r, w) for r, w in zip(every, root, strict=True)]
+
+    equations = [normal.of([t]) for t in range(len(root))]
+    matrix = np.array([positive(h * np.outer(prior, prior), np.ones(len(prior))) for h, _ in equations])
+    side = np.array([g * prior for _, g in equations])
+    bias = normal.bias
+    noise = [] if bias is None else list(zip(map(slopes, bias.slope), map(rests, bias.residual), strict=True))
+    low, high = bounds_of(problem, calibration)
+    near = 1e-3 * prior
+    inward = (x <= low + near).astype(float) - (x >= high - near)
+    background = Background(slopes(normal.slope), rests(normal.residual), root, matrix, side, x / prior, inward, noise)
+    more = tuple((r, OperatingPoint(r, x)) for r in problem.replicas) if replicas else ()
+    return Linearisation(OperatingPoint(problem, x), background, more)

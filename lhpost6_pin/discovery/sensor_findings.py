@@ -50,7 +50,7 @@ def find_sensor_faults(
 ) -> tuple[SensorFault, ...]:
     """Faults of redundant sensors, pooled over records; raises what `check_sensors` does.
 
-    Play of actuators that are `loose` shifts the means of their lengths.
+    Play of actuators that are `loose` shifts the means of their lengths, which are not reported.
     """
     findings = check_sensors(plant, records, sensors)
     late = _late(findings, sensors)
@@ -67,15 +67,11 @@ def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | Non
     """The gain, drift, offset or cross-talk of a finding; None for others."""
     channel, _, column = finding.channel.rstrip("]").partition("[")
     kind, error = finding.quantity, finding.estimate - finding.expected
-    if kind == "gain" or kind.startswith("cross"):
-        stated = sensors.gain_range.get(channel, 0.0)
-    elif kind == "drift":
-        stated = 0.0
-    elif kind == "offset" and not channel.startswith("platen"):
-        stated = sensors.offset_range.get(channel, 0.0)
-    else:
+    ranges = {"gain": sensors.gain_range, "cross": sensors.gain_range, "drift": {}, "offset": sensors.offset_range}
+    known = ranges.get(kind.split()[0])
+    if known is None or (kind == "offset" and channel.startswith("platen")):
         return None
-    return SensorFault(kind, channel, column, error, finding.unit, finding.deviation, stated)
+    return SensorFault(kind, channel, column, error, finding.unit, finding.deviation, known.get(channel, 0.0))
 
 
 def _late(findings: Sequence[ConsistencyFinding], sensors: SensorSet) -> list[SensorFault]:

@@ -4,15 +4,16 @@ A fitted parameter within 3 sigma of its prior counts as calibration; beyond tha
 family (seven times the leakage: worn seals).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from scipy.stats import chi2, norm
 
-from ..core.arrays import Complex, Mask
-from ..identification.calibration.problem import Problem
+from ..core.arrays import Array, Complex, Mask
+from ..identification.calibration import FreeParameter
+from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.parameters import Parameters
 from .acceptance import squares_by_column
 from .localise import Spot, worst_spots
@@ -22,6 +23,7 @@ from .sensor_findings import SensorFault
 
 __all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
+Functions = Sequence[ResidualFunction]
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
 
 
@@ -44,7 +46,7 @@ class EffectFinding:
     parameters: dict[str, Estimate]
     gain: float  # log-likelihood; of a parameter far off, half the square of its distance
     p_value: float
-    rivals: tuple[str, ...] = ()  # families that explain the campaign alike
+    rivals: tuple[str, ...] = ()  # families that explain the campaign equally well
     form: str = ""  # entry of the library, where a family has several forms
 
 
@@ -68,59 +70,44 @@ class Verdict:
     sensors: tuple[SensorFinding, ...]
     residual_function: ResidualFunction | None  # of the effect that was not identified
     untestable: tuple[str, ...]  # families that this campaign could not show, at typical size
-    nearest: tuple[str, ...] = ()  # families in the model that come nearest to what was not identified
+    nearest: tuple[str, ...] = ()  # families nearest to the effect that was not identified
     where: tuple[Spot, ...] = ()  # where most of the unexplained residual is, by falling share
 
 
 def judge(
-    found: Search, left: Sequence[ResidualFunction], instead: Sequence[ResidualFunction], faults: Sequence[SensorFault]
+    found: Search,
+    beside: Functions,
+    replacing: Functions,
+    faults: Sequence[SensorFault],
 ) -> Verdict:
     """The verdict on a search.
 
-    left are residual functions fitted beside the effects, instead those fitted in place of them, both by falling gain;
-    faults are of sensors whose records were corrected before.
+    beside are residual functions fitted in addition to the effects, replacing those fitted in their place, both by
+    falling gain; faults are of sensors whose records were corrected before.
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
-    count, added = len(problem.parameters), [a.candidate for a in found.added]
-    own = np.array([k.name.startswith(tuple(f"{c.name}." for c in added)) for k in problem.parameters])
-    floor = calibration.number("fit.floor") * problem.stated
-    floor[:count][own] = 0.0  # their priors are flat
-    by_lengths = tuple(f"{a.candidate.name}." for a in found.added if a.from_lengths)
-    for i, parameter in enumerate(problem.parameters):
-        if parameter.name.startswith(by_lengths):
-            floor[i] = numbers.number("lengths.form") * (parameter.value if parameter.form == "shift" else 1.0)
-    covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
-    sd = np.sqrt(np.diag(covariance) + floor**2)
+    own = tuple(f"{one.candidate.name}." for one in found.added)
+    sd = _deviations(found, own)
     reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
-
-    def estimate(i: int) -> Estimate:
-        if i >= count:
-            error = problem.unknowns[i - count]
-            return Estimate(float(x[i]), error.unit, float(x[i] - reach * sd[i]), float(x[i] + reach * sd[i]))
-        parameter = problem.parameters[i]
-        low, high = sorted(parameter.at(float(x[i] + side * reach * sd[i])) for side in (-1.0, 1.0))
-        return Estimate(parameter.at(float(x[i])), parameter.unit, low, high)
-
+    estimates = _estimates(found, reach * sd)
     released = tuple(
-        SensorFinding(u.name, c.family.named, estimate(i), float(np.sqrt(3.0) * u.sd))
-        for i, u in enumerate(problem.unknowns, start=count)
-        for c in added
-        if c.release == u.name
+        SensorFinding(u.name, one.candidate.family.named, estimates[u.name], float(np.sqrt(3.0) * u.sd))
+        for u in problem.unknowns
+        for one in found.added
+        if one.candidate.release == u.name
     )
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     kept = [one for one in found.added if one.candidate.name not in {s.name for s in released}]
-    changed = {}
-    for i, parameter in enumerate(problem.parameters):
-        sure = abs(x[i]) > calibration.number("report.deviations") * sd[i]
-        material = abs(x[i]) > calibration.number("report.material") * problem.stated[i]
-        if sure and material and not own[i] and parameter.name not in problem.free:
-            changed[parameter.name] = estimate(i)
-    free, rejected = reject_effects(kept, left, instead, numbers)
+    sure = np.abs(x) > calibration.number("report.deviations") * sd
+    material = np.abs(x) > calibration.number("report.material") * problem.stated
+    names = (parameter.name for i, parameter in enumerate(problem.parameters) if sure[i] and material[i])
+    changed = {name: estimates[name] for name in names if not name.startswith(own) and name not in problem.free}
+    function, rejected = reject_effects(kept, beside, replacing, numbers)
     rejected |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found)}
-    drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of what it is mounted on
-    unexplained = free is not None or bool(rejected) or drifting or _more_than_noise(found)
+    drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
+    unexplained = function is not None or bool(rejected) or drifting or _more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
-    effects = _merged([_of_added(one, problem, estimate) for one in kept if one.candidate.name not in rejected])
+    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected])
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
     word: Word = "not_testable" if blind else "parameters_only" if changed else "none"
@@ -131,7 +118,33 @@ def judge(
     elif sensors:
         word = "sensor"
     spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
-    return Verdict(word, effects, changed, sensors, free, hidden, nearest, spots)
+    return Verdict(word, effects, changed, sensors, function, hidden, nearest, spots)
+
+
+def _deviations(found: Search, own: tuple[str, ...]) -> Array:
+    """Standard deviations (p,) of the unknowns with their floors; the priors of effects' `own` parameters are flat."""
+    problem = found.problem
+    floor = found.calibration.number("fit.floor") * problem.stated
+    by_lengths = tuple(f"{a.candidate.name}." for a in found.added if a.from_lengths)
+    for i, parameter in enumerate(problem.parameters):
+        if parameter.name.startswith(by_lengths):
+            floor[i] = found.numbers.number("lengths.form") * (parameter.value if parameter.form == "shift" else 1.0)
+        elif parameter.name.startswith(own):
+            floor[i] = 0.0
+    covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
+    return np.asarray(np.sqrt(np.diag(covariance) + floor**2))
+
+
+def _estimates(found: Search, reach: Array) -> dict[str, Estimate]:
+    """All unknowns by name, in their units, with intervals of half width `reach` (p,)."""
+    every: list[FreeParameter | SensorUnknown] = [*found.problem.parameters, *found.problem.unknowns]
+    out = {}
+    for one, x, half in zip(every, found.solution.x.tolist(), reach.tolist(), strict=True):
+        values = [x, x - half, x + half]
+        if isinstance(one, FreeParameter):
+            values = [one.at(value) for value in values]
+        out[one.name] = Estimate(values[0], one.unit, *sorted(values[1:]))
+    return out
 
 
 def _untestable(found: Search) -> tuple[tuple[str, ...], int]:
@@ -139,26 +152,26 @@ def _untestable(found: Search) -> tuple[tuple[str, ...], int]:
     clear: dict[str, bool] = {}
     for one in found.rounds[-1].scored:
         if not one.candidate.release:
-            shape, name = one.candidate.amplitudes[0], one.candidate.family.named
-            significant = bool(one.score.sd[0] * found.numbers.number("verdict.clear") < shape.typical)
+            name, typical = one.candidate.family.named, one.candidate.amplitudes[0].typical
+            significant = bool(one.score.sd[0] * found.numbers.number("verdict.clear") < typical)
             clear[name] = clear.get(name, False) or significant
     hidden = tuple(name for name, significant in clear.items() if not significant)
     return hidden, len(clear) - len(hidden)
 
 
-def _of_added(added: AddedEffect, problem: Problem, estimate: Callable[[int], Estimate]) -> EffectFinding:
+def _of_added(added: AddedEffect, estimates: Mapping[str, Estimate]) -> EffectFinding:
     candidate = added.candidate
-    values = {
-        name.removeprefix(f"{candidate.name}."): estimate(i)
-        for i, name in enumerate(problem.names)
+    own = {
+        name.removeprefix(f"{candidate.name}."): value
+        for name, value in estimates.items()
         if name == candidate.release or name.startswith(f"{candidate.name}.")
     }
     return EffectFinding(
         family=candidate.family.named,
         components=candidate.components,
-        parameters=values,
+        parameters=own,
         gain=added.gain,
-        p_value=min(1.0, float(chi2.sf(2.0 * added.gain, len(values))) * added.tried),
+        p_value=min(1.0, float(chi2.sf(2.0 * added.gain, len(own))) * added.tried),
         rivals=tuple(dict.fromkeys(one.candidate.family.named for one in added.rivals)),
         form=candidate.family.name,
     )
@@ -174,26 +187,21 @@ def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:
     merged: dict[str, EffectFinding] = {}
     for one in effects:
         key = one.family if "." in next(iter(one.parameters), "") else f"{one.family} {one.components}"
-        first = merged.get(key)
-        merged[key] = (
-            one
-            if first is None
-            else replace(
+        if (first := merged.get(key)) is not None:
+            one = replace(
                 first,
                 components=tuple(dict.fromkeys((*first.components, *one.components))),
                 parameters={**first.parameters, **one.parameters},
                 gain=first.gain + one.gain,
                 p_value=min(first.p_value, one.p_value),
-                rivals=tuple(
-                    name for name in first.rivals if name in one.rivals
-                ),  # either kind excludes a rival of both
+                rivals=tuple(name for name in first.rivals if name in one.rivals),  # each kind excludes others
             )
-        )
+        merged[key] = one
     return tuple(merged.values())
 
 
 def _more_than_noise(found: Search) -> bool:
-    """Whether the residual exceeds noise, and what the form of the effects found may leave."""
+    """Whether the residual exceeds noise by more than errors in the form of the effects found explain."""
     limit, share, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "verdict.rest", "accept.doubt"))
     for kind in found.problem.kinds:
         rows = found.problem.rows(kind) & ~_impacted(found)
@@ -222,7 +230,7 @@ def _excess(residual: Sequence[Complex], doubt: float) -> float:
 
 
 def _leaves_much(added: AddedEffect, found: Search) -> bool:
-    """Whether an effect leaves much of the residual in the columns where it explained most: a wrong name."""
+    """Whether an effect leaves much of the residual unexplained in the columns where it explains most."""
     limit, share, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "verdict.rest", "accept.doubt"))
     where = (added.fall > 0.1 * added.fall.max()) & ~_impacted(found)
     left = squares_by_column(found.residual)[where]
@@ -232,35 +240,35 @@ def _leaves_much(added: AddedEffect, found: Search) -> bool:
 
 def reject_effects(
     kept: Sequence[AddedEffect],
-    left: Sequence[ResidualFunction],
-    instead: Sequence[ResidualFunction],
+    beside: Functions,
+    replacing: Functions,
     numbers: Parameters,
 ) -> tuple[ResidualFunction | None, set[str]]:
     """The residual function that is reported, and the effects that it rejects.
 
-    A function fitted in place of all forces that were added rejects them if it explains far more. One fitted beside
-    them rejects those that it outweighs; where it is small against an effect found there, it is attributed to the form
-    of that effect and not reported.
+    A function fitted in place of all forces that were added rejects them if it explains far more. One fitted in
+    addition rejects those that it outweighs; where it is small against an effect found there, it is attributed to the
+    form of that effect and not reported.
     """
     n = numbers.number
-    share, least = n("accept.held_out"), n("left.gain")
 
-    def first(functions: Sequence[ResidualFunction]) -> ResidualFunction | None:
+    def first(functions: Functions) -> ResidualFunction | None:
         """The significant function that gains most, if it passes cross-validation."""
-        found = (o for o in functions if min(o.gain, o.beyond) > least and o.held_out.sum() > share * least)
+        least, validated = n("left.gain"), n("accept.held_out") * n("left.gain")
+        found = (o for o in functions if min(o.gain, o.beyond) > least and o.held_out.sum() > validated)
         return next(found, None)
 
     forces = [one for one in kept if "wrench" in one.candidate.family.shows_in]
-    better, free = first(instead), first(left)
+    better, function = first(replacing), first(beside)
     if forces and better is not None and better.gain > n("left.better") * sum(one.gain for one in forces):
         return better, {one.candidate.name for one in forces}
-    if free is None:
+    if function is None:
         return None, set()
-    legs, rejected = set(free.components), set()
+    legs, rejected = set(function.components), set()
     for one in forces:
         there = set(one.candidate.components)
-        if free.gain < n("verdict.rest" if legs <= there else "verdict.elsewhere") * one.gain:
+        if function.gain < n("verdict.rest" if legs <= there else "verdict.elsewhere") * one.gain:
             return None, set()
-        if free.gain > (n("accept.again") if legs & there else 1.0) * one.gain:
+        if function.gain > (n("accept.again") if legs & there else 1.0) * one.gain:
             rejected.add(one.candidate.name)
-    return free, rejected
+    return function, rejected

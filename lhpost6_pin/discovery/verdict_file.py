@@ -1,4 +1,4 @@
-"""The verdict of a search as a file, verdict.json."""
+"""The verdict of a search: in a sentence or two, and as a file, verdict.json."""
 
 import math
 from dataclasses import asdict
@@ -10,9 +10,9 @@ from ..core.files import write_whole
 from ..core.jsonable import as_json
 from ..machine.library import find_family
 from .discover import Discovery
-from .verdict import EffectFinding, Estimate
+from .verdict import Estimate
 
-__all__ = ["save_verdict", "verdict_entries"]
+__all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
 
 
 def save_verdict(found: Discovery, path: Path) -> Path:
@@ -28,11 +28,21 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
     closure: dict[str, Any] = {}
     for gap in found.proof.gaps if found.proof else ():
         entry = {key: round(value, 4) for key, value in asdict(gap).items() if key not in ("phase", "test")}
-        share = None if math.isnan(gap.closure) else round(gap.closure, 4)
-        closure.setdefault(gap.phase, {})[gap.test] = {**entry, "floor": 1.0, "closure": share}
+        closure.setdefault(gap.phase, {})[gap.test] = {**entry, "floor": 1.0, "closure": _rounded(gap.closure, 4)}
     return {
         "verdict": verdict.word,
-        "effects": [_effect(one) for one in verdict.effects],
+        "effects": [
+            {
+                "name": one.family,
+                "family": one.family,
+                "form": one.form,
+                "components": list(one.components),
+                "parameters": {name: _interval(value) for name, value in one.parameters.items()},
+                "gain": one.gain,
+                "p_value": one.p_value,
+            }
+            for one in verdict.effects
+        ],
         "parameters_changed": {name: _interval(value) for name, value in verdict.changed.items()},
         "sensor_findings": [
             {"name": s.name, "family": s.family, **_interval(s.estimate), "stated_range": s.stated}
@@ -43,7 +53,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "unexplained": None if verdict.word != "unexplained" else _unexplained(found),
         "not_testable": list(verdict.untestable),
         "next_test": [
-            {"test": n.test, "tells": list(n.families), "margin": _finite(n.margin), "told": n.informative}
+            {"test": n.test, "tells": list(n.families), "margin": _rounded(n.margin, 1), "told": n.informative}
             for n in found.next_tests
         ],
         "advice": advice(found),
@@ -57,26 +67,14 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
     }
 
 
-def _finite(value: float) -> float | None:
-    return None if math.isnan(value) else round(value, 1)
+def _rounded(value: float, digits: int) -> float | None:
+    return None if math.isnan(value) else round(value, digits)
 
 
 def advice(found: Discovery) -> list[str]:
     """Tests that would discriminate between rivals, as the library states them."""
     rivals = [name for one in found.verdict.effects if one.rivals for name in (one.family, *one.rivals)]
     return [f"{name}: {find_family(name).tell_apart}" for name in dict.fromkeys(rivals)]
-
-
-def _effect(one: EffectFinding) -> dict[str, Any]:
-    return {
-        "name": one.family,
-        "family": one.family,
-        "form": one.form,
-        "components": list(one.components),
-        "parameters": {name: _interval(value) for name, value in one.parameters.items()},
-        "gain": one.gain,
-        "p_value": one.p_value,
-    }
 
 
 def _interval(value: Estimate) -> dict[str, Any]:
@@ -109,3 +107,48 @@ def _unexplained(found: Discovery) -> dict[str, Any] | None:
         "domain": [float(function.nodes[0]), float(function.nodes[-1]), function.unit],
         "formula": {"text": formula.text("N"), "share": formula.share},
     }
+
+
+def summary(found: Discovery) -> str:
+    """What was identified; and that it is not validated, where no test was held out."""
+    verdict = found.verdict
+    effects = " and ".join(f"{title_of(one.family)} ({where(one.components)})" for one in verdict.effects)
+    if verdict.word == "unexplained":
+        text = _unexplained_summary(found, effects)
+    else:
+        rivals = " and ".join(" or ".join(map(title_of, (e.family, *e.rivals))) for e in verdict.effects if e.rivals)
+        text = {
+            "none": "no missing effect; no parameter differs from the machine file.",
+            "not_testable": f"no missing effect, but {len(verdict.untestable)} families are not testable with this "
+            "campaign: it needs more excitation.",
+            "parameters_only": f"no missing effect; {len(verdict.changed)} parameters differ: "
+            f"{', '.join(verdict.changed)}.",
+            "sensor": "no missing effect; sensors beyond their stated ranges: "
+            f"{', '.join(s.name for s in verdict.sensors)}.",
+            "named": f"{effects}.",
+            "ambiguous": f"{effects}; the campaign does not discriminate between {rivals}.",
+        }[verdict.word]
+    if verdict.effects and found.proof is None:
+        return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
+    return text
+
+
+def _unexplained_summary(found: Discovery, effects: str) -> str:
+    verdict = found.verdict
+    function, place = verdict.residual_function, "the residual exceeds noise"
+    if function is not None:
+        place = f"an effect acts on {where(function.components)}, as a function of {function.description}"
+    elif drifting := [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]:
+        place = f"{', '.join(drifting)} drift against the platen's pose within tests"
+    near = f" Nearest family: {' and '.join(map(title_of, verdict.nearest))}." if verdict.nearest else ""
+    return f"{effects + '; in addition ' if effects else ''}{place}; no family of the library explains it.{near}"
+
+
+def title_of(family: str) -> str:
+    """Title of a family."""
+    return find_family(family).title
+
+
+def where(components: tuple[str, ...]) -> str:
+    """Components, abbreviated."""
+    return ", ".join(components) if len(components) < 4 else f"{components[0]} to {components[-1]}"

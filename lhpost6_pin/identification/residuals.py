@@ -14,7 +14,6 @@ same kernels.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..data.alignment import due_spools
@@ -68,7 +67,7 @@ def follow(
     the friction states at the start of the test, if not zero.
     """
     there: dict[tuple[object, ...], Array] = {}  # states by what they depend on
-    before: dict[tuple[object, ...], slice] = {}  # places in the known path
+    rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
     if known is None or _geometry(known[0]) != _geometry(plant):
         moved = plant_motion(plant, test.motion)
         along = ports = ports_along(plant, moved)
@@ -79,11 +78,10 @@ def follow(
         ports, along, required, old = known[1]
         if not require_alike(known[0], plant):
             required = required_wrench(plant, plant_motion(plant, test.motion), ports.turn)
-        if len(plant.states) == old.shape[1] and _alike(known[0].rows, plant.rows):
+        before = [(_marched(row), states_of(row)) for row in _moving(known[0])]
+        if len(plant.states) == old.shape[1] and before == [(key, place) for key, place, _ in rows]:
             return Path(ports, along, required, old)
-        before = {_marched(row): states_of(row) for row in _moving(known[0])}
-        there = {key: old[:, place] for key, place in before.items()}
-    rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
+        there = {key: old[:, place] for key, place in before}
     fresh = {key: row for key, _, row in rows if key not in there}
     # oscillators and heat average noise, and need the raw motion
     parts: tuple[list[np.void], list[np.void]] = [], []
@@ -94,13 +92,8 @@ def follow(
             marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
             there |= {_marched(row): marched[:, states_of(row)] for row in some}
     z = np.zeros((test.samples, len(plant.states)))
-    still = 0  # states before it are those of the known path, in the same places
-    if before:
-        still = min([z.shape[1], old.shape[1], *(at.start for key, at, _ in rows if before.get(key) != at)])
-        z[:, :still] = old[:, :still]
-    for key, at, _ in rows:
-        if at.start >= still:
-            z[:, at] = there[key]
+    for key, place, _ in rows:
+        z[:, place] = there[key]
     return Path(ports, along, required, z)
 
 
@@ -112,12 +105,6 @@ def _moving(plant: Plant) -> Array:
 def _marched(row: np.void) -> tuple[object, ...]:
     """What hidden states of a row depend on."""
     return int(row["law"]), *(int(row[port]) for port in PORTS), shapes_of(row).tobytes()
-
-
-def _alike(some: NDArray[np.void], others: NDArray[np.void]) -> bool:
-    """Whether two tables leave hidden states that are alike."""
-    same = some.shape == others.shape and all((some[k] == others[k]).all() for k in ("law", *PORTS, "state", "spool"))
-    return same and bool((shapes_of(some) == shapes_of(others))[some["spool"] < 0].all())
 
 
 def _geometry(plant: Plant) -> bytes:

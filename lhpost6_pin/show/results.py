@@ -10,7 +10,7 @@ from ..core.arrays import Array
 from ..core.names import AXES
 from ..data.layout_faults import RecordFinding
 from ..identification.calibration import Calibration
-from ..identification.calibration.verdicts import verdict_on
+from ..identification.calibration.result import verdict_on
 from ..identification.decompose import Decomposed, WrenchAgreement
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
@@ -205,5 +205,5 @@ def calibration_entries(found: Calibration) -> Entries:
         "parameters": parameters,
         "sensors": sensors,
         "misfit": misfits,
-        "alike": [{"pair": [a, b], "correlation": c} for a, b, c in found.alike()],
+        "alike": [{"pair": [a, b], "correlation": c} for a, b, c in found.correlated_pairs()],
     }

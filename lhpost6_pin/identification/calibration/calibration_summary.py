@@ -3,8 +3,7 @@
 import numpy as np
 
 from .free_parameters import parameter_changes
-from .result import Calibration
-from .verdicts import contradictions, out_of_range
+from .result import Calibration, contradictions, out_of_range
 
 __all__ = ["chance", "contradiction_summary", "correlation_summary", "cut_strokes", "range_summary"]
 
@@ -31,7 +30,7 @@ def range_summary(calibration: Calibration) -> str:
 
 def correlation_summary(calibration: Calibration) -> str:
     """How many pairs of unknowns are too strongly correlated to be identified separately."""
-    own, pairs = {parameter.name for parameter in calibration.parameters}, calibration.alike()
+    own, pairs = {parameter.name for parameter in calibration.parameters}, calibration.correlated_pairs()
     if not pairs:
         return "No unknowns are strongly correlated."
     named = sum(a in own or b in own for a, b, _ in pairs)

@@ -18,7 +18,7 @@ import xarray as xr
 
 from ...core.arrays import Array, Complex, Mask
 from ...core.names import AXES
-from ...core.progress import Progress, between
+from ...core.progress import Progress, between, split
 from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
@@ -50,8 +50,8 @@ def calibrate(
     """Calibrate a machine jointly by all tests of a campaign.
 
     Records are of one machine in one state, with the same channels; each may have its own sample rate. Servovalves are
-    open as in the first. Deterministic for a seed (of the simulated noise), whatever the number of `jobs` (threads; -1:
-    one a core). `progress` is called with the share done.
+    open as in the first. Deterministic for a seed (of the simulated noise), independent of the number of `jobs`
+    (threads; -1: one a core). `progress` is called with the share done.
 
     Raises RecordError for a record that breaks the layout, is of another machine, or was made with a specimen that the
     machine has not; that lacks platen_displacement, or both forces and pressures; that differs from the others in its
@@ -118,19 +118,19 @@ def solve(
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
-    bent = np.array([*(k.bends for k in problem.parameters), *(u.kind == "delay" for u in problem.unknowns)])
+    # residuals are nearly linear in shifts of points in plan, and in gains and offsets
+    bent = np.array([*(not k.mirrored for k in problem.parameters), *(u.kind == "delay" for u in problem.unknowns)])
     again = bent if frugal and not settled else fresh | near
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: NoiseBias | None = None
     normal: NormalEquations | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
     least, converged, replicas = np.inf, False, len(problem.again)
-    shares = np.linspace(0.0, 1.0, rounds + replicas + 1)
+    parts = split(progress, rounds + replicas)
     for done in range(1, rounds + 1):
-        part = done - 1 if done == 1 else done - 1 + replicas
-        share = between(progress, shares[part], shares[part + 1])
+        part = parts[0 if done == 1 else done - 1 + replicas]
         if normal is None:
-            normal = first or NormalEquations(problem, x, share, known, None if settled else fresh | again)
+            normal = first or NormalEquations(problem, x, part, known, None if settled else fresh | again)
             before = misfit(problem, normal.residual)
         else:
             renewed = not frugal or (
@@ -138,10 +138,9 @@ def solve(
                 and gain > numbers.number("fit.renew")
                 and done <= int(numbers.number("fit.renewals"))
             )
-            normal = NormalEquations(problem, x, share, normal, again if renewed else np.zeros_like(again))
-        if done == (1 if frugal else 2):  # near enough to the solution, and kept from there on
-            parts = [between(progress, shares[1 + k], shares[2 + k]) for k in range(replicas)]
-            bias = NoiseBias(normal, x, parts, known)
+            normal = NormalEquations(problem, x, part, normal, again if renewed else np.zeros_like(again))
+        if done == (1 if frugal else 2):  # close to the solution, and kept afterwards
+            bias = NoiseBias(normal, x, parts[1 : 1 + replicas], known)
         if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
         value = objective(problem, normal.residual, x)

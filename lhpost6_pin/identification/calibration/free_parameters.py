@@ -22,6 +22,8 @@ __all__ = ["FreeParameter", "drawn_coordinates", "machine_parameters", "plan_par
 __all__ += ["with_parameters"]
 
 
+Paths = tuple[tuple[str, int], ...]
+
 _OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus")
 _GAS = ("pressure", "polytropic_index")
 _GEOMETRY = ("wrench", "flow", "gas")
@@ -49,7 +51,7 @@ class FreeParameter:
     """One coordinate of the machine; `sd` is its prior standard deviation."""
 
     name: str  # such as "horizontal.flow", "platen.mass[x]", "horizontal.platen_height"
-    paths: tuple[tuple[str, int], ...]  # what it sets: path in the machine file, and component of a vector or -1
+    paths: Paths  # what it sets: path in the machine file, and component of a vector or -1
     unit: str
     value: float  # nominal, in `unit`
     sd: float  # of the coordinate: in `unit` for a shift, else relative
@@ -63,9 +65,9 @@ class FreeParameter:
     mirrored: bool = False  # points move symmetrically about the axis, those on it stay
 
     @property
-    def bends(self) -> bool:
-        """Whether residuals are nonlinear in it within its range: shifts in plan are not."""
-        return not self.mirrored
+    def alone(self) -> tuple[str, int]:
+        """Parameters of one alone[0] act on different rows (alone[1]; -1: all) and are evaluated together."""
+        return (self.of.partition(".")[2], self.place) if self.place >= 0 else (self.name, -1)
 
     def at(self, coordinate: float) -> float:
         """Value in `unit` at a coordinate."""
@@ -98,7 +100,7 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
         section, _, name = path.partition(".")
         if section in sections and quantity.sd is not None and name != "bearing_plane":
             found += _parameters_of(path, name, quantity)
-    found += _heights(machine)
+    found += _points(machine, (2,))
     if machine.motion != "free":  # a guided platen: one mass, no inertia, no geometry
         mass = f"platen.mass[{machine.motion}]"
         found = [p for p in found if p.name == mass or not p.name.startswith("platen.")]
@@ -134,37 +136,33 @@ def _parameters_of(path: str, name: str, quantity: Quantity) -> list[FreeParamet
     return found
 
 
-def _heights(machine: Machine) -> list[FreeParameter]:
-    """Height of the platen points and of the base points of each kind, its components moved together."""
-    found = []
-    for kind, members, bearing in _kinds(machine):
-        # from a bearing the leg is measured from its zero length: the height of its foot is not identifiable
-        for end in ("platen_point",) if bearing else ("platen_point", "base_point"):
-            paths = [(f"{c.name}.{end}", 2) for c in members]
-            if (sd := _mean_sd(machine, paths)) is not None:
-                if bearing:
-                    paths.append(("platen.bearing_plane", 2))
-                height = float(np.mean([getattr(c, end)[2] for c in members]))
-                name = f"{kind}.{end.split('_')[0]}_height"
-                found.append(FreeParameter(name, tuple(paths), "m", height, sd, "shift", _GEOMETRY))
-    return found
-
-
 def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:
-    """Parameters of the points of each kind's components in plan: mirror images of each other, moved symmetrically.
+    """Parameters of the points of each kind's components in plan; none of a guided platen."""
+    return _points(machine, (0, 1)) if machine.motion == "free" else ()
 
-    A bearing and its foot move together.
+
+def _points(machine: Machine, coordinates: Sequence[int]) -> tuple[FreeParameter, ...]:
+    """Parameters of coordinates (0, 1: in plan; 2: height) of the points of each kind's components, moved together.
+
+    In plan points are mirror images of each other, moved symmetrically, a bearing with its foot. The height of the foot
+    is not identifiable, since the leg is measured from its zero length there.
     """
     found = []
-    for kind, members, bearing in _kinds(machine) if machine.motion == "free" else ():
+    for kind, members, bearing in _kinds(machine):
         ends: tuple[tuple[str, ...], ...] = (("platen_point",), ("base_point",))
-        for points, i in product((("platen_point", "base_point"),) if bearing else ends, range(2)):
-            beside = [c for c in members if getattr(c, points[0])[i] != 0.0]
-            paths = tuple((f"{c.name}.{point}", i) for c in beside for point in points)
-            if len(beside) > 1 and (sd := _mean_sd(machine, paths)) is not None:
-                value = float(np.mean([abs(getattr(c, points[0])[i]) for c in beside]))
-                name = f"{kind}.{points[0].split('_')[0]}_{'xy'[i]}"
-                found.append(FreeParameter(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=True))
+        if bearing:
+            ends = (("platen_point",),) if 2 in coordinates else (("platen_point", "base_point"),)
+        for points, i in product(ends, coordinates):
+            moved = [c for c in members if i == 2 or getattr(c, points[0])[i] != 0.0]
+            paths = tuple((f"{c.name}.{point}", i) for c in moved for point in points)
+            if (i < 2 and len(moved) < 2) or (sd := _mean_sd(machine, paths)) is None:
+                continue
+            if bearing and i == 2:
+                paths += (("platen.bearing_plane", 2),)
+            values = [getattr(c, points[0])[i] for c in moved]
+            value = float(np.mean(np.abs(values) if i < 2 else values))
+            name = f"{kind}.{points[0].split('_')[0]}_{('x', 'y', 'height')[i]}"
+            found.append(FreeParameter(name, paths, "m", value, sd, "shift", _GEOMETRY, mirrored=i < 2))
     return tuple(found)
 
 
@@ -185,8 +183,8 @@ def _mean_sd(machine: Machine, paths: Sequence[tuple[str, int]]) -> float | None
 def scatter_parameters(machine: Machine, share: float, reach: float) -> tuple[FreeParameter, ...]:
     """Parameters of the scatter between identical components: factors, about one, of numbers that a kind shares.
 
-    share is their standard deviation, reach their bound in deviations. Components with numbers of their own are left
-    out, and kinds with one component.
+    share is their standard deviation, reach their bound in deviations. Components with numbers of their own, and kinds
+    with one component, are excluded.
     """
     found = []
     kinds = [c.kind for c in machine.components]
@@ -243,12 +241,11 @@ def parameter_changes(
 
 
 def _cut_strokes(machine: Machine, values: Mapping[str, float | list[float]]) -> dict[str, float]:
-    """Strokes that a chamber among new values is too short for, cut so that it holds oil; all others stay as stated.
+    """Strokes longer than a chamber among new values, reduced to its length.
 
     The length of a chamber is identifiable, a stroke is not, and the shipped stroke is assumed. A chamber bounded by it
-    would bias the oil: 0.70 m in truth beside 0.75 m stated made it 7 % stiffer, with little more than noise in the
-    residual. A chamber is thus bounded by its piston's measured travel (`machine_parameters`), and a stroke that is
-    inconsistent with the identified chamber is reduced.
+    would bias the oil (true 0.70 m, stated 0.75 m: 7 % stiffer). It is thus bounded by its piston's measured travel
+    (`machine_parameters`), and a stroke that is inconsistent with the identified chamber is reduced.
     """
     cut: dict[str, float] = {}
     for path, length in values.items():

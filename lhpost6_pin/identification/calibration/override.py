@@ -1,4 +1,4 @@
-"""The override file that a calibration leaves: the numbers found, with where they come from."""
+"""The override file of a calibration: calibrated numbers with their source."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +33,7 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     entries: dict[str, Quantity] = {}
     for name, value in values.items():
         spread: tuple[float, ...] | float | None = None
-        origin = f"cut to leave oil in the chamber found, not measured itself; {source}"  # a stroke
+        origin = f"reduced to the length of the identified chamber, not measured itself; {source}"  # a stroke
         if name in deviations:
             origin = source
             if calibration.converged:
@@ -51,7 +51,7 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     title = " ".join(f"Numbers of {machine.name}, {source}.".split())  # on one line
     about = "sd is the predicted standard deviation."
     if not calibration.converged:
-        about = "They are where the fit stopped; nothing says how far off they are, so no sd is given."
+        about = "The fit did not converge: these are the values of its last step, without standard deviations."
     with write_whole(path) as beside:
         text = sections_toml([title, about], groups)
         beside.write_text(text, encoding="utf-8")

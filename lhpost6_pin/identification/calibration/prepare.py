@@ -34,8 +34,9 @@ def prepare_problem(
 ) -> Problem:
     """The least-squares problem of a campaign; `numbers` are those of `models/procedures/calibration.toml`.
 
-    `others` and `preload` are sources of noise (`Problem`). Deterministic for a seed (of the simulated noise). Raises
-    what `calibrate` does.
+    `others` gives equally plausible machines (with friction of another form, with oil warmer in one test than in
+    others); they and `preload` are sources of noise (`Problem`). Deterministic for a seed (of the simulated noise).
+    Raises what `calibrate` does.
     """
     n = numbers.number
     comparison = ResidualBands(numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"))

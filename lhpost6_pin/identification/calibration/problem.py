@@ -12,7 +12,6 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from ...core.arrays import Array, Complex, Mask
-from ...data.channels import residuals_of
 from ...data.sensors import SensorSet
 from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
@@ -75,8 +74,7 @@ class Problem:
         self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
         self.noisy, self.again = tuple(noisy), tuple(map(tuple, again))
         unknowns = sensor_unknowns(machine, sensors, tests[0])
-        self.present = frozenset(tests[0].channels)
-        self.unknowns = tuple(u for u in unknowns if set(residuals_of(u.channel, self.present)) & set(kinds))
+        self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
         plant = make_plant(machine)
         self._set(machine, machine_parameters(machine, _travel(plant, tests)))
@@ -101,15 +99,16 @@ class Problem:
     def _set(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
         """Set the machine and its free parameters; returns itself."""
         self.machine, self.parameters = machine, parameters
-        both: tuple[FreeParameter | SensorUnknown, ...] = (*parameters, *self.unknowns)
-        share = self.comparison.step
-        self.names = tuple(one.name for one in both)
-        self.stated = np.array([one.sd for one in both])
+        every: tuple[FreeParameter | SensorUnknown, ...] = (*parameters, *self.unknowns)
+        self.names = tuple(one.name for one in every)
+        self.stated = np.array([one.sd for one in every])
         self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
-        self.step = np.array([*(k.step or share * k.sd for k in parameters), *(share * u.sd for u in self.unknowns)])
-        self.lowest = np.array([*(k.lowest for k in parameters), *(-np.inf for _ in self.unknowns)])
-        self.highest = np.array([*(k.highest for k in parameters), *(np.inf for _ in self.unknowns)])
-        self.groups = self._groups()
+        self.step = np.array([one.step or self.comparison.step * one.sd for one in every])
+        self.lowest, self.highest = np.array([(one.lowest, one.highest) for one in every]).T
+        groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int]]] = {}
+        for i, one in enumerate(every):
+            groups.setdefault((one.alone[0], one.shows_in), []).append((i, one.alone[1]))
+        self.groups = [EvaluationGroup(tuple(members), shows_in) for (_, shows_in), members in groups.items()]
         return self
 
     def _with(self, **changes: Any) -> "Problem":
@@ -208,9 +207,7 @@ class Problem:
         """Derivatives of every test's whitened bins, by place in x."""
         x, count = base.x, len(self.parameters)
         step = np.where(x + self.step > self.highest, -self.step, self.step)
-        more = np.zeros(len(x))
-        for i, _ in group.members:
-            more[i] = step[i]
+        more = np.where(np.isin(np.arange(len(x)), [i for i, _ in group.members]), step, 0.0)
         if group.members[0][0] < count:
             changes = self.change(base, self.plant_at(x + more), group.residuals)
         else:  # from the corrected tests: derivatives are the same to first order
@@ -219,7 +216,7 @@ class Problem:
         out = []
         for i, place in group.members:
             if free[i]:
-                rows: Mask | bool = True
+                rows = np.ones(sum(self.widths), bool)
                 if place >= 0:
                     rows = self.rows("gas", place) if group.residuals == ("gas",) else self.rows_of_actuator(place)
                 slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
@@ -259,6 +256,15 @@ class Problem:
         out[:, given] = bins
         return out, f
 
+    def of_wrench(self, test: int, wrench: Array) -> Complex:
+        """Whitened bins (m, c, k) of changes of a test's wrench residual (n, 6, k)."""
+        n, axes, count = wrench.shape
+        c = self.comparison
+        bins, f = spectrum_of(wrench.reshape(n, -1), self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
+        out = np.zeros((len(f), sum(self.widths), count), np.complex128)
+        out[:, self.rows("wrench")] = bins.reshape(len(f), axes, count)
+        return self.whitener.apply(test, out, f)
+
     def rows_of_actuator(self, place: int) -> Mask:
         """Mask of the stacked residuals' columns of one actuator."""
         names, double = self.machine.actuator_names, self.machine.double_acting
@@ -266,16 +272,6 @@ class Problem:
         if names[place] in double:
             rows |= self.rows("flow", len(names) + double.index(names[place]))
         return rows
-
-    def _groups(self) -> tuple[EvaluationGroup, ...]:
-        found: dict[tuple[str, tuple[str, ...]], list[tuple[int, int]]] = {}
-        for i, parameter in enumerate(self.parameters):
-            name = parameter.of.partition(".")[2] if parameter.place >= 0 else parameter.name
-            found.setdefault((name, parameter.shows_in), []).append((i, parameter.place))
-        for i, unknown in enumerate(self.unknowns, start=len(self.parameters)):
-            key = unknown.alone[0], residuals_of(unknown.channel, self.present)
-            found.setdefault(key, []).append((i, unknown.alone[1]))
-        return tuple(EvaluationGroup(tuple(members), shows_in) for (_, shows_in), members in found.items())
 
 
 class OperatingPoint:
@@ -292,20 +288,18 @@ class OperatingPoint:
 
 def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
     """Largest travel of the actuators and struts of each kind in either direction, with a margin [m]."""
-    moved = [np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests]
-    kinds = [c.kind for c in plant.machine.components]
-    most = np.max(moved, axis=0)
-    return {kind: 1.05 * float(max(m for m, k in zip(most, kinds, strict=True) if k == kind)) for kind in kinds}
+    most = np.max([np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests], axis=0)
+    kinds = np.array([c.kind for c in plant.machine.components])
+    return {str(kind): 1.05 * float(most[kinds == kind].max()) for kind in kinds}
 
 
 def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
     """Random hidden states (n_states,) of friction, their standard deviation a share of full force."""
     out = np.zeros(len(plant.states))
     for row in plant.rows:
-        if not law_of(row).friction_memory:
-            continue
-        both = states_of(row)
-        out[both] = np.clip(share * rng.standard_normal(len(out[both])), -0.7, 0.7)  # within the unit disc
+        if law_of(row).friction_memory:
+            own = out[states_of(row)]
+            own[:] = np.clip(share * rng.standard_normal(len(own)), -0.7, 0.7)  # within the unit disc
     return out
 
 

@@ -39,6 +39,10 @@ class SensorUnknown:
     sd: float  # of the prior, about zero
     unit: str
     alone: tuple[str, int]  # unknowns of one alone[0] act on different rows (alone[1]) and are evaluated together
+    shows_in: tuple[str, ...] = ()  # residuals that depend on it
+    lowest: float = -np.inf
+    highest: float = np.inf
+    step: float | None = None  # for derivatives; None: the comparison's share of sd
 
 
 def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:
@@ -46,24 +50,28 @@ def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) ->
     labels = {"axis": AXES, **machine.labels}
     present = {*test.share, *test.channels}
     channels = {name: c for name, c in LAYOUT.items() if name in present and c.residuals}
-    found = []
+    found: list[SensorUnknown] = []
+
+    def add(kind: str, name: str, i: int, label: str, sd: float, unit: str, alone: tuple[str, int]) -> None:
+        full = f"{kind} {name}[{label}]" if label else f"{kind} {name}"
+        found.append(SensorUnknown(full, kind, name, i, sd, unit, alone, residuals_of(name, test.channels)))
+
     for name, channel in channels.items():
         columns = labels[channel.dims[1]] if len(channel.dims) > 1 else ("",)
-        for kind, sd in (("gain", sensors.gain_sd(name)), ("offset", sensors.offset_sd(name))):
+        for kind, sd, unit in (
+            ("gain", sensors.gain_sd(name), "1"),
+            ("offset", sensors.offset_sd(name), channel_unit(name)),
+        ):
             for i, label in enumerate(columns if kind in channel.errors and sd > 0.0 else ()):
-                if channel.role == "motion" and not np.any(test.motion.displacement[:, i]):
-                    continue  # a guided platen
-                full, unit = f"{name}[{label}]" if label else name, "1" if kind == "gain" else channel_unit(name)
-                together = _together(machine, kind, name, i, label, present)
-                found.append(SensorUnknown(f"{kind} {full}", kind, name, i, sd, unit, together))
+                if channel.role != "motion" or np.any(test.motion.displacement[:, i]):  # else a guided platen
+                    add(kind, name, i, label, sd, unit, _together(machine, kind, name, i, label, present))
     for group, sd in _delays(sensors, channels).items():
-        found.append(SensorUnknown(f"delay {group}", "delay", group, -1, sd, "s", (f"delay {group}", -1)))
+        add("delay", group, -1, "", sd, "s", (f"delay {group}", -1))
     for name, channel in channels.items():
         if channel.held and sensors.delay_sd(name) > 0.0:
             held = 0.5 / sensors.rate / np.sqrt(3.0)
             for i, label in enumerate(labels[channel.dims[1]]):
-                together = (f"delay of a {name}", i)
-                found.append(SensorUnknown(f"delay {name}[{label}]", "delay", name, i, held, "s", together))
+                add("delay", name, i, label, held, "s", (f"delay of a {name}", i))
     return tuple(found)
 
 

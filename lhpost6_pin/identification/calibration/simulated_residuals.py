@@ -64,9 +64,12 @@ def by_simulation(
 
     def errors(plant: Plant, some: Sequence[_RecordedTest]) -> list[Complex] | None:
         """Bins of measured less simulated outputs of each drive; None if a run failed."""
-        found = [_outputs(plant, drive) for drive in some]
-        pairs = [(d, f) for d, f in zip(some, found, strict=True) if f is not None]
-        return [_bins(d, d.measured - f, problem, band)[0] for d, f in pairs] if len(pairs) == len(some) else None
+        found = []
+        for drive in some:
+            if (outputs := _outputs(plant, drive)) is None:
+                return None
+            found.append(_bins(drive, drive.measured - outputs, problem, band)[0])
+        return found
 
     results: list[list[Complex]] = []
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
@@ -124,22 +127,16 @@ def _outputs(plant: Plant, drive: _RecordedTest) -> Array | None:
     """Simulated platen velocity and chamber pressures (n, 6 + n_chambers) at a drive's samples."""
     from scipy.interpolate import CubicSpline
 
-    states = _pressure_states(plant)
+    # pressures in z: chamber A of every actuator, then B of the double-acting
+    first = plant.rows["state"][plant.tables.actuators]
+    double = [name in plant.machine.double_acting for name in plant.machine.actuator_names]
+    states = np.concatenate([first, first[double] + 1])
     zero = plant.zero_state()
     z = zero.z.copy()
     z[states] = drive.measured[0, 6:]
-    start = State(zero.q, zero.v, z)
-    samples = len(drive.spool) // STEPS
-    run: Run = simulate(plant, OpenLoop(drive.spool, start), samples=samples, engine="fused")
+    loop = OpenLoop(drive.spool, State(zero.q, zero.v, z))
+    run: Run = simulate(plant, loop, samples=len(drive.spool) // STEPS, engine="fused")
     if run.trouble:
         return None
-    velocity = platen_motion(plant, run.q, run.v, run.a).velocity
-    found = np.hstack([velocity, run.z[:, states]])
+    found = np.hstack([platen_motion(plant, run.q, run.v, run.a).velocity, run.z[:, states]])
     return np.asarray(CubicSpline(run.time, found)(np.minimum(drive.time, run.time[-1])))
-
-
-def _pressure_states(plant: Plant) -> Array:
-    """Places of the pressures in z: chamber A of every actuator, then B of the double-acting."""
-    first = plant.rows["state"][plant.tables.actuators]
-    double = [name in plant.machine.double_acting for name in plant.machine.actuator_names]
-    return np.concatenate([first, first[double] + 1])

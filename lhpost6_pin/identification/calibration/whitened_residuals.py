@@ -1,9 +1,8 @@
-"""Residuals in the frequency domain, whitened by the noise that sensors leave in them.
+"""Residuals in the frequency domain, whitened by their sensor noise.
 
-A discrete Fourier transform over a whole test is one zero-phase filter for everything that is compared: bins within
-the band count, the others do not. There stationary noise is independent from bin to bin, so that least squares with
-its cross-spectral matrix per band of frequencies is the best linear estimate, and its inverse normal matrix the
-covariance.
+A discrete Fourier transform over a whole test is a zero-phase filter: only bins within the band are compared. In it
+stationary noise is independent from bin to bin, so that least squares weighted with its cross-spectral matrix per band
+is the best linear estimate, and its inverse normal matrix the covariance.
 """
 
 from collections.abc import Sequence
@@ -29,8 +28,8 @@ CERTAIN = 9.0
 def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tuple[Complex, Array]:
     """Bins (m, k) of columns (n, k) from `low` to `high` [Hz], and their frequencies (m,) [Hz].
 
-    What is transformed is without `edge` [s] at both ends, and shorter by a few samples for a fast transform.
-    Scaled so that noise of one-sided spectrum S has E|X|^2 = S; the mean, which is real, so that E X^2 = S / 2.
+    `edge` [s] is cut off at both ends, and a few samples more for a fast transform. Noise of one-sided spectrum S has
+    E|X|^2 = S; the mean, which is real, E X^2 = S / 2.
     """
     from scipy import fft
 
@@ -69,7 +68,7 @@ class Whitener(NamedTuple):
     factor: Complex
 
     def band(self, f: Array) -> NDArray[np.intp]:
-        """Band (m,) that each frequency f (m,) is in."""
+        """Band (m,) of each frequency f (m,)."""
         return _band(self.edges, f)
 
     def scaled(self, scale: Array) -> "Whitener":

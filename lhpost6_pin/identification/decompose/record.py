@@ -55,7 +55,7 @@ class Decomposed:
     comparison: ComparisonBand
     whole: Decomposition
     forces: Decomposition  # filtered, edges cut; its states are those of `whole`, cut
-    motion: PlatenMotion  # filtered and cut alike
+    motion: PlatenMotion  # filtered and cut as the forces are
     inside: slice  # samples of `whole` that are compared
     delays: Mapping[str, Delay]  # removed, by group
     notes: tuple[str, ...]  # sources of motion and forces
@@ -72,7 +72,7 @@ class Decomposed:
 
     @property
     def time(self) -> Array:
-        """Time (n,) [s] of what is compared."""
+        """Time (n,) [s] of the compared samples."""
         return self.forces.ledger.time
 
     @property

@@ -4,12 +4,11 @@
 runs a whole campaign.
 """
 
-from .metrics_file import metrics, save_metrics
 from .phase_agreement import ColumnAgreement, ComparedQuantity
 from .phases import PHASES, Phase
 from .simulated_phases import Lag
 from .spectra import Peak, Resonance, Spectrum, Valves
-from .validate import Validation, validate
+from .validate import Validation, metrics, save_metrics, validate
 
 __all__ = ["PHASES", "ColumnAgreement", "Lag", "ComparedQuantity", "Peak", "Phase", "Resonance", "Spectrum"]
 __all__ += ["Validation", "Valves", "metrics", "save_metrics", "validate"]

@@ -31,7 +31,7 @@ _PRELOADED = ("wrench", "struts", "dissipative", "actuator_force", "chamber_pres
 
 @dataclass(frozen=True)
 class ComparedQuantity:
-    """One quantity, measured and of the model; n samples, k columns, low-passed alike."""
+    """One quantity, measured and of the model; n samples, k columns, with the same low-pass."""
 
     quantity: str  # a name of the units below: "displacement", ..., "wrench" at C in {c}, "actuator_force", ...
     columns: tuple[str, ...]
@@ -100,7 +100,7 @@ def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tup
 
 
 def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> Mask:
-    """Which columns (k,) move enough to be judged by a ratio."""
+    """Columns (k,) that move enough for a ratio to be meaningful."""
     size = measured.std(axis=0)
     per = {"m": 1.0, "rad": numbers.number("hardly_moving.radius"), "N m": 1.0 / numbers.number("hardly_moving.radius")}
     weight = [per.get(unit_of(pair.quantity, column).split("/")[0], 1.0) for column in pair.columns]
@@ -117,16 +117,16 @@ def _agree_one(pair: ComparedQuantity, k: int, moves: bool, late: float, part: s
     model = whole[part]
     shifted = align(whole, late, dt)[part] if np.isfinite(late) else model
     error = model - measured
-    ratio = ratio_aligned = peak = alike = alike_aligned = float("nan")
+    ratio = ratio_aligned = peak = correlated = correlated_aligned = float("nan")
     if moves:
-        ratio, peak, alike = (float(f(measured, model)) for f in (rrmse, peak_ratio, correlation))
-        ratio_aligned, alike_aligned = (float(f(measured, shifted)) for f in (rrmse, correlation))
+        ratio, peak, correlated = (float(f(measured, model)) for f in (rrmse, peak_ratio, correlation))
+        ratio_aligned, correlated_aligned = (float(f(measured, shifted)) for f in (rrmse, correlation))
     column = pair.columns[k]
     calibration = float("nan") if pair.calibration is None else float(pair.calibration[k])
     rms = [float(np.sqrt(np.mean(x**2))) for x in (error, shifted - measured)]
     return ColumnAgreement(
         *(pair.quantity, column, unit_of(pair.quantity, column), moves),
         *(float(measured.std()), rms[0], float(pair.noise[k]), rms[1]),
-        *(ratio, ratio_aligned, late, peak, alike, alike_aligned),
+        *(ratio, ratio_aligned, late, peak, correlated, correlated_aligned),
         *(offset, calibration, float(drift_rate(error, dt))),
     )

@@ -27,7 +27,7 @@ from ...simulation.simulate import fastest_engine
 from ...tuning.drives import load_drive
 from ..decompose.record import decompose_test
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
-from .prepare_tests import ComparisonBasis, PreparedTest, wrench_calibration
+from .prepare_tests import PreparedTest, wrench_calibration
 from .simulated_phases import Lag, SimulatedComparison
 from .spectra import Resonance, Spectrum, estimate_spectrum
 
@@ -68,63 +68,61 @@ class Phase:
         return tuple(a for a in self.agreement if a.quantity == quantity)
 
 
-def run_phase(number: int, test: PreparedTest, basis: ComparisonBasis) -> Phase:
+def run_phase(number: int, test: PreparedTest) -> Phase:
     """One phase of one test; a missing channel or a failed run becomes the phase's reason."""
     phases = {1: _inverse_dynamics, 2: _open_loop, 3: _closed_loop}
     try:
-        return phases[number](test, basis)
+        return phases[number](test)
     except LhpostError as error:
-        return Phase(number, test.name, test.time, reason=str(error))
+        return Phase(number, test.test.name, test.time, reason=str(error))
 
 
-def _inverse_dynamics(test: PreparedTest, basis: ComparisonBasis) -> Phase:
-    numbers, axes = basis.numbers, test.plant.axes
+def _inverse_dynamics(test: PreparedTest) -> Phase:
+    numbers, axes = test.basis.numbers, test.plant.axes
     columns = tuple(AXES[k] for k in axes)
     (found, notes), (again, _) = (decompose_test(test.plant, one) for one in (test.test, test.again))
-    calibration = wrench_calibration(test, basis.sensors)[axes]
+    calibration = wrench_calibration(test)[axes]
     pairs = []
     for quantity, *sides in _SIDES:
         values = [getattr(one, side) for one in (found, again) for side in sides]
         if all(x is not None for x in values):
-            measured, model, more, again_model = (numbers.band.apply(x[:, axes], test.dt) for x in values)
+            measured, model, more, again_model = (numbers.band.apply(x[:, axes], test.test.dt) for x in values)
             sensor_noise, noise = more - measured, again_model - more - model + measured
             known = calibration if quantity == "wrench" else None
             spread = sensor_noise.std(axis=0), noise.std(axis=0)
             pairs.append(ComparedQuantity(quantity, columns, measured, model, *spread, known))
     ours, theirs, noise = (x[:, axes] for x in (found.measured, found.required, again.measured - found.measured))
-    spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.dt, numbers)
-    return Phase(1, test.name, test.time, tuple(pairs), agree(pairs, test.dt, numbers), spectrum, notes=notes)
+    spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.test.dt, numbers)
+    return Phase(1, test.test.name, test.time, tuple(pairs), agree(pairs, test.test.dt, numbers), spectrum, notes=notes)
 
 
-def _open_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
+def _open_loop(test: PreparedTest) -> Phase:
     engine = fastest_engine(test.plant)
-    ran, again = (replay(test.machine, m.record, attrs={}, engine=engine) for m in (test.test, test.again))
+    ran, again = (replay(test.plant.machine, m.record, attrs={}, engine=engine) for m in (test.test, test.again))
     channels = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
-    return _of_run(2, test, SimulatedComparison(test, ran, again, basis), channels, basis)
+    return _of_run(2, SimulatedComparison(test, ran, again), channels)
 
 
-def _closed_loop(test: PreparedTest, basis: ComparisonBasis) -> Phase:
-    settings, note = _settings_of(test.test.record, basis.settings)
-    target, drive = _drive_of(test.test.record, settings, basis.numbers.number("reference.high"))
+def _closed_loop(test: PreparedTest) -> Phase:
+    settings, note = _settings_of(test.test.record, test.basis.settings)
+    target, drive = _drive_of(test.test.record, settings, test.basis.numbers.number("reference.high"))
     engine = fastest_engine(test.plant)
-    ran = rehearse(test.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
-    both = SimulatedComparison(test, ran, None, basis)
+    ran = rehearse(test.plant.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
+    both = SimulatedComparison(test, ran, None)
     both.notes.append(note)
-    phase = _of_run(3, test, both, ("spool_command",), basis)
+    phase = _of_run(3, both, ("spool_command",))
     velocity = phase.pair("velocity")
     assert velocity is not None
     moving = [a.column for a in phase.of("velocity") if a.moves]
     return replace(phase, lags=both.lags(target.velocity, velocity, moving))
 
 
-def _of_run(
-    number: int, test: PreparedTest, both: SimulatedComparison, channels: Sequence[str], basis: ComparisonBasis
-) -> Phase:
-    pairs = both.quantities(channels)
-    found = agree(pairs, test.dt, basis.numbers)
+def _of_run(number: int, both: SimulatedComparison, channels: Sequence[str]) -> Phase:
+    pairs, name = both.quantities(channels), both.test.test.name
+    found = agree(pairs, both.dt, both.basis.numbers)
     moving = {a.column for a in found if a.quantity == "acceleration" and a.moves}
     shown = tuple(r for r in both.resonances() if r.column in moving)
-    return Phase(number, test.name, both.time, tuple(pairs), found, both.spectrum(), shown, notes=tuple(both.notes))
+    return Phase(number, name, both.time, tuple(pairs), found, both.spectrum(), shown, notes=tuple(both.notes))
 
 
 def _settings_of(record: xr.Dataset, given: ControllerSettings | None) -> tuple[ControllerSettings, str]:

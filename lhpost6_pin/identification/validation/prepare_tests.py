@@ -5,7 +5,6 @@ change of the difference has the noise's size, through the same filters and form
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,35 +30,18 @@ __all__ += ["wrench_calibration"]
 SEED = 1  # of the second draw of noise: results repeat
 
 
-@dataclass(frozen=True)
-class Numbers:
+class Numbers(NamedTuple):
     """Numbers of `models/procedures/validate.toml`."""
 
     stated: Parameters
+    band: Band  # filter of all that is compared
+    edge: float  # cut off at both ends of a test [s]
+    longest_delay: float  # that is sought between model and measurement [s]
+    bands: tuple[float, ...]  # edges of the bands of spectra [Hz]
 
     def number(self, path: str) -> float:
         """Number at a path of the file."""
         return self.stated.number(path)
-
-    @property
-    def band(self) -> Band:
-        """Filter of all that is compared."""
-        return Band(high=self.number("comparison.high"), order=int(self.number("comparison.order")))
-
-    @property
-    def edge(self) -> float:
-        """Length cut off at both ends of a test [s]."""
-        return self.number("comparison.edge")
-
-    @property
-    def longest_delay(self) -> float:
-        """Longest delay that is sought between model and measurement [s]."""
-        return self.number("comparison.longest_delay")
-
-    @property
-    def bands(self) -> tuple[float, ...]:
-        """Edges of the bands of spectra [Hz]."""
-        return self.stated.vector("spectra.edges")
 
     @property
     def shortest(self) -> float:
@@ -78,28 +60,21 @@ class ComparisonBasis(NamedTuple):
 
 def validation_numbers() -> Numbers:
     """Read `models/procedures/validate.toml`."""
-    return Numbers(load_parameters(models_folder() / "procedures" / "validate.toml"))
+    stated = load_parameters(models_folder() / "procedures" / "validate.toml")
+    n = stated.number
+    band = Band(high=n("comparison.high"), order=int(n("comparison.order")))
+    bands = stated.vector("spectra.edges")
+    return Numbers(stated, band, n("comparison.edge"), n("comparison.longest_delay"), bands)
 
 
-@dataclass(frozen=True)
-class PreparedTest:
+class PreparedTest(NamedTuple):
     """A test, prepared for comparison with the model of its machine."""
 
-    name: str
+    basis: ComparisonBasis
     plant: Plant  # with the servovalves that were open
     time: Array  # (n,) from zero [s]
     test: MeasuredTest
     again: MeasuredTest  # with the stated noise added once more
-
-    @property
-    def dt(self) -> float:
-        """Sample interval [s]."""
-        return float(self.time[-1]) / (len(self.time) - 1)
-
-    @property
-    def machine(self) -> Machine:
-        """The machine with the servovalves that were open."""
-        return self.plant.machine
 
 
 def too_short(seconds: float, numbers: Numbers) -> str:
@@ -117,7 +92,7 @@ def prepare(machine: Machine, record: xr.Dataset, basis: ComparisonBasis) -> Pre
     policy = AS_RECORDED._replace(band=basis.numbers.band)
     both = (prepare_test(plant, r, sensors, policy) for r in (record, noisy))
     time = record["time"].values
-    return PreparedTest(str(record.attrs.get("test", "test")), plant, time - float(time[0]), *both)
+    return PreparedTest(basis, plant, time - float(time[0]), *both)
 
 
 def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
@@ -125,9 +100,9 @@ def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
     return np.asarray(leg_wrenches(plant, plant_motion(plant, motion).q, force).sum(axis=1))
 
 
-def wrench_calibration(test: PreparedTest, sensors: SensorSet) -> Array:
+def wrench_calibration(test: PreparedTest) -> Array:
     """Standard deviation (6,) of the measured wrench's mean at C by gains and offsets of force sensors; nan without."""
-    force = test.test.channels.get("actuator_force")
+    sensors, force = test.basis.sensors, test.test.channels.get("actuator_force")
     if force is None:
         return np.full(6, np.nan)
     mean = force.mean(axis=0)

@@ -1,4 +1,4 @@
-"""A simulated run in open or closed loop, compared with the test that it repeats."""
+"""A simulated run in open or closed loop, compared with the measured test."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from ...mechanics.pose import PlatenMotion
 from ...simulation.rehearse import SimulatedTest
 from ..prepare import actuator_forces
 from .phase_agreement import MOTIONS, ComparedQuantity
-from .prepare_tests import ComparisonBasis, PreparedTest, too_short, total_wrench, wrench_calibration
+from .prepare_tests import PreparedTest, too_short, total_wrench, wrench_calibration
 from .spectra import Resonance, Spectrum, estimate_response, estimate_spectrum, find_resonances
 
 __all__ = ["Lag", "SimulatedComparison"]
@@ -28,23 +28,21 @@ class Lag(NamedTuple):
 
 
 class SimulatedComparison:
-    """A run and its test on the test's samples, as far as the run lasted.
+    """A run and its test on the test's samples, up to the end of the run.
 
     `again` is the run of the test with another draw of noise, where the run depends on it: the change of the difference
     between model and measurement is its noise.
     """
 
-    def __init__(
-        self, test: PreparedTest, ran: SimulatedTest, again: SimulatedTest | None, basis: ComparisonBasis
-    ) -> None:
+    def __init__(self, test: PreparedTest, ran: SimulatedTest, again: SimulatedTest | None) -> None:
         """Raise SimulationError for a run that ended too early to be compared."""
-        self.test, self.basis = test, basis
+        self.test, self.basis, self.dt = test, test.basis, test.test.dt
         same = again is not None and len(again.run.time) == len(ran.run.time)
         self.ran, self.again = ran.record, again.record if again is not None and same else ran.record
         self.clock = ran.record["time"].values
         self.n = int(np.searchsorted(test.time, self.clock[-1] + 1e-9, side="right"))
-        if self.n * test.dt < basis.numbers.shortest:
-            raise SimulationError(ran.run.trouble or too_short(self.n * test.dt, basis.numbers))
+        if self.n * self.dt < self.basis.numbers.shortest:
+            raise SimulationError(ran.run.trouble or too_short(self.n * self.dt, self.basis.numbers))
         self.notes = [ran.run.trouble] if ran.run.trouble else []
         if ran.run.clipped:
             self.notes.append(f"{ran.run.clipped} spool values beyond full stroke were clipped")
@@ -58,21 +56,21 @@ class SimulatedComparison:
 
     def quantities(self, channels: Sequence[str]) -> list[ComparedQuantity]:
         """Motion and total actuator force per axis, and channels per actuator; missing channels are noted."""
-        plant, tests, runs = self.test.plant, (self.test.test, self.test.again), (self.ran, self.again)
+        plant, axes = self.test.plant, self.test.plant.axes
+        tests, runs = (self.test.test, self.test.again), (self.ran, self.again)
+        motions = [[t.motion for t in tests], self.moved]
         found = []
         for quantity in MOTIONS:
-            measured = [getattr(t.motion, quantity)[:, plant.axes] for t in tests]
-            model = [getattr(moved, quantity)[:, plant.axes] for moved in self.moved]
+            measured, model = ([getattr(m, quantity)[:, axes] for m in side] for side in motions)
             found.append(self._compared(quantity, self.axes, measured, model))
-        forces = [actuator_forces(plant.machine, t.channels) for t in tests]
-        if forces[0] is not None:
-            pairs = zip(tests, forces, strict=True)
-            measured = [total_wrench(plant, t.motion, f)[:, plant.axes] for t, f in pairs if f is not None]
-            model = [
-                total_wrench(plant, moved, run["actuator_force"].values)[:, plant.axes]
-                for moved, run in zip(self.moved, runs, strict=True)
-            ]
-            calibration = wrench_calibration(self.test, self.basis.sensors)[plant.axes]
+        forces: list[list[Array | None]] = [[actuator_forces(plant.machine, t.channels) for t in tests]]
+        forces.append([r["actuator_force"].values for r in runs])
+        if forces[0][0] is not None:
+            measured, model = (
+                [total_wrench(plant, m, f)[:, axes] for m, f in zip(moved, given, strict=True) if f is not None]
+                for moved, given in zip(motions, forces, strict=True)
+            )
+            calibration = wrench_calibration(self.test)[axes]
             found.append(self._compared("wrench", self.axes, measured, model, calibration))
         for name in channels:
             if name not in self.test.test.record:
@@ -86,24 +84,24 @@ class SimulatedComparison:
     def lags(self, target: Array, velocity: ComparedQuantity, moving: Sequence[str]) -> tuple[Lag, ...]:
         """Delays behind the target velocity (m, 6) at the run's samples, of the columns that move."""
         wanted = self._at_samples(target[: len(self.clock)], self.basis.numbers.band)
-        longest = self.basis.numbers.longest_delay
-        found = []
+        longest, found = self.basis.numbers.longest_delay, []
         for k, column in enumerate(velocity.columns):
             if column in moving:
-                reference, sides = wanted[:, AXES.index(column)], (velocity.measured, velocity.model)
-                found.append(Lag(column, *(float(delay(reference, x[:, k], self.test.dt, longest)) for x in sides)))
+                sides = velocity.measured[:, k], velocity.model[:, k]
+                reference = wanted[:, AXES.index(column)]
+                found.append(Lag(column, *(float(delay(reference, x, self.dt, longest)) for x in sides)))
         return tuple(found)
 
     def spectrum(self) -> Spectrum:
         """Spectra of the platen's acceleration."""
         measured, noise, model = self._accelerations()
-        return estimate_spectrum("acceleration", self.axes, measured, model, noise, self.test.dt, self.basis.numbers)
+        return estimate_spectrum("acceleration", self.axes, measured, model, noise, self.dt, self.basis.numbers)
 
     def resonances(self) -> tuple[Resonance, ...]:
         """Oil columns; none without spool positions."""
         if "spool_position" not in self.test.test.record:
             return ()
-        plant, numbers, dt = self.test.plant, self.basis.numbers, self.test.dt
+        plant, numbers, dt = self.test.plant, self.basis.numbers, self.dt
         spool, more = (m.record["spool_position"].values[: self.n] for m in (self.test.test, self.test.again))
         acceleration, noise, moved = self._accelerations()
         noises = more - spool, noise
@@ -122,18 +120,18 @@ class SimulatedComparison:
     ) -> ComparedQuantity:
         """Both sides of a quantity; each has two draws of noise."""
         band = self.basis.numbers.band
-        sensor_noise = band.apply(measured[1] - measured[0], self.test.dt)[: self.n]
+        sensor_noise = band.apply(measured[1] - measured[0], self.dt)[: self.n]
         noise = sensor_noise
         if self.again is not self.ran:
             noise = self._at_samples(model[1] - model[0], band) - sensor_noise
-        kept = band.apply(measured[0], self.test.dt)[: self.n], self._at_samples(model[0], band)
+        kept = band.apply(measured[0], self.dt)[: self.n], self._at_samples(model[0], band)
         spread = sensor_noise.std(axis=0), noise.std(axis=0)
         return ComparedQuantity(quantity, tuple(columns), *kept, *spread, calibration)
 
     def _at_samples(self, values: Array, band: Band) -> Array:
         """A run's values, filtered, at the test's samples: selected where these coincide, else interpolated."""
         step = self.clock[1] - self.clock[0]
-        kept, every = band.apply(values, step), max(round(self.test.dt / step), 1)
+        kept, every = band.apply(values, step), max(round(self.dt / step), 1)
         picked = self.clock[::every][: self.n]
         if len(picked) == self.n and np.allclose(picked, self.time, rtol=0.0, atol=1e-6 * step):
             return np.asarray(kept[::every][: self.n])

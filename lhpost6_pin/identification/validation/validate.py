@@ -1,4 +1,4 @@
-"""Three-phase validation of a campaign: every test through inverse dynamics, open loop and closed loop.
+"""Three-phase validation of a campaign: every test in inverse dynamics, open loop and closed loop; and its metrics.
 
 found = validate(machine, campaign)
 found.phase("TX", 1).of("wrench")       # agreement of required and measured actuator wrench, per axis
@@ -8,12 +8,18 @@ import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import xarray as xr
 from joblib import Parallel, delayed
 
 from ...control import ControllerSettings
 from ...core.errors import LhpostError, RecordError
+from ...core.files import write_whole
+from ...core.jsonable import as_json
+from ...core.progress import Progress
 from ...data.alignment import Delay, align_record
 from ...data.campaign import Campaign
 from ...data.sensors import SensorSet, load_sensors
@@ -23,11 +29,18 @@ from ...mechanics.plant import make_plant
 from ..prepare import SIGNIFICANT, find_delays
 from .phases import PHASES, Phase, run_phase
 from .prepare_tests import ComparisonBasis, Numbers, prepare, too_short, validation_numbers
-from .spectra import Valves, find_valves
+from .spectra import Resonance, Spectrum, Valves, find_valves
 
-__all__ = ["Validation", "validate"]
+__all__ = ["Validation", "metrics", "save_metrics", "validate"]
 
-Progress = Callable[[float], None]
+
+_UNITS = {
+    "seconds, delay, standard_error, behind_reference": "s",
+    "frequency, linear_model, low_pass": "Hz",
+    "variation, error, error_aligned, noise, offset, offset_expected": "the row's unit",
+    "drift": "the row's unit per second",
+    "all others": "1",
+}
 
 
 @dataclass(frozen=True)
@@ -131,6 +144,61 @@ def _phases_of(
         name, time = str(record.attrs.get("test", "test")), record["time"].values
         test, why = None, str(error)
     for number in phases:
-        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test, basis))
+        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test))
         count()
     return found
+
+
+def metrics(found: Validation) -> dict[str, Any]:
+    """All numbers of a validation, SI, by test and phase; None where not known."""
+    machine = found.machine
+    return {
+        "campaign": found.campaign,
+        "machine": machine.name,
+        "specimen": machine.specimen.name if machine.specimen else "none",
+        "units": _UNITS,
+        "low_pass": found.numbers.band.high,
+        "skews": {group: {"delay": d.delay, "standard_error": d.standard_error} for group, d in found.skews.items()},
+        "valves": _valves(found.valves),
+        "tests": {
+            test: {PHASES[p.number]: _phase(p, found) for p in found.phases if p.test == test} for test in found.tests
+        },
+    }
+
+
+def save_metrics(found: Validation, path: Path) -> None:
+    """Write `metrics` as JSON, whole or not at all."""
+    with write_whole(path) as beside:
+        beside.write_text(as_json(metrics(found)) + "\n", encoding="utf-8")
+
+
+def _phase(phase: Phase, found: Validation) -> dict[str, Any]:
+    if phase.reason:
+        return {"reason": phase.reason}
+    out: dict[str, Any] = {"seconds": float(phase.time[-1]), "notes": list(phase.notes), "agreement": {}}
+    for one in phase.agreement:
+        row = {**one._asdict(), "error_to_noise": one.error_to_noise}
+        out["agreement"].setdefault(row.pop("quantity"), {})[row.pop("column")] = row
+    if phase.spectrum is not None:
+        out["amplitude_ratio"] = _ratios(phase.spectrum, found.numbers.bands)
+    out["resonance"] = {r.column: _resonance(r) for r in phase.resonances}
+    if phase.lags:
+        out["behind_reference"] = {lag.column: {"measured": lag.measured, "model": lag.model} for lag in phase.lags}
+    return out
+
+
+def _valves(valves: Valves | None) -> dict[str, Any] | None:
+    if valves is None:
+        return None
+    columns = zip(valves.columns, valves.delay, valves.standard_error, valves.model, strict=True)
+    return {c: {"delay": float(d), "standard_error": float(e), "model": float(m)} for c, d, e, m in columns}
+
+
+def _ratios(spectrum: Spectrum, edges: tuple[float, ...]) -> dict[str, Any]:
+    bands = [f"{low:g}-{high:g} Hz" for low, high in pairwise(edges)]
+    columns = zip(spectrum.columns, spectrum.ratio.T.tolist(), strict=True)
+    return {"quantity": spectrum.quantity} | {c: dict(zip(bands, values, strict=True)) for c, values in columns}
+
+
+def _resonance(one: Resonance) -> dict[str, Any]:
+    return {"linear_model": one.expected, "measured": one.measured._asdict(), "model": one.model._asdict()}

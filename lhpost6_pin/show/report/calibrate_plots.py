@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...identification.calibration import Calibration
-from ...identification.calibration.verdicts import changed_parameters, contradictions
+from ...identification.calibration.result import changed_parameters, contradictions
 from .layout import band_on, stacked_layout
 from .page import Block, Figure, Markup, Table, number, shaded
 from .plots import BLACK, BLUE, CYCLE, GREY, VERMILLION

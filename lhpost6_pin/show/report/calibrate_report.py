@@ -6,7 +6,7 @@ import numpy as np
 
 from ...identification.calibration import Calibration
 from ...identification.calibration.calibration_summary import chance, range_summary
-from ...identification.calibration.verdicts import beyond, changed_parameters, contradictions, out_of_range, verdict_on
+from ...identification.calibration.result import beyond, changed_parameters, contradictions, out_of_range, verdict_on
 from .calibrate_sections import (
     change_of,
     correlation_blocks,

@@ -11,7 +11,7 @@ from ...identification.calibration.calibration_summary import (
     cut_strokes,
     range_summary,
 )
-from ...identification.calibration.verdicts import beyond, contradictions, far, stated_range, verdict_on
+from ...identification.calibration.result import beyond, contradictions, far, stated_range, verdict_on
 from ...identification.residuals import RESIDUALS
 from .calibrate_plots import (
     INTERVAL,
@@ -174,7 +174,7 @@ def group_blocks(calibration: Calibration) -> list[Block]:
 
 def correlation_blocks(calibration: Calibration) -> list[Block]:
     """Return the strongly correlated pairs of unknowns."""
-    pairs = calibration.alike()
+    pairs = calibration.correlated_pairs()
     limit = calibration.numbers.number("report.alike")
     if not pairs:
         return [f"No two unknowns are correlated by {limit:g} or more."]

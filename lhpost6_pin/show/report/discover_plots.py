@@ -11,7 +11,7 @@ from ...discovery.held_out import FLOOR
 from ...discovery.localise import gap_map
 from ...discovery.residual_function import ResidualFunction
 from ...discovery.search_state import Round
-from ...discovery.verdict_summary import where
+from ...discovery.verdict_file import where
 from .layout import line_on, log_ticks, stacked_layout
 from .page import Block, Figure, Markup, Table, shaded, text
 from .plots import BLACK, BLUE, GREY, VERMILLION

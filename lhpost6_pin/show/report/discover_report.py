@@ -7,8 +7,7 @@ from pathlib import Path
 from ...discovery import Discovery, save_verdict
 from ...discovery.held_out import Proof
 from ...discovery.verdict import EffectFinding, Estimate, SensorFinding, Word
-from ...discovery.verdict_file import advice
-from ...discovery.verdict_summary import summary, title_of, where
+from ...discovery.verdict_file import advice, summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .control_blocks import load_of, numbers_used

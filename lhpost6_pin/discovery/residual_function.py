@@ -207,9 +207,10 @@ def _fit(forms: Sequence[Form], value: Array, weight: Array) -> tuple[float, flo
     """Schwarz's criterion (deviations known up to a common factor), weighted sum of squared residuals, coefficients."""
     squares = float(np.sum((weight * value) ** 2))
     size: Array = np.zeros(0)
+    size: Array = np.zeros(0)
     if forms:
         a = np.hstack([columns for columns, _ in forms])
-        size, *_ = np.linalg.lstsq(a * weight[:, None], value * weight, rcond=None)
+        size = np.asarray(np.linalg.lstsq(a * weight[:, None], value * weight, rcond=None)[0], float)
         squares = float(np.sum((weight * (value - a @ size)) ** 2))
     count = len(value)
     return count * np.log(max(squares, 1e-300) / count) + len(size) * np.log(count), squares, size

@@ -207,7 +207,6 @@ def _fit(forms: Sequence[Form], value: Array, weight: Array) -> tuple[float, flo
     """Schwarz's criterion (deviations known up to a common factor), weighted sum of squared residuals, coefficients."""
     squares = float(np.sum((weight * value) ** 2))
     size: Array = np.zeros(0)
-    size: Array = np.zeros(0)
     if forms:
         a = np.hstack([columns for columns, _ in forms])
         size = np.asarray(np.linalg.lstsq(a * weight[:, None], value * weight, rcond=None)[0], float)

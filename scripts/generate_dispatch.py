@@ -26,7 +26,7 @@ VIEWS = '''"""A row's numbers as the parameters of its law: written by `scripts/
 from ..core.compiled import compiled_inline
 from ..laws import {modules}
 
-__all__: list[str] = []  # as `views.view_...` alone
+__all__ = ["view_hydraulic"]  # by name; all others as `views.view_...`
 '''
 
 DISPATCH = '''"""From a row of the effect table to its law: written by `scripts/generate_dispatch.py`, do not edit.

@@ -6,14 +6,14 @@ from machine_cases import plant_named
 from sensor_cases import RATE, measured
 
 from lhpost6_pin.core.errors import RecordError
-from lhpost6_pin.data.fusion import fuse_motion, kinematic_jacobian
+from lhpost6_pin.data.fusion import fuse_motion
 from lhpost6_pin.data.records import make_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import Band
 from lhpost6_pin.identification.inverse_dynamics import march_states
 from lhpost6_pin.mechanics.kinematics import pose_jacobian
 from lhpost6_pin.mechanics.port_path import ports_along
-from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
+from lhpost6_pin.mechanics.pose import PlatenMotion, kinematic_jacobian, plant_motion
 
 pytestmark = pytest.mark.long
 

@@ -13,7 +13,7 @@ from ..laws.orifice import opening
 from ..machine.machine import Machine
 from ..mechanics.equilibrium import Equilibrium, find_equilibrium, unloaded_speeds
 from ..mechanics.plant import Plant, make_plant
-from ..mechanics.pose import leg_displacements
+from ..mechanics.pose import kinematic_jacobian
 from ..mechanics.rigid_body import platen_inertia
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
 from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, ControlTables, Feedback, control_step, pack_control
@@ -94,8 +94,7 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
         origin = settings.stated.origin
         raise ControllerError(f"{origin}: loop.rate is {settings.rate:g} Hz; the rate of samples is {SAMPLE_RATE} Hz")
     n, axes = plant.spools, plant.axes
-    _, rates = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))
-    jacobian = np.ascontiguousarray(rates.T[:n])
+    jacobian = np.ascontiguousarray(kinematic_jacobian(plant))
     actuator, oil = np.zeros(n, ACTUATOR), np.zeros(n)
     for i, row in enumerate(plant.rows[plant.tables.actuators]):
         p, force, spool = parameters_of(row), float(rest.force[i]), float(rest.spool[i])

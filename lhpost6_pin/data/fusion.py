@@ -26,14 +26,14 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..mechanics.plant import Plant
-from ..mechanics.pose import PlatenMotion, forward_kinematics, leg_displacements
+from ..mechanics.pose import PlatenMotion, forward_kinematics, kinematic_jacobian
 from .channels import MOTION, channel_name
 from .conditioning import WIDTHS, integrate, quieted
 from .records import sample_interval
 from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate
 
-__all__ = ["FusedMotion", "fuse_motion", "kinematic_jacobian"]
+__all__ = ["FusedMotion", "fuse_motion"]
 
 log = logging.getLogger(__name__)
 
@@ -110,12 +110,6 @@ def fuse_motion(
     lost = [_deviation(f, power * (wider - narrower) ** 2) for narrower, wider in pairwise(gains)]
     share = {name: alone(order, part) for name, order, part in channels} if shares else {}
     return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), used, share)
-
-
-def kinematic_jacobian(plant: Plant) -> Array:
-    """Rates of the actuators' lengths per rate of the pose (n_actuators, 6) in the control zero-position (Eq. 3-33)."""
-    _, columns = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))
-    return columns[:, : plant.spools].T
 
 
 def _displacement(plant: Plant, record: xr.Dataset, sensors: SensorSet, f: Array) -> tuple[_Sensor, dict[str, Array]]:

@@ -15,11 +15,10 @@ from ..core.arrays import Array
 from ..core.names import AXES
 from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
-from ..mechanics.pose import forward_kinematics, leg_displacements
+from ..mechanics.pose import forward_kinematics, kinematic_jacobian, leg_displacements
 from .alignment import due_spools
 from .channels import LAYOUT, channel_name, columns_of
 from .conditioning import resolution
-from .fusion import kinematic_jacobian
 from .records import sample_interval
 from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate

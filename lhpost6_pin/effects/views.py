@@ -27,7 +27,7 @@ from ..laws import (
     warm_up,
 )
 
-__all__: list[str] = []  # as `views.view_...` alone
+__all__ = ["view_hydraulic"]  # by name; all others as `views.view_...`
 
 
 @compiled_inline

@@ -20,7 +20,6 @@ __all__ = [
     "DeadVolume",
     "LAWS",
     "chamber_energy",
-    "chamber_rate",
     "flow_enthalpy",
     "piston_force",
     "pressure_rises",
@@ -40,12 +39,6 @@ class DeadVolume(NamedTuple):
 
 
 LAWS = {"dead_volume": Law(DeadVolume, modifies="oil", fields=("dead_volume",))}
-
-
-@compiled
-def chamber_rate(flow: float, area: float, length_rate: float, length: float, bulk: float) -> float:
-    """Rate of pressure [Pa/s] of one chamber (Eq. 4-5): beta / L_c (Q/A - dL_c/dt)."""
-    return bulk / length * (flow / area - length_rate)
 
 
 @compiled

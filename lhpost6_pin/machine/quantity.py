@@ -47,7 +47,7 @@ def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
         return value
     import pint  # slow to import and needed only where a unit is not the SI one
 
-    registry: Any = pint.UnitRegistry()
+    registry: Any = pint.get_application_registry()
     try:
         factor = registry.Quantity(1.0, _pint_spelling(unit)).to(_pint_spelling(wanted)).magnitude
     except Exception as error:  # pint raises a dozen types for a bad unit

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
 from ..effects.registry import parameters_of
@@ -13,12 +13,11 @@ from ..laws.orifice import opening
 from ..machine.machine import Machine
 from .equilibrium import find_equilibrium, unloaded_speeds
 from .plant import Plant, make_plant
-from .pose import leg_displacements
+from .pose import kinematic_jacobian, leg_displacements
 from .rigid_body import platen_inertia
 
 __all__ = ["Capacity", "capacity_table", "has_printed_capacity", "actuator_speeds", "make_actuator_check"]
 
-Array = NDArray[np.float64]
 ActuatorCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
 
 
@@ -85,16 +84,10 @@ def capacity_table(machine: Machine) -> tuple[Capacity, ...]:
     return (*_forces(plant), *_speeds(machine), *_travel(plant))
 
 
-def _zero_jacobian(plant: Plant) -> Array:
-    """Actuator rates per velocity of C and Euler rates in the zero-position (n_actuators, 6)."""
-    _, rates = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))
-    return rates.T[: plant.spools]
-
-
 def _forces(plant: Plant) -> list[Capacity]:
     machine, par = plant.machine, plant.machine.parameters
     high, low = plant.supply[:2]
-    jacobian = _zero_jacobian(plant)
+    jacobian = kinematic_jacobian(plant)
     area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
     push, pull = high * area_a - low * area_b, low * area_a - high * area_b
     hold_down = sum(s.pressure * s.area for s in machine.struts)
@@ -120,7 +113,7 @@ def _forces(plant: Plant) -> list[Capacity]:
 
 def _speeds(machine: Machine) -> list[Capacity]:
     plant = make_plant(machine.with_valves(2))
-    jacobian, speeds = _zero_jacobian(plant), actuator_speeds(plant)
+    jacobian, speeds = kinematic_jacobian(plant), actuator_speeds(plant)
     lines = []
     for k, axis in enumerate(AXES):
         for sign, word in ((1.0, " up"), (-1.0, " down")) if axis == "z" else ((1.0, ""),):

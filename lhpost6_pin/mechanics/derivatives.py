@@ -1,9 +1,8 @@
 """Forces, rates and accelerations of a plant at one state."""
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from .plant import Plant
 from .schemes import TAU, V_SEEN, A, V, rates_stage
@@ -11,8 +10,6 @@ from .tables import unpack_tables
 from .workspace import Workspace, unpack_workspace
 
 __all__ = ["evaluate", "rates_at", "evaluate_derivatives"]
-
-Array = NDArray[np.float64]
 
 
 def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:

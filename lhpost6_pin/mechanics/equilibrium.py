@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..effects.actuator import start_line
 from ..effects.registry import actuator_rows, parameters_of
@@ -20,7 +20,6 @@ from .workspace import make_workspace
 
 __all__ = ["Equilibrium", "find_equilibrium", "rest_pressures", "unloaded_speeds"]
 
-Array = NDArray[np.float64]
 Pressures = tuple[float, ...]
 """Supply and return pressure [Pa], perhaps with what follows in `laws.supply.Supply`."""
 

@@ -1,8 +1,8 @@
 """Gas pressure of struts with all that acts on the gas: leaks and heat exchange beyond the polytropic law."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..effects.gas import log_ratio
 from ..effects.registry import law_of
 from ..laws.nitrogen_strut import gas_pressure
@@ -10,8 +10,6 @@ from ..machine.machine import Machine
 from .plant import Plant
 
 __all__ = ["gas_ratio", "strut_pressures"]
-
-Array = NDArray[np.float64]
 
 
 def gas_ratio(plant: Plant, z: Array) -> Array:

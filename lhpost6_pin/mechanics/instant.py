@@ -11,15 +11,14 @@ last. Whole records are arrays: `pose`, `ledger`.
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..core.arrays import Array
 from .plant import Plant
 from .port_path import ports_along
 from .pose import PlatenMotion, leg_displacements, plant_motion
 
 __all__ = ["displacement_of", "legs_at", "platen_pose_at", "required_wrench_at", "wrench_at"]
-
-Array = NDArray[np.float64]
 
 
 def platen_pose_at(displacement: ArrayLike) -> pin.SE3:

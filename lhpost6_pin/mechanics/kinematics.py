@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..core.arrays import Array
 from ..core.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -30,7 +31,6 @@ __all__ += ["inertial_wrench", "inverse_kinematics", "length_jacobian", "p_J_c",
 __all__ += ["rotation", "rotation_x", "rotation_y", "rotation_z", "s_J_E", "skew", "slip_velocity", "swivel_jacobian"]
 __all__ += ["swivel_vector", "thrust_direction", "to_pinocchio_order", "to_report_order", "twist_c", "wrench_transform"]
 
-Array = NDArray[np.float64]
 Component: TypeAlias = "Actuator | Strut"
 
 

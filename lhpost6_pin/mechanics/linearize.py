@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.names import AXES
 from ..machine.machine import Machine
 from .derivatives import evaluate_derivatives
@@ -15,8 +15,6 @@ from .schemes import A, V
 from .workspace import make_workspace
 
 __all__ = ["SPOOL_STEP", "LinearPlant", "OilColumnMode", "linearize", "oil_column_modes"]
-
-Array = NDArray[np.float64]
 
 # Finite-difference steps: small against every scale of the machine, large against rounding.
 _POSE_STEP, _VELOCITY_STEP, _PRESSURE_STEP, SPOOL_STEP = 1e-6, 1e-6, 1e2, 1e-6

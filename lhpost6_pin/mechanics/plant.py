@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..effects.modifiers import command_path, supply_of
 from ..effects.registry import PORTS, actuator_rows, columns_of
 from ..effects.table import effect_table, state_names
@@ -20,8 +21,6 @@ from .rigid_body import free_axes, make_model
 from .tables import Tables, pack_tables
 
 __all__ = ["Plant", "State", "make_plant"]
-
-Array = NDArray[np.float64]
 
 
 class State(NamedTuple):

@@ -6,8 +6,8 @@ All that laws need of a motion; poses are converted to ports once and evaluated 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..core.errors import RecordError
 from .plant import Plant
@@ -17,8 +17,6 @@ from .spatial import difference
 from .workspace import make_workspace
 
 __all__ = ["PortPath", "ports_along"]
-
-Array = NDArray[np.float64]
 
 
 class PortPath(NamedTuple):

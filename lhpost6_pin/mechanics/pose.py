@@ -8,8 +8,8 @@ their derivatives. A guided platen has one displacement.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled, compiled_inline
 from ..core.errors import RecordError
 from .plant import Plant
@@ -31,13 +31,12 @@ __all__ = [
     "PlantMotion",
     "PlatenMotion",
     "forward_kinematics",
+    "kinematic_jacobian",
     "leg_displacements",
     "plant_motion",
     "platen_motion",
     "rotation",
 ]
-
-Array = NDArray[np.float64]
 
 
 class PlatenMotion(NamedTuple):
@@ -315,3 +314,9 @@ def leg_displacements(plant: Plant, displacement: Array, velocity: Array | None 
     out, rates = np.zeros((len(pose), plant.legs.size)), np.zeros((len(pose), plant.legs.size))
     _lengths(pose, plant.legs, plant.body, len(plant.ports), out, rates, speed)
     return out, rates
+
+
+def kinematic_jacobian(plant: Plant) -> Array:
+    """Rates of the actuators' lengths per rate of the pose (n_actuators, 6) in the control zero-position (Eq. 3-33)."""
+    _, columns = leg_displacements(plant, np.zeros((6, 6)), np.eye(6))
+    return columns[:, : plant.spools].T

@@ -8,8 +8,8 @@ that no Inertia holds (see `rigid_body`):
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..core.errors import SimulationError
 from .plant import Plant
@@ -17,8 +17,6 @@ from .pose import PlantMotion
 from .spatial import act_force, cross, to_body
 
 __all__ = ["refuse_joints", "require_alike", "required_wrench", "rigid_wrenches", "wrenches_at_c"]
-
-Array = NDArray[np.float64]
 
 
 def refuse_joints(plant: Plant) -> None:

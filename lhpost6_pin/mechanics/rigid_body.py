@@ -13,14 +13,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..effects.modifiers import added_inertias
 from ..machine.machine import Machine
 from .specimen_mount import mount_specimen
 
 __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
-
-Array = NDArray[np.float64]
 
 
 def free_axes(machine: Machine) -> NDArray[np.int64]:

@@ -3,13 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from .plant import Plant
 
 __all__ = ["SpecimenJoint", "joints_beyond", "specimen_doubts", "specimen_joints", "specimen_positions"]
-
-Array = NDArray[np.float64]
 
 
 class SpecimenJoint(NamedTuple):

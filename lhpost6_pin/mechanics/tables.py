@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled_views
 from ..effects.registry import ROW
 from ..laws.supply import Supply
@@ -16,8 +17,6 @@ from .forward_dynamics import INERTIA
 from .ports import BODY, LEG
 
 __all__ = ["Tables", "pack_tables", "unpack_tables"]
-
-Array = NDArray[np.float64]
 
 
 class Tables(NamedTuple):

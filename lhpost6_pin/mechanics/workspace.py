@@ -3,16 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..core.arrays import Array
 from ..core.compiled import compiled_views
 from ..effects.registry import PORTS
 from .plant import Plant, State
 from .schemes import V
 
 __all__ = ["Workspace", "make_workspace", "unpack_workspace"]
-
-Array = NDArray[np.float64]
 
 
 class Workspace(NamedTuple):

@@ -20,11 +20,11 @@ import xarray as xr
 
 from ...core.arrays import Array, Complex
 from ...data.alignment import combine_delays, phase_delay
-from ...data.fusion import kinematic_jacobian
 from ...data.records import sample_interval
 from ...machine.machine import Machine
 from ...mechanics.linearize import OilColumnMode
 from ...mechanics.plant import Plant
+from ...mechanics.pose import kinematic_jacobian
 from .prepare_tests import Numbers
 
 __all__ = ["Peak", "Resonance", "Response", "Spectrum", "Valves", "estimate_response", "estimate_spectrum"]

@@ -15,7 +15,8 @@ import numpy as np
 
 from lhpost6_pin.core.errors import MotionError
 from lhpost6_pin.core.files import models_folder, write_whole
-from lhpost6_pin.motions.v1 import make_v1_motion, parse_v1
+from lhpost6_pin.motions.components import assemble
+from lhpost6_pin.motions.cosmos import read_cosmos
 
 FOLDER = "gmprocess/data/demo/ci38457511/raw/"
 GRAVITY = 9.80665  # standard gravity [m/s^2]: back to the unit of the file
@@ -56,7 +57,7 @@ CUTS = (
 
 def cut_text(text: str, cut: Cut) -> str:
     """CSV text of the strong part of a V1 text."""
-    motion = make_v1_motion(parse_v1(text, cut.member), cut.member)
+    motion = assemble(read_cosmos(text, cut.member), cut.member, cut.member)
     rate = round(1 / motion.time_step)
     first, last = round(cut.begin * rate), round(cut.end * rate)
     values = motion.samples[first : last + 1, :3] / GRAVITY

@@ -20,7 +20,7 @@ import pandas as pd
 import xarray as xr
 from data_files import LABELS, binary_469d, header, sines, text_469d
 from hypothesis import strategies as st
-from motions_files import at2_text, cosmos_text, csmip_text
+from motions_files import at2_text, cosmos_text, csmip_text, film_text, knet_text, v2_text
 from run_cases import at_rest
 
 from lhpost6_pin.control import load_controller, make_controller
@@ -65,6 +65,13 @@ WAVE = 0.3 * np.sin(np.arange(43) / 7)
 CSV = "# a comment\ntime_s,ax_g,z [mm/s^2],roll_deg_s2\n" + "".join(
     f"{k / 100},{x},{9 * x},1\n" for k, x in enumerate(WAVE)
 )
+CLOCK = np.arange(43) / 200
+NUMBERS = "".join(f"{x:.5f} {9 * x:.5f} 1\n" for x in WAVE)
+
+
+def load_columns(path: Path) -> Any:
+    """A motion from columns without names."""
+    return load_motion(path, time_step=0.01, units="g", channels="x=1,z=2")
 
 
 def use_motion(motion: Any) -> None:
@@ -374,6 +381,17 @@ READERS = (
     Reader("at2", "broken.AT2", lambda: at2_text(WAVE).encode(), load_motion, use_motion, text),
     Reader("csmip", "broken.RAW", lambda: csmip_text([("90", WAVE)]).encode(), load_motion, use_motion, text),
     Reader("cosmos", "broken.v1", lambda: cosmos_text([(90, WAVE)]).encode(), load_motion, use_motion, text),
+    Reader(
+        "film",
+        "broken.RAW",
+        lambda: film_text([("90 DEG", np.arange(43) / 200, WAVE)]).encode(),
+        load_motion,
+        use_motion,
+        text,
+    ),
+    Reader("v2", "broken.V2", lambda: v2_text([("90 Deg", 100 * WAVE)]).encode(), load_motion, use_motion, text),
+    Reader("knet", "broken.EW", lambda: knet_text(1e6 * WAVE).encode(), load_motion, use_motion, text),
+    Reader("columns", "broken.txt", lambda: NUMBERS.encode(), load_columns, use_motion, text),
     Reader("motions", "index.toml", shipped("ground_motions", "index.toml"), load_motions, use_motions, toml, 0.3),
     Reader("tests", "tests.toml", shipped("ground_motions", "tests.toml"), load_motions, use_motions, toml, 0.3),
     Reader("record", "broken.nc", short_record, loaded_record, use_record, netcdf),

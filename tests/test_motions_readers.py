@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from motions_files import at2_text, cosmos_text, csmip_text
 
 from lhpost6_pin.core.errors import MotionError
-from lhpost6_pin.motions import AXES, GroundMotion, load_at2, load_csv, load_motion, load_v1
+from lhpost6_pin.motions import AXES, GroundMotion, load_csv, load_motion
 from lhpost6_pin.motions.motion_units import to_si
 
 GRAVITY = 9.80665
@@ -32,14 +32,15 @@ def test_a_peer_file_is_read_in_both_of_its_header_forms(tmp_path, old):
 
 
 def test_three_peer_files_go_to_x_y_z_and_are_cut_to_the_shortest(tmp_path):
-    paths = [written(tmp_path, f"{i}.AT2", at2_text((i + 1) * WAVE[: 200 - i])) for i in range(3)]
+    texts = [at2_text((i + 1) * WAVE[: 200 - i], component=c) for i, c in enumerate(("090", "360", "UP"))]
+    paths = [written(tmp_path, f"{i}.AT2", text) for i, text in enumerate(texts)]
     motion = load_motion(paths)
     assert motion.samples.shape == (198, 6)
     for i in range(3):
         np.testing.assert_allclose(motion.samples[:, i], (i + 1) * WAVE[:198] * GRAVITY, atol=PRINTED * GRAVITY)
-    assert load_motion({"z": paths[0]}).axes == ("z",)
+    assert load_motion({"y": paths[0], "z": paths[2]}).axes == ("y", "z")
     with pytest.raises(MotionError, match="time steps differ"):
-        load_at2([paths[0], written(tmp_path, "slow.AT2", at2_text(WAVE, 0.01))])
+        load_motion([paths[0], written(tmp_path, "slow.AT2", at2_text(WAVE, 0.01))])
 
 
 def test_csmip_orientations_become_axes_with_their_sign(tmp_path):
@@ -61,11 +62,11 @@ def test_cosmos_headers_give_azimuth_and_interval(tmp_path):
 
 def test_a_station_at_another_angle_needs_and_takes_a_channel_mapping(tmp_path):
     path = written(tmp_path, "station.v1", csmip_text([("35 Deg", WAVE), ("125 Deg", WAVE), ("Up", WAVE)]))
-    with pytest.raises(MotionError, match=r"channel 1: orientation '35'.*channels="):
+    with pytest.raises(MotionError, match=r"channel 1: orientation 35 deg is not along an axis.*--channels x=1"):
         load_motion(path)
-    assert load_v1(path, channels={2: "x", 3: "z"}).axes == ("x", "z")
-    with pytest.raises(MotionError, match="no channel 7"):
-        load_v1(path, channels={7: "x"})
+    assert load_motion(path, channels={"x": 2, "z": 3}).axes == ("x", "z")
+    with pytest.raises(MotionError, match="no channel 7 for axis x; channels are 1, 2, 3"):
+        load_motion(path, channels={"x": 7})
 
 
 def test_csv_columns_carry_axis_and_unit_in_their_names(tmp_path):
@@ -79,7 +80,7 @@ def test_csv_columns_carry_axis_and_unit_in_their_names(tmp_path):
 
 def test_csv_columns_and_units_can_be_given(tmp_path):
     path = written(tmp_path, "m.csv", "n;east;extra\n1;10;5\n2;20;5\n")
-    motion = load_csv(path, columns={"y": "east"}, units="cm", time_step=0.5)
+    motion = load_csv(path, channels={"y": "east"}, units="cm", time_step=0.5)
     assert motion.quantity == "displacement" and motion.axes == ("y",) and motion.time_step == 0.5
     np.testing.assert_allclose(motion.samples[:, 1], [0.1, 0.2], rtol=1e-12)
     motion = load_csv(written(tmp_path, "m.csv", "time [ms],z_m\n0,0\n5,1\n10,2\n"))
@@ -160,10 +161,10 @@ def test_numbers_alone_have_no_header_and_a_field_too_many_is_no_decimal_comma(t
 
 
 def test_an_option_of_another_reader_and_a_column_that_is_not_there_are_refused(tmp_path):
-    with pytest.raises(MotionError, match="option 'columns' does not apply"):
-        load_motion(written(tmp_path, "A.AT2", at2_text(WAVE)), columns={"x": "a"})
+    with pytest.raises(MotionError, match=r"A\.AT2: this kind of file says its units itself; leave --unit out"):
+        load_motion(written(tmp_path, "A.AT2", at2_text(WAVE)), units="g")
     with pytest.raises(MotionError, match=r"no column 'up_g' for axis z; columns are time_s, ax_g"):
-        load_motion(written(tmp_path, "m.csv", CSV), columns={"z": "up_g"})
+        load_motion(written(tmp_path, "m.csv", CSV), channels={"z": "up_g"})
 
 
 def test_a_missing_or_binary_file_is_a_motion_error(tmp_path):

@@ -31,9 +31,10 @@ def components(tmp_path) -> list[Path]:
     """Three component files, 2 s of a sine each, of 0.02, 0.03 and 0.01 g."""
     time = np.arange(400) * STEP
     paths = []
-    for name, peak in (("L.AT2", 0.02), ("T.AT2", 0.03), ("UP.AT2", 0.01)):
-        paths.append(tmp_path / name)
-        paths[-1].write_text(at2_text(peak * np.sin(2 * np.pi * time) * np.sin(np.pi * time / 2) ** 2, STEP))
+    for name, peak in (("L", 0.02), ("T", 0.03), ("UP", 0.01)):
+        paths.append(tmp_path / f"{name}.AT2")
+        wave = peak * np.sin(2 * np.pi * time) * np.sin(np.pi * time / 2) ** 2
+        paths[-1].write_text(at2_text(wave, STEP, component=name))
     return paths
 
 
@@ -96,9 +97,9 @@ def test_files_go_only_to_tests_that_want_some_and_must_be_there(lhpost6, compon
         (("sine", *components), "sine takes no files"),
         (("nonsense", *components), "no ground motion named 'nonsense'"),
         (("tabas", tmp_path / "absent.AT2"), "absent.AT2"),
-        (("tabas", *components, *components), "6 PEER files"),
+        (("tabas", *components, *components), "a second channel for axis z"),
         (("tabas", "takatori"), "one motion at a time; got tabas, takatori, none of which is a file"),
-        (("tabas", *components, "--set", "units=g"), "'units' does not apply"),
+        (("tabas", *components, "--set", "units=g"), "says its units itself"),
         (("tabas", "--set", "name=mine"), "run it from your own file"),
         (("sine", "--set", "name=mine"), "no option 'name'"),
         (("sine", "--set", "files=mine"), "no option 'files'"),

@@ -140,6 +140,15 @@ class MotionOptions:
     high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None
     low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None
     set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None
+    dt: Annotated[float | None, typer.Option(help="Time step of a motion file that does not say it [s].")] = None
+    unit: Annotated[str | None, typer.Option(help="Unit of a motion file that does not say it, such as g.")] = None
+    channels: Annotated[
+        str | None, typer.Option(help="Channels or columns of a motion file by axis, such as x=2,y=1,z=3.")
+    ] = None
+    rotate: Annotated[
+        float | None,
+        typer.Option(help=r"Azimuth that the table's x gets: turns a file's horizontal components \[deg]."),
+    ] = None
 
     def target(self, table: "Machine", beyond: bool = False) -> "Target":
         """Target of the motion at the controller's rate; raises OutOfRangeError beyond the limits, unless allowed."""
@@ -169,9 +178,14 @@ class MotionOptions:
             if not equals:
                 raise MotionError(f"--set {item}: write key=value")
             options[key.strip()] = _number_or_text(value.strip())
+        about_file = {"time_step": self.dt, "units": self.unit, "channels": self.channels, "rotate": self.rotate}
+        about_file = {key: value for key, value in about_file.items() if value is not None}
         first, *files = self.motion
         if not _is_file(first) and files and not any(map(_is_file, files)):
             raise MotionError(f"one motion at a time; got {', '.join(self.motion)}, none of which is a file")
+        if about_file and not (files or _is_file(first)):
+            raise MotionError(f"{first}: --dt, --unit, --channels and --rotate are for motions from files")
+        options |= about_file
         return load_motion(self.motion, **options) if _is_file(first) else find_motion(first, files, **options)
 
 

@@ -1,7 +1,6 @@
 """Ground motions: reading, making, finding by name, turning into targets for the table, response spectra."""
 
 from .ac156 import required_spectrum
-from .at2 import load_at2
 from .csv import load_csv
 from .library import MotionEntry, find_motion, list_motions, motion_entry, motion_options
 from .limits import ActuatorUtilisation, LimitsSummary, MotionLimits, check_limits, largest_scale
@@ -10,7 +9,6 @@ from .motion_options import MotionOption
 from .process import Reference, Target, make_target, smooth_step, with_scale
 from .readers import load_motion
 from .response_spectra import ResponseSpectrum, response_spectrum
-from .v1 import load_v1
 
 __all__ = [
     "AXES",
@@ -28,10 +26,8 @@ __all__ = [
     "largest_scale",
     "list_motions",
     "motion_entry",
-    "load_at2",
     "load_csv",
     "load_motion",
-    "load_v1",
     "make_motion",
     "make_target",
     "motion_options",

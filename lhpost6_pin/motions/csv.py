@@ -3,116 +3,126 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ..core.errors import MotionError, meant
-from ..core.number_table import Dialect, has_decimal_comma, is_number, read_rows
-from .motion import AXES, GroundMotion, make_motion
+from ..core.number_table import Dialect, read_rows
+from .columns import COMMAS, without_comments
+from .components import Channels, Component, assemble
+from .motion import AXES, GroundMotion
 from .motion_units import to_si
 from .text import read_text
+from .time_steps import uniform_step
 
-__all__ = ["load_csv"]
+__all__ = ["is_csv", "load_csv", "read_csv"]
 
 _TIME = re.compile(r"(time|t)([\s_]*[\[(]?(?P<unit>s|sec|ms)[\])]?)?", re.I)
 _AXIS_NAMES = {"rx": "roll", "ry": "pitch", "rz": "yaw", **{axis: axis for axis in AXES}}
+_AXIS_NAMES |= dict.fromkeys(("ew", "e-w", "east"), "x") | dict.fromkeys(("ns", "n-s", "north"), "y")
+_AXIS_NAMES |= dict.fromkeys(("ud", "u-d", "up"), "z")
 _COLUMN = re.compile(
-    rf"[ad]?_?(?P<axis>{'|'.join(sorted(_AXIS_NAMES, key=len, reverse=True))})"
+    rf"(?:[ad]|acc)?_?(?P<axis>{'|'.join(sorted(_AXIS_NAMES, key=len, reverse=True))})"
     r"(?:[\s_]*[\[(](?P<bracketed>[^\])]*)[\])]|[_ ](?P<suffix>.+))?",
     re.I,
 )
-_COMMAS = "decimal commas are not read: write points, as 0.01"
-_UNIFORM = 0.01  # a step may differ from the mean by this part of it: room for times printed with few digits
 
 
-class _Channel(NamedTuple):
-    axis: str
-    column: int
-    unit: str
+def is_csv(text: str) -> bool:
+    """Whether the header row names time or an axis, above a row of as many fields."""
+    rows = [line for _, line in without_comments(text[:20000])[:2]]
+    if len(rows) < 2:
+        return False
+    names, dialect = _names(rows[0])
+    known = any(_TIME.fullmatch(name) or _COLUMN.fullmatch(name) for name in names)
+    return known and dialect.count(rows[1]) == len(names)
 
 
 def load_csv(
     path: "Path | str",
     *,
-    columns: "Mapping[str, str] | None" = None,
-    units: "str | Mapping[str, str] | None" = None,
-    time_step: float | None = None,
     name: str | None = None,
+    time_step: float | None = None,
+    units: "str | Mapping[str, str] | None" = None,
+    channels: Channels | None = None,
 ) -> GroundMotion:
-    """Read a CSV file into one motion.
+    """Read a CSV file into one motion, as `read_csv` says."""
+    found = read_csv(read_text(path), str(path), time_step=time_step, units=units, channels=channels)
+    return assemble(found, name or Path(path).stem, f"CSV file {Path(path).name}")
+
+
+def read_csv(
+    text: str,
+    where: str,
+    *,
+    time_step: float | None = None,
+    units: "str | Mapping[str, str] | None" = None,
+    channels: Channels | None = None,
+) -> list[Component]:
+    """Components of a CSV file.
 
     The header row names the columns: a time column (`time`, `t`, `time_s`, `time [ms]`) and one for each axis
     with its unit, such as `x_m_s2`, `ax_g`, `roll_rad` or `z [mm]`; all must be accelerations or all
-    displacements. `columns` maps axis to column name where the names differ, `units` gives one unit for all
-    or one for each axis, `time_step` [s] stands in for a missing time column. Columns are separated by
-    commas, semicolons or tabs.
+    displacements. `channels` maps axis to column name (or number) where the names differ, `units` gives one unit for
+    all or one for each axis, `time_step` [s] stands in for a missing time column. Columns are separated by
+    commas, semicolons, tabs or blanks.
 
     Raises MotionError naming the file and the line, column or sample: not a number, not finite, uneven time,
     missing or unknown column, unknown unit, wrong number of fields.
     """
-    where = str(path)
-    lines = read_text(path).splitlines()
-    start = next((i for i, line in enumerate(lines) if line.strip() and not _is_comment(line)), None)
-    if start is None:
+    rows = without_comments(text)
+    if not rows:
         raise MotionError(f"{where}: no header row; the first line that is no comment must name the columns")
-    dialect = Dialect(next((mark for mark in ";\t" if mark in lines[start]), ","))
-    names = [field.strip().strip('"') for field in lines[start].split(dialect.separator)]
-    if all(is_number(name, dialect) or has_decimal_comma(name) for name in names):
-        raise MotionError(f"{where}, line {start + 1}: no header row; the first must name the columns, as time_s,x_g")
+    (start, header), rows = rows[0], rows[1:]
+    names, dialect = _names(header)
     if len(set(names)) != len(names):
         twice = next(column for column in names if names.count(column) > 1)
-        raise MotionError(f"{where}, line {start + 1}: two columns named {twice!r}; rename one")
-    rows = [(k, line) for k, line in enumerate(lines[start + 1 :], start + 2) if line.strip() and not _is_comment(line)]
+        raise MotionError(f"{where}, line {start}: two columns named {twice!r}; rename one")
     if len(rows) < 2:
         raise MotionError(f"{where}: {len(rows)} row(s) of numbers; a motion needs at least 2")
     remedy = "fill the gap or cut the record there"
-    table = read_rows(rows, names, dialect, where, error=MotionError, commas=_COMMAS, correct=remedy)
-    time_column = next((i for i, column in enumerate(names) if _TIME.fullmatch(column)), None)
-    chosen = _channels(names, time_column, columns, units, f"{where}, line {start + 1}")
-    step = _time_step(table, time_column, names, time_step, where)
-    data: dict[str, np.ndarray] = {}
-    quantities: dict[str, str] = {}
-    for channel in chosen:
+    table = read_rows(rows, names, dialect, where, error=MotionError, commas=COMMAS, correct=remedy)
+    clock = next((i for i, column in enumerate(names) if _TIME.fullmatch(column)), None)
+    found = []
+    step = _time_step(table, clock, names, time_step, where)
+    for axis, column in _columns(names, clock, channels, f"{where}, line {start}").items():
+        unit = _unit(_COLUMN.fullmatch(names[column]), axis, units)
+        if not unit:
+            raise MotionError(
+                f"{where}, line {start}: column {names[column]!r} has no unit; write it in the name "
+                f"({names[column]}_m_s2), or give --unit"
+            )
+        here = f"{where}, column {names[column]!r}"
         try:
-            data[channel.axis], quantities[channel.axis] = to_si(table[:, channel.column], channel.unit, channel.axis)
+            values, quantity = to_si(table[:, column], unit, axis)
         except MotionError as error:
-            raise MotionError(f"{where}, column {names[channel.column]!r}: {error}") from None
-    if len(set(quantities.values())) > 1:
-        raise MotionError(f"{where}: accelerations and displacements are mixed: {quantities}; give one kind")
-    kind = next(iter(quantities.values()))
-    return make_motion(name or Path(path).stem, step, data, kind, f"CSV file {Path(path).name}")
+            raise MotionError(f"{here}: {error}") from None
+        found.append(Component(here, (names[column], str(column + 1)), None, step, values, quantity, axis))
+    return found
 
 
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith("#")
+def _names(header: str) -> tuple[list[str], Dialect]:
+    dialect = Dialect(next((mark for mark in ";\t," if mark in header), " "))
+    if dialect.separator == " " and _COLUMN.fullmatch(header.strip()):  # one column, a blank before its unit
+        dialect = Dialect(",")
+    return [field.strip().strip('"') for field in header.strip().split(dialect.separator.strip() or None)], dialect
 
 
-def _channels(
-    names: list[str],
-    time_column: int | None,
-    columns: "Mapping[str, str] | None",
-    units: "str | Mapping[str, str] | None",
-    where: str,
-) -> list[_Channel]:
-    """Column and unit of each axis."""
-    if columns is None:
-        pairs = [(_axis_of(name, where), name) for k, name in enumerate(names) if k != time_column]
+def _columns(names: list[str], clock: int | None, channels: Channels | None, where: str) -> dict[str, int]:
+    """Column of each axis."""
+    if channels is None:
+        pairs = [(_axis_of(name, where), name) for k, name in enumerate(names) if k != clock]
     else:
-        pairs = list(columns.items())
-    chosen: list[_Channel] = []
+        numbers = {str(k): name for k, name in enumerate(names, 1)}
+        pairs = [(axis, numbers.get(str(c), str(c)) if str(c) not in names else str(c)) for axis, c in channels.items()]
+    chosen: dict[str, int] = {}
     for axis, column in pairs:
-        if axis not in AXES:
-            raise MotionError(f"{where}: option columns names axis {axis!r}; axes are {', '.join(AXES)}")
         if column not in names:
             near = meant(column, names)
             raise MotionError(f"{where}: no column {column!r} for axis {axis}; {near}columns are {', '.join(names)}")
-        if axis in (channel.axis for channel in chosen):
+        if axis in chosen:
             raise MotionError(f"{where}: two columns for axis {axis}; leave one out")
-        unit = _unit(_COLUMN.fullmatch(column), axis, units)
-        if not unit:
-            raise MotionError(f"{where}: column {column!r} has no unit; write it in the name ({column}_m_s2)")
-        chosen.append(_Channel(axis, names.index(column), unit))
+        chosen[axis] = names.index(column)
     if not chosen:
         raise MotionError(f"{where}: no column for any axis; call them such as x_m_s2, ay_g, z_m, roll_rad")
     return chosen
@@ -122,8 +132,8 @@ def _axis_of(column: str, where: str) -> str:
     match = _COLUMN.fullmatch(column)
     if match is None:
         raise MotionError(
-            f"{where}: column {column[:60]!r} names no axis; call it such as x_m_s2, ay_g, z_m, roll_rad (from Python, "
-            "columns={axis: column} selects them)"
+            f"{where}: column {column[:60]!r} names no axis; call it such as x_m_s2, ay_g, z_m, roll_rad, or choose "
+            "columns, as in --channels x=2,y=3 (by number or name)"
         )
     return _AXIS_NAMES[match["axis"].lower()]
 
@@ -136,29 +146,16 @@ def _unit(match: "re.Match[str] | None", axis: str, units: "str | Mapping[str, s
     return (match["bracketed"] or match["suffix"] or "") if match else ""
 
 
-def _time_step(
-    table: np.ndarray, time_column: int | None, names: list[str], time_step: float | None, where: str
-) -> float:
-    """Uniform time step [s], from the argument or the time column."""
-    if time_step is not None:
-        return time_step
-    if time_column is None:
-        raise MotionError(
-            f"{where}: no time column (time_s, t) among {', '.join(names)[:200]}; add it, or give the option time_step "
-            "in seconds (--set time_step=0.01)"
+def _time_step(table: np.ndarray, clock: int | None, names: list[str], stated: float | None, where: str) -> float:
+    """Uniform time step [s], from the time column or as stated."""
+    if clock is not None:
+        match = _TIME.fullmatch(names[clock])
+        return uniform_step(
+            table[:, clock] * (1e-3 if match and (match["unit"] or "").lower() == "ms" else 1.0), where, stated
         )
-    match = _TIME.fullmatch(names[time_column])
-    time = table[:, time_column] * (1e-3 if match and (match["unit"] or "").lower() == "ms" else 1.0)
-    with np.errstate(over="ignore", invalid="ignore"):  # absurd times are caught below
-        mean = (time[-1] - time[0]) / (len(time) - 1)
-        uneven = ~(np.abs(np.diff(time) - mean) <= _UNIFORM * mean)
-    if not (np.isfinite(mean) and mean > 0):
-        raise MotionError(f"{where}: time runs from {time[0]:g} s to {time[-1]:g} s; it must increase")
-    if uneven.any():
-        sample = int(np.argmax(uneven)) + 1
-        here, before = float(time[sample]), float(time[sample - 1])
+    if stated is None:
         raise MotionError(
-            f"{where}: time step before sample {sample} (t = {here:g} s) is {here - before:g} s, "
-            f"the mean is {mean:g} s; resample the record to a uniform step"
+            f"{where}: no time column (time_s, t) among {', '.join(names)[:200]}; add it, or give the step in "
+            "seconds, as --dt 0.01"
         )
-    return float(mean)
+    return stated

@@ -1,4 +1,4 @@
-"""Reading a ground-motion file of any supported kind."""
+"""Reading ground-motion files of any known kind, one for all axes or one for each component."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Real
@@ -6,61 +6,114 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import MotionError, instead_of
-from .at2 import is_at2, load_at2
-from .csv import load_csv
-from .motion import GroundMotion
-from .text import read_text
-from .v1 import is_v1, load_v1
+from .at2 import is_at2, read_at2
+from .columns import begins_with_numbers, read_columns
+from .components import Channels, Component, assemble
+from .cosmos import is_cosmos, read_cosmos
+from .csv import is_csv, read_csv
+from .knet import is_knet, read_knet
+from .motion import AXES, GroundMotion
+from .text import READABLE, read_text
 
 __all__ = ["MotionFiles", "load_motion"]
 
 MotionFiles = Path | str | Sequence[Path | str] | Mapping[str, Path | str]
-"""One file, components for x, y, z in this order, or components by axis."""
+"""One file, or files of the components; a mapping gives the axis of each."""
+
+_OPTIONS: dict[str, tuple[Any, str]] = {
+    "name": (str, "a text"),
+    "time_step": (Real, "a number of seconds"),
+    "units": (str | Mapping, "a unit for all axes, such as g or mm, or from Python one by axis"),
+    "channels": (str | Mapping, "a channel or column by axis, as in x=2,y=1"),
+    "rotate": (Real, "the azimuth of the table's x in degrees"),
+}
+"""Options of `load_motion`: types in Python, and in words."""
 
 
 def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
-    """Read a motion from a PEER .AT2, COSMOS/CSMIP V1 or CSV file, recognised by its content.
+    """Read a motion from one file of any known format, or from one for each component; formats by their content.
 
-    Several paths (a sequence for x, y, z or a mapping by axis) are components in PEER files; one alone may hold all
-    axes. `options` go to the reader of the kind found: `load_at2`, `load_v1` or `load_csv`.
+    Components go where their files say they point: 90 degrees or east to +x, 0 or 360 or north to +y, up to +z; those
+    of PEER files and plain columns, unless vertical, to x, then y, in the order given. Options:
 
-    Raises MotionError naming the file and what to do.
+    - `name`: of the motion; by default that of the first file.
+    - `channels`: axis to channel, as ``{"x": 2, "y": 1}`` or ``"x=2,y=1"``: number of a channel or column, name of a
+      column, or number of a file where there are several.
+    - `rotate`: azimuth [deg] of the table's x, to which the two horizontal components are turned.
+    - `time_step` [s], `units`: for files that do not say.
+
+    Raises MotionError naming the file, line or option and what to do; a format that is not known with those that are.
     """
-    if isinstance(paths, Sequence) and not isinstance(paths, str) and len(paths) == 1:
-        paths = paths[0]
-    if not isinstance(paths, str | Path):
-        return _call(load_at2, paths, options)
-    text = read_text(paths)
-    suffix = Path(paths).suffix.lower()  # an incomplete file is refused by the reader of its suffix
+    _check_options(paths, options)
+    name, rotate = options.get("name"), options.get("rotate")
+    channels = _channels(options.get("channels"))
+    if isinstance(paths, Mapping):
+        channels = {axis: number for number, axis in enumerate(paths, 1)}
+        paths, together = list(paths.values()), True
+    else:
+        paths = [paths] if isinstance(paths, str | Path) else list(paths)
+        together = len(paths) > 1
+    if not paths:
+        raise MotionError("no motion file given; give one, or one for each component")
+    stated = {key: options[key] for key in ("time_step", "units") if options.get(key) is not None}
+    forms, found = zip(*(_read(Path(path), stated, None if together else channels) for path in paths), strict=True)
+    components = [component for file in found for component in file]
+    if together:
+        components = [c._replace(labels=(str(k),)) for k, c in enumerate(components, 1)]
+    elif any(component.axis for component in components):
+        channels = None  # its reader has heeded them
+    kind = f"{forms[0]} file{'s' if together else ''} {', '.join(Path(path).name for path in paths)}"
+    return assemble(components, name or Path(paths[0]).stem, kind, channels=channels, rotate=rotate)
+
+
+def _read(path: Path, stated: dict[str, Any], channels: Channels | None) -> tuple[str, list[Component]]:
+    """Format and components of a file; an incomplete one is refused by the reader of its suffix."""
+    text, suffix, where = read_text(path), path.suffix.lower(), str(path)
+    if not text.strip():
+        raise MotionError(f"{where}: is empty")
     if is_at2(text) or suffix == ".at2":
-        return _call(load_at2, paths, options)
-    if is_v1(text) or suffix in (".v1", ".raw"):
-        return _call(load_v1, paths, options)
-    return _call(load_csv, paths, options)
+        form, found = "PEER", [read_at2(_alone(text, where, stated), where)]
+    elif is_knet(text):
+        form, found = "K-NET", [read_knet(_alone(text, where, stated), where)]
+    elif is_cosmos(text) or suffix in (".v1", ".v2", ".raw", ".v1c", ".v2c"):
+        form, found = "V2" if "2" in suffix else "V1", read_cosmos(_alone(text, where, stated), where)
+    elif begins_with_numbers(text):
+        form, found = "text", read_columns(text, where, **stated, channels=channels)
+    elif is_csv(text) or suffix == ".csv":
+        form, found = "CSV", read_csv(text, where, **stated, channels=channels)
+    elif "units" in stated:
+        form, found = "text", read_columns(text, where, **stated, channels=channels)
+    else:
+        raise MotionError(f"{where}: unknown format; known are {READABLE}")
+    return form, found
 
 
-_KINDS: dict[str, tuple[Any, str]] = {
-    "name": (str, "a text"),
-    "units": (str | Mapping, "a unit for all axes, such as g or mm, or from Python one by axis"),
-    "time_step": (Real, "a number of seconds"),
-    "columns": (Mapping, "columns by axis from Python, or name the axes in the file's header"),
-    "channels": (Mapping, "axes by channel from Python"),
-}
-"""Types of the readers' options, in Python and in words."""
+def _alone(text: str, where: str, stated: dict[str, Any]) -> str:
+    """The text of a file that says time step and unit itself; raises MotionError where they are stated again."""
+    for key, flag in (("time_step", "--dt"), ("units", "--unit")):
+        if key in stated:
+            raise MotionError(f"{where}: this kind of file says its {key.replace('_', ' ')} itself; leave {flag} out")
+    return text
 
 
-def _call(reader: Any, paths: Any, options: dict[str, Any]) -> GroundMotion:
-    """Read; raises MotionError for options that the reader does not take."""
-    known = set(reader.__kwdefaults__)
-    unknown = sorted(set(options) - known)
-    if unknown:
-        raise MotionError(
-            f"{paths}: option {unknown[0]!r} does not apply to this kind of file; "
-            f"{instead_of(unknown[0], sorted(known))}"
-        )
+def _channels(given: "str | Channels | None") -> Channels | None:
+    """Channels by axis, from a text or mapping."""
+    if isinstance(given, str):
+        pairs = [item.partition("=") for item in given.split(",")]
+        if any(not channel.strip() for _, _, channel in pairs) or len({a for a, *_ in pairs}) < len(pairs):
+            raise MotionError(f"--channels {given}: write axis=channel with commas between, each axis once: x=2,y=1")
+        given = {axis.strip(): channel.strip() for axis, _, channel in pairs}
+    for axis in given or ():
+        if axis not in AXES:
+            raise MotionError(f"--channels: no axis {axis!r}; {instead_of(axis, AXES)}")
+    return given
+
+
+def _check_options(paths: Any, options: Mapping[str, Any]) -> None:
+    """Raise MotionError for options that do not exist, or are of a wrong type."""
     for key, value in options.items():
-        kind, wanted = _KINDS[key]
-        if value is not None and not isinstance(value, kind):
+        if key not in _OPTIONS:
+            raise MotionError(f"{paths}: option {key!r} does not exist; {instead_of(key, sorted(_OPTIONS))}")
+        kind, wanted = _OPTIONS[key]
+        if value is not None and (not isinstance(value, kind) or isinstance(value, bool)):
             raise MotionError(f"{paths}: option {key} is {value!r}; give {wanted}")
-    motion: GroundMotion = reader(paths, **options)
-    return motion

@@ -1,5 +1,6 @@
 """Reading text files whole, and turning blocks of numbers into arrays with errors that name the line."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,35 +9,51 @@ import numpy as np
 from ..core.errors import MotionError
 from ..core.files import reason_of
 
-__all__ = ["parse_fixed_width", "parse_numbers", "read_text"]
+__all__ = ["READABLE", "Rows", "number_rows", "parse_fixed_width", "parse_numbers", "read_text"]
+
+READABLE = (
+    "PEER .AT2; CSMIP and COSMOS V1 and V2 (.v1, .RAW, .v2, .V2c); K-NET and KiK-net (.EW, .NS, .UD); CSV whose header "
+    "row names time and axes with units (time_s,x_g); any other columns of numbers in text with --dt and --unit "
+    "(from Python time_step and units)"
+)
+"""The formats that are read, for messages."""
+
+Rows = Sequence[tuple[int, str]]
+"""Lines that are not blank, each with its number in the file, from 1."""
 
 
 def read_text(path: "Path | str") -> str:
-    """Text of a file; raises MotionError when it is missing, unreadable or not text."""
+    """Text of a file; raises MotionError when it is missing, unreadable or not text.
+
+    Lines that end twice (CR CR LF, after a transfer between systems) end once.
+    """
     try:
         data = Path(path).read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
         raise MotionError(f"cannot read ground motion {path}: {reason_of(error)}") from error
     if b"\0" in data[:4096]:
-        raise MotionError(f"{path}: not a text file; give PEER .AT2, CSV, or COSMOS/CSMIP V1")
-    return data.decode("utf-8-sig", errors="replace")
+        raise MotionError(f"{path}: not a text file, of unknown format; known are {READABLE}")
+    return re.sub(r"\r+\n", "\n", data.decode("utf-8-sig", errors="replace"))
 
 
-def parse_numbers(lines: Sequence[str], where: str, first_line: int) -> np.ndarray:
-    """Numbers separated by blanks (n,); the error names the line, counted from `first_line`."""
+def number_rows(text: str) -> Rows:
+    """Lines of a text with their numbers, without blank ones."""
+    return [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+
+
+def parse_numbers(rows: Rows, where: str) -> np.ndarray:
+    """Numbers separated by blanks (n,); raises MotionError naming the line."""
     try:
-        return np.array(" ".join(lines).split(), dtype=float)
+        return np.array(" ".join(line for _, line in rows).split(), dtype=float)
     except ValueError:
-        return np.array(
-            [_number(token, where, k) for k, line in enumerate(lines, first_line) for token in line.split()]
-        )
+        return np.array([_number(token, where, number) for number, line in rows for token in line.split()])
 
 
-def parse_fixed_width(lines: Sequence[str], width: int, where: str, first_line: int) -> np.ndarray:
+def parse_fixed_width(rows: Rows, width: int, where: str) -> np.ndarray:
     """Numbers in columns of `width` characters (n,), as Fortran writes them: without blanks where full."""
     values = [
         _number(line[start : start + width], where, number)
-        for number, line in enumerate(map(str.rstrip, lines), first_line)
+        for number, line in ((number, line.rstrip()) for number, line in rows)
         for start in range(0, len(line), width)
     ]
     return np.array(values, dtype=float)

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.core.units import quantity_unit
+from lhpost6_pin.data import channels as channels_module
 from lhpost6_pin.data.importing import (
     ChannelMap,
     Source,
@@ -28,6 +29,7 @@ from lhpost6_pin.data.importing import (
     save_map,
 )
 from lhpost6_pin.data.importing.channel_units import si_factor, unit_in_name
+from lhpost6_pin.data.importing.raw import RawTest, make_raw
 from lhpost6_pin.machine.machine import load_machine
 
 SINGLE = 2.0**-24  # relative: the rounding of a float32
@@ -548,8 +550,10 @@ def test_a_file_that_says_nothing_of_time_needs_its_rate():
     [
         (0.0, lambda t: np.round(t, 4)),  # a step of 0.488 ms, written to 0.1 ms
         (200.0, lambda t: t.astype("f4").astype(float)),  # float32 holds 200 s to 8 us, 1.6 % of a step
+        (9.0, lambda t: np.array([float(f"{x:.6g}") for x in t])),  # to 0.1 ms from 10 s on
+        (0.0, lambda t: np.array([float(f"{x:.5g}") for x in t])),  # to 0.1 ms from 1 s on
     ],
-    ids=["few decimals", "single precision"],
+    ids=["few decimals", "single precision", "six digits", "five digits"],
 )
 def test_rounded_stamps_stand_for_uniform_times(start, stamped):
     time = start + np.arange(4000) / 2048
@@ -655,8 +659,9 @@ def test_a_typical_channel_list_is_guessed_right(tmp_path):
     found = {source.column: name for name, source in channels.channels.items()}
     assert {t.description: found.get(t.description) for t in typical} == {t.description: t.channel for t in typical}
     unmatched = [t.description for t in typical if t.channel is None]
-    assert len(remarks) == len(unmatched)
-    assert all(any(repr(name) in remark for remark in remarks) for name in unmatched)
+    lines = [remark for remark in remarks if remark.startswith('"CHANNEL" = ')]
+    assert len(lines) == len(unmatched)
+    assert all(any(f'column = "{name}"' in line for line in lines) for name in unmatched)
 
 
 @pytest.mark.parametrize(
@@ -675,6 +680,11 @@ def test_a_typical_channel_list_is_guessed_right(tmp_path):
         ("Long Displ fbk", "g", None),  # the unit says otherwise
         ("H1 Delta P", "psi", None),
         ("Humidity", "%", None),
+        ("Acc 1F x", "g", None),  # of the specimen
+        ("Roof accel Y (g)", "g", None),
+        ("F1", "kN", None),  # not floor 1, and of which actuator?
+        ("Long dis cmd", "mm", "reference_displacement[x]"),
+        ("AccX", "g", "platen_acceleration[x]"),
     ],
 )
 def test_one_name_is_guessed_as(name, unit, channel):
@@ -690,10 +700,90 @@ def test_a_guess_says_what_it_left_open(tmp_path):
     text = "\n".join(remarks)
     assert "add the unit of platen_displacement[x]: column 1" in text
     assert "also like platen_displacement[x]: column 2" in text
-    assert "not recognised: column 3" in text
-    assert 'not found: "platen_displacement[yaw]" = { constant = 0.0, unit = "rad" }' in text
+    assert '"CHANNEL" = { column = "Foo" }  # not recognised: column 3 of run.csv' in text
+    assert (
+        '"platen_displacement[yaw]" = { unit = "rad", constant = 0.0 }  # not found; if it is known to be zero' in text
+    )
 
 
-def test_columns_of_which_none_is_recognised_need_a_map_by_hand():
-    with pytest.raises(RecordError, match="no column's name is recognised among 'c1', 'c2', 'c3'"):
-        guess_map([raw(VALUES, [None] * 3, TIME)], LABELS)
+ONE = {"actuator": ("A1",), "horizontal": ("A1",), "strut": ()}
+"""Labels of a table with one actuator, which moves in x alone."""
+SMALL = ("Table disp (mm)", "Table acc (mm/s2)", "Delta P (MPa)", "Voltage command (V)", "Dis command (mm)")
+SMALL += ("Acc 1F (mm/s2)", "AccRF (mm/s2)")
+"""Columns of a small laboratory's table with a specimen."""
+
+
+def columns_called(names, units=None) -> RawTest:
+    values = sines(400, len(names))
+    return make_raw("run.csv", "table", names, units or [unit_in_name(n) for n in names], values, TIME)
+
+
+def guessed(names, units=None) -> dict[str, str]:
+    """Column by channel, as guessed for the table with one actuator."""
+    channels, _ = guess_map([columns_called(names, units)], ONE, ("x",))
+    return {name: source.column for name, source in channels.channels.items() if source.constant is None}
+
+
+def test_columns_of_a_table_with_one_axis_need_no_word_for_it():
+    names = ["PosT", "acc", "vel (m/s)", "load cell (kN)", "Press A (bar)", "pressure b (bar)", "actuator stroke"]
+    expected = ["platen_displacement[x]", "platen_acceleration[x]", "platen_velocity[x]", "actuator_force[A1]"]
+    expected += ["chamber_pressure_a[A1]", "chamber_pressure_b[A1]", "actuator_displacement[A1]"]
+    assert guessed(names) == dict(zip(expected, names, strict=True))
+
+
+def test_what_a_guided_table_cannot_do_is_zero_and_makes_a_record():
+    raws = [columns_called(SMALL)]
+    channels, remarks = guess_map(raws, ONE, ("x",))
+    record = make_imported_record(raws, channels, ONE)
+    np.testing.assert_allclose(record["platen_displacement"].sel(axis="x"), 1e-3 * raws[0].values[:, 0], rtol=1e-12)
+    assert not record["platen_displacement"].sel(axis=["y", "z", "roll", "pitch", "yaw"]).any()
+    assert "platen_acceleration[yaw]" in record.attrs["constant"]
+    assert not any("velocity[y]" in remark or "not found" in remark for remark in remarks)
+
+
+def test_kinds_of_channels_that_a_layout_has_are_matched_by_their_words():
+    """Words for kinds that the layout lacks match nothing, and are said; with the kinds in it they match."""
+    kinds = {
+        "pressure_difference": channels_module.Channel(dims=("time", "actuator"), units="Pa", long_name="d"),
+        "valve_command": channels_module.Channel(dims=("time", "actuator"), units="1", long_name="v"),
+        "floor_acceleration": channels_module.Channel(dims=("time", "floor"), units="m/s2", long_name="f"),
+    }
+    without = {name: c for name, c in channels_module.LAYOUT.items() if name not in kinds}
+    wanted = {"pressure_difference[A1]": SMALL[2]}
+    wanted |= {"floor_acceleration[1F]": SMALL[5], "floor_acceleration[RF]": SMALL[6]}
+    raws = [columns_called(SMALL)]
+    with mock.patch.dict(channels_module.LAYOUT, without, clear=True):
+        channels, remarks = guess_map(raws, ONE, ("x",))
+        assert not set(wanted) & set(channels.channels)
+        text = "\n".join(remarks)
+        for name in ("valve_command[A1]", *wanted):
+            assert f"like {name}, which a record of this machine does not have" in text
+    with mock.patch.dict(channels_module.LAYOUT, kinds):
+        channels, remarks = guess_map(raws, ONE, ("x",))
+        assert {name: channels.channels[name].column for name in wanted} == wanted
+        line = '"valve_command[A1]" = { column = "Voltage command (V)", unit = "1" }  # add gain = 1 / full command'
+        assert any(remark.startswith(line) for remark in remarks)
+        floors = make_imported_record(raws, channels, ONE)["floor_acceleration"]
+        assert floors["floor"].values.tolist() == ["1F", "RF"]
+        np.testing.assert_allclose(floors.sel(floor="RF"), 1e-3 * raws[0].values[:, 6], rtol=1e-12)
+        for words in ("dP (bar)", "A1 diff press (bar)", "Load pressure (bar)", "ΔP (bar)", "Differential pressure"):
+            found, _ = guess_map([columns_called([words])], ONE, ("x",))
+            assert set(found.channels) == {"pressure_difference[A1]"}, words
+        for words in ("servo voltage", "Valve cmd", "cmd"):
+            _, remarks = guess_map([columns_called([words], ["V"])], ONE, ("x",))
+            assert remarks[0].startswith('"valve_command[A1]" = '), words
+
+
+def test_a_map_is_written_even_where_no_column_is_recognised_and_says_what_they_could_be(tmp_path):
+    channels, remarks = guess_map([columns_called(["CH1", "CH 2  x", "CH3"], [None, "bar", "V"])], ONE, ("x",))
+    assert not channels.channels
+    save_map(channels, tmp_path / "map.toml", remarks)
+    text = (tmp_path / "map.toml").read_text()
+    assert '# "CHANNEL" = { column = "CH 2  x", unit = "bar" }  # not recognised: column 2' in text
+    assert "by its unit: chamber_pressure_a[A1], chamber_pressure_b[A1], supply_pressure" in text
+    assert "CHANNEL is one of: platen_displacement[x], platen_velocity[x]" in text
+    with pytest.raises(RecordError, match="names no channel; write one, or complete the lines that --guess put there"):
+        load_map(tmp_path / "map.toml")
+    completed = text.replace('# "CHANNEL" = { column = "CH 2', '"supply_pressure" = { column = "CH 2')
+    (tmp_path / "map.toml").write_text(completed)
+    assert load_map(tmp_path / "map.toml").channels == {"supply_pressure": Source("CH 2  x", unit="bar")}

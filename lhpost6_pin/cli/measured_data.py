@@ -1,4 +1,4 @@
-"""Commands for measured data: import, check, export, decompose, validate, calibrate."""
+"""Commands for measured data: check, export, decompose, validate, calibrate."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,88 +11,9 @@ from .app import command, print_result, progress_bar, repeating_command
 
 if TYPE_CHECKING:
     from ..data.consistency import ConsistencyFinding
-    from ..data.importing import RawTest
     from ..machine.machine import Machine
 
-__all__ = ["calibrate", "check", "decompose", "export", "import_", "validate"]
-
-
-@command("import")
-def import_(
-    files: Annotated[list[Path], typer.Argument(help="Data file(s) of one test.")],
-    machine: opt.MachineOptions,
-    map_: Annotated[Path | None, typer.Option("--map", help="Channel map (TOML).")] = None,
-    guess: Annotated[bool, typer.Option("--guess", help="Write a draft channel map to edit, and no record.")] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Record to write, default: out/TEST.nc; with --guess the map, default: FILE_map.toml."),
-    ] = None,
-    json: opt.Json = False,
-) -> None:
-    """Convert measured data to a record: MTS 469D, CSV, MATLAB, HDF5, netCDF, TDMS or Parquet."""
-    from ..data.check import check_dataset
-    from ..data.importing import (
-        channel_units,
-        described_sources,
-        guess_map,
-        is_export,
-        load_map,
-        load_raw,
-        make_imported_record,
-    )
-    from ..data.records import save_record
-    from ..show.results import finding_entries
-    from ..show.tables import print_findings
-
-    if guess and map_:
-        raise RecordError("--guess writes a map, --map uses one; give one of them")
-    table = machine.load()
-    raws = [raw for file in files for raw in load_raw(file)]
-    if guess:
-        _write_draft_map(raws, table, files, out or Path(f"{files[0].stem}_map.toml"), json)
-        return
-    if map_ is None and not is_export(raws):
-        raise RecordError(f"{files[0]}: which column is which channel? --guess writes a first map, --map uses one")
-    channels = load_map(map_) if map_ else guess_map(raws, table.labels).channels
-    record = make_imported_record(raws, channels, table.labels, table)
-    path = out or Path("out") / f"{record.attrs['test'].replace('/', '_')}.nc"
-    if any(path.exists() and path.samefile(file) for file in files):
-        raise RecordError(f"{path}: is one of the files to import; name another with --out")
-    save_record(record, path)
-    sources, findings = described_sources(raws, channels), check_dataset(record, table)
-    entries = {  # source and range of every channel expose a wrong unit
-        name: {"from": sources.get(name, "derived"), "unit": unit, "least": values.min(), "most": values.max()}
-        for name, unit, values in channel_units(record)
-    }
-
-    def show() -> None:
-        from rich.markup import escape
-        from rich.table import Table
-
-        from ..core.console import make_console
-
-        rows = Table("channel", "from", "unit", "least", "most", title=escape(str(record.attrs["title"])))
-        for name, entry in entries.items():
-            cells = (name, entry["from"], entry["unit"], f"{entry['least']:.6g}", f"{entry['most']:.6g}")
-            rows.add_row(*map(escape, cells))
-        make_console().print(rows)
-        print_findings(str(path), findings)
-
-    print_result(json, lambda: {**finding_entries({str(path): findings}), "channels": entries}, show, [path])
-
-
-def _write_draft_map(raws: "list[RawTest]", table: "Machine", files: list[Path], path: Path, json: bool) -> None:
-    """Write a first channel map, and print the command that uses it."""
-    from ..data.importing import guess_map, save_map
-
-    found, remarks = guess_map(raws, table.labels)
-    if path.exists():
-        raise RecordError(f"{path}: exists and may have been edited; remove it, or name another with --out")
-    save_map(found, path, remarks)
-    then = f"lhpost6 import {' '.join(map(str, files))} --map {path}"
-    hint = f"{path}: {len(found.channels)} channels, {len(remarks)} remarks; read and edit it, then\n{then}"
-    entries = {"channels": len(found.channels), "remarks": remarks, "then": then}
-    print_result(json, lambda: entries, lambda: typer.echo(hint), [path])
+__all__ = ["calibrate", "check", "decompose", "export", "validate"]
 
 
 @command()

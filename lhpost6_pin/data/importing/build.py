@@ -13,7 +13,7 @@ from ...machine.machine import Machine
 from ..alignment import oil_force
 from ..channels import LAYOUT, channel_unit
 from ..records import make_record
-from .channel_map import ChannelMap, channels_of, check_map, find_column
+from .channel_map import ChannelMap, channels_of, check_map, find_column, with_labels
 from .channel_units import si_factor
 from .raw import RawTest
 from .sampling import Sampling, common_time, fill_holes, resample, uniform
@@ -33,6 +33,7 @@ def make_imported_record(
     are not mapped are derived from the chamber pressures. Attributes list what was filled, held constant or derived.
     Raises RecordError naming map and key, or file, channel and sample.
     """
+    labels = with_labels(labels, list(channels.channels))
     check_map(channels, labels)
     known = channels_of(labels)
     sources = {name: source for name, source in channels.channels.items() if source.constant is None}

@@ -12,6 +12,7 @@ valves_per_horizontal_actuator = 1
 import fnmatch
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -25,6 +26,7 @@ from ..layout_faults import FASTEST, SLOWEST
 from .raw import RawTest, shown
 
 __all__ = ["ChannelMap", "Source", "TestFacts", "channels_of", "check_map", "find_column", "load_map", "save_map"]
+__all__ += ["source_line", "with_labels"]
 
 _KINDS = {str: "a text", int: "a whole number", float: "a finite number"}
 
@@ -88,7 +90,9 @@ def load_map(path: Path | str) -> ChannelMap:
         if not isinstance(section, dict):
             raise RecordError(f"{origin}: {name} must be a section [{name}]")
     if not sections["channel"]:
-        raise RecordError(f"{origin}: [channel] names no channel; --guess writes a first map")
+        raise RecordError(
+            f"{origin}: [channel] names no channel; write one, or complete the lines that --guess put there"
+        )
     test = _typed(TestFacts, sections["test"], f"{origin}, [test]")
     channels = {}
     for name, entry in sections["channel"].items():
@@ -102,7 +106,7 @@ def load_map(path: Path | str) -> ChannelMap:
 
 
 def save_map(channels: ChannelMap, path: Path | str, remarks: Sequence[str] = ()) -> None:
-    """Write a channel map to edit; `remarks` become comment lines at its end."""
+    """Write a channel map to edit; `remarks` become comment lines at its end, which may be lines to uncomment."""
     test = {f.name: getattr(channels.test, f.name) for f in fields(TestFacts)}
     lines = [
         "# Which column of the data files is which channel of a record. A channel's value in SI is",
@@ -114,12 +118,16 @@ def save_map(channels: ChannelMap, path: Path | str, remarks: Sequence[str] = ()
         "",
         "[channel]",
     ]
-    for name, source in channels.channels.items():
-        given = {f.name: getattr(source, f.name) for f in fields(Source) if getattr(source, f.name) != f.default}
-        lines.append(f"{_toml(name)} = {{ {', '.join(f'{key} = {_toml(value)}' for key, value in given.items())} }}")
-    lines += ["", *(f"# {' '.join(remark.split())}" for remark in remarks)]
+    lines += [source_line(name, source) for name, source in channels.channels.items()]
+    lines += [*(re.sub(r"[\x00-\x1f\x7f]+", " ", f"# {remark}") for remark in remarks)]
     with write_whole(path) as beside:
         beside.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def source_line(name: str, source: Source) -> str:
+    """Return the line of a map that gives a channel its source."""
+    given = {f.name: getattr(source, f.name) for f in fields(Source) if getattr(source, f.name) != f.default}
+    return f"{_toml(name)} = {{ {', '.join(f'{key} = {_toml(value)}' for key, value in given.items())} }}"
 
 
 def _toml(value: object) -> str:
@@ -187,6 +195,17 @@ def channels_of(labels: Labels) -> dict[str, tuple[str, str | None]]:
         else:
             found |= {f"{variable}[{label}]": (variable, label) for label in known.get(channel.dims[1], ())}
     return found
+
+
+def with_labels(labels: Labels, names: Sequence[str]) -> dict[str, Sequence[str]]:
+    """Labels, and those that the `names` of channels give along dimensions that are not the machine's: floors."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        variable, _, label = name.rstrip("]").partition("[")
+        dims = LAYOUT[variable].dims[1:] if variable in LAYOUT else ()
+        if label and dims and dims[0] not in ("axis", *labels):
+            found.setdefault(dims[0], []).append(label)
+    return {**labels, **{dim: list(dict.fromkeys(own)) for dim, own in found.items()}}
 
 
 def check_map(channels: ChannelMap, labels: Labels) -> None:

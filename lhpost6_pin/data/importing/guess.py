@@ -2,61 +2,49 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from dataclasses import replace
 from typing import NamedTuple
 
-from ...core.errors import RecordError
 from ...core.names import AXES
 from ...core.units import quantity_unit
 from ..channels import channel_unit
-from .channel_map import ChannelMap, Source, TestFacts, channels_of
+from .channel_map import ChannelMap, Source, TestFacts, channels_of, source_line, with_labels
 from .channel_units import without_unit
+from .guess_words import (
+    SUPPLY,
+    Labels,
+    axis_in,
+    chamber_in,
+    component_in,
+    floor_in,
+    is_unlike,
+    is_wanted,
+    quantity_in,
+    words_of,
+)
 from .raw import RawTest, shown
 
-__all__ = ["Guess", "guess_map", "is_export"]
+__all__ = ["Guess", "guess_map", "is_export", "other_columns"]
 
-Labels = Mapping[str, Sequence[str]]
-
-_AXIS_WORDS = {
-    "x": ("x", "long", "longitudinal", "lon"),
-    "y": ("y", "lat", "lateral", "trans", "transverse", "tran"),
-    "z": ("z", "vert", "vertical"),
-    "roll": ("roll", "rx"),
-    "pitch": ("pitch", "ry"),
-    "yaw": ("yaw", "rz"),
-}
-_QUANTITY_WORDS = {
-    "displacement": ("displ", "disp", "displacement", "position", "pos", "stroke", "lvdt", "length", "d"),
-    "velocity": ("vel", "velocity", "v"),
-    "acceleration": ("accel", "acc", "acceleration", "a"),
-    "pressure": ("press", "pressure", "pres", "prs", "p", "pa", "pb"),
-    "force": ("force", "load", "cell", "loadcell"),
-    "spool": ("spool", "valve", "servovalve"),
-}
-_BY_UNIT = {
-    "m": "displacement",
-    "rad": "displacement",
-    "m/s": "velocity",
-    "rad/s": "velocity",
-    "m/s2": "acceleration",
-    "rad/s2": "acceleration",
-    "Pa": "pressure",
-    "N": "force",
-}
-_ROLES = {
-    "wanted": ("ref", "reference", "cmd", "command", "target", "desired"),
-    "other": ("err", "error", "delta", "diff", "dp", "dof"),
-}
-_SUPPLY = ("supply", "hps", "hsm", "system", "accumulator")
-_FAMILIES = {"x": "H", "z": "V", "strut": "S", "holddown": "S", "down": "S", "actuator": "", "act": ""}
-"""Words before a number that name a component otherwise: X1 is H1, Z3 is V3, strut 2 is S2."""
+_PLACEHOLDER = "CHANNEL"
+_FLOORS, _SHARE = "floor_acceleration", "valve_command"
+_FEW_SENSORS = ("pressure_difference", _SHARE, _FLOORS)
+"""Kinds of channels that a remark names even where a record of the machine does not have them."""
 
 
 class Guess(NamedTuple):
-    """A first map, and a remark on each column and channel that is not in it."""
+    """A first map, and remarks: a line to complete for each column and channel that is not in it."""
 
     channels: ChannelMap
     remarks: tuple[str, ...]
+
+
+class _Machine(NamedTuple):
+    """What is known of the machine: names along the dimensions of its records, axes on which it moves, channels."""
+
+    labels: Labels
+    axes: tuple[str, ...]
+    known: Mapping[str, tuple[str, str | None]]
 
 
 def is_export(raws: Sequence[RawTest]) -> bool:
@@ -64,45 +52,93 @@ def is_export(raws: Sequence[RawTest]) -> bool:
     return all("layout_version" in raw.facts for raw in raws)
 
 
-def guess_map(raws: Sequence[RawTest], labels: Labels) -> Guess:
+def guess_map(raws: Sequence[RawTest], labels: Labels, moves: Sequence[str] = AXES) -> Guess:
     """Make the map that the columns' names suggest, the first column for each channel.
 
-    Raises RecordError if not a single column is recognised.
+    `labels` are the machine's; the platen `moves` in some axes, on the others it is at a constant zero. A column
+    without a word for its axis or actuator is of the only one, where there is one. Columns that are not recognised
+    become remarks with the channels that they could be.
     """
-    known = channels_of(labels)
+    words = [words_of(without_unit(name)) for raw in raws for name in raw.names]
+    labels = with_labels(labels, [f"{_FLOORS}[{floor}]" for w in words if (floor := floor_in(w))])
+    machine = _Machine(labels, tuple(moves), channels_of(labels))
     found: dict[str, Source] = {}
+    unknown: list[tuple[Source, str]] = []
     remarks: list[str] = []
     for raw, name, number in ((r, n, k) for r in raws for k, n in enumerate(r.names, 1)):
         unit = raw.units[number - 1]
-        channel = _channel(name, unit, labels, known)
-        where = f"{raw.source}: {name!r} in {unit or 'an unknown unit'}"
-        if channel is None:
-            remarks.append(f"not recognised: column {number} of {where}")
+        channel, like = _channel(name, unit, machine)
+        source = _source(raws, raw, name, number, unit)
+        where = f"column {number} of {_file_name(raw)}"
+        if channel and channel.startswith(_SHARE) and quantity_unit(unit) != "1":
+            line = source_line(channel, replace(source, unit="1"))
+            remarks.append(f"{line}  # add gain = 1 / full command, in the unit of {where}; 0.1 for 10 V")
+        elif channel is None:
+            why = f"; like {like}, which a record of this machine does not have" if like else ""
+            unknown.append((source, f"not recognised: {where}{why}"))
         elif channel in found:
-            remarks.append(f"also like {channel}: column {number} of {where}")
+            remarks.append(f"{source_line(channel, source)}  # also like {channel}: {where}")
         else:
-            found[channel] = _source(raws, raw, name, number, unit)
+            found[channel] = source
             if unit is None:
-                remarks.append(f"add the unit of {channel}: column {number} of {where}")
-    if not found:
-        columns = shown([name for raw in raws for name in raw.names], 20)
-        raise RecordError(f"{raws[0].source}: no column's name is recognised among {columns}; write the map by hand")
-    partly = {known[name][0] for name in found}
-    for name, (variable, _) in known.items():
-        if variable in partly and name not in found:
-            unit = channel_unit(name)
-            remarks.append(f'not found: "{name}" = {{ constant = 0.0, unit = "{unit}" }}  # if it is known to be zero')
+                remarks.append(f"add the unit of {channel}: {where}, {name!r}")
+    partly = {machine.known[name][0] for name in found}
+    for name, (variable, label) in machine.known.items():
+        if variable not in partly or name in found:
+            continue
+        zero = Source(constant=0.0, unit=channel_unit(name))
+        if _is_still(label, machine):
+            found[name] = zero
+        else:
+            remarks.append(f"{source_line(name, zero)}  # not found; if it is known to be zero")
+    free = [n for n, (_, label) in machine.known.items() if n not in found and not _is_still(label, machine)]
+    remarks += [f"{source_line(_PLACEHOLDER, source)}  # {why}{_possible(source, free)}" for source, why in unknown]
+    if unknown:
+        remarks.append(f"{_PLACEHOLDER} is one of: {_short(free)}")
     facts = {key: value for raw in reversed(raws) for key, value in raw.facts.items()}
-    ordered = {name: found[name] for name in known if name in found}
+    ordered = {name: found[name] for name in machine.known if name in found}
     return Guess(ChannelMap("guessed map", _test(facts), ordered), tuple(remarks))
+
+
+def other_columns(first: Sequence[RawTest], other: Sequence[RawTest]) -> str:
+    """Return in what the columns of one file differ from those of another, for a remark; empty if in nothing."""
+    ours, theirs = ([name for raw in raws for name in raw.names] for raws in (first, other))
+    more, less = [n for n in theirs if n not in ours], [n for n in ours if n not in theirs]
+    parts = [f"{word} {shown(names)}" for word, names in (("has also", more), ("lacks", less)) if names]
+    return f"{other[0].source}: {'; '.join(parts)}" if parts else ""
+
+
+def _is_still(label: str | None, machine: _Machine) -> bool:
+    """Whether a label is an axis on which the machine does not move."""
+    return label in AXES and label not in machine.axes
+
+
+def _possible(source: Source, free: Sequence[str]) -> str:
+    """Channels that a column of this unit could be."""
+    si = quantity_unit(source.unit)
+    fitting = [name for name in free if channel_unit(name) == si]
+    return f"; by its unit: {_short(fitting)}" if fitting else ""
+
+
+def _short(names: Sequence[str]) -> str:
+    """Channels for a remark, those of a variable together: `actuator_force[H1, H2]`."""
+    together: dict[str, list[str]] = {}
+    for name in names:
+        variable, _, label = name.rstrip("]").partition("[")
+        together.setdefault(variable, []).append(label)
+    return ", ".join(f"{v}[{', '.join(labels)}]" if labels[0] else v for v, labels in together.items())
 
 
 def _source(raws: Sequence[RawTest], raw: RawTest, name: str, number: int, unit: str | None) -> Source:
     alone = sum(other.names.count(name) for other in raws) == 1
     if alone:
         return Source(column=name, unit=unit)
-    file = None if len(raws) == 1 else re.split(r"[\\/]", raw.source)[-1]
+    file = None if len(raws) == 1 else _file_name(raw)
     return Source(column=name if raw.names.count(name) == 1 else number, unit=unit, file=file)
+
+
+def _file_name(raw: RawTest) -> str:
+    return re.split(r"[\\/]", raw.source)[-1]
 
 
 def _test(facts: Mapping[str, str]) -> TestFacts:
@@ -117,78 +153,53 @@ def _test(facts: Mapping[str, str]) -> TestFacts:
 
 
 # --------------------------------------------------------------------------------------------- names
-def _channel(name: str, unit: str | None, labels: Labels, known: Mapping[str, tuple[str, str | None]]) -> str | None:
-    """Channel of a column by its name; None if there is none, or its unit does not fit."""
-    plain = without_unit(name)
+def _channel(name: str, unit: str | None, machine: _Machine) -> tuple[str | None, str | None]:
+    """Channel of a column by its name, None if there is none or its unit does not fit; and one that is not known."""
+    known, plain = machine.known, without_unit(name)
     own = next((c for c, (v, label) in known.items() if plain in (c, v if label is None else f"{v}_{label}")), None)
     if own:
-        return own
-    words = _words(plain)
-    quantity = _quantity(words, unit)
-    if quantity is None or set(words) & set(_ROLES["other"]):
-        return None
-    wanted = bool(set(words) & set(_ROLES["wanted"]))
-    component = _component(words, labels)
-    if component:
-        channel = _of_component(quantity, component, words, wanted, labels)
-    elif quantity == "pressure" and set(words) & set(_SUPPLY):
-        channel = "supply_pressure"
-    else:
-        axis = next((axis for axis in AXES if set(words) & set(_AXIS_WORDS[axis])), None)
-        variable = "reference_displacement" if wanted else f"platen_{quantity}"
-        channel = f"{variable}[{axis}]" if axis and not (wanted and quantity != "displacement") else None
+        return own, None
+    words = words_of(plain)
+    quantity = quantity_in(words, unit)
+    if quantity is None or (is_unlike(words) and quantity != "pressure_difference"):
+        return None, None
+    channel = _meant(quantity, words, machine)
     if channel is None or channel not in known:
+        return None, channel if channel and channel.startswith(_FEW_SENSORS) else None
+    si = quantity_unit(unit)
+    return (channel if si in (None, channel_unit(channel)) else None), None
+
+
+def _meant(quantity: str, words: Sequence[str], machine: _Machine) -> str | None:
+    """Channel that a quantity and words stand for, be it in the layout or not."""
+    wanted, moves = is_wanted(words), quantity in ("displacement", "velocity", "acceleration")
+    floor = floor_in(words) if moves else None
+    if floor is not None:  # of the specimen, never of the platen
+        return f"{_FLOORS}[{floor}]" if quantity == "acceleration" and floor else None
+    component = component_in(words, machine.labels)
+    if quantity == "pressure" and not component and set(words) & SUPPLY:
+        return "supply_pressure"
+    actuators = machine.labels.get("actuator", ())
+    if not component and len(actuators) == 1 and (not moves or "actuator" in words):
+        component = actuators[0]
+    if component:
+        return _of_component(quantity, component, words, wanted, machine.labels)
+    axis = axis_in(words) or (machine.axes[0] if len(machine.axes) == 1 else None)
+    if axis is None or (wanted and quantity != "displacement"):
         return None
-    si = quantity_unit(unit)
-    return channel if si in (None, channel_unit(channel)) else None
-
-
-def _words(name: str) -> list[str]:
-    """Lower-case words of a name: `AccelX`, `accel_x` and `Ax` are acceleration and x."""
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    words = [word.lower() for word in re.findall(r"[^\W_]+", spaced)]
-    parts = []
-    for word in words:
-        match = re.fullmatch(r"(displ?|vel|acc(?:el)?|[dva])([xyz]|rx|ry|rz)", word)
-        parts += list(match.groups()) if match else [word]
-    return parts
-
-
-def _quantity(words: Sequence[str], unit: str | None) -> str | None:
-    """Quantity by a word of the name, else by the unit; single letters count only beside an axis or a chamber."""
-    for quantity, known in _QUANTITY_WORDS.items():
-        if any(len(word) > 1 and word in known for word in words):
-            return quantity
-    si = quantity_unit(unit)
-    if si in _BY_UNIT:
-        return _BY_UNIT[si]
-    return next((q for q, known in _QUANTITY_WORDS.items() if words and words[0] in known), None)
-
-
-def _component(words: Sequence[str], labels: Labels) -> str | None:
-    every = {label.lower(): label for dim in ("actuator", "strut") for label in labels.get(dim, ())}
-    joined = [*words, *(a + b for a, b in pairwise(words) if b[-1].isdigit())]
-    for word in joined:
-        if word in every:
-            return every[word]
-        match = re.fullmatch(r"([a-z]+)(\d+)", word)
-        if match and match[1] in _FAMILIES:
-            other = f"{_FAMILIES[match[1]]}{match[2]}".lower()
-            if other in every:
-                return every[other]
-    return None
+    return f"{'reference_displacement' if wanted else f'platen_{quantity}'}[{axis}]"
 
 
 def _of_component(quantity: str, component: str, words: Sequence[str], wanted: bool, labels: Labels) -> str | None:
     if component in labels.get("strut", ()):
         return f"strut_pressure[{component}]" if quantity == "pressure" else None
+    if quantity in ("valve_command", "pressure_difference"):
+        return f"{quantity}[{component}]"
     if quantity == "spool":
         return f"spool_{'command' if wanted else 'position'}[{component}]"
     if wanted:
         return None
     if quantity == "pressure":
-        chambers = [c for c in "ab" if set(words) & {c, f"p{c}"}]
-        single = component not in labels.get("horizontal", ())
-        chamber = chambers[0] if len(chambers) == 1 else "a" if single and not chambers else None
+        chamber = chamber_in(words, single=component not in labels.get("horizontal", ()))
         return f"chamber_pressure_{chamber}[{component}]" if chamber else None
     return f"actuator_{quantity}[{component}]"

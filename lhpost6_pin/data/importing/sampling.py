@@ -17,7 +17,8 @@ Indices = NDArray[np.intp]
 
 _SAME_TIME = 1e-6  # of one sample: two clocks that differ by less are the same
 _ANTI_ALIAS = (0.4, 16)  # cutoff of the new rate, order: 1 % lost at 0.3 of the rate, 0.2 % left at 0.6
-_MOST_DIGITS = 9
+_FEWEST_DIGITS, _MOST_DIGITS = 4, 9
+_WHOLE = 1e-4  # of the last digit: a number so near to a whole one is that
 _MOST = 2**24  # samples: more than two hours at 2048 Hz
 _LONGEST = 1e12  # [s]: seconds since any usual epoch are far fewer
 
@@ -38,8 +39,8 @@ class Sampling(NamedTuple):
 def uniform(time: Array, most_missing: int, where: str) -> Sampling:
     """Uniform times that the stamps `time` (n,) [s] stand for.
 
-    Stamps may be off their place by 1 % of a sample, or by their rounding to decimals or single precision. Gaps of up
-    to `most_missing` samples are allowed. Raises RecordError naming the sample of anything else.
+    Stamps may be off their place by 1 % of a sample, or by their rounding to decimals, digits or single precision. Gaps
+    of up to `most_missing` samples are allowed. Raises RecordError naming the sample of anything else.
     """
     usable = np.abs(time) < _LONGEST
     if not usable.all():
@@ -66,8 +67,9 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
     place = np.concatenate([[0], np.cumsum(lost + 1)]).astype(np.intp)
     step, start = np.polyfit(place, time - time[0], 1)
     off = np.abs(time - time[0] - start - step * place)
-    if (off > max(STEP_TOLERANCE * step, _written_to(time))).any():
-        k = int(np.argmax(off))
+    beyond = off - np.maximum(STEP_TOLERANCE * step, _written_to(time))
+    if (beyond > 0).any():
+        k = int(np.argmax(beyond))
         raise RecordError(
             f"{where}, time, sample {k}: {time[k]:.9g} s is {off[k] / step:.2g} of a sample off its place at "
             f"{1 / step:.6g} Hz; resample the file to a uniform rate"
@@ -76,14 +78,21 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
     return Sampling(time[0] + start + step * np.arange(place[-1] + 1), place, gaps)
 
 
-def _written_to(time: Array) -> float:
-    """Largest rounding error of a stamp as it is written [s]."""
+def _written_to(time: Array) -> Array:
+    """Largest rounding errors (n,) [s] of stamps as they are written: in single precision, to decimals, to digits."""
     if np.array_equal(time, time.astype(np.float32)):
-        return float(np.spacing(np.float32(np.abs(time).max())))
-    for digits in range(_MOST_DIGITS):
-        if np.allclose(time, np.round(time, digits), rtol=0, atol=1e-6 * 10.0**-digits):
-            return 0.51 * 10.0**-digits
-    return 0.0
+        return np.full(len(time), np.spacing(np.float32(np.abs(time).max())), float)
+    bound = np.zeros(len(time))
+    for decimals in range(_MOST_DIGITS):
+        if np.allclose(time, np.round(time, decimals), rtol=0, atol=1e-6 * 10.0**-decimals):
+            bound += 0.51 * 10.0**-decimals
+            break
+    size = np.floor(np.log10(np.maximum(np.abs(time), 10.0**-_MOST_DIGITS)))
+    for digits in range(_FEWEST_DIGITS, _MOST_DIGITS):  # as %g writes: fewer decimals from 1, 10, 100 s on
+        last = 10.0 ** (size - digits + 1)
+        if (np.abs(time / last - np.rint(time / last)) <= _WHOLE).all():
+            return np.maximum(bound, 0.51 * last)
+    return bound
 
 
 def fill_holes(values: Array, most: int, where: str) -> tuple[Array, tuple[tuple[int, int], ...]]:

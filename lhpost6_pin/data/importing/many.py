@@ -1,0 +1,57 @@
+"""Files and folders of many tests: which files are a test, and the name of each."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ...core.errors import RecordError
+from ...core.files import reason_of
+
+__all__ = ["FileOfTest", "find_tests"]
+
+_NO_DATA = {".md", ".toml", ".pdf", ".png", ".jpg", ".jpeg", ".html", ".py", ".m", ".doc", ".docx", ".zip", ".nc"}
+"""Suffixes of files that a folder of tests may hold beside its data: records (.nc) are imported already."""
+
+
+class FileOfTest(NamedTuple):
+    """The file of one test, and its name."""
+
+    name: str
+    file: Path
+
+
+def find_tests(paths: Sequence[Path]) -> list[FileOfTest]:
+    """Tests of files and folders, each data file one; folders give the files directly in them, in order of names.
+
+    A test is called as its file; where two files are called alike, by folder and file. Raises RecordError for a folder
+    without data files, or a file given twice.
+    """
+    files: list[Path] = []
+    for path in paths:
+        files += _inside(path) if path.is_dir() else [path]
+    places = [file.resolve() for file in files]
+    if len(set(places)) < len(places):
+        twice = next(place for place in places if places.count(place) > 1)
+        raise RecordError(f"{twice}: is given twice; give each test once")
+    names = [file.stem for file in files]
+    if len(set(names)) < len(names):
+        names = [f"{file.resolve().parent.name}_{file.stem}" for file in files]
+    if len(set(names)) < len(names):
+        names = [f"{name}{file.suffix.replace('.', '_')}" for name, file in zip(names, files, strict=True)]
+    if len(set(names)) < len(names):
+        same = next(name for name in names if names.count(name) > 1)
+        raise RecordError(f"two tests would be called {same}; rename a file, or import its folder apart")
+    return [FileOfTest(name, file) for name, file in zip(names, files, strict=True)]
+
+
+def _inside(folder: Path) -> list[Path]:
+    try:
+        inside = sorted(folder.iterdir())
+    except OSError as error:
+        raise RecordError(f"{folder}: cannot be read: {reason_of(error)}") from None
+    files = [p for p in inside if p.is_file() and not p.name.startswith(".") and p.suffix.lower() not in _NO_DATA]
+    if not files:
+        below = [p.name for p in inside if p.is_dir()]
+        remedy = f"name the folders in it: {', '.join(below[:8])}" if below else "name the folder of the data files"
+        raise RecordError(f"{folder}: holds no data file; {remedy}")
+    return files

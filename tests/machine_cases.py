@@ -16,8 +16,8 @@ PRACTICE = DATA / "records" / "practice_a_TX.nc"
 PENDULUM = DATA / "pendulum.urdf"
 STEWART = DATA / "stewart.toml"
 SCRIPTS = Path(__file__).parent.parent / "scripts"
-FREE_MACHINES = ("lhpost6", "stewart")
-MACHINES = (*FREE_MACHINES, "uniaxial")
+FREE_MACHINES = ("lhpost6", "stewart", "hexapod")
+MACHINES = (*FREE_MACHINES, "uniaxial", "biaxial")
 
 
 @cache
@@ -37,8 +37,7 @@ def random_poses(machine: Machine, count: int, seed: int = 0) -> np.ndarray:
     """Poses (count, 6), uniform over the whole travel range, its corners first."""
     rng = np.random.default_rng(seed)
     reach = np.array(machine.limits.displacement)
-    if machine.motion != "free":
-        reach[np.arange(6) != "xyz".index(machine.motion)] = 0.0
+    reach[~np.isin(np.arange(6), machine.axes)] = 0.0
     corners = np.sign(rng.uniform(-1.0, 1.0, (count // 4, 6)))
     inside = rng.uniform(-1.0, 1.0, (count - len(corners), 6))
     return reach * np.vstack([corners, inside])
@@ -48,8 +47,7 @@ def smooth_motion(machine: Machine, t: np.ndarray, seed: int = 0) -> PlatenMotio
     """Sum of sines over the travel range at times t (n,), with exact derivatives; (n, 6) each."""
     rng = np.random.default_rng(seed)
     reach = np.array(machine.limits.displacement) / 3.0
-    if machine.motion != "free":
-        reach[np.arange(6) != "xyz".index(machine.motion)] = 0.0
+    reach[~np.isin(np.arange(6), machine.axes)] = 0.0
     omega, phase = rng.uniform(1.0, 8.0, (3, 6)), rng.uniform(0.0, 2.0 * np.pi, (3, 6))
     angle = np.multiply.outer(t, omega) + phase  # (n, 3, 6)
     return PlatenMotion(

@@ -32,7 +32,7 @@ JOBS: Mapping[str, tuple[str, ...]] = {
     "Measured data": ("import", "check", "export", "decompose", "validate", "calibrate"),
     "Discover": ("discover", "demo"),
     "Connect": ("serve", "link", "export-fmu"),
-    "Look": ("view", "info", "capacity", "doctor"),
+    "Look": ("view", "info", "capacity", "new-machine", "doctor"),
 }
 """Commands by job, in the order of `--help`, of the command reference and of the README."""
 

@@ -19,7 +19,7 @@ from .parameters import EffectEntry, Parameters, load_parameters, override_param
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
-from .structure import Structure
+from .structure import MOTIONS, Structure
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -148,7 +148,7 @@ def build_machine(
     """Give typed objects to a flat mapping of quantities; raises ParameterError."""
     words = parameters.words
     options = {
-        "motion": _word(parameters, "machine.motion", ("free", "x", "y", "z")),
+        "motion": _word(parameters, "machine.motion", MOTIONS),
         "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]

@@ -12,7 +12,7 @@ __all__ += ["vector_length"]
 
 Value: TypeAlias = float | tuple[float, ...]
 
-EVIDENCE = ("report", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
+EVIDENCE = ("report", "measured", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
 """How well a number is known, strongest claim first; `override` is what a user set by hand."""
 
 LARGEST = 1e30

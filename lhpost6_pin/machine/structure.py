@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from .components import Actuator, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
-__all__ = ["Structure"]
+__all__ = ["MOTIONS", "Structure"]
+
+MOTIONS = ("free", "x", "y", "z", "xy", "xz", "yz", "xyz")
+"""Freedom of a platen: six degrees of freedom, or displacements along guides, which hold it against turning."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,11 @@ class Structure:
     struts: tuple[Strut, ...]
     limits: Limits
     parameters: Parameters
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Numbers, of x y z roll pitch yaw, of the axes in which the platen can move."""
+        return tuple(range(6)) if self.motion == "free" else tuple("xyz".index(axis) for axis in self.motion)
 
     @property
     def components(self) -> tuple[Actuator | Strut, ...]:

@@ -246,7 +246,7 @@ def forward_kinematics(
     below `tolerance` [m, rad]. Raises SimulationError if `steps` do not suffice or the lengths fit no pose.
     """
     pose = np.zeros(6) if start is None else np.array(start, float)
-    free = range(6) if machine.motion == "free" else ["xyz".index(machine.motion)]
+    free = list(machine.axes)
     for _ in range(steps):
         error = inverse_kinematics(machine, pose) - length
         if not np.all(np.isfinite(error)):

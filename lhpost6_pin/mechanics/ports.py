@@ -103,8 +103,8 @@ def body_table(machine: Machine) -> NDArray[np.void]:
 def platen_pose(q, axes, body, frame):
     """Fill rows 0 to 3 of frame from q: the rotation s_R_b and the position of B in {s} [m].
 
-    With six free axes q starts with the position of B and a unit quaternion (x, y, z, w); a guided platen has q[0],
-    its displacement [m] along axes[0], and does not turn.
+    With six free axes q starts with the position of B and a unit quaternion (x, y, z, w); of a guided platen, which
+    does not turn, q starts with the displacements [m] along axes.
     """
     if axes.size == 6:
         quaternion_to_matrix(q[3], q[4], q[5], q[6], frame)
@@ -115,7 +115,8 @@ def platen_pose(q, axes, body, frame):
             for j in range(3):
                 frame[k, j] = 1.0 if k == j else 0.0
             frame[3, k] = -body[0].rho_c[k]
-        frame[3, axes[0]] += q[0]
+        for k in range(axes.size):
+            frame[3, axes[k]] += q[k]
 
 
 @compiled_inline

@@ -2,7 +2,7 @@
 
 A plant's q holds the position of B and a quaternion, v the twist of B in platen axes, linear first. A record holds the
 displacement of C in {s} and Euler angles alpha, beta, gamma with s_R_b = Rz(gamma) Ry(beta) Rx(alpha) (Eq. 3-5), and
-their derivatives. A guided platen has one displacement.
+their derivatives. Of a guided platen q and v are the displacements along its guides and their rates.
 """
 
 from typing import NamedTuple
@@ -83,7 +83,8 @@ def _platen_motion(moved, axes, body, motion):
     frame = np.zeros((8, 3))
     for k in range(len(q)):
         if axes.size != 6:
-            displacement[k, axes[0]], velocity[k, axes[0]] = q[k, 0], v[k, 0]
+            for j in range(axes.size):
+                displacement[k, axes[j]], velocity[k, axes[j]] = q[k, j], v[k, j]
         else:
             rho, linear, omega = body[0].rho_c, v[k], v[k, 3:6]
             platen_pose(q[k], axes, body, frame)
@@ -179,7 +180,8 @@ def pose_acceleration(frame, body, axes, v, a, out):
     """
     if axes.size != 6:
         out[:] = 0.0
-        out[axes[0]] = a[0]
+        for k in range(axes.size):
+            out[axes[k]] = a[k]
         return
     rho, omega, alpha = body[0].rho_c, v[3:6], a[3:6]
     tx, ty, tz = cross(omega, rho)

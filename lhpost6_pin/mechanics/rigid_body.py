@@ -23,15 +23,16 @@ __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
 
 
 def free_axes(machine: Machine) -> NDArray[np.int64]:
-    """Twist components (linear first) that the platen can have: all six, or one guided axis."""
-    return np.arange(6) if machine.motion == "free" else np.array(["xyz".index(machine.motion)])
+    """Twist components (linear first) that the platen can have: all six, or those along its guides."""
+    return np.array(machine.axes, np.int64)
 
 
 def make_model(machine: Machine) -> Any:
     """Build the pin.Model of platen and specimen; the platen is joint 1, its frame {b} at B.
 
-    q starts with the position of B in {s} and a quaternion (x, y, z, w), or with the guided displacement; v with the
-    twist of B in platen axes, linear first. Specimen joints follow. Raises ParameterError for an unreadable URDF.
+    q starts with the position of B in {s} and a quaternion (x, y, z, w), or with the displacements along guides; v with
+    the twist of B in platen axes, linear first, on the free axes. Specimen joints follow. Raises ParameterError for an
+    unreadable URDF.
     """
     platen = machine.platen
     model = pin.Model()
@@ -40,7 +41,7 @@ def make_model(machine: Machine) -> Any:
     if machine.motion == "free":
         joint, placement = pin.JointModelFreeFlyer(), pin.SE3.Identity()
     else:
-        joint = {"x": pin.JointModelPX, "y": pin.JointModelPY, "z": pin.JointModelPZ}[machine.motion]()
+        joint = _guides(machine.axes)
         placement = pin.SE3(np.eye(3), np.array(platen.centre_of_gravity))
     index = model.addJoint(0, joint, placement, "platen")
     model.addJointFrame(index)
@@ -57,6 +58,17 @@ def make_model(machine: Machine) -> Any:
     extra[: axes.size] = armature[axes]
     model.armature = model.armature + extra
     return model
+
+
+def _guides(axes: Sequence[int]) -> Any:
+    """Joint of a platen on guides: a prismatic one, or one of several."""
+    prismatic = [(pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)[k]() for k in axes]
+    if len(prismatic) == 1:
+        return prismatic[0]
+    joint = pin.JointModelComposite(len(prismatic))
+    for each in prismatic:
+        joint.addJoint(each)
+    return joint
 
 
 def _with_added(inertia: Any, machine: Machine) -> Any:

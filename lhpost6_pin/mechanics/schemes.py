@@ -55,7 +55,8 @@ def set_twist(v, axes, frame):
     for k in range(3):
         frame[4, k] = 0.0
         frame[5, k] = 0.0
-    frame[4, axes[0]] = v[0]
+    for k in range(axes.size):
+        frame[4, axes[k]] = v[k]
 
 
 @compiled_inline
@@ -91,7 +92,8 @@ def forces_stage(tables, ws, z):
             motion[TAU, k] = frame[6, k]
             motion[TAU, 3 + k] = frame[7, k]
     else:
-        motion[TAU, 0] = frame[6, axes[0]]
+        for k in range(axes.size):
+            motion[TAU, k] = frame[6, axes[k]]
     for k in range(axes.size, motion.shape[1]):  # specimen joints
         motion[TAU, k] = -tables.damping[k] * motion[V_SEEN, k]
 

@@ -130,7 +130,8 @@ def rpy_acceleration(frame, rate, alpha):
 def integrate(q, dq, axes, out):
     """Pose after the body displacement dq: q exp(dq) on SE(3), quaternion kept unit (pin.integrate's oracle)."""
     if axes.size != 6:
-        out[0] = q[0] + dq[0]
+        for k in range(axes.size):
+            out[k] = q[k] + dq[k]
         return
     x, y, z, w = q[3], q[4], q[5], q[6]
     w0, w1, w2 = dq[3], dq[4], dq[5]
@@ -171,10 +172,11 @@ def integrate(q, dq, axes, out):
 def difference(q, after, axes, out):
     """Body displacement dq that leads from pose q to pose `after`, the inverse of `integrate`.
 
-    out (6,), or (1,) of a guided platen [m, rad]; for turns below half a revolution.
+    out (n_axes,) [m, rad]; for turns below half a revolution.
     """
     if axes.size != 6:
-        out[0] = after[0] - q[0]
+        for k in range(axes.size):
+            out[k] = after[k] - q[k]
         return
     x, y, z, w = -q[3], -q[4], -q[5], q[6]
     a, b, c, d = after[3], after[4], after[5], after[6]

@@ -84,11 +84,10 @@ def _uniform_box(joint: int, inertia: Any) -> Any:
 def joint_positions(machine: Machine, model: Any, displacement: Array) -> Array:
     """Positions q (n, nq) of the URDF's joints at which every leg ends at the platen (Eqs. 3-20, 3-24, 4-13, 4-14).
 
-    displacement (n, 6): of C in {s} and Euler angles [m, rad]. A guided platen uses its own axis only.
+    displacement (n, 6): of C in {s} and Euler angles [m, rad]. A guided platen uses its own axes only.
     """
     pose = np.array(np.atleast_2d(displacement), float)
-    if machine.motion != "free":
-        pose[:, np.arange(6) != "xyz".index(machine.motion)] = 0.0
+    pose[:, ~np.isin(np.arange(6), machine.axes)] = 0.0
     turn = rotation(pose[:, 3:])
     q = np.zeros((len(pose), model.nq))
 
@@ -101,7 +100,8 @@ def joint_positions(machine: Machine, model: Any, displacement: Array) -> Array:
         centre = np.array(machine.platen.centre_of_gravity)
         put("platen_motion", np.hstack([pose[:, :3] + turn @ centre - centre, quaternions(turn)]))
     else:
-        put("platen_motion", pose[:, "xyz".index(machine.motion)])
+        for k in machine.axes:
+            put(f"platen_motion_{'xyz'[k]}", pose[:, k])
     normal = turn[:, :, 2]
     foot = pose[:, :3] + turn @ np.array(machine.platen.bearing_plane)
     for leg in legs(machine):

@@ -155,9 +155,23 @@ def _platen(robot: ET.Element, machine: Machine, measures: Sequence[_Leg]) -> No
     if machine.motion == "free":
         _joint(robot, "platen_motion", "floating", ends, centre)
         return
-    k = "xyz".index(machine.motion)
-    limit = machine.limits.displacement[k], 0.0, machine.limits.velocity[k]
-    _joint(robot, "platen_motion", "prismatic", ends, centre, axis=np.eye(3)[k], limit=limit)
+    # one guide on the other: massless carriages between
+    carriages = [f"platen_carriage_{'xyz'[k]}" for k in machine.axes[:-1]]
+    for carriage in carriages:
+        _add(robot, "link", name=carriage)
+    between = ("world", *carriages, "platen")
+    for n, k in enumerate(machine.axes):
+        limit = machine.limits.displacement[k], 0.0, machine.limits.velocity[k]
+        place = centre if n == 0 else np.zeros(3)
+        _joint(
+            robot,
+            f"platen_motion_{'xyz'[k]}",
+            "prismatic",
+            (between[n], between[n + 1]),
+            place,
+            axis=np.eye(3)[k],
+            limit=limit,
+        )
 
 
 def _platen_inertia(machine: Machine) -> tuple[float, Vec, Vec]:

@@ -101,9 +101,9 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
         if section in sections and quantity.sd is not None and name != "bearing_plane":
             found += _parameters_of(path, name, quantity)
     found += _points(machine, (2,))
-    if machine.motion != "free":  # a guided platen: one mass, no inertia, no geometry
-        mass = f"platen.mass[{machine.motion}]"
-        found = [p for p in found if p.name == mass or not p.name.startswith("platen.")]
+    if machine.motion != "free":  # a guided platen: masses along its guides, no inertia, no geometry
+        masses = {f"platen.mass[{axis}]" for axis in machine.motion}
+        found = [p for p in found if p.name in masses or not p.name.startswith("platen.")]
         found = [p for p in found if not p.name.endswith("_height")]
     return tuple(_with_room(p, machine, travel or {}) for p in found)
 

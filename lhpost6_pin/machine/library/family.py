@@ -67,7 +67,7 @@ class Family:
         if "supply" in self.acts_on:
             found.append("supply")
         axes = PLATEN_PORTS if "axis" in self.acts_on else PLATEN_PORTS[:2] if "level axis" in self.acts_on else ()
-        found += [axis for axis in axes if machine.motion in ("free", axis.removeprefix("platen."))]
+        found += [axis for axis in axes if PLATEN_PORTS.index(axis) in machine.axes]
         return tuple(found)
 
     def groups(self, machine: Structure) -> tuple[tuple[str, ...], ...]:

@@ -1,0 +1,94 @@
+"""What `lhpost6 new-machine` asks of a table, in order: its prompts, its options and what is checked follow from it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ...core.errors import ParameterError
+from ..quantity import Quantity
+from .stated import read_stated
+
+__all__ = ["ASKED", "Asked", "option_of", "read_answers"]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One number that is asked for."""
+
+    unit: str
+    question: str
+    needed: bool = False
+    sizes: tuple[int, ...] = (1,)  # how many numbers it may have
+    when: str = ""  # "free": only of a six-leg platform
+
+
+ASKED: Mapping[str, Asked] = {
+    "mass": Asked("kg", "Moving mass: table, fittings, pistons; one number, or one an axis", True, (1, 2, 3)),
+    "size": Asked("m", "Table in plan, along x and y", sizes=(2,)),
+    "inertia": Asked(
+        "kg m2", "Moments of inertia about x, y, z through the centre of gravity", sizes=(3,), when="free"
+    ),
+    "area": Asked("m2", "Piston area that the oil acts on (of a single-rod cylinder that without the rod)"),
+    "bore": Asked("m", "Bore of the cylinder, in place of the area"),
+    "rod": Asked("m", "Diameter of the rod"),
+    "stroke": Asked("m", "Stroke each way from the middle", True),
+    "length": Asked("m", "Actuator from swivel to swivel at mid-stroke"),
+    "supply_pressure": Asked("Pa", "Supply pressure", True),
+    "return_pressure": Asked("Pa", "Return pressure"),
+    "speed": Asked("m/s", "Speed of the piston without load at full command (or per volt, with the full voltage)"),
+    "rated_flow": Asked("m3/s", "Rated flow of the valve, all valves of an actuator together; in place of the speed"),
+    "rated_drop": Asked("Pa", "Pressure drop over both paths of the valve at which that flow is rated"),
+    "valve_delay": Asked("s", "Delay of the valve, from command to spool"),
+    "friction": Asked("N", "Friction of one actuator with its share of the guides"),
+    "bulk_modulus": Asked("Pa", "Effective bulk modulus of the oil"),
+    "platen_radius": Asked("m", "Radius of the joints under the platen", when="free"),
+    "base_radius": Asked("m", "Radius of the joints on the base", when="free"),
+    "platen_spread": Asked("rad", "Angle between the joints of a pair under the platen", when="free"),
+    "base_spread": Asked("rad", "Angle between the joints of a pair on the base", when="free"),
+}
+"""By name; an option is the name with hyphens."""
+
+
+def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict[str, Quantity]:
+    """Quantities of what was answered, by name, in SI; `voltage` [V] is the full command, for a speed per volt.
+
+    Such a speed becomes `slope`: at full command, if the valve's flow were proportional to it.
+    Raises ParameterError naming the option for what cannot be read, is not positive, or is missing.
+    """
+    found = {}
+    for name, text in texts.items():
+        asked, option = ASKED[name], option_of(name)
+        source = f"stated to lhpost6 new-machine: {' '.join(text.split())}"
+        if name == "speed" and text.rstrip().split("+")[0].rstrip().endswith("V"):
+            name = "slope"
+            found[name] = _per_volt(text, voltage, option, source)
+        else:
+            found[name] = read_stated(text, asked.unit, option, source)
+        value = found[name].value
+        numbers = value if isinstance(value, tuple) else (value,)
+        if len(numbers) not in asked.sizes:
+            raise ParameterError(f"{option}: {text!r} should be {' or '.join(map(str, asked.sizes))} number(s)")
+        if min(numbers) < 0.0 or (min(numbers) == 0.0 and name not in ("return_pressure", "valve_delay", "friction")):
+            raise ParameterError(f"{option}: {text!r} must be positive")
+    for name, asked in ASKED.items():
+        if asked.needed and name not in found:
+            raise ParameterError(f"{option_of(name)} is missing: {asked.question.lower()} [{asked.unit}]")
+    if "area" not in found and "bore" not in found:
+        raise ParameterError("--area is missing: the piston area that the oil acts on, or --bore and --rod")
+    return found
+
+
+def option_of(name: str) -> str:
+    """The option on the command line that states a number."""
+    return f"--{name.replace('_', '-')}"
+
+
+def _per_volt(text: str, voltage: float | None, option: str, source: str) -> Quantity:
+    if voltage is None:
+        raise ParameterError(f"{option}: {text!r} is per volt; give the command's full voltage with --voltage")
+    if not voltage > 0.0:
+        raise ParameterError(f"--voltage {voltage:g}: must be positive")
+    slope = read_stated(text, "m/s/V", option, source)
+    if isinstance(slope.value, tuple) or isinstance(slope.sd, tuple):
+        raise ParameterError(f"{option}: {text!r} should be 1 number")
+    sd = None if slope.sd is None else slope.sd * voltage
+    return Quantity(slope.value * voltage, "m/s", "measured", f"{source}, times {voltage:g} V", sd)

@@ -66,13 +66,10 @@ def _write_draft_map(
     files: Sequence[Path], many: bool, table: "Machine", again: str, out: Path | None, json: bool
 ) -> None:
     """Write a first channel map, and print the command that uses it; of many tests, by the columns of the first."""
-    from ..core.names import AXES
     from ..data.importing import find_tests, guess_map, load_raw, other_columns, save_map
-    from ..motions.process import axes_map
 
     raws = load_raw(find_tests(files)[0].file) if many else [raw for file in files for raw in load_raw(file)]
-    moves = AXES if table.motion == "free" else tuple(axis for axis, _ in axes_map(table.motion))
-    found, remarks = guess_map(raws, table.labels, moves)
+    found, remarks = guess_map(raws, table.labels, table.axis_names)
     for test in find_tests(files)[1:] if many else ():
         try:
             differs = other_columns(raws, load_raw(test.file))
@@ -116,6 +113,7 @@ def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out:
     entries = {
         name: {"from": sources.get(name, "derived"), "unit": unit, "least": values.min(), "most": values.max()}
         for name, unit, values in channel_units(record)
+        if name in sources or values.any()  # else an axis held by guides
     }
 
     def show() -> None:

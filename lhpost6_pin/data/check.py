@@ -15,6 +15,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import RecordError
+from ..core.names import AXES
 from ..machine.machine import Machine
 from .alignment import hydraulic_force
 from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
@@ -73,7 +74,7 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     if "time" in broken or not known:
         return errors + contents  # signals cannot be judged on a broken time axis
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
-    columns = tuple(_columns(sound, known))
+    columns = tuple(c for c in _columns(sound, known) if not _held(c, machine))
     by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
     warnings = chain(
         (warning for judge in by_column for c in columns if (warning := judge(c))),
@@ -128,6 +129,12 @@ def _columns(dataset: xr.Dataset, names: Iterable[str]) -> Iterator[_Column]:
         for k, x in enumerate(values.T):
             alike = spans[3 * (k // 3) :][:3] if "axis" in variable.dims else spans
             yield _Column(channel_name(variable, k), x, float(max(alike.max(), 1e-6 * spans.max())), measured)
+
+
+def _held(c: _Column, machine: Machine | None) -> bool:
+    """Whether it is zero along an axis in which the guides hold the platen: not measured, and nothing to judge."""
+    label = c.channel.rstrip("]").partition("[")[2]
+    return machine is not None and label in AXES and label not in machine.axis_names and not c.x.any()
 
 
 def _implausible_unit(c: _Column) -> _Warning | None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from ..core.names import AXES
 from .components import Actuator, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
@@ -51,6 +52,11 @@ class Structure:
     def double_acting(self) -> tuple[str, ...]:
         """Names of the actuators that have a chamber B; the `horizontal` dimension of records."""
         return tuple(a.name for a in self.actuators if a.area_b is not None)
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """Names of the axes in which the platen can move."""
+        return tuple(AXES[k] for k in self.axes)
 
     @property
     def labels(self) -> dict[str, tuple[str, ...]]:

@@ -9,11 +9,12 @@ import xarray as xr
 
 from ...core.arrays import Array
 from ...core.errors import RecordError
+from ...core.names import AXES
 from ...machine.machine import Machine
 from ..alignment import oil_force
 from ..channels import LAYOUT, channel_unit
 from ..records import make_record
-from .channel_map import ChannelMap, channels_of, check_map, find_column, with_labels
+from .channel_map import ChannelMap, channels_of, check_map, find_column, still_channels, with_labels
 from .channel_units import si_factor
 from .raw import RawTest
 from .sampling import Sampling, common_time, fill_holes, resample, uniform
@@ -30,11 +31,13 @@ def make_imported_record(
     """Make a record from the raw columns of one test.
 
     `labels` are the machine's, by dimension (`actuator`, `horizontal`, `strut`). With a `machine`, actuator forces that
-    are not mapped are derived from the chamber pressures. Attributes list what was filled, held constant or derived.
+    are not mapped are derived from the chamber pressures, and axes in which it cannot move are zero. Attributes list
+    what was filled, held constant or derived.
     Raises RecordError naming map and key, or file, channel and sample.
     """
     labels = with_labels(labels, list(channels.channels))
-    check_map(channels, labels)
+    moves = machine.axis_names if machine else AXES
+    check_map(channels, labels, moves)
     known = channels_of(labels)
     sources = {name: source for name, source in channels.channels.items() if source.constant is None}
     constant = [name for name in channels.channels if name not in sources]
@@ -56,6 +59,10 @@ def make_imported_record(
         columns[name] = resample(fill_holes(everywhere, most, where)[0], sampling, time)
     columns |= {name: np.full(len(time), _constant(channels, name)) for name in constant}
     together: dict[str, list[Array]] = {}  # complete, by `check_map`
+    mapped = {known[name][0] for name in columns}
+    for name in still_channels(labels, moves):
+        if known[name][0] in mapped:
+            columns.setdefault(name, np.zeros(len(time)))
     for name, (variable, _) in known.items():
         if name in columns:
             together.setdefault(variable, []).append(columns[name])

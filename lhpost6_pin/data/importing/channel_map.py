@@ -26,7 +26,7 @@ from ..layout_faults import FASTEST, SLOWEST
 from .raw import RawTest, shown
 
 __all__ = ["ChannelMap", "Source", "TestFacts", "channels_of", "check_map", "find_column", "load_map", "save_map"]
-__all__ += ["source_line", "with_labels"]
+__all__ += ["source_line", "still_channels", "with_labels"]
 
 _KINDS = {str: "a text", int: "a whole number", float: "a finite number"}
 
@@ -208,9 +208,18 @@ def with_labels(labels: Labels, names: Sequence[str]) -> dict[str, Sequence[str]
     return {**labels, **{dim: list(dict.fromkeys(own)) for dim, own in found.items()}}
 
 
-def check_map(channels: ChannelMap, labels: Labels) -> None:
-    """Raise RecordError for a channel that no record of the machine has, or a variable with a channel missing."""
-    known = channels_of(labels)
+def still_channels(labels: Labels, moves: Sequence[str] = AXES) -> tuple[str, ...]:
+    """Channels along axes in which the platen cannot move, where it `moves` in some: zero unless they are mapped."""
+    every = channels_of(labels).items()
+    return tuple(name for name, (v, label) in every if "axis" in LAYOUT[v].dims and label not in moves)
+
+
+def check_map(channels: ChannelMap, labels: Labels, moves: Sequence[str] = AXES) -> None:
+    """Raise RecordError for a channel that no record of the machine has, or a variable with a channel missing.
+
+    Axes in which the platen cannot move, those not in `moves`, may be missing.
+    """
+    known, still = channels_of(labels), still_channels(labels, moves)
     where = f"{channels.origin}, [channel]"
     for name in channels.channels:
         if name not in known:
@@ -219,7 +228,7 @@ def check_map(channels: ChannelMap, labels: Labels) -> None:
             raise RecordError(f"{where} {name}: is no channel of a record; {instead_of(name, valid)}")
     for variable in dict.fromkeys(known[name][0] for name in channels.channels):
         every = {name: str(label) for name, (v, label) in known.items() if v == variable}
-        missing = [name for name in every if name not in channels.channels]
+        missing = [name for name in every if name not in channels.channels and name not in still]
         if missing:
             have = ", ".join(label for name, label in every.items() if name not in missing)
             lacks, unit = ", ".join(every[name] for name in missing), channel_unit(missing[0])

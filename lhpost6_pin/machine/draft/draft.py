@@ -63,7 +63,7 @@ def draft_machine(
         "machine.title": title or f"{table}, {cylinder} cylinders",
         "machine.motion": motion,
         "machine.thrust": "report",
-        "machine.controller": "untuned",
+        "machine.controller": "cautious",
         **{f"{KIND}.{key}": word for key, word in (("role", "actuator"), ("mount", "swivel"), ("valve", "4-way"))},
         f"{KIND}.valves": 1,
         **{f"{leg.name}.kind": KIND for leg in legs},

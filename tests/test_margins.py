@@ -101,7 +101,7 @@ def test_the_expected_response_starts_at_one_and_master_gain_notches_and_loops_e
 
 def test_along_the_vertical_noise_measures_what_the_linear_model_expects(plant, rest, controller):
     """Little friction acts there. Nearer to the oil column at 37 Hz the valves' flow damps more than in the small."""
-    target = noise_target(("z",), seed=5)
+    target = noise_target(("z",), plant.machine.limits, seed=5)
     measured = band(identify(controller, rest, target, ("z",), 8.0), 0.5, 20.0)
     expected = expected_response(make_loop_model(controller, measured.frequency), controller)[:, 2, 2]
     found = measured.response[:, 0, 0]

@@ -156,7 +156,9 @@ def test_a_rigid_specimen_is_tuned_without_hand_work():
 
 def test_the_shipped_settings_came_of_this_machine(plant, rest, controller):
     for name in "xyz":
-        found = identify.identify(controller, rest, noise_target((name,), seed=7), (name,), segment=4.0)
+        found = identify.identify(
+            controller, rest, noise_target((name,), plant.machine.limits, seed=7), (name,), segment=4.0
+        )
         low, high = tuning.band_within(found, 0, 3.0, 0.7)
         assert low <= 0.75 and high > 15.0, name
 
@@ -186,7 +188,8 @@ def test_what_limits_a_band_is_said_even_where_there_is_none(plant):
 
 def test_noise_has_the_level_and_the_band_it_says():
     numbers = tuning_numbers()
-    target = noise_target(("x", "roll"))
+    limits = load_machine().limits
+    target = noise_target(("x", "roll"), limits)
     x, roll = target.acceleration[:, 0], target.acceleration[:, 3]
     middle = slice(len(x) // 2 - 20000, len(x) // 2 + 20000)  # it rises and falls at its ends
     rms = np.sqrt(np.mean(x[middle] ** 2))
@@ -195,10 +198,22 @@ def test_noise_has_the_level_and_the_band_it_says():
     assert np.sqrt(np.mean(roll[middle] ** 2)) == pytest.approx(rms / numbers.number("noise.rotation_radius"), rel=0.1)
     assert not target.acceleration[:, [1, 2, 4, 5]].any()
     assert abs(np.corrcoef(x, roll)[0, 1]) < 0.1  # independent of each other
-    assert not np.allclose(x, noise_target(("x", "roll"), seed=2).acceleration[:, 0])
-    slow = noise_target(("x",), slow=True)
+    assert not np.allclose(x, noise_target(("x", "roll"), limits, seed=2).acceleration[:, 0])
+    slow = noise_target(("x",), limits, slow=True)
     spectrum = np.abs(np.fft.rfft(slow.acceleration[:, 0])) ** 2
     f = np.fft.rfftfreq(len(slow.acceleration), 1 / 2048)
     inside = (f > numbers.number("noise.slow_low")) & (f < numbers.number("noise.high") * 1.05)
     assert spectrum[inside].sum() > 0.99 * spectrum.sum()
     assert np.abs(slow.displacement[:, 0]).max() < 0.2
+
+
+def test_noise_stays_within_the_limits_of_a_small_table():
+    """A tenth of the LHPOST6's stroke in y alone: y falls to the share of its limit, x is as it was."""
+    limits, share = load_machine().limits, tuning_numbers().number("noise.of_limits")
+    x, _, *rest = limits.displacement
+    small = replace(limits, displacement=(x, 0.02, *rest))
+    usual, less = (noise_target(("x", "y"), bound, slow=True) for bound in (limits, small))
+    assert np.array_equal(usual.displacement[:, 0], less.displacement[:, 0])
+    assert np.abs(less.displacement[:, 1]).max() == pytest.approx(share * 0.02, rel=1e-12)
+    ratio = less.acceleration[:, 1] @ usual.acceleration[:, 1] / (usual.acceleration[:, 1] @ usual.acceleration[:, 1])
+    assert np.allclose(less.velocity[:, 1], ratio * usual.velocity[:, 1], rtol=1e-12, atol=0.0)

@@ -45,7 +45,7 @@ def late_by(record, source, late):
 def campaign(machine):
     """A triangle along X and white noise on all axes, in closed loop, free of sensor noise."""
     settings = load_controller("lhpost6")
-    noise = noise_target(("x", "y", "z", "roll", "pitch", "yaw"), duration=8.0)
+    noise = noise_target(("x", "y", "z", "roll", "pitch", "yaw"), machine.limits, duration=8.0)
     records = [
         rehearse(machine, target, settings, attrs={"test": name}, engine="fused").record.isel(time=slice(0, 20481))
         for name, target in (("TX", triangle()), ("WN", noise))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import ParameterError, RecordError, UnknownNameError, instead_of
+from ..core.names import AXES
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
 from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
@@ -263,6 +264,10 @@ def _check_machine(machine: Machine) -> None:
     origin = machine.parameters.origin
     if machine.hydraulics.return_pressure >= machine.hydraulics.supply_pressure:
         raise ParameterError(f"{origin}: hydraulics.return_pressure is not below hydraulics.supply_pressure")
+    for quantity in ("displacement", "velocity", "acceleration"):
+        still = [AXES[k] for k in machine.axes if not getattr(machine.limits, quantity)[k]]
+        if still:
+            raise ParameterError(f"{origin}: limits.{quantity} is 0 in {', '.join(still)}, where the platen can move")
     for component in machine.components:
         if component.platen_point == component.base_point:
             raise ParameterError(f"{origin}: {component.name}: platen_point and base_point coincide")

@@ -1,6 +1,6 @@
 """Response of the table under white noise: transfer function from reference to feedback, with coherence.
 
-    transfer = identify(controller, rest, noise_target(("x",)), ("x",), segment=8.0)
+    transfer = identify(controller, rest, noise_target(("x",), machine.limits), ("x",), segment=8.0)
 
 Signals are accelerations of C and Euler angles: the reference of the drive, and the achieved motion of the platen.
 """
@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 from joblib import Parallel, delayed
 
 from ..control import Controller
@@ -17,6 +18,7 @@ from ..core.errors import SimulationError
 from ..core.files import models_folder
 from ..core.names import AXES, SAMPLE_RATE
 from ..data.transfer import Transfer, estimate_transfer
+from ..machine.components import Limits
 from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.pose import platen_motion
@@ -37,10 +39,13 @@ def section(numbers: Parameters, name: str) -> SimpleNamespace:
     return SimpleNamespace(**{key: numbers.number(f"{name}.{key}") for first, _, key in keys if first == name})
 
 
-def noise_target(axes: Sequence[str], seed: int = 1, *, slow: bool = False, duration: float | None = None) -> Target:
+def noise_target(
+    axes: Sequence[str], limits: Limits, seed: int = 1, *, slow: bool = False, duration: float | None = None
+) -> Target:
     """White noise on the axes named, independent on each; `slow` adds a part below its band, and lasts longer.
 
-    Level, band and duration [s] are those of `tuning.toml`. Different seeds draw different noise.
+    Level, band and duration [s] are those of `tuning.toml`; the level is less along an axis whose limits it would
+    reach. Different seeds draw different noise.
     """
     numbers = section(tuning_numbers(), "noise")
     low, high = numbers.low, numbers.high
@@ -57,7 +62,14 @@ def noise_target(axes: Sequence[str], seed: int = 1, *, slow: bool = False, dura
         lowest = numbers.slow_low
         below = drawn(numbers.slow_rms, lowest, low, seed + 1000)
         noise = replace(noise, samples=noise.samples + below.samples)
-    return make_target(noise, axes=",".join(axes), high_pass=lowest / 4, low_pass=2 * high)
+    target = make_target(noise, axes=",".join(axes), high_pass=lowest / 4, low_pass=2 * high)
+    factor = np.ones(6)
+    for name in ("displacement", "velocity", "acceleration"):
+        peak, most = np.abs(getattr(target, name)).max(axis=0), numbers.of_limits * np.array(getattr(limits, name))
+        factor = np.minimum(factor, np.divide(most, peak, out=np.ones(6), where=peak > 0.0))
+    if (factor == 1.0).all():
+        return target
+    return replace(target, **{n: factor * getattr(target, n) for n in ("displacement", "velocity", "acceleration")})
 
 
 def run_noise(controller: Controller, rest: Equilibrium, target: Target) -> Array:

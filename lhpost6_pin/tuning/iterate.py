@@ -82,7 +82,7 @@ def identify_inverse(machine: Machine, settings: ControllerSettings) -> TableInv
     band = numbers.low, numbers.high
     plant, rest, controller = controlled(machine, settings)
     names = tuple(AXES[k] for k in plant.axes)
-    target = noise_target(names, duration=numbers.noise_duration)
+    target = noise_target(names, machine.limits, duration=numbers.noise_duration)
     transfer = identify(controller, rest, target, names, parameters.number("noise.segment"))
     inverse, correction = (make_inverse(transfer, float(SAMPLE_RATE), *band, corrects=c) for c in (False, True))
     late = float(np.mean([delay_of(transfer, k, k, *band) for k in range(len(names))]))

@@ -96,7 +96,7 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
 
     def unseen(axis: str) -> Target:
         """Noise that is not used for tuning."""
-        return noise_target((axis,), seed=2, slow=True)
+        return noise_target((axis,), machine.limits, seed=2, slow=True)
 
     responses = identify_axes(controllers, job.rest, unseen, job.numbers.number("noise.slow_segment"))
     new, *old = (margins(job.model, controller) for controller in controllers)
@@ -155,7 +155,7 @@ def stays_stable(machine: Machine, settings: ControllerSettings, seconds: float 
     Over the last thirds of the `seconds` after it every axis must decay, or be at rest; a limit cycle does neither.
     """
     plant, rest, controller = controlled(without_dry_friction(machine), settings)
-    target = noise_target([AXES[k] for k in plant.axes], duration=5.0)
+    target = noise_target([AXES[k] for k in plant.axes], machine.limits, duration=5.0)
     n = round(seconds * SAMPLE_RATE / 3)
     quiet = np.zeros((round(seconds * SAMPLE_RATE), 6))
     motion = (np.vstack([x, quiet]) for x in (target.displacement, target.velocity, target.acceleration))
@@ -276,7 +276,7 @@ def _resonance(job: _Job, settings: ControllerSettings, a: int) -> float:
 def _tune_feedforward(job: _Job, settings: ControllerSettings) -> tuple[ControllerSettings, float]:
     """Kvf, Kjf, both again, Kaf of all axes, by rounds of measuring and fitting; the settings and the common delay."""
     goals = section(job.numbers, "feedforward_targets")
-    targets = {AXES[k]: noise_target((AXES[k],)) for k in job.plant.axes}
+    targets = {AXES[k]: noise_target((AXES[k],), job.plant.machine.limits) for k in job.plant.axes}
     segment = job.numbers.number("noise.segment")
     tuned = settings
     for k in job.plant.axes:  # a well-conditioned start, independent of the settings given

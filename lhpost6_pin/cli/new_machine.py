@@ -111,12 +111,11 @@ def _write(machine: "Machine", path: Path, text: "Callable[[Machine], str]") -> 
 
 
 def ask(
-    texts: dict[str, str], motion: str | None, cylinder: str | None, voltage: float | None, stream: Any = None
+    texts: dict[str, str], motion: str | None, cylinder: str | None, voltage: float | None
 ) -> tuple[str, str, float | None]:
     """Ask for what `texts` does not hold and add the answers; returns motion, cylinder and voltage.
 
-    An answer that cannot be read is asked for again; nothing stands for what is not known. stream: where answers come
-    from, by default the terminal.
+    An answer that cannot be read is asked for again; an empty one stands for what is not known.
     """
     from rich.prompt import Prompt
 
@@ -127,9 +126,7 @@ def ask(
 
     def put(question: str, default: str = "", choices: list[str] | None = None) -> str:
         extra: dict[str, Any] = {"choices": choices} if choices else {}
-        answer = Prompt.ask(
-            question, console=console, default=default, show_default=bool(default), stream=stream, **extra
-        )
+        answer = Prompt.ask(question, console=console, default=default, show_default=bool(default), **extra)
         return answer.strip()
 
     motion = motion or put("Axes of the guides; free: a platform on six legs", MOTIONS[1], list(MOTIONS))

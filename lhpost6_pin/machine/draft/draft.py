@@ -50,7 +50,7 @@ def draft_machine(
     drive = cylinder_numbers(basis, areas, area_a * (high - low), motion != "free")
     valve, speed = _valve(basis, (area_a, area_b), (high, low))
     legs = _legs(basis, motion, vector(platen["size"]), -vector(platen["bearing_plane"])[2])
-    limits = _limits(basis, legs, motion, platen, speed, area_b * (high - low))  # the weaker direction
+    limits = _limits(basis, legs, motion, platen, speed, (area_a * (high - low), area_b * (high - low)))
     sections = {"platen": platen, "hydraulics": oil, KIND: {**drive, **valve}, **_ends(basis, legs), "limits": limits}
     numbers = {
         f"{section}.{key}": replace(q, value=_rounded(q.value), sd=None if q.sd is None else _rounded(q.sd))
@@ -177,9 +177,17 @@ def _ends(basis: Basis, legs: Sequence[Leg]) -> dict[str, dict[str, Quantity]]:
 
 
 def _limits(
-    basis: Basis, legs: Sequence[Leg], motion: str, platen: Mapping[str, Quantity], speed: float, force: float
+    basis: Basis,
+    legs: Sequence[Leg],
+    motion: str,
+    platen: Mapping[str, Quantity],
+    speed: float,
+    forces: tuple[float, float],
 ) -> dict[str, Quantity]:
-    """What stroke, speed [m/s] and force [N] of the actuators give along each free axis alone."""
+    """What stroke, speed [m/s] and forces [N] (pushing, pulling) of the actuators give along each free axis alone.
+
+    Raises ParameterError if they do not carry the weight.
+    """
     levers, free = np.abs(leg_rows(legs)), motion == "free"
     axes = range(6) if free else ["xyz".index(axis) for axis in motion]
     stroke = basis.number("stroke")
@@ -191,7 +199,13 @@ def _limits(
         moved[k] = travel * largest_travel(legs, stroke, [k] if free else axes)
         fast[k] = speed / levers[:, k].max()
         weight = inertia[2] * basis.rule("platen.gravity") if k == 2 else 0.0
-        strong[k] = max(0.0, share * force * levers[:, k].sum() - weight) / inertia[k]
+        usable = share * (forces[0] if k == 2 else min(forces)) * levers[:, k].sum()
+        if usable <= weight:
+            raise ParameterError(
+                f"--mass: {weight / 1e3:.4g} kN to be carried, and {share:g} of the actuators' force is "
+                f"{usable / 1e3:.4g} kN; check --mass, --area and --supply-pressure"
+            )
+        strong[k] = (usable - weight) / inertia[k]
     reasons = {
         "displacement": (moved, "m | rad", f"{f'{travel:g} of what ' if free else ''}the actuators' stroke admits"),
         "velocity": (fast, "m/s | rad/s", "speed of the actuators without load, over their lever"),

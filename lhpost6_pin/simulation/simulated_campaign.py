@@ -113,7 +113,7 @@ def _target(numbers: Parameters, test: str, machine: Machine, factor: float) -> 
     motion = find_motion(str(numbers.words[f"{test}.motion"]), **options)
     scale = factor * (numbers.number(f"{test}.scale") if f"{test}.scale" in numbers else 1.0)
     own = None if machine.motion == "free" else machine.motion
-    if own and motion.axes and not set(own) & set(motion.axes):  # what the guides hold moves the first axis that is free
+    if own and motion.axes and not set(own) & set(motion.axes):  # held by the guides: move a free one
         own = f"{own[0]}={motion.axes[0]}"
     return make_target(motion, scale=scale, axes=own, rate=float(SAMPLE_RATE))
 

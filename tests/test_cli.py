@@ -298,7 +298,10 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         *((("sine", "--specimen", "pendulum", "--specimen-at", x), ("x,y,z", x)) for x in ("1,2", "a,b,c", "1,2,3,4")),
         (("sine", "--specimen", PENDULUM, "--engine", "fused"), ("--engine pinocchio", "--locked")),
         (("sine", "--machine", "absent"), ("no machine named 'absent'", "uniaxial")),
-        (("sine", "--machine", "unaxial"), ("did you mean 'uniaxial'? valid names: lhpost6, uniaxial",)),
+        (
+            ("sine", "--machine", "unaxial"),
+            ("did you mean 'uniaxial'", "valid names: biaxial, hexapod, lhpost6, uniaxial"),
+        ),
         (("sine", "--machine", "absent.toml"), ("absent.toml",)),
         (("sine", "--override", "absent.toml"), ("absent.toml",)),
         (("sine", "--controller", "absent"), ("absent", "lhpost6")),

@@ -3,11 +3,16 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from data_files import raw
 from machine_cases import plant_named, random_poses
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.core.errors import ParameterError, RecordError
 from lhpost6_pin.core.files import shipped
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.importing import ChannelMap, Source, TestFacts, make_imported_record
+from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
+from lhpost6_pin.machine.library.family import families
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import displacement_of, legs_at
@@ -213,6 +218,33 @@ def test_both_engines_agree_on_guided_axes(motion, scheme):
     assert np.allclose(runs[0].q, runs[1].q, rtol=0.0, atol=1e-9 * np.abs(runs[0].q).max())  # rounding, over 2 s
 
 
+# Channels -------------------------------------------------------------------------------------------------------------
+
+
+def test_channels_along_axes_that_guides_hold_need_no_map_and_bring_no_warnings():
+    """One displacement and one acceleration of a one-axis table make a whole record; of the LHPOST6 they do not."""
+    time = np.arange(512) / 256.0
+    x = 0.02 * np.sin(2.0 * np.pi * 2.0 * time) * np.minimum(1.0, time) ** 3
+    moved = np.column_stack([x, np.gradient(np.gradient(x, time), time)])
+    columns = raw(moved, ["m", "m/s2"], time)
+    sources = {
+        "platen_displacement[x]": Source(column="c1"),
+        "platen_acceleration[x]": Source(column="c2"),
+    }
+    channels = ChannelMap("map.toml", TestFacts(name="a"), sources)
+    machine = load_machine("uniaxial")
+    record = make_imported_record([columns], channels, machine.labels, machine)
+    assert np.array_equal(record["platen_displacement"].values[:, 0], x)
+    assert not record["platen_acceleration"].values[:, 1:].any() and "constant" not in record.attrs
+    assert not [f for f in check_dataset(record, machine) if "[" in f.channel and not f.channel.endswith("[x]")]
+    frozen = record.assign(platen_displacement=record["platen_displacement"].copy())
+    frozen["platen_displacement"][:, 0] = 0.0  # along its own axis a sensor that stands still is one
+    assert any("is constant" in f.message for f in check_dataset(frozen, machine))
+    large = load_machine()
+    with pytest.raises(RecordError, match=r"platen_displacement has x, but not y, z, roll, pitch, yaw"):
+        make_imported_record([columns], channels, large.labels, large)
+
+
 # Files ----------------------------------------------------------------------------------------------------------------
 
 
@@ -220,6 +252,16 @@ def test_axes_of_guides_are_named_once_and_in_order():
     for wrong in ("yx", "xx", "roll", ""):
         with pytest.raises(ParameterError, match=r"machine.motion .*should be one of free, x, y, z, xy, xz, yz, xyz"):
             load_machine("biaxial").with_params({"machine.motion": wrong})
+
+
+@pytest.mark.parametrize(("name", "axes"), [("uniaxial", "x"), ("biaxial", "xy"), ("hexapod", "free")])
+def test_effects_act_along_the_axes_that_are_free(name, axes):
+    machine = load_machine(name)
+    free = [f"platen.{axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")][: 6 if axes == "free" else len(axes)]
+    found = {c for family in families().values() for c in family.components(machine) if c.startswith("platen.")}
+    assert found == set(free) and machine.axis_names == tuple(axis.removeprefix("platen.") for axis in free)
+    masses = {p.name for p in machine_parameters(machine) if p.name.startswith("platen.mass")}
+    assert masses == {f"platen.mass[{axis}]" for axis in ("xyz" if axes == "free" else axes)}
 
 
 def test_one_example_of_each_kind_is_shipped():

@@ -55,7 +55,7 @@ def is_export(raws: Sequence[RawTest]) -> bool:
 def guess_map(raws: Sequence[RawTest], labels: Labels, moves: Sequence[str] = AXES) -> Guess:
     """Make the map that the columns' names suggest, the first column for each channel.
 
-    `labels` are the machine's; the platen `moves` in some axes, on the others it is at a constant zero. A column
+    `labels` are the machine's; the platen `moves` in some axes, the others need no map. A column
     without a word for its axis or actuator is of the only one, where there is one. Columns that are not recognised
     become remarks with the channels that they could be.
     """
@@ -84,12 +84,8 @@ def guess_map(raws: Sequence[RawTest], labels: Labels, moves: Sequence[str] = AX
                 remarks.append(f"add the unit of {channel}: {where}, {name!r}")
     partly = {machine.known[name][0] for name in found}
     for name, (variable, label) in machine.known.items():
-        if variable not in partly or name in found:
-            continue
-        zero = Source(constant=0.0, unit=channel_unit(name))
-        if _is_still(label, machine):
-            found[name] = zero
-        else:
+        if variable in partly and name not in found and not _is_still(label, machine):
+            zero = Source(constant=0.0, unit=channel_unit(name))
             remarks.append(f"{source_line(name, zero)}  # not found; if it is known to be zero")
     free = [n for n, (_, label) in machine.known.items() if n not in found and not _is_still(label, machine)]
     remarks += [f"{source_line(_PLACEHOLDER, source)}  # {why}{_possible(source, free)}" for source, why in unknown]

@@ -100,6 +100,14 @@ LAYOUT: Mapping[str, Channel] = {
     ),
     "chamber_pressure_a": Channel(**_CHAMBER, dims=_ACTUATOR, long_name="pressure in chamber A"),
     "chamber_pressure_b": Channel(**_CHAMBER, dims=("time", "horizontal"), long_name="pressure in chamber B"),
+    "pressure_difference": Channel(
+        **_PRESSURE,
+        dims=("time", "horizontal"),
+        long_name="pressure in chamber A minus that in chamber B",
+        residuals=("flow",),
+        replaces="actuator_force",
+        differentiated=True,
+    ),
     "strut_pressure": Channel(
         **_PRESSURE,
         dims=("time", "strut"),
@@ -123,6 +131,21 @@ LAYOUT: Mapping[str, Channel] = {
         residuals=("flow", "servo"),
         fault="spool_null_bias",
         held=True,
+    ),
+    "valve_command": Channel(
+        dims=_ACTUATOR,
+        units="1",
+        long_name="command to a valve whose spool is not measured, over full command",
+        role="command",
+        errors=(),  # a delay is the valve's
+        residuals=("flow",),
+    ),
+    "floor_acceleration": Channel(
+        dims=("time", "floor"),
+        units="m/s2",
+        long_name="absolute acceleration of a specimen's floor along its direction",
+        residuals=("wrench",),
+        fault="accelerometer_error",
     ),
     "supply_pressure": Channel(
         **_PRESSURE, dims=("time",), long_name="supply pressure", errors=("gain", "offset"), residuals=("supply",)

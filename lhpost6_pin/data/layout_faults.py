@@ -93,7 +93,7 @@ def sampling_rate(time: NDArray[np.float64]) -> float:
 
 def _label_faults(dataset: xr.Dataset, wanted: Mapping[str, Sequence[str]]) -> Iterator[_Fault]:
     have: dict[str, list[str]] = {}
-    for dim in ("axis", "actuator", "horizontal", "strut"):
+    for dim in ("axis", "actuator", "horizontal", "strut", "floor"):
         if dim in dataset.coords:
             have[dim] = [str(label) for label in np.atleast_1d(dataset[dim].values)]
         elif dim in dataset.dims:

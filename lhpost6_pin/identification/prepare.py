@@ -31,7 +31,8 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
-__all__ += ["actuator_forces", "find_delays", "oil_forces", "check_usable", "prepare_test", "source_of"]
+__all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable", "prepare_test"]
+__all__ += ["source_of"]
 
 
 class Policy(NamedTuple):
@@ -72,25 +73,25 @@ class MeasuredTest:
         """Number of samples."""
         return len(self.motion.displacement)
 
-    @property
-    def pressure(self) -> Array | None:
-        """Chamber pressures (n, n_chambers) [Pa]: A of every actuator, then B of the double-acting."""
-        return _chambers(self.channels)
-
-    @property
-    def pressure_rate(self) -> Array | None:
-        """Their rates [Pa/s]."""
-        return _chambers(self.rates)
-
     def with_channels(self, **channels: Array | None) -> "MeasuredTest":
         """The same test with other values of some channels; without those that are None."""
         merged = {**self.channels, **channels}
         return replace(self, channels={name: x for name, x in merged.items() if x is not None})
 
 
-def _chambers(channels: Mapping[str, Array]) -> Array | None:
+def chamber_pressures(machine: Machine | None, channels: Mapping[str, Array]) -> Array | None:
+    """Chamber pressures (n, n_chambers) [Pa], A of every actuator, then B of the double-acting; None if not measured.
+
+    Where only the pressure difference is measured, both add up to supply and return pressure, as a valve whose ports
+    match the piston's areas makes them (Merritt 1967, Section 5.2). Without a machine channels are rates [Pa/s].
+    """
     sides = [channels[name] for name in ("chamber_pressure_a", "chamber_pressure_b") if name in channels]
-    return np.hstack(sides) if "chamber_pressure_a" in channels else None
+    if "chamber_pressure_a" in channels:
+        return np.hstack(sides)
+    half, level = 0.5 * channels.get("pressure_difference", np.zeros((0, 0))), 0.0
+    if machine is not None:
+        level = 0.5 * (machine.hydraulics.supply_pressure + machine.hydraulics.return_pressure)
+    return np.hstack([level + half, level - half]) if "pressure_difference" in channels else None
 
 
 def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
@@ -101,10 +102,10 @@ def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | 
 
 def oil_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
     """P_A A_1 - P_B A_2 (n, n_actuators) [N] of the measured pressures (Eq. 4-6); None where some are missing."""
-    a, b = (channels.get(f"chamber_pressure_{side}") for side in "ab")
-    if a is None or (b is None and machine.double_acting):
+    pressure, count = chamber_pressures(machine, channels), len(machine.actuators)
+    if pressure is None or pressure.shape[1] < count + len(machine.double_acting):
         return None
-    return oil_force(machine, a, np.zeros((len(a), 0)) if b is None else b)
+    return oil_force(machine, pressure[:, :count], pressure[:, count:])
 
 
 def check_usable(machine: Machine, record: xr.Dataset) -> None:
@@ -156,6 +157,8 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     """
     record = _decimated(record, policy.rate)
     dt = sample_interval(record)
+    if "actuator_force" in str(record.attrs.get("derived", "")):  # from pressures: no sensor of its own
+        record = record.drop_vars("actuator_force")
     columns = {n: record[n].values for n, c in LAYOUT.items() if n in record and c.residuals and c.role != "motion"}
     channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}
     cutoff, rates = policy.pressure_cutoff, {}

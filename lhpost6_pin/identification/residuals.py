@@ -2,6 +2,7 @@
 
     wrench   required less measured actuator wrench on the platen at C in {c} [N, N m]      (Eqs. 4-24 to 4-26)
     flow     L A / beta dP/dt + A dL/dt - Q, per chamber [m3/s]                              (Eqs. 4-2 to 4-5)
+             or half the difference of both chambers' per actuator, of which only the pressure difference is measured
     gas      ln P/P_0 + n ln(1 + dL/L_c0), per strut [1]                                     (Eq. 4-7)
     force    measured actuator force less P_A A_1 - P_B A_2 [N]                              (Eq. 4-6)
     servo    measured spool position less its command, delayed by the valve [1]              (Section 4.1.2)
@@ -11,6 +12,7 @@ All are zero where the model is right and sensors are perfect. The laws are thos
 same kernels.
 """
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -24,10 +26,10 @@ from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import plant_motion
 from ..mechanics.required_wrench import require_alike, required_wrench
 from .inverse_dynamics import march_states, with_loads
-from .prepare import MeasuredTest, actuator_forces, oil_forces
+from .prepare import MeasuredTest, actuator_forces, chamber_pressures, oil_forces
 from .residual_kernels import MeasuredOil, oil_residuals, wrench_residual
 
-__all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow"]
+__all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow", "kinds_shown"]
 
 
 RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
@@ -137,11 +139,27 @@ def evaluate_residuals(
     return Residuals(wrench, flow, gas, by_cell, servo, supply)
 
 
+def kinds_shown(kinds: Collection[str], channels: Collection[str]) -> tuple[str, ...]:
+    """Kinds of residuals that what shows in `kinds` changes in a test with these channels.
+
+    Where spools are not measured, an error of the command path shows in the flow that the command gives.
+    """
+    more = ("flow",) if "servo" in kinds and "spool_position" not in channels else ()
+    return tuple(dict.fromkeys((*kinds, *more)))
+
+
+def _spools(plant: Plant, test: MeasuredTest) -> Array | None:
+    """Spool positions (n, n_actuators): measured, else those that the valves' commands give; None without either."""
+    spool, command = test.channels.get("spool_position"), test.channels.get("valve_command")
+    return due_spools(plant, command, test.dt) if spool is None and command is not None else spool
+
+
 def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
     """Residuals `flow` and `supply`."""
     n, none = test.samples, np.zeros((test.samples, 0))
     supply = test.channels.get("supply_pressure") if "supply" in only else None
-    pressure, rate, spool = test.pressure, test.pressure_rate, test.channels.get("spool_position")
+    pressure, rate = chamber_pressures(plant.machine, test.channels), chamber_pressures(None, test.rates)
+    spool = _spools(plant, test)
     if pressure is None or rate is None or spool is None or ("flow" not in only and supply is None):
         return none, none
     double = np.isin(plant.machine.actuator_names, plant.machine.double_acting)
@@ -152,4 +170,6 @@ def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...])
     drooped, oil = np.zeros(n), MeasuredOil(chamber, pressure, rate, spool, test.dt)
     rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
     oil_residuals(rows, plant.supply, oil, path.ports, z, drooped, flow)
+    if "flow" in only and "chamber_pressure_a" not in test.channels:
+        flow = 0.5 * (flow[:, : plant.spools] - flow[:, plant.spools :])
     return flow, none if supply is None else supply - drooped[:, None]

@@ -19,6 +19,9 @@ from .whitened_residuals import spectrum_of
 
 __all__ = ["policy_of", "prepare_problem"]
 
+EQUAL_AREAS = 0.01
+"""Relative difference of a piston's areas up to which its rod counts as double."""
+
 
 def prepare_problem(
     machine: Machine,
@@ -76,20 +79,26 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
         if faults := layout_faults(record, machine.labels):
             raise RecordError(f"{test}: {faults[0]}")
         machine.refuse_unmounted(record.attrs, test)
-        _refuse_channels(test, record, double_acting=bool(machine.double_acting))
+        _refuse_channels(test, record, machine)
         _refuse_short(test, record, comparison)
         if lacking := [c for c in calibrated_channels() if c not in record and any(c in other for other in records)]:
             what = f"{test} has no {', '.join(lacking)}, which other tests have"
             raise RecordError(f"{what}; remove that test from the campaign, or the channel from all tests")
 
 
-def _refuse_channels(test: str, record: xr.Dataset, *, double_acting: bool) -> None:
+def _refuse_channels(test: str, record: xr.Dataset, machine: Machine) -> None:
     if "platen_displacement" not in record:
         why = "lengths do not replace it, since the geometry behind them is calibrated"
         raise RecordError(f"{test}: has no platen_displacement; {why}")
-    if "actuator_force" not in record and "chamber_pressure_a" not in record:
-        raise RecordError(f"{test}: has neither actuator_force nor chamber_pressure_a; give one of them or both")
-    if double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):
+    if not {"actuator_force", "chamber_pressure_a", "pressure_difference"} & set(record.data_vars):
+        what = "neither actuator_force nor chamber_pressure_a nor pressure_difference"
+        raise RecordError(f"{test}: has {what}; give at least one of them")
+    if "pressure_difference" in record and "chamber_pressure_a" not in record:
+        for actuator in machine.actuators:
+            if actuator.area_b is None or abs(actuator.area_b / actuator.area_a - 1.0) > EQUAL_AREAS:
+                why = f"of {actuator.name}, whose areas differ, does not determine its force"
+                raise RecordError(f"{test}: pressure_difference {why}; give both chamber pressures")
+    if machine.double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):
         raise RecordError(f"{test}: has pressures of one side only; give chamber_pressure_a and chamber_pressure_b")
     if "strut_pressure" in record:
         below = np.argwhere(record["strut_pressure"].values <= 0.0)

@@ -18,7 +18,7 @@ from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
 from ..prepare import MeasuredTest
-from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow
+from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .sensor_errors import SensorUnknown, corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
@@ -231,7 +231,7 @@ class Problem:
         tests: Sequence[MeasuredTest] | None = None,
     ) -> list[Complex]:
         """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
-        kinds = tuple(k for k in residuals if k in self.kinds)
+        kinds = tuple(k for k in kinds_shown(residuals, self.tests[0].channels) if k in self.kinds)
         changes = []
         for k, test in enumerate(tests or base.tests):
             path = None

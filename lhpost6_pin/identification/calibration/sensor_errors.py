@@ -80,7 +80,7 @@ def _delays(sensors: SensorSet, channels: Mapping[str, Channel]) -> dict[str, fl
     groups = {c.group or name: sensors.delay_sd(c.group or name) for name, c in channels.items() if c.role == "sensor"}
     # a command is not measured, but recorded with another clock than its companion, and held
     for name, channel in channels.items():
-        if channel.role == "command":
+        if channel.role == "command" and channel.companions:
             groups[name] = 2.0 * max(sensors.delay_sd(other) for other in channel.companions)
     return {group: sd for group, sd in groups.items() if sd > 0.0}
 

@@ -19,7 +19,7 @@ from ...machine.parameters import Parameters
 from ...mechanics.plant import Plant, State
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, simulate
-from ..prepare import MeasuredTest
+from ..prepare import MeasuredTest, chamber_pressures
 from .normal_equations import squares
 from .problem import Problem
 from .result import Subset
@@ -119,8 +119,9 @@ def _noisier(drive: _RecordedTest, test: MeasuredTest, other: MeasuredTest) -> _
 
 
 def _measured(test: MeasuredTest) -> Array:
-    assert test.pressure is not None
-    return np.hstack([test.motion.velocity, test.pressure])
+    pressure = chamber_pressures(None, test.channels)
+    assert pressure is not None
+    return np.hstack([test.motion.velocity, pressure])
 
 
 def _outputs(plant: Plant, drive: _RecordedTest) -> Array | None:

@@ -13,6 +13,7 @@ from ..core.arrays import Array, Complex
 from ..effects.registry import LAWS
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
+from ..identification.prepare import actuator_forces
 from ..identification.residual_kernels import row_wrenches
 from ..identification.residuals import RESIDUALS, follow
 from ..machine.machine import Machine
@@ -72,8 +73,8 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
     found: Columns = []
     for test, there in zip(base.tests, base.paths, strict=True):
         path = follow(plant, test, (base.plant, there))
-        force = test.channels.get("actuator_force")
-        z = path.z if force is None else with_loads(plant, path.z, force)
+        force = actuator_forces(plant.machine, test.channels)
+        z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
         own = [wrench[:, rows["effect"] == known + i].sum(axis=1) for i in range(len(candidates))]
         found.append(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size))

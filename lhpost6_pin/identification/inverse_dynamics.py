@@ -24,10 +24,15 @@ from ..effects.evaluate import advance_states
 from ..effects.registry import LAWS, actuator_rows, law_of
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
-from ..mechanics.pose import PlatenMotion, plant_motion
+from ..mechanics.pose import PlatenMotion, kinematic_jacobian, plant_motion
+from ..mechanics.required_wrench import required_wrench
 from ..mechanics.schemes import pose_stage
 from ..mechanics.workspace import make_workspace
 from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
+from .residual_kernels import wrench_residual
+
+LOAD_ROUNDS, LOAD_ROUNDING = 20, 1e-12
+"""Rounds at most in which loads and the friction under them are found, and the relative change that ends them."""
 
 __all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "with_loads"]
 
@@ -125,19 +130,32 @@ def inverse_dynamics(
         names += plant.machine.strut_names
     force = np.hstack(measured)
     wrench = leg_wrenches(plant, moved.q, force)
-    ledger = _without_oil(force_ledger(states._replace(z=with_loads(plant, z, measured[0]))), plant)
+    seen = moved._replace(v=v)
+    ports = ports_along(plant, seen)
+    loaded = with_loads(plant, ports, required_wrench(plant, seen, ports.turn), z, measured[0])
+    ledger = _without_oil(force_ledger(states._replace(z=loaded)), plant)
     return Decomposition(states, ledger, tuple(names), force, wrench, plant.spools)
 
 
-def with_loads(plant: Plant, z: Array, actuator_force: Array) -> Array:
-    """Hidden states (n, n_states) with measured actuator forces (n, n_actuators) [N], for friction under load.
+def with_loads(plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array) -> Array:
+    """Hidden states (n, n_states) with the actuators' loads, for friction under load.
 
-    Each force is set as pressure in chamber A, with none in B. Without such friction z is returned as it is.
+    The load is the model's: of the measured forces (n, n_actuators) [N] only those count that cancel in the platen's
+    balance. The rest is what the motion requires (`required`, (n, 6) at B) beyond all other laws, so that no friction
+    under load explains the force that it was computed from. Each load is set as pressure in chamber A, with none in B.
+    Without such friction z is returned as it is.
     """
     if not any(law_of(row).feels_load for row in plant.rows):
         return z
-    out = z.copy()
-    out[:, plant.rows["state"][actuator_rows(plant.rows)]] = actuator_force / plant.actuators.area_a
+    shares = np.linalg.pinv(kinematic_jacobian(plant)[:, plant.axes])
+    states, areas = plant.rows["state"][actuator_rows(plant.rows)], plant.actuators.area_a
+    out, loads = z.copy(), np.zeros_like(measured)
+    for _ in range(LOAD_ROUNDS):  # friction is a small share of its load
+        before, lacking = loads, wrench_residual(plant, ports, required, out, measured)[:, plant.axes]
+        loads = measured + lacking @ shares
+        out[:, states] = loads / areas
+        if np.abs(loads - before).max() <= LOAD_ROUNDING * np.abs(loads).max():
+            break
     return out
 
 

@@ -127,7 +127,8 @@ def evaluate_residuals(
     force, oil = actuator_forces(machine, measured), oil_forces(machine, measured)
     wrench = gas = by_cell = servo = np.zeros((test.samples, 0))
     if "wrench" in only and force is not None:
-        wrench = wrench_residual(plant, path.ports, path.required, with_loads(plant, path.z, force), force)
+        z = with_loads(plant, path.ports, path.required, path.z, force)
+        wrench = wrench_residual(plant, path.ports, path.required, z, force)
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
         gas = np.log(measured["strut_pressure"] / strut_pressures(machine, length) / gas_ratio(plant, path.z))

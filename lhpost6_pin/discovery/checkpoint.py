@@ -10,6 +10,7 @@ import joblib
 
 from .. import __version__
 from ..core.files import write_whole
+from ..identification.calibration.problem import Problem
 from ..machine.machine import Machine
 from ..machine.machine_toml import machine_toml
 from .search_state import Search
@@ -24,6 +25,7 @@ class SearchCheckpoint(NamedTuple):
 
     machine: Machine  # as delivered, in the state that was tested
     held: tuple[int, ...]  # places of the tests that are held out
+    held_problem: Problem | None  # those tests with the noise of all; None without any
     search: Search
 
 

@@ -23,13 +23,14 @@ from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.plant import make_plant
+from .balances import Balance, evaluate_balances, residual_at, unproven_effects
 from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
 from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
-from .search import refit, search
+from .search import refit, search, without_effect
 from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
 from .verdict import Verdict, judge
@@ -51,6 +52,7 @@ class Discovery:
     verdict: Verdict
     search: Search
     proof: Proof | None  # None where no test was held out
+    balances: tuple[Balance, ...]  # of the held-out tests
     next_tests: tuple[NextTest, ...]  # simulated: tests that would discriminate between rivals
     numbers: Parameters
     seed: int
@@ -119,12 +121,21 @@ def discover(
     report(0.8)
     out, part = [records[i] for i in held], between(report, 0.8, 0.95)
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
-    verdict = judge(found, beside, replacing, faults)
+    balances: tuple[Balance, ...] = ()
+    unproven: dict[str, float] = {}
+    if (held_problem := begun.held_problem) is not None:
+        solutions = (None, found.refit, found.solution)
+        balances = evaluate_balances(held_problem, [residual_at(held_problem, machine, one) for one in solutions])
+        unproven = unproven_effects(found, held_problem)
+    verdict = judge(found, beside, replacing, faults, unproven)
     ambiguous = propose and verdict.word == "ambiguous"
     tests = next_tests(found, load_controller("lhpost6"), sensors) if ambiguous else ()
     checkpoint.remove()
     report(1.0)
     function = verdict.residual_function
+    for one in found.added:
+        if one.candidate.name in unproven:
+            found = without_effect(found, one.candidate)
     fitted = fitted_machine(found.refit if any(function is one for one in replacing) else found.solution)
     return Discovery(
         campaign=campaign.name,
@@ -135,6 +146,7 @@ def discover(
         verdict=verdict,
         search=found,
         proof=proof,
+        balances=balances,
         next_tests=tests,
         numbers=numbers,
         seed=seed,
@@ -157,12 +169,13 @@ def _begin(
     whole, forms = with_background(machine, numbers.number("scatter.spread"))
     parameters = (*problem.parameters, *plan_parameters(machine), *identical, *forms)
     used = [i for i in range(len(problem.tests)) if i not in held]
-    problem = problem.with_machine(whole, parameters).only(used)
+    every, problem = problem, problem.with_machine(whole, parameters).only(used)
     first = NormalEquations(problem, np.zeros(len(problem.prior)), between(progress, 0.0, 0.3))
     if hold_one_out and len(used) > FEWEST:
         held = (used.pop(_least_informative(first)),)
         problem, first = problem.only(used), first.only(used)
-    return SearchCheckpoint(machine, held, refit(problem, first, numbers, calibration, between(progress, 0.3, 1.0)))
+    begun = refit(problem, first, numbers, calibration, between(progress, 0.3, 1.0))
+    return SearchCheckpoint(machine, held, every.only(held) if held else None, begun)
 
 
 def discovery_numbers() -> tuple[Parameters, Parameters]:

@@ -30,7 +30,7 @@ from .search_state import (
     linearise,
 )
 
-__all__ = ["refit", "search", "with_candidate"]
+__all__ = ["refit", "search", "with_candidate", "without_effect"]
 
 
 def refit(
@@ -75,13 +75,13 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
 def _pruned(found: Search) -> Search:
     """The search without effects that have become superfluous since others were added."""
     for one in found.added[:-1]:
-        less = _without(found, one.candidate)
+        less = without_effect(found, one.candidate)
         if less.objective - found.objective + one.from_lengths < gate(one.candidate.family, found.numbers):
             return _pruned(_refined(less, lambda share: None))
     return found
 
 
-def _without(found: Search, candidate: Candidate) -> Search:
+def without_effect(found: Search, candidate: Candidate) -> Search:
     """The search without one of its effects, everything else refitted."""
     problem = found.problem
     if candidate.release:

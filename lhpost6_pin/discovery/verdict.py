@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 
 from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration import FreeParameter
+from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.parameters import Parameters
 from .acceptance import squares_by_column
@@ -24,6 +25,7 @@ from .sensor_findings import SensorFault
 __all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
 Functions = Sequence[ResidualFunction]
+AT_BOUND = 1e-3  # of an unknown's prior deviation: nearer to a bound it counts as at it
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
 
 
@@ -72,6 +74,8 @@ class Verdict:
     untestable: tuple[str, ...]  # families that this campaign could not show, at typical size
     nearest: tuple[str, ...] = ()  # families nearest to the effect that was not identified
     where: tuple[Spot, ...] = ()  # where most of the unexplained residual is, by falling share
+    unproven: tuple[tuple[str, float], ...] = ()  # families rejected on held-out tests, with the gain there
+    bounded: tuple[str, ...] = ()  # unknowns at a bound, which are no estimates
 
 
 def judge(
@@ -79,11 +83,13 @@ def judge(
     beside: Functions,
     replacing: Functions,
     faults: Sequence[SensorFault],
+    unproven: Mapping[str, float],
 ) -> Verdict:
     """The verdict on a search.
 
     beside are residual functions fitted in addition to the effects, replacing those fitted in their place, both by
-    falling gain; faults are of sensors whose records were corrected before.
+    falling gain; faults are of sensors whose records were corrected before; `unproven` are the effects by name that do
+    not close the gap on held-out tests, with their gain there.
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
     own = tuple(f"{one.candidate.name}." for one in found.added)
@@ -98,12 +104,18 @@ def judge(
     )
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     kept = [one for one in found.added if one.candidate.name not in {s.name for s in released}]
+    failed = tuple(
+        (one.candidate.family.named, unproven[one.candidate.name]) for one in kept if one.candidate.name in unproven
+    )
+    kept = [one for one in kept if one.candidate.name not in unproven]
     sure = np.abs(x) > calibration.number("report.deviations") * sd
     material = np.abs(x) > calibration.number("report.material") * problem.stated
     names = (parameter.name for i, parameter in enumerate(problem.parameters) if sure[i] and material[i])
     changed = {name: estimates[name] for name in names if not name.startswith(own) and name not in problem.free}
     function, rejected = reject_effects(kept, beside, replacing, numbers)
     rejected |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found)}
+    bounded = _at_bounds(found)
+    rejected |= {one.candidate.name for one in kept if _amplitude(one) in bounded}
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or _more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
@@ -118,7 +130,20 @@ def judge(
     elif sensors:
         word = "sensor"
     spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
-    return Verdict(word, effects, changed, sensors, function, hidden, nearest, spots)
+    return Verdict(word, effects, changed, sensors, function, hidden, nearest, spots, failed, bounded)
+
+
+def _amplitude(one: AddedEffect) -> str:
+    """Name of the unknown in proportion to which an effect vanishes."""
+    return one.candidate.release or f"{one.candidate.name}.{one.candidate.amplitudes[0].name}"
+
+
+def _at_bounds(found: Search) -> tuple[str, ...]:
+    """Unknowns at a bound: not estimates."""
+    x, problem = found.solution.x, found.problem
+    low, high = bounds_of(problem, found.calibration)
+    near = AT_BOUND * problem.prior
+    return tuple(n for n, a, b, c, d in zip(problem.names, x, low, high, near, strict=True) if a <= b + d or a >= c - d)
 
 
 def _deviations(found: Search, own: tuple[str, ...]) -> Array:

@@ -10,9 +10,14 @@ from ..core.files import write_whole
 from ..core.jsonable import as_json
 from ..machine.library import find_family
 from .discover import Discovery
+from .held_out import FLOOR
 from .verdict import Estimate
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
+
+
+WORSE = 1.05
+"""Normalised RMS error on a held-out test over that before, from which it counts as worse."""
 
 
 def save_verdict(found: Discovery, path: Path) -> Path:
@@ -52,6 +57,9 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "ambiguity": [[one.family, *one.rivals] for one in verdict.effects if one.rivals],
         "unexplained": None if verdict.word != "unexplained" else _unexplained(found),
         "not_testable": list(verdict.untestable),
+        "at_bound": list(verdict.bounded),
+        "rejected_on_held_out": {family: round(gain, 2) for family, gain in verdict.unproven},
+        "held_out_balances": [asdict(one) for one in found.balances],
         "next_test": [
             {"test": n.test, "tells": list(n.families), "margin": _rounded(n.margin, 1), "told": n.informative}
             for n in found.next_tests
@@ -128,9 +136,25 @@ def summary(found: Discovery) -> str:
             "named": f"{effects}.",
             "ambiguous": f"{effects}; the campaign does not discriminate between {rivals}.",
         }[verdict.word]
+    if verdict.unproven:
+        names = " and ".join(title_of(family) for family, _ in verdict.unproven)
+        text += f" Not identified: {names}, which lowers the residual of the tests searched, but not of those held out."
+    if (worse := _worse(found)) is not None:
+        text += f" {worse}"
+    if verdict.bounded:
+        text += f" At the bound of their ranges, and no estimates: {', '.join(verdict.bounded)}."
     if verdict.effects and found.proof is None:
         return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
     return text
+
+
+def _worse(found: Discovery) -> str | None:
+    """That a refit is worse than the machine as delivered on held-out tests; None where it is not."""
+    worse = [one for one in found.balances if one.error[1] > WORSE * max(one.error[0], FLOOR)]
+    if not worse:
+        return None
+    each = ", ".join(f"{one.kind} of {one.test} {one.error[0]:.2f} to {one.error[1]:.2f}" for one in worse)
+    return f"The refit without effects is worse than the machine as delivered on held-out tests ({each})."
 
 
 def _unexplained_summary(found: Discovery, effects: str) -> str:

@@ -104,7 +104,7 @@ class Problem:
         self.stated = np.array([one.sd for one in every])
         self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
         self.step = np.array([one.step or self.comparison.step * one.sd for one in every])
-        self.lowest, self.highest = np.array([(one.lowest, one.highest) for one in every]).T
+        self.lowest, self.highest = np.array([(one.lowest, one.highest) for one in every]).reshape(-1, 2).T
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int]]] = {}
         for i, one in enumerate(every):
             groups.setdefault((one.alone[0], one.shows_in), []).append((i, one.alone[1]))

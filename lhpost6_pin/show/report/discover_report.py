@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ...discovery import Discovery, save_verdict
+from ...discovery.balances import Balance
 from ...discovery.held_out import Proof
 from ...discovery.verdict import EffectFinding, Estimate, SensorFinding, Word
 from ...discovery.verdict_file import advice, summary, title_of, where
@@ -71,10 +72,32 @@ def verdict_sentence(found: Discovery) -> str:
 def discovery_tables(found: Discovery) -> list[Table]:
     """Return the tables of a verdict: effects, recalibrated parameters, sensors, errors on held-out tests."""
     verdict = found.verdict
-    changed = [_estimates("Recalibrated parameters", "Parameter", verdict.changed)] if verdict.changed else []
+    changed = []
+    if verdict.changed:
+        changed.append(_estimates("Recalibrated parameters", "Parameter", verdict.changed, verdict.bounded))
     sensors = [_sensor_table(verdict.sensors)] if verdict.sensors else []
     proof = [_proof_table(found.proof)] if found.proof else []
-    return [*map(_effect_table, verdict.effects), *changed, *sensors, *proof]
+    balances = [_balance_table(found.balances)] if found.balances else []
+    return [*map(_effect_table, verdict.effects), *changed, *sensors, *proof, *balances]
+
+
+def _balance_table(balances: Sequence[Balance]) -> Table:
+    """Balances on held-out tests: as delivered, refitted, with the effects."""
+
+    def three(values: tuple[float, float, float] | None, form: str) -> str:
+        return " → ".join(form.format(v) for v in values) if values else "–"
+
+    rows = [
+        (
+            f"{one.kind}, {one.test}",
+            three(one.error, "{:.2f}"),
+            three(one.share, "{:.1%}"),
+            three(one.explained, "{:.3f}"),
+        )
+        for one in balances
+    ]
+    header = ("Balance and test", "Error over noise", "Error over measured force", "R²")
+    return Table("Balances of held-out tests: as delivered → refitted → with the effects", header, rows)
 
 
 def _sensor_table(sensors: Sequence[SensorFinding]) -> Table:
@@ -88,8 +111,11 @@ def _effect_table(one: EffectFinding) -> Table:
     )
 
 
-def _estimates(caption: str, what: str, estimates: dict[str, Estimate]) -> Table:
-    rows = [(n, f"{e.value:.5g}", f"{e.low:.5g} to {e.high:.5g}", e.unit) for n, e in estimates.items()]
+def _estimates(caption: str, what: str, estimates: dict[str, Estimate], bounded: Sequence[str] = ()) -> Table:
+    rows = [
+        (n, f"{e.value:.5g}", "at its bound" if n in bounded else f"{e.low:.5g} to {e.high:.5g}", e.unit)
+        for n, e in estimates.items()
+    ]
     return Table(caption, (what, "Value", "90 % interval", "Unit"), rows)
 
 
@@ -174,7 +200,7 @@ def _proof_blocks(found: Discovery) -> list[Block]:
     if found.proof is None:
         return ["No test was held out; name one with --hold-out."]
     closure = "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
-    return [gap_figure(found), _proof_table(found.proof), closure]
+    return [gap_figure(found), _proof_table(found.proof), closure, _balance_table(found.balances)]
 
 
 def _considered(found: Discovery) -> list[Block]:

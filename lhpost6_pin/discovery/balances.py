@@ -1,0 +1,136 @@
+"""Balances on held-out tests: what models leave of the measured forces and flows of tests that were not searched.
+
+Three models as in `held_out`, each with its sensor errors. Per kind of residual: the normalised RMS error in units of
+sensor noise; of the wrench also the error of its forces over the measured actuator forces, and the share R2 of their
+variance explained, over the band that is compared, without the mean.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.arrays import Array, Complex, Mask
+from ..identification.calibration.fit import Solution
+from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
+from ..identification.inverse_dynamics import leg_wrenches
+from ..identification.prepare import actuator_forces
+from ..identification.residuals import Residuals, kinds_shown
+from ..machine.machine import Machine
+from ..mechanics.plant import make_plant
+from ..mechanics.pose import plant_motion
+from .search import without_effect
+from .search_state import Search
+
+__all__ = ["Balance", "HeldOut", "evaluate_balances", "gain_on", "residual_at", "unproven_effects"]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """One kind of residual of one held-out test: (delivered, refitted, with the effects)."""
+
+    kind: str
+    test: str
+    error: tuple[float, float, float]  # normalised RMS, 1 is sensor noise
+    share: tuple[float, float, float] | None = None  # RMS error over RMS measured, of the wrench
+    explained: tuple[float, float, float] | None = None  # R2 of the wrench
+
+
+class HeldOut(NamedTuple):
+    """Whitened residual of the held-out tests by one model, and that model's residual in its units."""
+
+    whitened: list[Complex]  # (m, c) of every test
+    plain: list[Complex]  # the same bins, not whitened
+    measured: list[Complex]  # (m, 6) measured actuator wrench at C
+
+
+def residual_at(held: Problem, machine: Machine, solution: Solution | None = None) -> HeldOut:
+    """Held-out residuals of a solution of the search, or of a machine as delivered with sensors as stated."""
+    if solution is None:
+        problem, x = held.with_machine(machine, ()), np.zeros(len(held.unknowns))
+    else:
+        own = solution.normal.problem
+        problem, x = held.with_machine(own.machine, own.parameters), solution.x
+    base = OperatingPoint(problem, x)
+    bins = [problem.bins(r, test.dt)[0] for r, test in zip(base.residuals, base.tests, strict=True)]
+    return HeldOut(problem.residual(base), bins, [_measured(problem, base, t) for t in range(len(base.tests))])
+
+
+def _measured(problem: Problem, base: OperatingPoint, t: int) -> Complex:
+    """Bins (m, 6) of the measured actuator wrench at C."""
+    test, plant = base.tests[t], base.plant
+    force = actuator_forces(plant.machine, test.channels)
+    if force is None or not problem.rows("wrench").any():
+        return np.zeros((len(problem.frequency[t]), 6), np.complex128)
+    wrench = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)
+    none = np.zeros((len(wrench), 0))
+    stacked = Residuals(wrench, none, none, none, none, none)
+    return problem.bins(stacked, test.dt)[0][:, problem.rows("wrench")]
+
+
+def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance, ...]:
+    """Balances of the held-out tests by three models."""
+    found, axes = [], make_plant(held.machine).axes
+    forces = axes[axes < 3]
+    for t, test in enumerate(held.tests):
+        for kind in held.kinds:
+            rows = held.rows(kind)
+            if not rows.any():
+                continue
+            error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
+            share = explained = None
+            if kind == "wrench" and (size := _squares(three[0].measured[t], held.frequency[t], forces)) > 0.0:
+                plain = [one.plain[t][:, rows] for one in three]
+                left = [_squares(bins, held.frequency[t], forces) / size for bins in plain]
+                share, explained = _three(np.sqrt(left)), _three(1.0 - np.array(left))
+            found.append(Balance(kind, test.name, _three(np.array(error)), share, explained))
+    return tuple(found)
+
+
+def _squares(bins: Complex, f: Array, columns: NDArray[np.int64]) -> float:
+    """Sum of squares of some columns of bins (m, c) above zero frequency."""
+    return float(np.sum(np.abs(bins[f > 0.0][:, columns]) ** 2))
+
+
+def _three(values: Array) -> tuple[float, float, float]:
+    first, second, third = values.tolist()
+    return first, second, third
+
+
+def gain_on(held: Problem, before: HeldOut, after: HeldOut, rows: Mask) -> tuple[float, float]:
+    """Gain of log-likelihood on the held-out tests in some columns (c,), and the gain expected of the true effect.
+
+    Expected is what the change of the residual would gain if it were the missing part of it: half its square over the
+    power of the residual before.
+    """
+    gain = expected = 0.0
+    for old, new, f in zip(before.whitened, after.whitened, held.frequency, strict=True):
+        means, counts = mean_squares(held.whitener, np.abs(old[:, rows]) ** 2, f)
+        then, _ = mean_squares(held.whitener, np.abs(new[:, rows]) ** 2, f)
+        change, _ = mean_squares(held.whitener, np.abs(new[:, rows] - old[:, rows]) ** 2, f)
+        gain += float(np.sum(negative_log_likelihood(means, counts) - negative_log_likelihood(then, counts)))
+        expected += float(np.sum(counts @ (change / np.maximum(means, 1.0))))
+    return gain, expected
+
+
+def unproven_effects(found: Search, held: Problem) -> dict[str, float]:
+    """Effects that do not close the gap on held-out tests, by name, with their gain of log-likelihood there.
+
+    Each is compared with everything else refitted without it, in the residuals that its family shows in. An effect that
+    the held-out tests do not excite is none of them: its expected gain is within chance.
+    """
+    n, unproven = found.numbers.number, {}
+    after = residual_at(held, found.problem.machine, found.solution)
+    for one in found.added:
+        if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
+            continue  # a sensor's error
+        before = residual_at(held, held.machine, without_effect(found, one.candidate).solution)
+        kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
+        rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
+        gain, expected = gain_on(held, before, after, rows)
+        if expected > n("accept.chance") and gain < max(n("accept.chance"), n("accept.held_out") * expected):
+            unproven[one.candidate.name] = gain
+    return unproven

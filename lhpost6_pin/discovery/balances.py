@@ -55,7 +55,7 @@ def residual_at(held: Problem, machine: Machine, solution: Solution | None = Non
         own = solution.normal.problem
         problem, x = held.with_machine(own.machine, own.parameters), solution.x
     base = OperatingPoint(problem, x)
-    bins = [problem.bins(r, test.dt)[0] for r, test in zip(base.residuals, base.tests, strict=True)]
+    bins = [problem.bins(r, test)[0] for r, test in zip(base.residuals, base.tests, strict=True)]
     return HeldOut(problem.residual(base), bins, [_measured(problem, base, t) for t in range(len(base.tests))])
 
 
@@ -68,7 +68,7 @@ def _measured(problem: Problem, base: OperatingPoint, t: int) -> Complex:
     wrench = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)
     none = np.zeros((len(wrench), 0))
     stacked = Residuals(wrench, none, none, none, none, none)
-    return problem.bins(stacked, test.dt)[0][:, problem.rows("wrench")]
+    return problem.bins(stacked, test)[0][:, problem.rows("wrench")]
 
 
 def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance, ...]:

@@ -16,7 +16,7 @@ from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.normal_equations import NormalEquations, bounds_of
 from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
-from .acceptance import gate, squares_by_column
+from .acceptance import gate, share_explained, squares_by_column
 from .candidates import Candidate
 from .screening import score_pairs, screen
 from .search_state import (
@@ -99,7 +99,9 @@ def _more_effects(found: Search, linear: Linearisation, progress: Progress) -> S
     """The search with one more effect, or with two where no one does as well; None if nothing is to be added."""
     n, scored = found.numbers.number, found.rounds[-1].scored
     passed = [one for one in scored if not one.refused]
-    more = _add(found, passed, between(progress, 0.0, 0.7)) if passed else None
+    more = _add(found, passed, between(progress, 0.0, 0.6)) if passed else None
+    if more is None and (leading := _leading(found)) is not None:
+        more = _proven_in_full(found, leading, between(progress, 0.6, 0.7))
     strong = [one for one in scored if one.score.gain >= n("accept.look") and not one.candidate.release]
     few = best_per_family(strong, named=True)[: int(n("accept.paired"))]
     beyond = sorted((one.gain - gate(one.candidate.family, found.numbers) for one in few), reverse=True)
@@ -127,6 +129,25 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
     if found.objective - both.objective < sum(gates):
         return more
     return both if more is None or more.objective - both.objective >= max(gates) else more
+
+
+def _leading(found: Search) -> Scored | None:
+    """The candidate that leads by far in cross-validation, but is refused: its linear estimate may be too far off."""
+    n = found.numbers.number
+    best = best_per_family([one for one in found.rounds[-1].scored if not one.candidate.release], named=True)
+    best.sort(key=lambda one: -one.score.held_out.sum())
+    if not best or not best[0].refused:
+        return None
+    first, second = best[0], best[1].score.held_out.sum() if len(best) > 1 else 0.0
+    least = max(n("accept.lead") * gate(first.candidate.family, found.numbers), n("accept.ahead") * second)
+    return first if first.score.held_out.sum() > least else None
+
+
+def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | None:
+    """The search with a leading candidate, if its joint fit explains enough of the residual beyond noise."""
+    more = _best_of(found, [one], progress)
+    closes = more is not None and share_explained(found, more) >= found.numbers.number("accept.closure")
+    return more if closes else None
 
 
 def _in_its_place(found: Search, one: Scored) -> list[Scored]:

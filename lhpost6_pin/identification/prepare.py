@@ -67,6 +67,7 @@ class MeasuredTest:
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
+    weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
 
     @property
     def samples(self) -> int:

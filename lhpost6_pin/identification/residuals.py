@@ -25,7 +25,8 @@ from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import plant_motion
 from ..mechanics.required_wrench import require_alike, required_wrench
-from .inverse_dynamics import march_states, with_loads
+from .friction_march import march_finely
+from .inverse_dynamics import with_loads
 from .prepare import MeasuredTest, actuator_forces, chamber_pressures, oil_forces
 from .residual_kernels import MeasuredOil, oil_residuals, wrench_residual
 
@@ -90,9 +91,8 @@ def follow(
     for row in fresh.values():
         parts[test.path is not None and law_of(row).follows_motion].append(row)
     for some, way in zip(parts, (along, ports), strict=True):
-        if some:
-            marched = march_states(plant, way, test.dt, start, rows=np.array(some, plant.rows.dtype))
-            there |= {_marched(row): marched[:, states_of(row)] for row in some}
+        for row, states in march_finely(plant, way, test.dt, some, start):
+            there[_marched(row)] = states
     z = np.zeros((test.samples, len(plant.states)))
     for key, place, _ in rows:
         z[:, place] = there[key]

@@ -17,6 +17,7 @@ from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
+from ..friction_march import sliding
 from ..prepare import MeasuredTest
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
@@ -71,28 +72,37 @@ class Problem:
         differences of residuals between equally plausible machines (`others`), and friction's state at the start of a
         test, of which a share `preload` of the force is unknown. Raises RecordError if they are too short together.
         """
-        self.tests, self.comparison, self.jobs, self.kinds = tuple(tests), comparison, jobs, kinds
-        self.noisy, self.again = tuple(noisy), tuple(map(tuple, again))
+        plant = make_plant(machine)
+        weights = [sliding(plant, test) for test in tests]
+
+        def weighed(some: Sequence[MeasuredTest]) -> tuple[MeasuredTest, ...]:
+            """Draws of the tests in order, any number of times, with the weights of the tests."""
+            return tuple(replace(t, weight=weights[i % len(weights)]) for i, t in enumerate(some))
+
+        tests, noisy = weighed(tests), weighed(noisy)
+        self.tests, self.comparison, self.jobs, self.kinds = tests, comparison, jobs, kinds
+        self.noisy, self.again = noisy, tuple(map(weighed, again))
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
-        plant = make_plant(machine)
         self._set(machine, machine_parameters(machine, _travel(plant, tests)))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
-        self.frequency = [self.bins(r, t.dt)[1] for r, t in zip(clean, tests, strict=True)]
+        self.frequency = [self.bins(r, t)[1] for r, t in zip(clean, tests, strict=True)]
         noise = self._noise(plant, clean)
         instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
         for found, test, base in zip(noise, tests, clean, strict=True):
             # friction's state is uncertain by the difference between the raw and the smoothed path; that weighs as
             # much as all draws together, and so do the initial state and each of the other machines
-            more = [evaluate_residuals(plant, replace(test, path=None), kinds)]
+            more = []
+            if test.weight is None:
+                more.append(evaluate_residuals(plant, replace(test, path=None), kinds))
             if preload > 0.0:
                 held = follow(plant, test, start=_held(plant, preload, rng))
                 more.append(evaluate_residuals(plant, test, kinds, path=held))
             more += [evaluate_residuals(one, test, kinds) for one in instead]
             draws = len(found)
-            found += [self.bins(_less(one, base), test.dt)[0] * np.sqrt(draws) for one in more]
+            found += [self.bins(_less(one, base), test)[0] * np.sqrt(draws) for one in more]
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
 
@@ -166,7 +176,7 @@ class Problem:
         found: list[list[Complex]] = [[] for _ in clean]
         for i, test in enumerate(self.noisy):
             at = i % len(clean)
-            found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test.dt)[0])
+            found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test)[0])
         return found
 
     def rows(self, kind: str, *places: int) -> Mask:
@@ -184,7 +194,7 @@ class Problem:
     def residual(self, base: "OperatingPoint") -> list[Complex]:
         """Whitened bins (m, c) of every test at an operating point."""
         pairs = zip(base.residuals, base.tests, strict=True)
-        return [self._whitened(i, self.bins(r, test.dt)[0]) for i, (r, test) in enumerate(pairs)]
+        return [self._whitened(i, self.bins(r, test)[0]) for i, (r, test) in enumerate(pairs)]
 
     def _whitened(self, test: int, bins: Complex) -> Complex:
         return np.asarray(self.whitener.apply(test, bins[..., None], self.frequency[test])[..., 0])
@@ -238,17 +248,19 @@ class Problem:
             if test.motion is base.tests[k].motion:
                 path = follow(plant, test, (base.plant, base.paths[k]))
             after = evaluate_residuals(plant, test, kinds, path=path)
-            changes.append(self.bins(_less(after, base.residuals[k]), test.dt)[0])
+            changes.append(self.bins(_less(after, base.residuals[k]), test)[0])
         return changes
 
     def plant_at(self, x: Array) -> Plant:
         """Plant with its parameters set to x (p,)."""
         return make_plant(with_parameters(self.machine, self.parameters, x[: len(self.parameters)]))
 
-    def bins(self, residuals: Residuals, dt: float) -> tuple[Complex, Array]:
-        """Bins (m, c) of stacked residuals, zero for those that have no columns here."""
+    def bins(self, residuals: Residuals, test: MeasuredTest) -> tuple[Complex, Array]:
+        """Bins (m, c) of a test's stacked residuals, zero for those that have no columns here."""
         c = self.comparison
-        bins, f = spectrum_of(residuals.stacked(), dt, c.bands[0], c.bands[-1], c.edge)
+        if test.weight is not None:
+            residuals = residuals._replace(wrench=residuals.wrench * test.weight[:, None])
+        bins, f = spectrum_of(residuals.stacked(), test.dt, c.bands[0], c.bands[-1], c.edge)
         given = np.repeat([part.shape[1] > 0 for part in residuals], self.widths)
         if given.all():
             return bins, f
@@ -260,7 +272,9 @@ class Problem:
         """Whitened bins (m, c, k) of changes of a test's wrench residual (n, 6, k)."""
         n, axes, count = wrench.shape
         c = self.comparison
-        bins, f = spectrum_of(wrench.reshape(n, -1), self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
+        weight = self.tests[test].weight
+        weighed = wrench.reshape(n, -1) if weight is None else wrench.reshape(n, -1) * weight[:, None]
+        bins, f = spectrum_of(weighed, self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
         out = np.zeros((len(f), sum(self.widths), count), np.complex128)
         out[:, self.rows("wrench")] = bins.reshape(len(f), axes, count)
         return self.whitener.apply(test, out, f)

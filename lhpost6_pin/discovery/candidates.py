@@ -1,5 +1,6 @@
 """Candidates: effects of the library as a search tries them, each a family on some components with some shape."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -10,7 +11,7 @@ from ..data.channels import LAYOUT
 from ..identification.calibration import FreeParameter
 from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
-from ..machine.library import Family, Shape, families, find_family
+from ..machine.library import Family, Shape, families, find_family, in_size_of, scaled_families
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 
@@ -108,13 +109,20 @@ class Candidate:
         return tuple(found)
 
 
-def with_background(machine: Machine, spread: float) -> tuple[Machine, tuple[FreeParameter, ...]]:
+def with_background(
+    machine: Machine, spread: float, channels: Collection[str]
+) -> tuple[Machine, tuple[FreeParameter, ...]]:
     """The machine with the library's effects of the background, at zero, one of each for a kind; and their parameters.
 
-    spread is the standard deviation of an amplitude in typical ones.
+    spread is the standard deviation of an amplitude in typical ones; channels are those measured. What the machine has
+    already is not added again.
     """
     parameters: list[FreeParameter] = []
-    for one in _of_background(machine):
+    stated = {effect.name for effect in machine.added_effects}
+    lacking = {family.name for family in families().values() if family.background_without not in {"", *channels}}
+    for one in _of_background(machine, lacking):
+        if one.name in stated:
+            continue
         absent = tuple(0.0 for _ in one.amplitudes)
         machine = one.on(machine, absent)
         parameters += one.parameters(absent, spread)
@@ -134,11 +142,14 @@ def with_warm_oil(machine: Machine, share: float) -> Machine:
     return machine.with_params({path: (1.0 - share) * machine.parameters.number(path) for path in paths})
 
 
-def _of_background(machine: Machine) -> list["Candidate"]:
-    """Effects of the library's background, on all components of each kind that have friction."""
+def _of_background(machine: Machine, lacking: Collection[str] = ()) -> list["Candidate"]:
+    """Effects of the library's background, on all components of each kind that have what they modify.
+
+    `lacking` are further families, for want of a channel.
+    """
     found = []
-    for family in families().values():
-        names = family.components(machine) if family.search == "background" else ()
+    for family in scaled_families(machine).values():
+        names = family.components(machine) if family.search == "background" or family.name in lacking else ()
         for kind in dict.fromkeys(c.kind for c in machine.components):
             members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
             one = Candidate(family, members, first_shape(family))
@@ -155,15 +166,16 @@ def first_shape(family: Family) -> tuple[tuple[str, float], ...]:
 
 def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
     """All candidates of the library for a machine: each family at each start of its shapes, on each group together."""
-    found = []
-    for family in families().values():
+    found, there = [], {effect.name for effect in machine.added_effects}
+    for family in scaled_families(machine).values():
         if family.search != "named":
             continue
         shapes = [s for s in family.shapes if not s.amplitude]
         names = [s.name for s in shapes]
         for values in product(*(s.start for s in shapes)):
             shape = tuple(zip(names, values, strict=True))
-            found.append(tuple(Candidate(family, group, shape) for group in family.groups(machine)))
+            each = (Candidate(family, group, shape) for group in family.groups(machine))
+            found.append(tuple(one for one in each if one.name not in there))
     return tuple(group for group in found if group)
 
 
@@ -179,7 +191,7 @@ def list_releases(problem: Problem) -> tuple[Candidate, ...]:
         family = "" if parameter.of else _PARAMETER.get(name.split(".")[-1].split("[")[0], "")
         if family and parameter.name not in problem.free:
             where = tuple(c.name for c in problem.machine.components if c.kind == section) or (section,)
-            found.append(Candidate(find_family(family), where, (), parameter.name))
+            found.append(Candidate(in_size_of(find_family(family), problem.machine), where, (), parameter.name))
     for unknown in problem.unknowns:  # those of the platen's motion were cross-checked before
         if unknown.name in problem.free or (unknown.kind == "delay" and unknown.column >= 0):
             continue

@@ -166,7 +166,7 @@ def _begin(
     """Refit all parameters to the tests that are not held out, nor, if `hold_one_out`, the least informative one."""
     machine = problem.machine
     identical = scatter_parameters(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
-    whole, forms = with_background(machine, numbers.number("scatter.spread"))
+    whole, forms = with_background(machine, numbers.number("scatter.spread"), problem.tests[0].channels)
     parameters = (*problem.parameters, *plan_parameters(machine), *identical, *forms)
     used = [i for i in range(len(problem.tests)) if i not in held]
     every, problem = problem, problem.with_machine(whole, parameters).only(used)

@@ -17,7 +17,7 @@ from ..core.progress import Progress, split
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import SensorComparison, loose_lengths
 from ..data.sensors import SensorSet
-from ..machine.library import find_family
+from ..machine.library import find_family, in_size_of
 from ..machine.parameters import Parameters
 from ..mechanics.plant import Plant
 from .acceptance import squares_by_column
@@ -100,7 +100,7 @@ def _groups(lost: Sequence[LostMotion], found: Search) -> list[tuple[LostMotion,
 
 
 def _with_play(found: Search, group: Sequence[LostMotion], progress: Progress) -> Search:
-    family = find_family("swivel_play")
+    family = in_size_of(find_family("swivel_play"), found.problem.machine)
     candidate = Candidate(family, tuple(one.component for one in group), first_shape(family))
     weight = np.array([one.deviation**-2.0 for one in group])
     size = float(weight @ [one.half_play for one in group] / weight.sum())

@@ -124,7 +124,10 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
     """The search with one more effect, or with two others if each of them is worth its threshold."""
     both = found
     for one, part in zip(two, split(progress, 2), strict=True):
-        both = _best_of(both, [one, *_in_its_place(both, one)], part, least=-np.inf) or both
+        # one in the other's place may be added already
+        there = {added.candidate.name for added in both.added}
+        rivals = [o for o in (one, *_in_its_place(both, one)) if o.candidate.name not in there]
+        both = (_best_of(both, rivals, part, least=-np.inf) if rivals else None) or both
     gates = [gate(one.candidate.family, found.numbers) for one in two]
     if found.objective - both.objective < sum(gates):
         return more

@@ -7,17 +7,21 @@ interval about it: friction that jumps between samples has no value at one of th
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 
 from ..core.arrays import Array
-from ..effects.registry import law_of, parameters_of, states_of
+from ..effects.registry import law_of, states_of
+from ..machine.components import Actuator, Strut
+from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath
 from .inverse_dynamics import march_states
 from .prepare import MeasuredTest
 
-__all__ = ["march_finely", "sliding", "substeps"]
+__all__ = ["made_fine", "march_finely"]
 
 SHAKEN = 0.1
 """Noise of a displacement over a friction's yield slip from which it shakes presliding: 0.05 on the LHPOST6."""
@@ -28,43 +32,58 @@ KNOWN = 3.0
 TAPER = 3
 """Samples over which the weight rises beside a stretch of unknown slip."""
 
-COARSE, FINE, MOST = 0.1, 0.02, 16
-"""Turn-back over yield slip from which a path is refined, to which it is, and substeps at most."""
+FINE, SMALLEST, MOST = 0.02, 0.1, 16
+"""Turn-back over yield slip to which a path is refined, yield slip over the stated one, and substeps at most."""
 
 
 def march_finely(
-    plant: Plant,
-    path: PortPath,
-    dt: float,
-    rows: Sequence[np.void],
-    start: Array | None = None,
-    *,
-    averaged: bool = True,
+    plant: Plant, path: PortPath, test: MeasuredTest, rows: Sequence[np.void], start: Array | None = None
 ) -> Iterator[tuple[np.void, Array]]:
-    """Rows with their hidden states (n, k) along a path of n samples, from `start` (n_states,) or zero.
-
-    Not `averaged`, refined states are those at the samples.
-    """
-    steps = [substeps(row, path, dt) for row in rows]
+    """Rows with their hidden states (n, k) along a path of a test's n samples, from `start` (n_states,) or zero."""
+    steps = [test.substeps if law_of(row).friction_memory else 1 for row in rows]
     for count in sorted(set(steps)):
         some = [row for row, own in zip(rows, steps, strict=True) if own == count]
-        way = path if count == 1 else _refined(path, dt, count)
-        marched = march_states(plant, way, dt / count, start, rows=np.array(some, plant.rows.dtype))
+        way = path if count == 1 else _refined(path, test.dt, count)
+        marched = march_states(plant, way, test.dt / count, start, rows=np.array(some, plant.rows.dtype))
         if count > 1:
-            marched = _thinned(marched, count, averaged)
+            marched = _thinned(marched, count)
         for row in some:
             yield row, marched[:, states_of(row)]
 
 
-def sliding(plant: Plant, test: MeasuredTest) -> Array | None:
+def made_fine(plant: Plant, test: MeasuredTest) -> MeasuredTest:
+    """The test with substeps and weight where noise shakes presliding; as it is where no yield slip is that small.
+
+    A yield slip may turn out smaller than stated: by its uncertainty; substeps are those of a tenth of that.
+    """
+    least = min(map(_least_yield, repeat(plant.machine), plant.machine.components), default=np.inf)
+    weight = _sliding(plant, test, least)
+    if weight is None:
+        return test
+    turn = float(np.sqrt(np.mean(np.diff(test.motion.velocity[:, plant.axes], axis=0) ** 2))) * test.dt / 8.0
+    count = int(np.ceil(np.sqrt(turn / (FINE * SMALLEST * least))))
+    return replace(test, weight=weight, substeps=min(max(count, 1), MOST))
+
+
+def _least_yield(machine: Machine, component: Actuator | Strut) -> float:
+    """Yield slip [m] that a component's friction may have: the stated one less two deviations, as a factor."""
+    least = np.inf
+    for key in ("seal_yield", "pad_yield"):
+        paths = (f"{component.name}.{key}", f"{component.kind}.{key}")
+        for path in (path for path in paths if path in machine.parameters):
+            stated, sd = machine.parameters.number(path), machine.parameters[path].sd
+            least = min(least, stated**2 / (stated + 2.0 * (sd if isinstance(sd, float) else 0.0)))
+    return least
+
+
+def _sliding(plant: Plant, test: MeasuredTest, least: float) -> Array | None:
     """Weight (n,) of a test's wrench residual: zero where noise hides which way the platen slips, one where it slides.
 
-    Friction's state then depends on slips below the displacement's noise. None where no yield slip is that small.
+    Friction's state then depends on slips below the displacement's noise. None where the `least` yield slip [m] is
+    large against it.
     """
     if test.path is None:
         return None
-    rubbing = [parameters_of(row) for row in plant.rows if law_of(row).friction_memory]
-    least = min((p.yield_slip for p in rubbing if hasattr(p, "yield_slip")), default=np.inf)
     axes = plant.axes[plant.axes < 3]
     noise = np.abs(test.motion.displacement - test.path)[:, axes].max(axis=0, initial=0.0)
     if not np.any(noise > SHAKEN * least):
@@ -73,15 +92,6 @@ def sliding(plant: Plant, test: MeasuredTest) -> Array | None:
     unknown = np.all(travel < KNOWN * noise, axis=1).astype(float)
     kernel = np.hanning(2 * TAPER + 1)[1:-1]
     return np.asarray(1.0 - np.minimum(np.convolve(unknown, kernel, "same"), 1.0))
-
-
-def substeps(row: np.void, path: PortPath, dt: float) -> int:
-    """Steps into which an interval is divided for a row: one unless its friction yields within a turn-back."""
-    slip = getattr(parameters_of(row), "yield_slip", 0.0) if law_of(row).friction_memory else 0.0
-    if slip <= 0.0:
-        return 1
-    turn = float(np.sqrt(np.mean(np.diff(path.rate[:, row["port"]]) ** 2))) * dt / 8.0
-    return 1 if turn < COARSE * slip else min(MOST, int(np.ceil(np.sqrt(turn / (FINE * slip)))))
 
 
 def _refined(path: PortPath, dt: float, count: int) -> PortPath:
@@ -97,10 +107,8 @@ def _refined(path: PortPath, dt: float, count: int) -> PortPath:
     return PortPath(at(fine), at(fine, 1), slip, path.column[:0], path.turn[:0])
 
 
-def _thinned(z: Array, count: int, averaged: bool) -> Array:
-    """States (n, k) at the samples of those at every substep: the mean over one interval about each, or the value."""
-    if not averaged:
-        return z[::count]
+def _thinned(z: Array, count: int) -> Array:
+    """States (n, k) of samples by those of every substep: the mean over one interval about each."""
     half = count // 2
     padded = np.concatenate([np.repeat(z[:1], half, axis=0), z, np.repeat(z[-1:], half, axis=0)])
     total = np.cumsum(np.concatenate([np.zeros((1, z.shape[1])), padded]), axis=0)

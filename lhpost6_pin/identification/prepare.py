@@ -68,6 +68,7 @@ class MeasuredTest:
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
     weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
+    substeps: int = 1  # in which friction is marched between samples
 
     @property
     def samples(self) -> int:

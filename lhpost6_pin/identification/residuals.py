@@ -91,7 +91,7 @@ def follow(
     for row in fresh.values():
         parts[test.path is not None and law_of(row).follows_motion].append(row)
     for some, way in zip(parts, (along, ports), strict=True):
-        for row, states in march_finely(plant, way, test.dt, some, start):
+        for row, states in march_finely(plant, way, test, some, start):
             there[_marched(row)] = states
     z = np.zeros((test.samples, len(plant.states)))
     for key, place, _ in rows:

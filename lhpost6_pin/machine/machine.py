@@ -79,7 +79,7 @@ class Machine(Structure):
             raise ParameterError(f"an effect named {label!r} is in this machine already; give it another name")
         if isinstance(effect, Effect):
             return replace(self, own_effects=(*self.own_effects, effect))
-        return self._with_effects({**self.parameters.effects, label: effect_entry(effect, components, values)})
+        return self._with_effects({**self.parameters.effects, label: effect_entry(self, effect, components, values)})
 
     def without_effect(self, name: str) -> "Machine":
         """Return a copy without an effect of the library by its name; raises UnknownNameError."""

@@ -36,6 +36,9 @@ _MECHANICAL = (
 _LEAST = 0.05
 """Least value of a positive number, relative to the nominal one."""
 
+_WIDE = 0.7
+"""Relative standard deviation from which a prior is one of the logarithm."""
+
 _ROOM = 1.001
 """Least length of a chamber over the stroke."""
 
@@ -129,11 +132,17 @@ def _parameters_of(path: str, name: str, quantity: Quantity) -> list[FreeParamet
     for i, (value, sd) in enumerate(zip(values, sds, strict=True)):
         label, at = f"{path}[{'xyz'[i]}]" if vector else path, ((path, i if vector else -1),)
         if sd > 0.0 and value > 0.0 and name != "centre_of_gravity":
-            relative = FreeParameter(label, at, quantity.unit, value, sd / value, "factor", shows_in)
-            found.append(replace(relative, lowest=_LEAST - 1.0))
+            found.append(_relative(label, at, quantity.unit, value, sd / value, shows_in))
         elif sd > 0.0:
             found.append(FreeParameter(label, at, quantity.unit, value, sd, "shift", shows_in))
     return found
+
+
+def _relative(name: str, paths: Paths, unit: str, value: float, sd: float, shows_in: tuple[str, ...]) -> FreeParameter:
+    """A positive number by its relative change, or, where that is uncertain by more than `_WIDE`, by its logarithm."""
+    if sd > _WIDE:
+        return FreeParameter(name, paths, unit, value, math.log1p(sd), "log", shows_in)
+    return FreeParameter(name, paths, unit, value, sd, "factor", shows_in, lowest=_LEAST - 1.0)
 
 
 def plan_parameters(machine: Machine) -> tuple[FreeParameter, ...]:

@@ -6,6 +6,7 @@ Unknowns x (p,) are the machine's parameters, then the sensors' errors; zero at 
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
+from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
-from ..friction_march import sliding
+from ..friction_march import made_fine
 from ..prepare import MeasuredTest
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
@@ -73,13 +74,14 @@ class Problem:
         test, of which a share `preload` of the force is unknown. Raises RecordError if they are too short together.
         """
         plant = make_plant(machine)
-        weights = [sliding(plant, test) for test in tests]
+        tests = tuple(made_fine(plant, test) for test in tests)
 
         def weighed(some: Sequence[MeasuredTest]) -> tuple[MeasuredTest, ...]:
             """Draws of the tests in order, any number of times, with the weights of the tests."""
-            return tuple(replace(t, weight=weights[i % len(weights)]) for i, t in enumerate(some))
+            each = zip(some, cycle(tests), strict=False)
+            return tuple(replace(t, weight=own.weight, substeps=own.substeps) for t, own in each)
 
-        tests, noisy = weighed(tests), weighed(noisy)
+        noisy = weighed(noisy)
         self.tests, self.comparison, self.jobs, self.kinds = tests, comparison, jobs, kinds
         self.noisy, self.again = noisy, tuple(map(weighed, again))
         unknowns = sensor_unknowns(machine, sensors, tests[0])

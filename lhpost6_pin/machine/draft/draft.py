@@ -132,7 +132,9 @@ def _valve(
         stated = basis.with_sd(stated, basis.rule("stated.speed"))
         factor = 1.0 / speed_per_flow / (curve if name == "slope" else full)
         how = "speed without load times area, at rated pressure, over the flow curve"
-    flow, sd = first(stated.value) * factor, first(stated.sd) * factor
+    flow, bent = first(stated.value) * factor, basis.typical["valve.flow_curve"]
+    # the slope at null is flow times curve: an uncertain curve leaves the flow as uncertain
+    sd = math.hypot(first(stated.sd) * factor, flow * first(bent.sd) / first(bent.value))
     speed = flow * full * speed_per_flow
     evidence = "derived" if stated.evidence == "measured" else "assumed"
     found = {

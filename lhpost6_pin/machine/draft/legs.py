@@ -22,7 +22,10 @@ class Leg(NamedTuple):
 
 
 def guided_legs(motion: str, size: tuple[float, float], depth: float, length: float) -> list[Leg]:
-    """One actuator along each guided axis, at the edge of the platen at half its depth; from below for z."""
+    """One actuator along each guided axis, at the edge of the platen at half its depth; from below for z.
+
+    It extends towards positive motion, as laboratories count force and pressure difference.
+    """
     legs = []
     for axis in motion:
         k = "xyz".index(axis)
@@ -30,7 +33,7 @@ def guided_legs(motion: str, size: tuple[float, float], depth: float, length: fl
         if axis == "z":
             point[2], away[2] = -depth, -length
         else:
-            point[k], away[k] = 0.5 * size[k], length
+            point[k], away[k] = -0.5 * size[k], -length
         legs.append(Leg(f"A{axis.upper()}", point, point + away))
     return legs
 

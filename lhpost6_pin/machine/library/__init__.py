@@ -2,6 +2,7 @@
 
 from .family import Family, Shape, families, find_family
 from .make import effect_entry, make_effect, make_named_effect
+from .scaled import in_size_of, scaled_families
 
 __all__ = [
     "Family",
@@ -9,6 +10,8 @@ __all__ = [
     "effect_entry",
     "families",
     "find_family",
+    "in_size_of",
     "make_effect",
     "make_named_effect",
+    "scaled_families",
 ]

@@ -47,6 +47,7 @@ class Family:
     tell_apart: str
     grouping: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
     named: str  # the family that it is a form of; usually itself
+    background_without: str  # channel without which it is refitted in every search and never named; empty: none
     search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
     confusable: bool  # whether another form of the report's own laws may pass for it
     law: str  # whose parameters are the family's numbers and the component's; empty where `make` composes it
@@ -135,6 +136,7 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         tell_apart=table["tell_apart"],
         grouping=table.get("grouping", "kind"),
         named=table.get("named", name),
+        background_without=table.get("background_without", ""),
         search=table.get("search", "named"),
         confusable=table.get("confusable", False),
         law=table.get("law", ""),

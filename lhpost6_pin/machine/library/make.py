@@ -10,6 +10,7 @@ from ..parameters import EffectEntry, Quantity, to_unit
 from ..structure import Structure
 from .composed import COMPOSED
 from .family import Family, Shape, find_family
+from .scaled import in_size_of
 
 __all__ = ["effect_entry", "make_effect", "make_named_effect"]
 
@@ -30,7 +31,7 @@ def make_effect(
     Raises UnknownNameError for a family that the library has not; ParameterError for a component that it cannot act on
     and for a number that it does not have or that is out of its bounds.
     """
-    known = find_family(family)
+    known = in_size_of(find_family(family), machine)
     if not known.law and family not in COMPOSED:
         raise ParameterError(f"{family} is no part of a machine: state it in the file of the sensors or the controller")
     possible = known.components(machine)
@@ -77,9 +78,11 @@ def make_named_effect(machine: Structure, name: str, entry: EffectEntry) -> Effe
     return make_effect(machine, entry.family, entry.components, values, name=name, source=source)
 
 
-def effect_entry(family: str, components: Sequence[str], values: Mapping[str, float]) -> EffectEntry:
-    """What a machine file would state for these values in SI; raises UnknownNameError or ParameterError."""
-    shapes = {shape.name: shape for shape in find_family(family).shapes}
+def effect_entry(
+    machine: Structure, family: str, components: Sequence[str], values: Mapping[str, float]
+) -> EffectEntry:
+    """What a machine's file would state for these values in SI; raises UnknownNameError or ParameterError."""
+    shapes = {shape.name: shape for shape in in_size_of(find_family(family), machine).shapes}
     _refuse_unknown(family, values, shapes)
     stated = {
         key: Quantity(float(values[key]), shape.unit, "override", "given by hand")

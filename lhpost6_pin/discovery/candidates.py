@@ -164,11 +164,16 @@ def first_shape(family: Family) -> tuple[tuple[str, float], ...]:
     return tuple((s.name, s.start[0]) for s in family.shapes if not s.amplitude)
 
 
-def list_candidates(machine: Machine) -> tuple[tuple[Candidate, ...], ...]:
-    """All candidates of the library for a machine: each family at each start of its shapes, on each group together."""
+def list_candidates(machine: Machine, channels: Collection[str] = LAYOUT) -> tuple[tuple[Candidate, ...], ...]:
+    """All candidates of the library for a machine: each family at each start of its shapes, on each group together.
+
+    Where spools are not among the measured `channels`, errors of the command path are calibrated, not named: delay and
+    lag of a valve cannot be told apart from those that its machine states.
+    """
     found, there = [], {effect.name for effect in machine.added_effects}
     for family in scaled_families(machine).values():
-        if family.search != "named":
+        unseen = family.shows_in == ("servo",) and "spool_position" not in channels
+        if family.search != "named" or unseen:
             continue
         shapes = [s for s in family.shapes if not s.amplitude]
         names = [s.name for s in shapes]

@@ -32,7 +32,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     """Score all candidates."""
     problem, numbers, base, background = found.problem, found.numbers, linear.base, linear.background
     taken = {a.candidate.name for a in found.added}
-    groups = [g for g in list_candidates(base.plant.machine) if not taken & {c.name for c in g}]
+    groups = [g for g in list_candidates(base.plant.machine, base.tests[0].channels) if not taken & {c.name for c in g}]
     residual = found.solution.normal.residual
     misfit = float(sum(np.sum(np.abs(r) ** 2) for r in residual) / sum(r.size for r in residual))
     weigh, look = Reweighting(found, background), numbers.number("accept.look")

@@ -9,7 +9,7 @@ import typer
 
 from .app import command, print_result, progress_bar, repeating_command
 from .live_view import NoOpen
-from .options import CampaignFolder, Jobs, Json, MachineName, Out, SensorsName, folder_for
+from .options import CampaignFolder, Jobs, Json, MachineName, Out, SensorsName, folder_for, measuring
 
 __all__ = ["demo", "discover"]
 
@@ -27,7 +27,7 @@ def discover(
     ] = None,
     out: Out = None,
     machine: MachineName = "lhpost6",
-    sensors: SensorsName = "lhpost6",
+    sensors: SensorsName = None,
     seed: Annotated[int, typer.Option(help="Seed of the simulated sensor noise.")] = 0,
     jobs: Jobs = -1,
     json: Json = False,
@@ -37,7 +37,7 @@ def discover(
     Writes verdict.json, model.toml and report.html. An interrupted search resumes from its last checkpoint.
     """
     from ..data.campaign import load_campaign
-    from ..data.sensors import load_sensors
+    from ..data.measured_sensors import find_sensors
     from ..discovery import discover as search
     from ..discovery import verdict_entries
     from ..machine.machine import load_machine
@@ -45,7 +45,8 @@ def discover(
     from ..show.result_tables import print_discovery
 
     table = load_machine(machine, model)
-    known, tests = load_sensors(sensors), load_campaign(campaign, table)
+    tests = load_campaign(campaign, table)
+    known = find_sensors(table, tests.records, sensors, measuring(campaign, machine))
     held = None if hold_out is None else [] if hold_out == ["none"] else hold_out
     folder = folder_for(out, f"{tests.name}_discovery")
     with progress_bar(f"searching {tests.name} for effects that {table.name} lacks") as progress:

@@ -10,8 +10,7 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 
 if TYPE_CHECKING:
-    from ..data.consistency import ConsistencyFinding
-    from ..machine.machine import Machine
+    import xarray as xr
 
 __all__ = ["calibrate", "check", "decompose", "export", "validate"]
 
@@ -20,47 +19,56 @@ __all__ = ["calibrate", "check", "decompose", "export", "validate"]
 def check(
     file: Annotated[Path, typer.Argument(help="Record, or a campaign: a directory of records.")],
     machine: opt.MachineOptions,
-    sensors: opt.SensorsName = "lhpost6",
+    sensors: opt.SensorsName = None,
+    sensors_out: Annotated[
+        Path | None, typer.Option(help="Sensors file (TOML) to write, with noise as rests of these records show it.")
+    ] = None,
     json: opt.Json = False,
 ) -> None:
-    """Check records: layout, values, and the agreement of redundant sensors."""
+    """Check records: layout, values, signs, noise at rest, agreement of redundant sensors; what sensors can tell."""
+    from ..data.campaign_check import check_campaign
     from ..data.check import check_record
+    from ..data.measured_sensors import save_sensors
+    from ..data.records import load_record
+    from ..show.check_tables import check_entries, print_check
     from ..show.results import finding_entries
-    from ..show.tables import print_findings, print_sensor_findings
+    from ..show.tables import print_findings
 
     table = machine.load()
+    if sensors_out is not None and sensors_out.exists():
+        raise ParameterError(f"{sensors_out}: exists and may have been edited; remove it, or name another")
     files = sorted(file.glob("*.nc")) or [file]
     found = {str(path): check_record(path, table) for path in files}
     wrong = any(f.severity == "error" for findings in found.values() for f in findings)
-    compared = None if wrong else _check_sensors(table, files, sensors)
+    try:
+        checked = check_campaign(table, [_named(load_record(path), path) for path in files], sensors)
+    except RecordError:
+        if not wrong:
+            raise
+        checked = None  # a record that breaks the layout is among the findings
+    written = []
+    if sensors_out is not None:
+        if checked is None or checked.content is None:
+            why = "correct the errors first" if wrong else "no measured record of this machine"
+            raise RecordError(f"{sensors_out}: not written: {(checked.reason if checked else '') or why}")
+        save_sensors(checked.content, sensors_out)
+        written = [sensors_out]
 
     def show() -> None:
         for path, findings in found.items():
             print_findings(path, findings)
-        if compared is not None:
-            print_sensor_findings(compared)
+        if checked is not None:
+            print_check(checked)
 
-    print_result(json, lambda: {**finding_entries(found), "sensors": compared}, show)
+    print_result(json, lambda: {**finding_entries(found), **check_entries(checked)}, show, written)
     if wrong:
         raise typer.Exit(1)
 
 
-def _check_sensors(table: "Machine", files: list[Path], sensors: str) -> "list[ConsistencyFinding] | None":
-    """Compare redundant sensors in measured records of this machine; noise-free simulated records are skipped."""
-    from ..data.consistency import check_sensors
-    from ..data.records import is_measured, load_record
-    from ..data.sensors import load_sensors
-    from ..mechanics.plant import make_plant
-
-    records = [load_record(path) for path in files]
-    labels = {"actuator": table.actuator_names, "strut": table.strut_names}
-    measured = [
-        r
-        for r in records
-        if is_measured(r)
-        and all([str(x) for x in r[dim].values] == list(names) for dim, names in labels.items() if dim in r.coords)
-    ]
-    return list(check_sensors(make_plant(table), measured, load_sensors(sensors))) if measured else None
+def _named(record: "xr.Dataset", path: Path) -> "xr.Dataset":
+    """A record called by its file if it has no name."""
+    record.attrs.setdefault("test", path.stem)
+    return record
 
 
 @command()
@@ -87,14 +95,14 @@ def decompose(
     record: Annotated[Path, typer.Argument(help="Record of a test, measured or simulated.")],
     machine: opt.SpecimenOptions,
     out: opt.Out = None,
-    sensors: opt.SensorsName = "lhpost6",
+    sensors: opt.SensorsName = None,
     cutoff: Annotated[float | None, typer.Option(help="Low-pass of all forces [Hz]; default: 33.")] = None,
     no_align: Annotated[bool, typer.Option("--no-align", help="Do not correct skews between channels.")] = False,
     json: opt.Json = False,
 ) -> None:
     """Decompose the forces of a test, effect by effect, by inverse dynamics; writes ledger.nc and report.html."""
-    from ..data.records import load_record
-    from ..data.sensors import load_sensors
+    from ..data.measured_sensors import find_sensors
+    from ..data.records import is_measured, load_record
     from ..identification.decompose import decompose_record, find_agreement, find_work, save_ledger
     from ..show.report import write_decompose_report
     from ..show.result_tables import print_agreement
@@ -103,7 +111,10 @@ def decompose(
     table = machine.load()
     measured = load_record(record)
     folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces")
-    found = decompose_record(table, measured, load_sensors(sensors), cutoff=cutoff, align=not no_align)
+    known = None
+    if is_measured(measured):
+        known = find_sensors(table, [measured], sensors, opt.measuring(record.parent, machine.machine))
+    found = decompose_record(table, measured, known, cutoff=cutoff, align=not no_align)
     agreement, work = find_agreement(found), find_work(found)
     files = [folder / name for name in ("ledger.nc", "report.html")]
     save_ledger(found, files[0], work, str(record))
@@ -116,7 +127,7 @@ def validate(
     campaign: opt.CampaignFolder,
     machine: opt.SpecimenOptions,
     out: opt.Out = None,
-    sensors: opt.SensorsName = "lhpost6",
+    sensors: opt.SensorsName = None,
     controller: opt.PhaseSettingsName = None,
     phases: Annotated[str, typer.Option(help="Phases: 1 inverse dynamics, 2 open loop, 3 closed loop.")] = "1,2,3",
     jobs: opt.Jobs = -1,
@@ -124,7 +135,7 @@ def validate(
 ) -> None:
     """Validate the model on measured tests in three phases; writes report.html and metrics.json."""
     from ..data.campaign import load_campaign
-    from ..data.sensors import load_sensors
+    from ..data.measured_sensors import find_sensors
     from ..identification.validation import metrics, save_metrics
     from ..identification.validation import validate as validate_campaign
     from ..show.report.validate_report import write_validate_report
@@ -136,7 +147,8 @@ def validate(
     numbers = tuple(sorted(map(int, words)))
     table = machine.load()
     settings = opt.find_settings(controller, table) if controller else None
-    known, tests = load_sensors(sensors), load_campaign(campaign, table)
+    tests = load_campaign(campaign, table)
+    known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_validation")
     with progress_bar(f"validating {table.name} on {tests.name}") as progress:
         found = validate_campaign(
@@ -153,14 +165,14 @@ def calibrate(
     campaign: opt.CampaignFolder,
     machine: opt.SpecimenOptions,
     out: opt.Out = None,
-    sensors: opt.SensorsName = "lhpost6",
+    sensors: opt.SensorsName = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated sensor noise behind the weights.")] = 0,
     jobs: opt.Jobs = -1,
     json: opt.Json = False,
 ) -> None:
     """Calibrate parameters and sensors on measured tests; writes override.toml and report.html."""
     from ..data.campaign import load_campaign
-    from ..data.sensors import load_sensors
+    from ..data.measured_sensors import find_sensors
     from ..identification.calibration import calibrate as calibrate_machine
     from ..identification.calibration.override import save_override
     from ..show.report import write_calibrate_report
@@ -168,7 +180,8 @@ def calibrate(
     from ..show.results import calibration_entries
 
     table = machine.load()
-    known, tests = load_sensors(sensors), load_campaign(campaign, table)
+    tests = load_campaign(campaign, table)
+    known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_calibration")
     with progress_bar(f"calibrating {table.name} on {tests.name}") as progress:
         found = calibrate_machine(

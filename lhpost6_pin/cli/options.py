@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 __all__ = ["Beyond", "CampaignFolder", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
 __all__ += ["MotionOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName", "SpecimenOptions"]
-__all__ += ["StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "record_name"]
+__all__ += ["StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring", "record_name"]
 
 
 def _refuse_no_jobs(jobs: int) -> int:
@@ -42,9 +42,10 @@ Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves per horizontal actuator; 0: as in the machine file.")
 ]
 SensorsName = Annotated[
-    str,
+    str | None,
     typer.Option(
-        help="Noise and calibration ranges of the sensors: shipped name, or a TOML file.",
+        help="Noise and calibration ranges of the sensors: shipped name, or a TOML file; default: those that the "
+        "machine file names, else as rests of the records show.",
         autocompletion=completing(lambda: shipped("sensors")),
     ),
 ]
@@ -247,6 +248,12 @@ def folder_for(out: Path | None, name: str) -> Path:
     folder = out or Path("out") / name
     refuse_folder(folder)
     return folder
+
+
+def measuring(campaign: Path, machine: str) -> str:
+    """Remedy where no sensors are known: the command that measures them."""
+    command = f"lhpost6 check {campaign} --machine {machine} --sensors-out sensors.toml"
+    return f"`{command}` writes one where tests rest for two seconds"
 
 
 def record_name(path: Path, attrs: Any) -> str:

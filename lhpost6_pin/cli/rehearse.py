@@ -106,7 +106,7 @@ def campaign(
     machine: opt.SpecimenOptions,
     out: opt.Out = None,
     controller: opt.SettingsName = None,
-    sensors: opt.SensorsName = "lhpost6",
+    sensors: opt.SensorsName = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
     scale: Annotated[float, typer.Option(help="Scale factor of all motions, e.g. for a smaller table.")] = 1.0,
     errors: Annotated[bool, typer.Option(help="Draw random gains, offsets and skews of the sensors.")] = True,
@@ -119,7 +119,10 @@ def campaign(
     from ..simulation.simulated_campaign import simulate_campaign
 
     table = machine.load()
-    settings, known = opt.find_settings(controller, table), load_sensors(sensors)
+    named = sensors or table.parameters.words.get("machine.sensors")
+    if not named:
+        log.warning("%s names no sensors file: tests are recorded with the noise of the LHPOST6's sensors", table.name)
+    settings, known = opt.find_settings(controller, table), load_sensors(str(named or "lhpost6"))
     chosen = tuple(word.strip() for word in tests.split(",")) if tests is not None else None
     if chosen is not None and len(set(chosen)) < len(chosen):
         raise ParameterError(f"--tests {tests}: names a test twice")

@@ -23,6 +23,7 @@ from .conditioning import resolution
 from .layout_faults import RecordFinding, layout_faults
 from .records import open_record, sample_interval
 from .signals import differentiate, lowpass_zero_phase
+from .turned_signs import turned_signs
 
 __all__ = ["check_dataset", "check_record"]
 
@@ -57,7 +58,8 @@ LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mist
 def check_record(path: Path | str, machine: Machine | None = None) -> list[RecordFinding]:
     """Contents and faults of the record at `path`; an unreadable file is one error.
 
-    With a `machine` forces are compared with its piston areas times the chamber pressures.
+    With a `machine` forces are compared with its piston areas times the chamber pressures, and their signs with the
+    acceleration of its mass.
     """
     try:
         return check_dataset(open_record(path), machine)
@@ -82,6 +84,7 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         _inconsistent_motion(sound),
         _inconsistent_forces(sound, machine),
     )
+    errors += turned_signs(sound, machine) if machine is not None and not errors else []
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + contents
 
 
@@ -246,14 +249,20 @@ def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
 
 
 def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
-    """Median real gain found / expected where the two are coherent; None if that is almost nowhere."""
+    """Median gain found / expected where the two are coherent; None if that is almost nowhere.
+
+    Its sign is that of the lower half of these frequencies, where a delay turns the phase least.
+    """
     from scipy.signal import csd, welch
 
     each = {"fs": 1 / dt, "nperseg": int(min(len(found) // 4, round(2 / dt)))}
     f, cross = csd(expected, found, **each)
     ours, theirs = welch(expected, **each)[1], welch(found, **each)[1]
     band = (f > 0) & (f < 20) & (ours > 1e-4 * ours.max()) & (np.abs(cross) ** 2 > 0.95 * ours * theirs)
-    return float(np.median((cross[band] / ours[band]).real)) if band.sum() >= 5 else None
+    if band.sum() < 5:
+        return None
+    ratio = cross[band] / ours[band]
+    return float(np.copysign(np.median(np.abs(ratio)), np.median(ratio[: len(ratio) // 2].real)))
 
 
 def _inconsistent_forces(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:

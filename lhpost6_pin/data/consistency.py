@@ -23,9 +23,10 @@ import xarray as xr
 
 from ..core.arrays import Array, Mask
 from ..mechanics.plant import Plant
+from .alignment import align_record, group_delays
 from .channels import channel_unit
 from .records import require
-from .sensor_pairs import Regressor, SensorComparison, comparisons
+from .sensor_pairs import BAND, Regressor, SensorComparison, comparisons
 from .sensors import SensorSet
 
 __all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]
@@ -33,6 +34,8 @@ __all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]
 
 Verdict = Literal["ok", "suspicious", "untested"]
 
+FOLLOWING = ("platen_velocity", "platen_acceleration", "actuator_displacement")  # compared with platen_displacement
+LATE = 0.2  # rad at the end of the band: a delay below it is a coefficient of the derivative
 LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise
 CONFIDENCE = 3.0  # standard deviations
 MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its correction is not accurate
@@ -89,15 +92,26 @@ def check_sensors(plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSe
     A missing channel disables only its comparisons. A suspicious finding need not be a sensor fault: an effect missing
     in the law (a leaking strut, a drooping supply) shows as well. Raises RecordError for channels without time.
     """
-    parts: dict[tuple[str, str], list[_Sums]] = {}
     for record in records:
         require(record, "time")
-        for one in comparisons(plant, record, sensors):
+    late = _late(plant, records)
+    parts: dict[tuple[str, str], list[_Sums]] = {}
+    for record in records:
+        for one in comparisons(plant, align_record(record, late), sensors):
             if len(one.y):  # none where a record is no longer than its edges
                 parts.setdefault((one.check, one.channel), []).append(_sums(one))
     order = {check: k for k, check in enumerate(dict.fromkeys(check for check, _ in parts))}
     keys = sorted(parts, key=lambda key: order[key[0]])
-    return tuple(finding for key in keys for finding in _findings(*key, _pooled(parts[key]), sensors.noise_range))
+    each = ((key, _pooled(parts[key]), late.get(key[1].partition("[")[0], 0.0)) for key in keys)
+    return tuple(one for key, sums, delay in each for one in _findings(*key, sums, sensors.noise_range, delay))
+
+
+def _late(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, float]:
+    """Delays [s] of channels of motion too large for a regression on the derivative, which is of first order."""
+    least = LATE / (2 * np.pi * BAND.high)
+    found = {group: delay for group, delay in group_delays(plant, records).items() if group in FOLLOWING}
+    clear = {group: d.delay for group, d in found.items() if abs(d.delay) > CONFIDENCE * d.standard_error}
+    return {group: delay for group, delay in clear.items() if abs(delay) > least}
 
 
 # ------------------------------------------------------------------------------------------------ regression
@@ -164,7 +178,8 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
     )
 
 
-def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterator[ConsistencyFinding]:
+def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: float) -> Iterator[ConsistencyFinding]:
+    """Findings on one channel, whose delay `late` [s] has been removed."""
     unit_y = channel_unit(channel)
     hidden = s.noise * np.diag(scaled_inverse(s.xx, np.diag(s.xx))) > MOST_NOISE
     whole = any(h and not term.beside for h, term in zip(hidden, s.terms, strict=True))
@@ -178,7 +193,7 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float) -> Iterato
         value, sigma, range_ = by.theta[i], by.error[i], by.lawful[i] + by.doubt[i]
         if term.delay is not None:
             gain = by.theta[0] or 1.0
-            value, sigma = term.delay - value / gain, sigma / abs(gain)
+            value, sigma = late + term.delay - value / gain, sigma / abs(gain)
         value, sigma, due, range_ = float(value), float(sigma), float(term.expected), float(range_)
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
         verdict: Verdict = "untested" if held[i] else _verdict(abs(value - due), sigma, range_)

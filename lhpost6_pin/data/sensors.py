@@ -22,7 +22,7 @@ from .conditioning import resolution
 from .records import sample_interval
 from .signals import Band
 
-__all__ = ["SensorSet", "add_noise", "load_sensors", "spectrum"]
+__all__ = ["SensorSet", "add_noise", "load_sensors", "make_sensors", "recorded_spectrum", "spectrum"]
 
 SAMPLING = {"rate": "Hz", "low_pass": "Hz", "low_pass_order": "1", "bits": "1", "noise_range": "1"}
 
@@ -84,7 +84,11 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> SensorSet:
     path = Path(name_or_path)
     if path.suffix != ".toml":
         path = find_shipped("sensors", str(name_or_path), "sensors")
-    given = load_parameters(path)
+    return make_sensors(load_parameters(path), path.stem)
+
+
+def make_sensors(given: Parameters, stem: str = "sensors") -> SensorSet:
+    """Sensors of the quantities of a file, called `stem` where they state none; raises ParameterError."""
     units = {name: channel.units for name, channel in LAYOUT.items()}
     delays, gains = dict.fromkeys(sensor_groups(), "s"), dict.fromkeys(LAYOUT, "1")
     known = {"sampling": SAMPLING, "noise": units, "gain_range": gains, "offset_range": units, "delay_range": delays}
@@ -110,7 +114,7 @@ def load_sensors(name_or_path: str | Path = "lhpost6") -> SensorSet:
             what = f"{sampling[key]:g} should be a whole number from {least} to {most}"
             raise ParameterError(f"{given.origin}: sampling.{key}: {what}")
     return SensorSet(
-        name=str(given.words.get("sensors.name", path.stem)),
+        name=str(given.words.get("sensors.name", stem)),
         rate=sampling["rate"],
         band=Band(high=sampling["low_pass"], order=int(sampling["low_pass_order"])),
         bits=int(sampling["bits"]),
@@ -129,6 +133,14 @@ def spectrum(sensors: SensorSet, record: xr.Dataset, channel: str, f: ArrayLike)
     step = resolution(values)
     stated = sensors.noise_spectrum(channel, f) + step**2 / 6 * sample_interval(record)
     return np.broadcast_to(stated, (len(stated), values.shape[1]))
+
+
+def recorded_spectrum(sensors: SensorSet, channel: str, f: ArrayLike, rate: float) -> Array:
+    """Noise spectrum (n, 1) or (n, 6) of a channel sampled at `rate` [Hz]: what lies above half of it is folded."""
+    f = np.asarray(f, dtype=float)
+    folds = range(int(np.ceil(sensors.rate / 2 / rate)) + 1)
+    places = [f + k * rate for k in folds] + [k * rate - f for k in folds[1:]]
+    return np.asarray(np.sum([sensors.noise_spectrum(channel, place) for place in places], axis=0))
 
 
 # -------------------------------------------------------------------------------------------- simulation
@@ -155,8 +167,6 @@ def _draw(sensors: SensorSet, channel: str, shape: tuple[int, int], rate: float,
     extra = int(np.ceil(0.1 * rate))  # the Fourier sum is periodic: what wraps around is discarded
     n = fft.next_fast_len(shape[0] + extra, real=True)
     f = fft.rfftfreq(n, 1 / rate)
-    folds = range(int(np.ceil(sensors.rate / 2 / rate)) + 1)
-    places = [f + k * rate for k in folds] + [k * rate - f for k in folds[1:]]
-    power = np.sum([sensors.noise_spectrum(channel, place) for place in places], axis=0)
+    power = recorded_spectrum(sensors, channel, f, rate)
     white = fft.rfft(rng.standard_normal((n, shape[1])), axis=0)  # of unit variance: spectrum 2 / rate
     return fft.irfft(white * np.sqrt(power * rate / 2), n, axis=0)[: shape[0]]

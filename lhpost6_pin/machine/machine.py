@@ -227,7 +227,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str])
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
         "limits": {f.name for f in fields(Limits)},
-        "machine": {"name", "title", "motion", "thrust", "controller"},
+        "machine": {"name", "title", "motion", "thrust", "controller", "sensors"},
         **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
         **{name: both | {"kind", "valves"} for name in components},
     }

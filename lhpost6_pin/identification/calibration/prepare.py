@@ -44,6 +44,7 @@ def prepare_problem(
     n = numbers.number
     comparison = ResidualBands(numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"))
     _refuse(machine, records, comparison)
+    _refuse_free_of_noise(records, sensors)
     machine = machine.as_tested(records[0].attrs, "the first test")
     plant = make_plant(machine)
     policy = policy_of(numbers)
@@ -84,6 +85,15 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
         if lacking := [c for c in calibrated_channels() if c not in record and any(c in other for other in records)]:
             what = f"{test} has no {', '.join(lacking)}, which other tests have"
             raise RecordError(f"{what}; remove that test from the campaign, or the channel from all tests")
+
+
+def _refuse_free_of_noise(records: Sequence[xr.Dataset], sensors: SensorSet) -> None:
+    """Raise RecordError for measured channels whose noise the sensors do not state: nothing could be weighed by it."""
+    present = [name for name in calibrated_channels() if any(name in r and np.ptp(r[name].values) > 0 for r in records)]
+    if lacking := [name for name in present if not np.any(sensors.noise.get(name, 0.0))]:
+        what = f"sensors {sensors.name}: no noise is stated for {', '.join(lacking)}, which these tests measure"
+        how = "add it to the sensors file; `lhpost6 check CAMPAIGN --sensors-out FILE` measures it"
+        raise RecordError(f"{what}; {how}")
 
 
 def _refuse_channels(test: str, record: xr.Dataset, machine: Machine) -> None:

@@ -17,8 +17,9 @@ from ...core.errors import RecordError
 from ...core.files import models_folder
 from ...data.alignment import Delay, align_record
 from ...data.channels import MOTION
+from ...data.measured_sensors import find_sensors
 from ...data.records import is_measured, require, sample_interval
-from ...data.sensors import SensorSet, load_sensors
+from ...data.sensors import SensorSet
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -98,8 +99,9 @@ def decompose_record(
     cutoff: float | None = None,
     align: bool = True,
 ) -> Decomposed:
-    """Decompose a record with a machine's equations; sensors are the LHPOST6's, cutoff [Hz] that of `decompose.toml`.
+    """Decompose a record with a machine's equations; sensors by default those of `find_sensors`.
 
+    cutoff [Hz] is by default that of `decompose.toml`.
     Actuator forces come from chamber pressures where they were not measured. The number of open servovalves has no
     effect. Raises RecordError for a record that lacks channels, is not finite, of another machine, out of stroke or too
     short; SimulationError for a specimen with joints.
@@ -118,7 +120,7 @@ def decompose_record(
     comparison = ComparisonBand(band, numbers.number("comparison.edge"))
     policy = AS_RECORDED
     if is_measured(record):
-        sensors, policy = sensors or load_sensors(), EACH_TEST if align else AS_RECORDED
+        sensors, policy = sensors or find_sensors(machine, [record]), EACH_TEST if align else AS_RECORDED
     else:
         require(record, *MOTION)
         sensors = None

@@ -22,7 +22,8 @@ from ...core.jsonable import as_json
 from ...core.progress import Progress
 from ...data.alignment import Delay, align_record
 from ...data.campaign import Campaign
-from ...data.sensors import SensorSet, load_sensors
+from ...data.measured_sensors import find_sensors
+from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
@@ -89,7 +90,7 @@ def validate(
     two tests have one name.
     """
     _check_names(campaign)
-    sensors, numbers = sensors or load_sensors(), validation_numbers()
+    sensors, numbers = sensors or find_sensors(machine, campaign.records), validation_numbers()
     plant = make_plant(machine)
     enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
     skews = find_delays(plant, enough, SIGNIFICANT._replace(significance=numbers.number("comparison.significant_skew")))

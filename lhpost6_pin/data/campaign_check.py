@@ -1,0 +1,86 @@
+"""What the sensors of a campaign show together: noise at rest, agreement of redundant ones, and what they can tell."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import xarray as xr
+
+from ..core.errors import RecordError
+from ..machine.machine import Machine
+from ..machine.parameters import Parameters
+from ..mechanics.plant import make_plant
+from .channels import LAYOUT
+from .consistency import ConsistencyFinding, check_sensors
+from .measured_sensors import NoiseComparison, compare_noise, measured_sensors
+from .noise_levels import noise_levels
+from .observable import Observable, observable
+from .records import is_measured
+from .sensors import SensorSet, load_sensors, make_sensors
+
+__all__ = ["CampaignCheck", "check_campaign"]
+
+UNEVEN = 2.0  # a column is that much noisier than those like it: a loose cable rather than a worse sensor
+
+
+@dataclass(frozen=True)
+class CampaignCheck:
+    """Sensors of the measured records of a campaign."""
+
+    rate: float  # of the records [Hz]
+    rest: float  # seconds of it
+    source: str  # of the noise levels
+    stated: str  # name of the sensors that they are compared with; empty: none
+    noise: tuple[NoiseComparison, ...]
+    findings: tuple[ConsistencyFinding, ...] | None  # of redundant sensors; None where their noise is not known
+    observable: tuple[Observable, ...]
+    content: Parameters | None  # of a sensors file
+    reason: str  # why there is none
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is wrong with the stated noise, or with one sensor among its like."""
+        found = [f"{one.channel}: {one.warning}" for one in self.noise if one.warning]
+        found += [
+            f"{one.channel}: its noisiest column has {one.uneven:.2g} times the noise of the others: check that sensor"
+            for one in self.noise
+            if one.uneven > UNEVEN
+        ]
+        return tuple([*found, self.reason] if self.reason else found)
+
+
+def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str | None = None) -> CampaignCheck | None:
+    """Check the measured records of this machine together; None if there is none.
+
+    Sensors, by name or file, are by default those that the machine file names, else as the records show them. Raises
+    what `load_sensors` does.
+    """
+    measured = [r for r in records if is_measured(r) and _of(machine, r)]
+    if not measured:
+        return None
+    plant, levels = make_plant(machine), noise_levels(measured)
+    named = sensors or machine.parameters.words.get("machine.sensors")
+    known: SensorSet | None = load_sensors(str(named)) if named else None
+    content, reason = None, ""
+    try:
+        content = measured_sensors(plant, measured, levels)
+    except RecordError as error:
+        reason = f"{error}; record two seconds of rest before and after each test"
+    used = known or (make_sensors(content) if content else None)
+    present = [name for name in LAYOUT if all(name in r for r in measured)]
+    return CampaignCheck(
+        rate=levels.rate,
+        rest=levels.seconds,
+        source=levels.source,
+        stated=known.name if known else "",
+        noise=compare_noise(levels, known),
+        findings=None if used is None else check_sensors(plant, measured, used),
+        observable=observable(machine, present, str(measured[0].attrs.get("derived", ""))),
+        content=content,
+        reason=reason,
+    )
+
+
+def _of(machine: Machine, record: xr.Dataset) -> bool:
+    labels = {"actuator": machine.actuator_names, "strut": machine.strut_names}
+    known = ((record[dim], names) for dim, names in labels.items() if dim in record.coords)
+    return all([str(x) for x in found.values] == list(names) for found, names in known)

@@ -1,0 +1,139 @@
+"""What a set of sensors can tell of a machine, and what it cannot: a rule per quantity.
+
+A rule names the channels that a quantity needs and what fixes its scale. A pressure measures a force only through a
+piston area that the machine file states: what follows from it is known as a ratio to that area.
+"""
+
+from collections.abc import Collection
+from typing import Literal, NamedTuple
+
+from ..machine.machine import Machine
+
+__all__ = ["Observable", "observable"]
+
+Verdict = Literal["yes", "ratio", "no"]
+
+
+class Observable(NamedTuple):
+    """One quantity: whether its value can be told, only a ratio or a sum, or nothing; and why."""
+
+    quantity: str
+    verdict: Verdict
+    why: str
+
+
+class _Channels(NamedTuple):
+    """Channels of a campaign, by what they measure."""
+
+    machine: Machine
+    present: Collection[str]
+
+    def any(self, *names: str) -> bool:
+        return bool(set(names) & set(self.present))
+
+    @property
+    def motion(self) -> bool:
+        return self.any("platen_displacement", "actuator_displacement")
+
+    @property
+    def pressures(self) -> bool:
+        both = self.any("chamber_pressure_b") or not self.machine.double_acting
+        return self.any("pressure_difference") or (self.any("chamber_pressure_a") and both)
+
+    @property
+    def force(self) -> bool:
+        return self.any("actuator_force")
+
+    @property
+    def valve(self) -> bool:
+        return self.any("spool_position", "valve_command")
+
+
+def observable(machine: Machine, present: Collection[str], derived: str = "") -> tuple[Observable, ...]:
+    """What the channels `present` in every test can tell; a channel named in `derived` is no sensor of its own."""
+    have = _Channels(machine, [name for name in present if name not in derived])
+    rules = (_mass, _friction, _valve, _leakage, _lag, _oil, _specimen, _supply, _struts, _accelerometer)
+    return tuple(found for rule in rules if (found := rule(have)))
+
+
+def _by_force(quantity: str, c: _Channels, of: str) -> Observable:
+    """A quantity of the balance of forces: its scale is that of the force."""
+    if not c.motion:
+        return Observable(quantity, "no", "needs platen_displacement or actuator_displacement")
+    if c.force:
+        return Observable(quantity, "yes", f"{of}; scale: calibration of actuator_force")
+    if c.pressures:
+        return Observable(
+            quantity, "ratio", f"{of}, over the piston area that the machine file states; no actuator_force"
+        )
+    return Observable(quantity, "no", "no force: needs actuator_force, chamber pressures or pressure_difference")
+
+
+def _mass(c: _Channels) -> Observable:
+    fast = "" if c.any("platen_acceleration") else "; no accelerometer, so only from motion of a few hertz"
+    return _by_force("moving mass", c, f"force against acceleration{fast}")
+
+
+def _friction(c: _Channels) -> Observable:
+    return _by_force("friction law", c, "force against velocity, at all speeds of the tests")
+
+
+def _valve(c: _Channels) -> Observable:
+    name = "valve gain and null"
+    if not (c.valve and c.motion):
+        return Observable(name, "no", "needs spool_position or valve_command, and displacement")
+    if not c.pressures:
+        return Observable(name, "no", "needs pressures: without them the load shifts the flow as a null does")
+    return Observable(name, "ratio", "flow against command; null in full command, gain over the piston area")
+
+
+def _leakage(c: _Channels) -> Observable:
+    if c.valve and c.motion and c.pressures:
+        return Observable("leakage", "ratio", "flow without motion against pressure, over the piston area")
+    return Observable("leakage", "no", "needs pressures, displacement, and spool_position or valve_command")
+
+
+def _lag(c: _Channels) -> Observable:
+    name = "valve delay and lag"
+    if c.any("spool_command") and c.any("spool_position"):
+        return Observable(name, "yes", "spool_position against spool_command")
+    if c.any("valve_command") and c.motion:
+        return Observable(name, "ratio", "only their sum: the spool between command and motion is not measured")
+    return Observable(name, "no", "needs a command, and the spool or the motion that it causes")
+
+
+def _oil(c: _Channels) -> Observable:
+    if c.valve and c.motion and c.pressures:
+        return Observable("oil stiffness", "ratio", "rate of pressure against flow, over area and chamber lengths")
+    return Observable("oil stiffness", "no", "needs pressures, displacement, and spool_position or valve_command")
+
+
+def _specimen(c: _Channels) -> Observable:
+    name = "specimen"
+    if c.any("floor_acceleration"):
+        return Observable(name, "yes", "base shear: floor masses, which must be stated, times floor_acceleration")
+    if c.motion and (c.force or c.pressures):
+        return Observable(name, "ratio", "its base shear as what the bare table lacks; no floor_acceleration")
+    return Observable(name, "no", "needs floor_acceleration, or forces on the table")
+
+
+def _supply(c: _Channels) -> Observable:
+    if c.any("supply_pressure"):
+        return Observable("droop of the supply", "yes", "supply_pressure")
+    return Observable("droop of the supply", "no", "needs supply_pressure; taken as constant")
+
+
+def _struts(c: _Channels) -> Observable | None:
+    if not c.machine.struts:
+        return None
+    if c.any("strut_pressure") and c.motion:
+        return Observable("gas of the struts", "yes", "strut_pressure against displacement")
+    return Observable("gas of the struts", "no", "needs strut_pressure and displacement")
+
+
+def _accelerometer(c: _Channels) -> Observable | None:
+    if not c.any("platen_acceleration"):
+        return None
+    if c.motion:
+        return Observable("gain and delay of accelerometers", "yes", "against the measured displacement")
+    return Observable("gain and delay of accelerometers", "no", "needs platen_displacement")

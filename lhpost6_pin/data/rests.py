@@ -1,0 +1,115 @@
+"""Rests: stretches of a record in which neither the platen nor any command moves, so that channels show noise alone.
+
+Channels are smoothed over some periods of the mains' hum, and a block of them is still where its deviation from its own
+mean is within a few times that of the quietest blocks of the campaign, for every channel of motion and every command.
+Smoothing and blocks have a finite length: a strong motion nearby reaches no further. What is quiet must also be noise:
+a displacement that smoothing leaves as it was moves slowly, and then the campaign has no rest.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+
+from ..core.arrays import Array, Mask
+from ..core.files import models_folder
+from ..machine.parameters import Parameters, load_parameters
+from .channels import LAYOUT, columns_of
+from .conditioning import resolution
+from .records import sample_interval
+
+__all__ = ["find_rests", "rest_numbers", "seconds_of"]
+
+LENGTHS = ("platen_displacement", "actuator_displacement")
+"""Displacements: in motion most of their power is slow."""
+
+_Key = tuple[str, int]  # channel, column
+
+
+def rest_numbers() -> Parameters:
+    """Numbers of `models/procedures/rests.toml`."""
+    return load_parameters(models_folder() / "procedures" / "rests.toml")
+
+
+def find_rests(records: Sequence[xr.Dataset], numbers: Parameters | None = None) -> list[tuple[slice, ...]]:
+    """Rests of every record of a campaign, as slices of its samples; none where it never rests."""
+    numbers = numbers or rest_numbers()
+    found = [dict(_blocks(record, numbers)) for record in records]
+    quantile, factor, command = (numbers.number(f"rest.{key}") for key in ("quantile", "factor", "command"))
+    limits: dict[_Key, float] = {}
+    for key in dict.fromkeys(key for blocks in found for key in blocks):
+        pooled = np.concatenate([blocks[key][0] for blocks in found if key in blocks])
+        step = max(blocks[key][2] for blocks in found if key in blocks)
+        limits[key] = max(factor * float(np.quantile(pooled, quantile, method="lower")), 0.5 * step)
+        if LAYOUT[key[0]].role == "command":  # free of noise: what still moves the channels of motion show
+            limits[key] = max(limits[key], command * float(pooled.max()))
+    still = [_still(blocks, limits) for blocks in found]
+    if _moves_slowly(found, still, numbers.number("rest.motion_share")):
+        return [() for _ in records]
+    return [tuple(_runs(mask, r, numbers)) for mask, r in zip(still, records, strict=True)]
+
+
+def seconds_of(records: Sequence[xr.Dataset], rests: Sequence[tuple[slice, ...]]) -> float:
+    """Seconds of rest in all records together."""
+    each = zip(records, rests, strict=True)
+    return float(sum((s.stop - s.start) * sample_interval(r) for r, slices in each for s in slices))
+
+
+def _lengths(record: xr.Dataset, numbers: Parameters) -> tuple[int, int, int]:
+    """Samples of a box, of a block and from block to block."""
+    dt = sample_interval(record)
+    block = max(4, round(numbers.number("rest.block") / dt))
+    return max(1, round(numbers.number("rest.smooth") / dt)), block, max(1, block // 4)
+
+
+def _blocks(record: xr.Dataset, numbers: Parameters) -> Iterator[tuple[_Key, tuple[Array, Array, float]]]:
+    """Deviations in blocks of every column of motion and of commands, smoothed and not, with its digital resolution."""
+    from scipy.ndimage import uniform_filter1d
+
+    box, block, hop = _lengths(record, numbers)
+    if record.sizes["time"] < block:
+        return
+    for name, channel in LAYOUT.items():
+        if name not in record or (channel.role == "sensor" and name not in LENGTHS):
+            continue
+        for column, x in enumerate(columns_of(record[name]).T):
+            smooth = x
+            for _ in range(3):
+                smooth = uniform_filter1d(smooth, box, mode="nearest")
+            yield (name, column), (_deviations(smooth, block, hop), _deviations(x, block, hop), resolution(x))
+
+
+def _deviations(x: Array, block: int, hop: int) -> Array:
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(x, block)[::hop].std(axis=1))
+
+
+def _still(blocks: dict[_Key, tuple[Array, Array, float]], limits: dict[_Key, float]) -> Mask:
+    if not blocks:
+        return np.zeros(0, bool)
+    return np.asarray(np.all([smooth <= limits[key] for key, (smooth, _, _) in blocks.items()], axis=0))
+
+
+def _moves_slowly(found: Sequence[dict[_Key, tuple[Array, Array, float]]], still: Sequence[Mask], most: float) -> bool:
+    """Whether a displacement in the blocks that are still is motion: smooth, and above its digital resolution."""
+    for key in {key for blocks in found for key in blocks if key[0] in LENGTHS}:
+        kept = [(blocks[key], mask) for blocks, mask in zip(found, still, strict=True) if key in blocks and mask.any()]
+        if not kept:
+            continue
+        smooth = float(np.median(np.concatenate([b[0][mask] for b, mask in kept])))
+        raw = float(np.median(np.concatenate([b[1][mask] for b, mask in kept])))
+        if smooth > max(max(b[2] for b, _ in kept), most * raw):
+            return True
+    return False
+
+
+def _runs(mask: Mask, record: xr.Dataset, numbers: Parameters) -> Iterator[slice]:
+    """Stretches of blocks that are still, without the reach of smoothing at either end, if long enough."""
+    box, block, hop = _lengths(record, numbers)
+    least = numbers.number("rest.shortest") / sample_interval(record)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        whole = last == len(mask)
+        start = 0 if first == 0 else int(first) * hop + 2 * box
+        stop = record.sizes["time"] if whole else int(last - 1) * hop + block - 2 * box
+        if stop - start >= least:
+            yield slice(start, stop)

@@ -40,6 +40,8 @@ class CampaignCheck:
     def warnings(self) -> tuple[str, ...]:
         """What is wrong with the stated noise, or with one sensor among its like."""
         found = [f"{one.channel}: {one.warning}" for one in self.noise if one.warning]
+        if not self.rest and self.noise:
+            found.append("no test rests long enough: noise is an upper bound, jumps of friction are in it")
         found += [
             f"{one.channel}: its noisiest column has {one.uneven:.2g} times the noise of the others: check that sensor"
             for one in self.noise

@@ -3,7 +3,7 @@
 Channels are smoothed over some periods of the mains' hum, and a block of them is still where its deviation from its own
 mean is within a few times that of the quietest blocks of the campaign, for every channel of motion and every command.
 Smoothing and blocks have a finite length: a strong motion nearby reaches no further. What is quiet must also be noise:
-a displacement that smoothing leaves as it was moves slowly, and then the campaign has no rest.
+a displacement or command that smoothing leaves as it was moves slowly, and then no record with that channel rests.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,16 +37,18 @@ def find_rests(records: Sequence[xr.Dataset], numbers: Parameters | None = None)
     found = [dict(_blocks(record, numbers)) for record in records]
     quantile, factor, command = (numbers.number(f"rest.{key}") for key in ("quantile", "factor", "command"))
     limits: dict[_Key, float] = {}
+    allowed: dict[_Key, float] = {}
     for key in dict.fromkeys(key for blocks in found for key in blocks):
         pooled = np.concatenate([blocks[key][0] for blocks in found if key in blocks])
         step = max(blocks[key][2] for blocks in found if key in blocks)
         limits[key] = max(factor * float(np.quantile(pooled, quantile, method="lower")), 0.5 * step)
         if LAYOUT[key[0]].role == "command":  # free of noise: what still moves the channels of motion show
-            limits[key] = max(limits[key], command * float(pooled.max()))
+            allowed[key] = command * float(pooled.max())
+            limits[key] = max(limits[key], allowed[key])
     still = [_still(blocks, limits) for blocks in found]
-    if _moves_slowly(found, still, numbers.number("rest.motion_share")):
-        return [() for _ in records]
-    return [tuple(_runs(mask, r, numbers)) for mask, r in zip(still, records, strict=True)]
+    slow = _slow(found, still, allowed, numbers.number("rest.motion_share"))
+    each = zip(found, still, records, strict=True)
+    return [() if slow & set(blocks) else tuple(_runs(mask, record, numbers)) for blocks, mask, record in each]
 
 
 def seconds_of(records: Sequence[xr.Dataset], rests: Sequence[tuple[slice, ...]]) -> float:
@@ -89,17 +91,22 @@ def _still(blocks: dict[_Key, tuple[Array, Array, float]], limits: dict[_Key, fl
     return np.asarray(np.all([smooth <= limits[key] for key, (smooth, _, _) in blocks.items()], axis=0))
 
 
-def _moves_slowly(found: Sequence[dict[_Key, tuple[Array, Array, float]]], still: Sequence[Mask], most: float) -> bool:
-    """Whether a displacement in the blocks that are still is motion: smooth, and above its digital resolution."""
-    for key in {key for blocks in found for key in blocks if key[0] in LENGTHS}:
+def _slow(
+    found: Sequence[dict[_Key, tuple[Array, Array, float]]],
+    still: Sequence[Mask],
+    allowed: dict[_Key, float],
+    most: float,
+) -> set[_Key]:
+    """Displacements and commands that move in the blocks that are still: smooth, above what is allowed."""
+    slow = set()
+    for key in {key for blocks in found for key in blocks if key[0] in LENGTHS or LAYOUT[key[0]].role == "command"}:
         kept = [(blocks[key], mask) for blocks, mask in zip(found, still, strict=True) if key in blocks and mask.any()]
-        if not kept:
-            continue
-        smooth = float(np.median(np.concatenate([b[0][mask] for b, mask in kept])))
-        raw = float(np.median(np.concatenate([b[1][mask] for b, mask in kept])))
-        if smooth > max(max(b[2] for b, _ in kept), most * raw):
-            return True
-    return False
+        if kept:
+            smooth = float(np.median(np.concatenate([b[0][mask] for b, mask in kept])))
+            raw = float(np.median(np.concatenate([b[1][mask] for b, mask in kept])))
+            if smooth > max(*(b[2] for b, _ in kept), allowed.get(key, 0.0), most * raw):
+                slow.add(key)
+    return slow
 
 
 def _runs(mask: Mask, record: xr.Dataset, numbers: Parameters) -> Iterator[slice]:

@@ -1,0 +1,292 @@
+"""Noise measured by the records themselves: rests, levels, sensors files, signs, and what sensors can tell."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from commands import refused
+from machine_cases import PRACTICE
+from sensor_cases import with_change
+
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.consistency import check_sensors
+from lhpost6_pin.data.measured_sensors import compare_noise, find_sensors, measured_sensors, save_sensors
+from lhpost6_pin.data.noise_levels import noise_levels
+from lhpost6_pin.data.observable import observable
+from lhpost6_pin.data.records import load_record, make_record, save_record
+from lhpost6_pin.data.rests import find_rests
+from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
+from lhpost6_pin.data.signals import Band, align, differentiate
+from lhpost6_pin.data.turned_signs import turned_signs
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
+
+TABLE = load_machine("uniaxial")
+PLANT = make_plant(TABLE)
+BEFORE, MOVING, AFTER = 1.5, 12.0, 2.0  # s
+TRUE = {
+    "platen_displacement": np.array([3e-6, 0, 0, 0, 0, 0]),
+    "platen_acceleration": np.array([0.03, 0, 0, 0, 0, 0]),
+    "pressure_difference": np.array([8e3]),
+}
+AREA, MASS, FRICTION = TABLE.actuators[0].area_a, TABLE.platen.mass[0], 5e3
+ALONG = np.sign(TABLE.actuators[0].platen_point[0] - TABLE.actuators[0].base_point[0])
+
+
+def sensors(rate: float, low_pass: float, bits: int = 24) -> SensorSet:
+    given = load_sensors()
+    return replace(given, rate=rate, band=Band(high=low_pass, order=16), noise=TRUE, bits=bits)
+
+
+def shaken(seed: int, rate: float = 256.0, before: float = BEFORE, after: float = AFTER) -> xr.Dataset:
+    """A one-axis test without noise: rest, tones up to 8 Hz that swell and fade, rest; inertia and friction."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round((before + MOVING + after) * rate)) / rate
+    inside = np.clip((t - before) / MOVING, 0, 1)
+    f = rng.uniform(0.7, 8, 12)
+    tones = np.sin(2 * np.pi * np.multiply.outer(t, f) + rng.uniform(0, 6, 12)) / f**1.5
+    x = 0.02 * np.sin(np.pi * inside) ** 4 * tones.sum(axis=1)
+    v = differentiate(x, 1 / rate)
+    a = differentiate(v, 1 / rate)
+    six = [np.column_stack([column, np.zeros((len(t), 5))]) for column in (x, a)]
+    pressure = ALONG * (MASS * a + FRICTION * np.tanh(v / 1e-3))[:, None] / AREA
+    channels = {"platen_displacement": six[0], "platen_acceleration": six[1], "pressure_difference": pressure}
+    facts = {"kind": "measured", "test": f"test {seed}"}
+    return make_record(t, channels, TABLE.labels, facts)
+
+
+def campaign(rate: float = 256.0, low_pass: float = 1e4, **options: float) -> list[xr.Dataset]:
+    rng = np.random.default_rng(7)
+    return [add_noise(shaken(k, rate, **options), sensors(rate, low_pass), rng) for k in range(4)]
+
+
+@pytest.fixture(scope="module")
+def tests() -> list[xr.Dataset]:
+    return campaign()
+
+
+# Rests ----------------------------------------------------------------------------------------------------------------
+
+
+def test_rests_are_found_before_and_after_the_motion_and_nowhere_else(tests):
+    for record, slices in zip(tests, find_rests(tests), strict=True):
+        time = record["time"].values
+        (first, last) = [(time[s][0], time[s][-1]) for s in slices]
+        # motion swells with the fourth power: 2 % of its time is below 0.4 um, a seventh of the noise
+        assert first[0] == 0 and BEFORE - 0.6 < first[1] < BEFORE + 0.7
+        assert BEFORE + MOVING - 0.7 < last[0] < BEFORE + MOVING + 0.6 and last[1] == time[-1]
+
+
+def test_constant_speed_and_creep_are_no_rest(tests):
+    t = tests[0]["time"].values
+    ramp = np.where(t < BEFORE, 0.002 * t, 0.0)  # 2 mm/s: no acceleration
+    moved = with_change(tests[:1], "platen_displacement", lambda x: x + np.outer(ramp, np.eye(6)[0]))
+    for part in (slice(0, round(1.2 * 256)),):
+        assert all(s.start >= part.stop for s in find_rests([*moved, *tests[1:]])[0])
+
+
+def test_a_command_that_moves_ends_a_rest(tests):
+    t = tests[0]["time"].values
+    command = np.zeros((len(t), 1)) + np.where(t > BEFORE, 0.1 * np.sin(8 * t), 0.01 * np.sin(20 * t))[:, None]
+    late = make_record(t, {"valve_command": command}, TABLE.labels, {})["valve_command"]
+    rests = find_rests([tests[0].assign(valve_command=late), *tests[1:]])
+    assert rests[0] == () and all(len(slices) == 2 for slices in rests[1:])
+
+
+# Levels ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("disturbed", ["as it is", "hum", "drift"])
+def test_the_level_at_rest_is_that_of_the_noise(tests, disturbed):
+    t = tests[0]["time"].values
+    if disturbed == "hum":  # three times the noise
+        tests = with_change(tests, "pressure_difference", lambda x: x + 34e3 * np.sin(2 * np.pi * 50 * t)[:, None])
+    if disturbed == "drift":  # forty times the noise in a test
+        tests = with_change(tests, "pressure_difference", lambda x: x + 20e3 * t[:, None])
+    found = noise_levels(tests)
+    assert found.seconds > 4 * 2.5 and found.band is None and set(found.channels) == set(TRUE)
+    for name, one in found.channels.items():
+        # three standard errors, 2 % each; hum raises two bins of 49 and their neighbours, the median by 2 %
+        most = 3 * one.error[0] + 0.03 * (disturbed == "hum")
+        assert one.sd(256.0)[0] == pytest.approx(TRUE[name][0], rel=most), name
+        assert one.error[0] < 0.04 and not one.density[1:].any()
+
+
+def test_the_low_pass_of_a_recorder_is_found_by_its_corner_and_order():
+    found = noise_levels(campaign(1024.0, 120.0))
+    assert found.band is not None
+    assert found.band.high == pytest.approx(120.0, rel=0.03)  # bins are 2 Hz apart
+    assert found.band.order == pytest.approx(16, abs=4)
+    for name, one in found.channels.items():  # the density, which the filter leaves below its corner
+        assert one.sd(1024.0)[0] == pytest.approx(TRUE[name][0], rel=3 * one.error[0]), name
+
+
+def test_steps_of_a_converter_are_no_noise_of_the_sensor():
+    step = 4e-6
+    rounded = with_change(campaign(), "platen_displacement", lambda x: step * np.round(x / step))
+    one = noise_levels(rounded).channels["platen_displacement"]
+    extent = np.ptp([r["platen_displacement"].values for r in rounded])
+    assert one.step == pytest.approx(step) and one.bits == pytest.approx(np.log2(extent / step), abs=1)
+    assert one.sd(256.0)[0] == pytest.approx(3e-6, rel=3 * one.error[0])
+    assert one.quantum == pytest.approx(step**2 / 6 / 256)
+
+
+def test_offsets_are_means_at_rest():
+    shifted = with_change(campaign(), "platen_acceleration", lambda x: x + 0.1 * np.eye(6)[0])
+    one = noise_levels(shifted).channels["platen_acceleration"]
+    assert one.offset[0] == pytest.approx(0.1, abs=4 * 0.03 / np.sqrt(256 * 9))  # of the mean of nine seconds of noise
+
+
+def test_without_a_rest_the_least_flat_part_of_the_spectrum_stands_in():
+    moving = [r.isel(time=slice(4 * 256, 11 * 256)) for r in campaign()]
+    found = noise_levels(moving)
+    assert found.seconds == 0 and "without a rest" in found.source
+    sd = {name: one.sd(256.0)[0] / TRUE[name][0] for name, one in found.channels.items()}
+    for name in ("platen_displacement", "platen_acceleration"):
+        # the quietest of a tenth of the windows and the least of several bands: up to 20 % too little
+        assert sd[name] == pytest.approx(1, rel=0.25), name
+    assert sd["pressure_difference"] > 0.75  # an upper bound: friction that jumps has power at all frequencies
+
+
+def test_noise_that_motion_hides_is_not_guessed():
+    moving = [shaken(k).isel(time=slice(4 * 256, 11 * 256)) for k in range(4)]
+    with pytest.raises(RecordError, match="hide the noise of platen_displacement, platen_acceleration"):
+        measured_sensors(PLANT, moving)
+
+
+# Sensors files --------------------------------------------------------------------------------------------------------
+
+
+def test_a_sensors_file_holds_what_the_records_show_and_says_what_is_assumed(tests, tmp_path):
+    content = measured_sensors(PLANT, tests)
+    save_sensors(content, tmp_path / "own.toml")
+    read = load_sensors(tmp_path / "own.toml")
+    levels = noise_levels(tests)
+    for name, one in levels.channels.items():
+        f = np.array([10.0, 30.0])
+        # four figures, and a low-pass stated at half the rate: 1e-6 of the power at 30 of 128 Hz
+        assert read.noise_spectrum(name, f)[:, 0] == pytest.approx(one.density[0], rel=2e-3)
+    assert {key: q.evidence for key, q in content.items()} == {k: q.evidence for k, q in read.parameters.items()}
+    assert all(
+        q.evidence == "measured" and "test 0, test 1" in q.source for k, q in content.items() if k[:6] == "noise."
+    )
+    assert {q.evidence for k, q in content.items() if k.startswith(("gain_range", "delay_range"))} == {"assumed"}
+    assert read.offset_range["pressure_difference"] == 0.01 * TABLE.hydraulics.supply_pressure
+    assert len(list(tmp_path.iterdir())) == 1  # no half file beside it
+
+
+@pytest.mark.parametrize(
+    ("factor", "phrase"), [(2.0, "0.5 of what"), (0.5, "2 times what"), (0.0, "states none"), (1.0, "")]
+)
+def test_noise_is_compared_with_what_a_file_states(tests, factor, phrase):
+    stated = replace(sensors(256.0, 1e4), noise={**TRUE, "pressure_difference": factor * TRUE["pressure_difference"]})
+    found = {one.channel: one for one in compare_noise(noise_levels(tests), stated)}
+    one = found["pressure_difference"]
+    assert phrase in one.warning and bool(phrase) == bool(one.warning)
+    assert one.ratio == pytest.approx(1 / factor if factor else np.inf, rel=0.06)  # three standard errors
+    assert not found["platen_displacement[x]"].warning
+
+
+def test_sensors_of_another_machine_are_measured_unless_named(tests, caplog):
+    found = find_sensors(TABLE, tests)
+    assert found.noise["pressure_difference"][0] == pytest.approx(8e3, rel=0.06)
+    assert "s of rest in test 0" in caplog.text  # it says so
+    assert find_sensors(load_machine("lhpost6"), []).name == load_sensors().name
+    assert find_sensors(TABLE, tests, "lhpost6").name == load_sensors().name
+    silent = [shaken(0).assign_attrs(kind="simulated")]
+    with pytest.raises(RecordError, match=r"uniaxial names no sensors file.*without noise.*--sensors-out"):
+        find_sensors(TABLE, silent)
+
+
+def test_a_late_accelerometer_is_found_with_its_delay(tests):
+    tau = 0.009
+    late = with_change(tests, "platen_acceleration", lambda x: align(x, -tau, 1 / 256))
+    known = find_sensors(TABLE, late)
+    found = {f.quantity: f for f in check_sensors(PLANT, late, known) if f.channel == "platen_acceleration[x]"}
+    assert found["delay"].estimate == pytest.approx(tau, abs=1e-4) and found["delay"].verdict == "suspicious"
+    assert found["gain"].estimate == pytest.approx(1, abs=0.01) and found["gain"].verdict == "ok"
+    # magnitude alone: no wrong unit
+    assert not [
+        f for f in check_dataset(late[0], TABLE) if f.channel == "platen_acceleration[x]" and "times" in f.message
+    ]
+
+
+# Signs ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("column", [0, 3, 7])
+def test_a_force_with_its_sign_turned_is_found_and_no_other(column):
+    machine, record = load_machine(), load_record(PRACTICE)
+    assert turned_signs(record, machine) == []
+    signs = np.where(np.arange(10) == column, -1.0, 1.0)
+    (turned,) = with_change([record], "actuator_force", lambda x: x * signs)
+    moves = column < 4  # a test along x: the vertical actuators hold, and nothing can be said of them
+    expected = [f"actuator_force[{machine.actuator_names[column]}]"] * moves
+    assert [f.channel for f in turned_signs(turned, machine)] == expected
+
+
+def test_a_pressure_difference_with_its_sign_turned_is_an_error_with_the_remedy(tests):
+    assert turned_signs(tests[0], TABLE) == []
+    (turned,) = with_change(tests[:1], "pressure_difference", lambda x: -x)
+    errors = [f for f in check_dataset(turned, TABLE) if f.severity == "error"]
+    assert [f.channel for f in errors] == [f"pressure_difference[{TABLE.actuator_names[0]}]"]
+    assert "sign = -1" in errors[0].remedy
+
+
+def test_a_turned_accelerometer_is_not_taken_for_a_turned_pressure(tests):
+    (turned,) = with_change(tests[:1], "platen_acceleration", lambda x: -x)
+    assert turned_signs(turned, TABLE) == []
+    assert any("opposite signs" in f.message for f in check_dataset(turned, TABLE))
+
+
+# What sensors can tell ------------------------------------------------------------------------------------------------
+
+
+def told(present: set[str], derived: str = "") -> dict[str, str]:
+    return {one.quantity: one.verdict for one in observable(TABLE, present, derived)}
+
+
+def test_scales_are_told_by_a_force_and_ratios_by_pressures():
+    bare = {"platen_displacement", "valve_command"}
+    assert told(bare)["moving mass"] == told(bare)["valve gain and null"] == told(bare)["leakage"] == "no"
+    assert told(bare)["valve delay and lag"] == "ratio"
+    few = told({*bare, "pressure_difference"})
+    assert few["moving mass"] == few["friction law"] == few["leakage"] == few["specimen"] == "ratio"
+    assert told({*bare, "pressure_difference", "actuator_force"})["moving mass"] == "yes"
+    assert (
+        told({*bare, "chamber_pressure_a", "chamber_pressure_b", "actuator_force"}, "actuator_force")["moving mass"]
+        == "ratio"
+    )  # a force derived from pressures is no sensor
+    assert told({*bare, "floor_acceleration"})["specimen"] == "yes"
+    assert told({"spool_command", "spool_position"})["valve delay and lag"] == "yes"
+    assert "gas of the struts" not in told(bare) and "gas of the struts" in {
+        one.quantity for one in observable(load_machine(), bare)
+    }
+
+
+# The command ----------------------------------------------------------------------------------------------------------
+
+
+def test_check_writes_a_sensors_file_for_a_campaign(tests, lhpost6, tmp_path):
+    for record in tests:
+        save_record(record, tmp_path / "c" / f"{record.attrs['test']}.nc")
+    ended = lhpost6("check", "c", "--machine", "uniaxial", "--sensors-out", "own.toml")
+    assert ended.code == 0 and Path("own.toml").is_file()
+    for phrase in ("s of rest in test 0", "What these sensors can tell", "moving mass", "piston area"):
+        assert phrase in ended.words
+    assert refused(lhpost6("check", "c", "--machine", "uniaxial", "--sensors-out", "own.toml"), "exists", "own.toml")
+    compared = lhpost6("check", "c", "--machine", "uniaxial", "--sensors", "lhpost6")
+    assert "of what the sensors file states: an effect may pass for noise" in compared.words
+
+
+def test_without_rests_or_sensors_a_command_says_what_to_run(lhpost6, tmp_path):
+    moving = shaken(0).isel(time=slice(4 * 256, 11 * 256))
+    save_record(moving, tmp_path / "c" / "a.nc")
+    for command in ("calibrate", "discover", "validate"):
+        ended = lhpost6(command, "c", "--machine", "uniaxial")
+        assert refused(ended, "uniaxial names no sensors file", "lhpost6 check c --machine uniaxial --sensors-out")
+    assert refused(lhpost6("check", "c", "--machine", "uniaxial", "--sensors-out", "own.toml"), "not written", "rest")
+    assert not Path("own.toml").exists()

@@ -174,6 +174,7 @@ def test_a_sensors_file_holds_what_the_records_show_and_says_what_is_assumed(tes
         q.evidence == "measured" and "test 0, test 1" in q.source for k, q in content.items() if k[:6] == "noise."
     )
     assert {q.evidence for k, q in content.items() if k.startswith(("gain_range", "delay_range"))} == {"assumed"}
+    assert set(read.gain_range) == {"platen_acceleration"}  # the others' gains are scales of mass and friction
     assert read.offset_range["pressure_difference"] == 0.01 * TABLE.hydraulics.supply_pressure
     assert len(list(tmp_path.iterdir())) == 1  # no half file beside it
 

@@ -2,7 +2,8 @@
 
 Noise, low-pass, resolution and the offsets of motion are measured. Rests show no gain, no delay and no offset of what
 carries a load: their ranges are assumed (`models/procedures/rests.toml`) and say so, with the skew that redundant
-channels show.
+channels show. A gain has a range only where another channel measures the same: else it is the scale of what the channel
+tells, a mass or a friction, and no record separates the two.
 """
 
 import json
@@ -110,13 +111,14 @@ def measured_sensors(
         sd = one.sd(levels.rate).tolist() if six else float(np.sqrt(one.pooled() * levels.rate / 2))
         found[f"noise.{name}"] = _measured(sd, _unit(name), f"{levels.source}, {one.low:.3g} to {one.high:.3g} Hz")
     sensors = [name for name in levels.channels if LAYOUT[name].role != "command"]
+    skews = group_delays(plant, records)
     for name in sensors:
-        found[f"gain_range.{name}"] = numbers["assumed.gain"]
+        if (LAYOUT[name].group or name) in skews:
+            found[f"gain_range.{name}"] = numbers["assumed.gain"]
     for name in sensors:
         offset = _offset(plant.machine, levels.channels[name], levels.source, numbers)
         if offset is not None:
             found[f"offset_range.{name}"] = offset
-    skews = group_delays(plant, records)
     for group, members in sensor_groups().items():
         if set(members) & set(sensors):
             said, skew = numbers["assumed.delay"].source, skews.get(group)
@@ -139,6 +141,7 @@ def save_sensors(content: Parameters, path: Path) -> None:
     about = [
         "Sensors measured by their own records (lhpost6 check --sensors-out). SI; keys as in models/sensors.",
         "noise: standard deviation of white noise at that rate, before the low-pass, without the digital resolution.",
+        "No gain_range: nothing else measures what that channel does, and its gain is the scale of what it tells.",
         "Ranges are largest errors, either way: replace what is assumed there by what calibration sheets say.",
     ]
     with write_whole(path) as beside:

@@ -9,7 +9,18 @@ from .rates import GAS_PRESSURE, PA, PB, PULL, SUPPLY_PRESSURE, X
 from .simulate import RATE, Channels
 from .table import rotation
 
-__all__ = ["VARIABLES", "Fault", "Instruments", "draw_instruments", "floor_of", "observe", "truth"]
+__all__ = [
+    "VARIABLES",
+    "Fault",
+    "Instruments",
+    "coloured_noise",
+    "delayed",
+    "draw_instruments",
+    "floor_of",
+    "low_pass",
+    "observe",
+    "truth",
+]
 
 # variable: dimension beside time, units, long name
 VARIABLES = {
@@ -122,7 +133,7 @@ def observe(
         if delay := late[group_of(name)]:
             values = delayed(values, delay * RATE)
         if name not in COMPUTED:
-            values = values + _noise(values.shape, numbers, random) * np.array(numbers["noise"][name])
+            values = values + coloured_noise(values.shape, numbers, random) * np.array(numbers["noise"][name])
             values = low_pass(values, numbers)
         seen[name] = _sixteen_bits(values[:: round(RATE / numbers["rate"])], VARIABLES[name][0])
     return seen
@@ -149,7 +160,7 @@ def floor_of(name: str, numbers: dict) -> np.ndarray:
     return np.array(numbers["noise"][name]) * numbers["noise_left"]
 
 
-def _noise(shape: tuple[int, ...], numbers: dict, random: np.random.Generator) -> np.ndarray:
+def coloured_noise(shape: tuple[int, ...], numbers: dict, random: np.random.Generator) -> np.ndarray:
     """Noise of unit variance: mostly white, a share of it slower."""
     share, pole = numbers["colour_share"], np.exp(-2 * np.pi * numbers["colour_corner"] / RATE)
     slow = lfilter([np.sqrt(1 - pole**2)], [1, -pole], random.standard_normal(shape), axis=0)

@@ -32,6 +32,9 @@ from lhpost6_pin.machine.machine import load_machine
 TOGETHER = 10
 """Cases simulated side by side: more would gain little, and need more memory."""
 
+LAG = "spool_lag"
+"""In every valve here and in no machine file: one that cannot be told from the delay should be calibrated with it."""
+
 LEAST = 0.5
 """Share of effects found below which something is broken; a brief campaign shows less than a full one."""
 
@@ -55,6 +58,7 @@ def shares(pairs: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
         )
         groups.setdefault(f"a false name, {label['hides']}", []).append(false)
         groups.setdefault(f"a false name, {force}", []).append(false)
+        groups.setdefault(f"a false name but for {LAG}, {label['hides']}", []).append(bool(named - hidden - {LAG}))
         if hidden:
             groups.setdefault("found", []).append(hidden <= named)
             groups.setdefault(found, []).append(hidden <= named)

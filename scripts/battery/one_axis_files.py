@@ -175,7 +175,7 @@ def machine_text(case: Case) -> str:
     drive = [
         _row("area_a", s["area"], "m2", "drawing"),
         _row("area_b", s["area"], "m2", "drawing"),
-        _row("flow", s["flow"], "m3/s", "data sheet; over the flow curve, full command passes 1 % of it", sd["flow"]),
+        _row("flow", s["flow"], "m3/s", "data sheet; full command passes this times the flow curve", sd["flow"]),
         _row("flow_curve", numbers()["prior"]["flow_curve"], "1", "straight flow gain"),
         _row("leakage", s["leakage"], "m3/s/Pa", "data sheet", sd["leakage"]),
         _row("chamber_a", s["chamber_a"], "m", "stroke, ports and lines", sd["chamber"]),

@@ -15,7 +15,7 @@ right one, or a case got no verdict: `scripts/checks.py` runs it.
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from battery.one_axis_cases import Case, draw_cases, numbers
@@ -31,6 +31,9 @@ from lhpost6_pin.machine.machine import load_machine
 
 TOGETHER = 10
 """Cases simulated side by side: more would gain little, and need more memory."""
+
+FORCES = ("pressure_difference", "actuator_force", "chamber_pressure_a")
+"""Channels that measure the force, of which a set of sensors has one."""
 
 LAG = "spool_lag"
 """In every valve here and in no machine file: one that cannot be told from the delay should be calibrated with it."""
@@ -51,11 +54,7 @@ def shares(pairs: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
         named, hidden = set(families(answer)), set(families(label))
         false = bool(named - hidden)
         found = f"found, {label['hides']}"
-        force = next(
-            name
-            for name in ("pressure_difference", "actuator_force", "chamber_pressure_a")
-            if name in label["channels"]
-        )
+        force = next(name for name in FORCES if name in label["channels"])
         groups.setdefault(f"a false name, {label['hides']}", []).append(false)
         groups.setdefault(f"a false name, {force}", []).append(false)
         groups.setdefault(f"a false name but for {LAG}, {label['hides']}", []).append(bool(named - hidden - {LAG}))
@@ -66,8 +65,9 @@ def shares(pairs: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
     return {name: Share(sum(hits), len(hits)) for name, hits in sorted(groups.items())}
 
 
-def rows(_: Sequence[str], pairs: Sequence[tuple[Label, Answer]]) -> list[str]:
-    """The shares as rows of the table of scores."""
+def rows(labels: Mapping[str, Label], answered: Mapping[str, tuple[Label, Answer]]) -> list[str]:
+    """The shares of all cases as rows of the table of scores; a case without a verdict found nothing."""
+    pairs = [answered.get(name, (label, {"effects": []})) for name, label in labels.items()]
     return [f"| {name} | {share.text} |" for name, share in shares(pairs).items()]
 
 
@@ -101,7 +101,7 @@ def main() -> None:
         print(f"searched {done} of {len(cases)}", flush=True)
     labels = unseal(folder)
     answered = answers(folder, labels)
-    text = report(folder, labels, answered, rows)
+    text = report(folder, labels, answered, lambda *_: rows(labels, answered))
     with write_whole(folder / "scores.md") as beside:
         beside.write_text(text, encoding="utf-8")
     print(text)

@@ -255,11 +255,14 @@ def test_sensors_err_as_stated():
 
 def test_a_test_that_would_cavitate_is_made_smaller():
     case = one_axis_cases.draw_case("null", 33, "brief")
-    wild = {name: 2.5 * motion for name, motion in case.references.items()}
+    wild = {"WN": 5.0 * case.references["WN"], "TRI": case.references["TRI"]}
     (tamed,), runs = one_axis_files.run_cases([replace(case, references=wild)])
-    for name, motion in tamed.references.items():
-        assert np.abs(motion).max() < np.abs(wild[name]).max()
-        assert runs[case.id, name].y[:, (PA, PB)].min() > one_axis_cases.numbers()["limit"]["least_pressure"]
+    shrunk = np.abs(tamed.references["WN"]).max() / np.abs(wild["WN"]).max()
+    steps = math.log(shrunk) / math.log(one_axis_cases.numbers()["limit"]["shrink"])
+    assert 0.5 < steps == pytest.approx(round(steps))
+    assert tamed.references["TRI"] is wild["TRI"]
+    for run in runs.values():
+        assert run.y[:, (PA, PB)].min() > one_axis_cases.numbers()["limit"]["least_pressure"]
 
 
 def test_scores_tell_what_was_found_from_what_was_named_wrongly():

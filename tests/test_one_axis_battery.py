@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from battery import one_axis, one_axis_cases, one_axis_files, scoring
+from battery import one_axis, one_axis_cases, one_axis_files, reporting, scoring
 from battery.one_axis import PA, PB, SPOOL, Table, V, X, at_rest, march, rates
 from battery.simulate import RATE
 from scipy.integrate import cumulative_simpson
@@ -289,3 +289,21 @@ def test_scores_tell_what_was_found_from_what_was_named_wrongly():
     assert found["found, stribeck"] == (1, 1)
     assert found["found, null_bias"] == (0, 1)
     assert rates(PLAIN, at_rest(PLAIN, 1), np.zeros(1))[SPOOL] == 0.0
+
+
+def test_a_check_of_a_battery_says_what_is_wrong():
+    def case(sort: str, *hidden: str) -> dict:
+        effects = [{"family": name, "components": [], "gap": 9.0, "offset": 0.0} for name in hidden]
+        return {"sort": sort, "accept": [], "effects": effects, "decoys": []}
+
+    def answer(*names: str) -> dict:
+        return {"verdict": "named", "effects": [{"family": n, "components": []} for n in names], "closure": {}}
+
+    labels = {"a": case("null"), "b": case("one", "stribeck_friction")}
+    right = {"a": (labels["a"], answer()), "b": (labels["b"], answer("stribeck_friction"))}
+    assert reporting.wrong(labels, right, "family first", 0.5) == ""
+    assert "no verdict on b" in reporting.wrong(labels, {"a": right["a"]}, "family first", 0.5)
+    false = {**right, "a": (labels["a"], answer("backlash"))}
+    assert "lack nothing" in reporting.wrong(labels, false, "family first", 0.5)
+    missed = {**right, "b": (labels["b"], answer())}
+    assert "too few right names" in reporting.wrong(labels, missed, "family first", 0.5)

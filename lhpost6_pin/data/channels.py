@@ -97,6 +97,7 @@ LAYOUT: Mapping[str, Channel] = {
         needed_by=_INVERSE,
         residuals=("wrench", "force"),
         fault="pressure_sensor_error",
+        differentiated=True,
     ),
     "chamber_pressure_a": Channel(**_CHAMBER, dims=_ACTUATOR, long_name="pressure in chamber A"),
     "chamber_pressure_b": Channel(**_CHAMBER, dims=("time", "horizontal"), long_name="pressure in chamber B"),
@@ -178,7 +179,9 @@ def residuals_of(name: str, present: Collection[str]) -> tuple[str, ...]:
     """Kinds of residuals that a channel (or a group of channels) enters in a test that has those `present`."""
     channel = LAYOUT.get(name) or LAYOUT[sensor_groups()[name][0]]
     stands_in = bool(channel.replaces) and channel.replaces not in present
-    return ("wrench", *channel.residuals) if stands_in else channel.residuals
+    oil = {other for other, one in LAYOUT.items() if one.replaces == name}
+    alone = bool(oil) and not oil & set(present)  # a force that pressures are computed from
+    return (*("wrench",) * stands_in, *channel.residuals, *("flow",) * alone)
 
 
 def columns_of(variable: xr.DataArray) -> Array:

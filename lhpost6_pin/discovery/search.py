@@ -141,15 +141,24 @@ def _leading(found: Search) -> Scored | None:
     best.sort(key=lambda one: -one.score.held_out.sum())
     if not best or not best[0].refused:
         return None
-    first, second = best[0], best[1].score.held_out.sum() if len(best) > 1 else 0.0
-    least = max(n("accept.lead") * gate(first.candidate.family, found.numbers), n("accept.ahead") * second)
+    first, family = best[0], best[0].candidate.family
+    others = [o for o in best[1:] if o.candidate.family.named not in family.confused_with]
+    second = others[0].score.held_out.sum() if others else 0.0
+    least = max(n("accept.lead") * gate(family, found.numbers), n("accept.ahead") * second)
     return first if first.score.held_out.sum() > least else None
 
 
 def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | None:
-    """The search with a leading candidate, if its joint fit explains enough of the residual beyond noise."""
-    more = _best_of(found, [one], progress)
-    closes = more is not None and share_explained(found, more) >= found.numbers.number("accept.closure")
+    """The search with a leading candidate, if its joint fit explains enough of the residual beyond noise.
+
+    Or gains far more than its threshold: held-out tests then decide (`balances.unproven_effects`).
+    """
+    n = found.numbers.number
+    more = _best_of(found, [one, *_in_its_place(found, one)], progress)
+    if more is None:
+        return None
+    far = n("accept.lead") * gate(one.candidate.family, found.numbers)
+    closes = share_explained(found, more) >= n("accept.closure") or found.objective - more.objective >= far
     return more if closes else None
 
 

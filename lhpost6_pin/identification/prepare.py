@@ -31,8 +31,8 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
-__all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable", "prepare_test"]
-__all__ += ["source_of"]
+__all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable", "equal_areas"]
+__all__ += ["prepare_test", "source_of"]
 
 
 class Policy(NamedTuple):
@@ -47,6 +47,9 @@ class Policy(NamedTuple):
     band: Band | None = None  # of a motion without accelerometers; by default the sensors' own
     pressure_cutoff: float | None = None  # up to which pressures are differentiated [Hz]; None: they are not
 
+
+EQUAL_AREAS = 0.01
+"""Relative difference of a piston's areas up to which its rod counts as double."""
 
 AS_RECORDED = Policy(align=False)
 EACH_TEST = Policy(align=True)
@@ -81,19 +84,29 @@ class MeasuredTest:
         return replace(self, channels={name: x for name, x in merged.items() if x is not None})
 
 
-def chamber_pressures(machine: Machine | None, channels: Mapping[str, Array]) -> Array | None:
+def chamber_pressures(machine: Machine, channels: Mapping[str, Array], *, rates: bool = False) -> Array | None:
     """Chamber pressures (n, n_chambers) [Pa], A of every actuator, then B of the double-acting; None if not measured.
 
-    Where only the pressure difference is measured, both add up to supply and return pressure, as a valve whose ports
-    match the piston's areas makes them (Merritt 1967, Section 5.2). Without a machine channels are rates [Pa/s].
+    Where only the pressure difference is measured, or the force of a piston of equal areas, both add up to supply and
+    return pressure, as a valve whose ports match the piston's areas makes them (Merritt 1967, Section 5.2). With
+    `rates` the channels are rates [Pa/s].
     """
     sides = [channels[name] for name in ("chamber_pressure_a", "chamber_pressure_b") if name in channels]
     if "chamber_pressure_a" in channels:
         return np.hstack(sides)
-    half, level = 0.5 * channels.get("pressure_difference", np.zeros((0, 0))), 0.0
-    if machine is not None:
-        level = 0.5 * (machine.hydraulics.supply_pressure + machine.hydraulics.return_pressure)
-    return np.hstack([level + half, level - half]) if "pressure_difference" in channels else None
+    difference, force = channels.get("pressure_difference"), channels.get("actuator_force")
+    if difference is None and force is not None and equal_areas(machine):
+        difference = force / [a.area_a for a in machine.actuators]
+    if difference is None:
+        return None
+    level = 0.5 * (machine.hydraulics.supply_pressure + machine.hydraulics.return_pressure) * (not rates)
+    return np.hstack([level + 0.5 * difference, level - 0.5 * difference])
+
+
+def equal_areas(machine: Machine) -> bool:
+    """Whether every piston has the same area on both sides: its force is that of the pressure difference."""
+    areas = [(a.area_a, a.area_b) for a in machine.actuators]
+    return all(b is not None and abs(b / a - 1.0) <= EQUAL_AREAS for a, b in areas)
 
 
 def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
@@ -104,7 +117,8 @@ def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | 
 
 def oil_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
     """P_A A_1 - P_B A_2 (n, n_actuators) [N] of the measured pressures (Eq. 4-6); None where some are missing."""
-    pressure, count = chamber_pressures(machine, channels), len(machine.actuators)
+    measured = {name: x for name, x in channels.items() if name != "actuator_force"}
+    pressure, count = chamber_pressures(machine, measured), len(machine.actuators)
     if pressure is None or pressure.shape[1] < count + len(machine.double_acting):
         return None
     return oil_force(machine, pressure[:, :count], pressure[:, count:])

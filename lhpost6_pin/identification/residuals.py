@@ -2,7 +2,8 @@
 
     wrench   required less measured actuator wrench on the platen at C in {c} [N, N m]      (Eqs. 4-24 to 4-26)
     flow     L A / beta dP/dt + A dL/dt - Q, per chamber [m3/s]                              (Eqs. 4-2 to 4-5)
-             or half the difference of both chambers' per actuator, of which only the pressure difference is measured
+             or half the difference of both chambers' per actuator, of which only the pressure difference is measured,
+             or the force of a piston of equal areas
     gas      ln P/P_0 + n ln(1 + dL/L_c0), per strut [1]                                     (Eq. 4-7)
     force    measured actuator force less P_A A_1 - P_B A_2 [N]                              (Eq. 4-6)
     servo    measured spool position less its command, delayed by the valve [1]              (Section 4.1.2)
@@ -159,7 +160,8 @@ def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...])
     """Residuals `flow` and `supply`."""
     n, none = test.samples, np.zeros((test.samples, 0))
     supply = test.channels.get("supply_pressure") if "supply" in only else None
-    pressure, rate = chamber_pressures(plant.machine, test.channels), chamber_pressures(None, test.rates)
+    pressure = chamber_pressures(plant.machine, test.channels)
+    rate = chamber_pressures(plant.machine, test.rates, rates=True)
     spool = _spools(plant, test)
     if pressure is None or rate is None or spool is None or ("flow" not in only and supply is None):
         return none, none

@@ -13,14 +13,11 @@ from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
-from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
+from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, equal_areas, prepare_test
 from .problem import KINDS, Problem, ResidualBands
 from .whitened_residuals import spectrum_of
 
 __all__ = ["policy_of", "prepare_problem"]
-
-EQUAL_AREAS = 0.01
-"""Relative difference of a piston's areas up to which its rod counts as double."""
 
 
 def prepare_problem(
@@ -104,10 +101,9 @@ def _refuse_channels(test: str, record: xr.Dataset, machine: Machine) -> None:
         what = "neither actuator_force nor chamber_pressure_a nor pressure_difference"
         raise RecordError(f"{test}: has {what}; give at least one of them")
     if "pressure_difference" in record and "chamber_pressure_a" not in record:
-        for actuator in machine.actuators:
-            if actuator.area_b is None or abs(actuator.area_b / actuator.area_a - 1.0) > EQUAL_AREAS:
-                why = f"of {actuator.name}, whose areas differ, does not determine its force"
-                raise RecordError(f"{test}: pressure_difference {why}; give both chamber pressures")
+        if not equal_areas(machine):
+            why = "of pistons whose areas differ does not determine their force"
+            raise RecordError(f"{test}: pressure_difference {why}; give both chamber pressures")
     if machine.double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):
         raise RecordError(f"{test}: has pressures of one side only; give chamber_pressure_a and chamber_pressure_b")
     if "strut_pressure" in record:

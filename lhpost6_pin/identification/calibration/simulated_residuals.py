@@ -19,7 +19,7 @@ from ...machine.parameters import Parameters
 from ...mechanics.plant import Plant, State
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, simulate
-from ..prepare import MeasuredTest, chamber_pressures
+from ..prepare import MeasuredTest
 from .normal_equations import squares
 from .problem import Problem
 from .result import Subset
@@ -119,9 +119,8 @@ def _noisier(drive: _RecordedTest, test: MeasuredTest, other: MeasuredTest) -> _
 
 
 def _measured(test: MeasuredTest) -> Array:
-    pressure = chamber_pressures(None, test.channels)
-    assert pressure is not None
-    return np.hstack([test.motion.velocity, pressure])
+    sides = (f"chamber_pressure_{side}" for side in "ab")
+    return np.hstack([test.motion.velocity, *(test.channels[name] for name in sides if name in test.channels)])
 
 
 def _outputs(plant: Plant, drive: _RecordedTest) -> Array | None:

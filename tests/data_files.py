@@ -14,6 +14,7 @@ LABELS = {
     "actuator": ("H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"),
     "horizontal": ("H1", "H2", "H3", "H4"),
     "strut": ("S1", "S2", "S3"),
+    "floor": ["1F", "RF"],
 }
 
 

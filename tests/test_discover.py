@@ -14,6 +14,7 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ParameterError, RecordError, UnknownNameError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, save_campaign
+from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
@@ -26,7 +27,7 @@ from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import _by_rank, score_pairs
-from lhpost6_pin.discovery.search import _fit_jointly, _pruned, _without
+from lhpost6_pin.discovery.search import _fit_jointly, _pruned, without_effect
 from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
 from lhpost6_pin.discovery.verdict import reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
@@ -324,7 +325,7 @@ def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_
 
 
 def test_friction_of_another_form_is_noise_and_a_background(machine):
-    whole, parameters = with_background(machine, 1.5)
+    whole, parameters = with_background(machine, 1.5, LAYOUT)
     assert [k.value for k in parameters] == [0.0] * len(parameters)
     assert {e.family for e in whole.added_effects} == {f.name for f in families().values() if f.search == "background"}
     other = with_other_form(machine, 0.7)
@@ -415,7 +416,7 @@ def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
     # the same place but for the last step of a search that ends where little is gained
     assert abs(left.objective - search.objective) < 3.0
     alone = replace(search, added=(search.added[0], replace(search.added[0], candidate=helper.candidate)))
-    assert _without(alone, search.added[0].candidate).added == (alone.added[1],)
+    assert without_effect(alone, search.added[0].candidate).added == (alone.added[1],)
 
 
 def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_noise(found):

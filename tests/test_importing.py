@@ -678,9 +678,9 @@ def test_a_typical_channel_list_is_guessed_right(tmp_path):
         ("Actuator H2 stroke", "mm", "actuator_displacement[H2]"),
         ("H1 Press", "psi", None),  # of which chamber?
         ("Long Displ fbk", "g", None),  # the unit says otherwise
-        ("H1 Delta P", "psi", None),
+        ("H1 Delta P", "psi", "pressure_difference[H1]"),
         ("Humidity", "%", None),
-        ("Acc 1F x", "g", None),  # of the specimen
+        ("Acc 1F x", "g", "floor_acceleration[1F]"),
         ("Roof accel Y (g)", "g", None),
         ("F1", "kN", None),  # not floor 1, and of which actuator?
         ("Long dis cmd", "mm", "reference_displacement[x]"),
@@ -781,7 +781,9 @@ def test_a_map_is_written_even_where_no_column_is_recognised_and_says_what_they_
     save_map(channels, tmp_path / "map.toml", remarks)
     text = (tmp_path / "map.toml").read_text()
     assert '# "CHANNEL" = { column = "CH 2  x", unit = "bar" }  # not recognised: column 2' in text
-    assert "by its unit: chamber_pressure_a[A1], chamber_pressure_b[A1], supply_pressure" in text
+    assert (
+        "by its unit: chamber_pressure_a[A1], chamber_pressure_b[A1], supply_pressure, pressure_difference[A1]" in text
+    )
     assert "CHANNEL is one of: platen_displacement[x], platen_velocity[x]" in text
     with pytest.raises(RecordError, match="names no channel; write one, or complete the lines that --guess put there"):
         load_map(tmp_path / "map.toml")

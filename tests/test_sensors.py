@@ -39,7 +39,8 @@ def still(rate: float, duration: float = 40.0, moves: float | None = None) -> xr
 
 def test_every_noise_has_a_channel_a_unit_and_a_source():
     assert set(SENSORS.noise) <= set(LAYOUT)
-    assert set(SENSORS.delay_range) == set(sensor_groups())
+    few = {"pressure_difference", "floor_acceleration"}  # sensors that the LHPOST6 does not have
+    assert set(SENSORS.delay_range) == set(sensor_groups()) - few
     assert all(q.source and q.evidence for q in SENSORS.parameters.values())
 
 

@@ -101,14 +101,6 @@ LAYOUT: Mapping[str, Channel] = {
     ),
     "chamber_pressure_a": Channel(**_CHAMBER, dims=_ACTUATOR, long_name="pressure in chamber A"),
     "chamber_pressure_b": Channel(**_CHAMBER, dims=("time", "horizontal"), long_name="pressure in chamber B"),
-    "pressure_difference": Channel(
-        **_PRESSURE,
-        dims=("time", "horizontal"),
-        long_name="pressure in chamber A minus that in chamber B",
-        residuals=("flow",),
-        replaces="actuator_force",
-        differentiated=True,
-    ),
     "strut_pressure": Channel(
         **_PRESSURE,
         dims=("time", "strut"),
@@ -133,6 +125,20 @@ LAYOUT: Mapping[str, Channel] = {
         fault="spool_null_bias",
         held=True,
     ),
+    "supply_pressure": Channel(
+        **_PRESSURE, dims=("time",), long_name="supply pressure", errors=("gain", "offset"), residuals=("supply",)
+    ),
+    "reference_displacement": Channel(
+        dims=_AXIS, units="m, rad", long_name="displacement the test asked for", role="command", errors=()
+    ),
+    "pressure_difference": Channel(
+        **_PRESSURE,
+        dims=("time", "horizontal"),
+        long_name="pressure in chamber A minus that in chamber B",
+        residuals=("flow",),
+        replaces="actuator_force",
+        differentiated=True,
+    ),
     "valve_command": Channel(
         dims=_ACTUATOR,
         units="1",
@@ -147,12 +153,6 @@ LAYOUT: Mapping[str, Channel] = {
         long_name="absolute acceleration of a specimen's floor along its direction",
         residuals=("wrench",),
         fault="accelerometer_error",
-    ),
-    "supply_pressure": Channel(
-        **_PRESSURE, dims=("time",), long_name="supply pressure", errors=("gain", "offset"), residuals=("supply",)
-    ),
-    "reference_displacement": Channel(
-        dims=_AXIS, units="m, rad", long_name="displacement the test asked for", role="command", errors=()
     ),
 }
 

@@ -129,7 +129,7 @@ def evaluate_residuals(
     wrench = gas = by_cell = servo = np.zeros((test.samples, 0))
     if "wrench" in only and force is not None:
         z = with_loads(plant, path.ports, path.required, path.z, force)
-        wrench = wrench_residual(plant, path.ports, path.required, z, force)
+        wrench = wrench_residual(plant, path.ports, path.required, z, force) + _floor_wrench(plant, test)
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
         gas = np.log(measured["strut_pressure"] / strut_pressures(machine, length) / gas_ratio(plant, path.z))
@@ -154,6 +154,20 @@ def _spools(plant: Plant, test: MeasuredTest) -> Array | None:
     """Spool positions (n, n_actuators): measured, else those that the valves' commands give; None without either."""
     spool, command = test.channels.get("spool_position"), test.channels.get("valve_command")
     return due_spools(plant, command, test.dt) if spool is None and command is not None else spool
+
+
+def _floor_wrench(plant: Plant, test: MeasuredTest) -> Array:
+    """Wrench (n, 6) at C [N, N m] that moves the floors of a specimen: their masses times measured accelerations.
+
+    Axes of {c}: the platen turns by little. Zero without measured floors.
+    """
+    out, accelerations = np.zeros((test.samples, 6)), test.channels.get("floor_acceleration")
+    for k, floor in enumerate(plant.machine.floors if accelerations is not None else ()):
+        assert accelerations is not None
+        along = np.eye(3)["xyz".index(floor.along)]
+        moved = np.concatenate([along, np.cross(floor.point, along)])
+        out += floor.mass * accelerations[:, k, None] * np.where(np.isin(range(6), plant.axes), moved, 0.0)
+    return out
 
 
 def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from .schema import quantity_field
 
-__all__ = ["Actuator", "Hydraulics", "Limits", "Platen", "Strut", "Vec3"]
+__all__ = ["Actuator", "Floor", "Hydraulics", "Limits", "Platen", "Strut", "Vec3"]
 
 Vec3 = tuple[float, float, float]
 
@@ -96,6 +96,19 @@ class Strut:
     seal_shape: float = quantity_field("1", bound="fraction")
     mass_along: float = quantity_field("kg", bound="nonnegative")
     mass_across: float = quantity_field("kg", bound="nonnegative")
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A floor of a specimen whose acceleration is measured: its mass times that is its share of the base shear.
+
+    `along` is the platen axis, x, y or z, of its accelerometer; point is where its mass is, in platen axes from C.
+    """
+
+    name: str
+    along: str
+    mass: float = quantity_field("kg", bound="positive")
+    point: Vec3 = quantity_field("m", length=3)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ..core.errors import ParameterError, RecordError, UnknownNameError, instead
 from ..core.names import AXES
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
-from .components import Actuator, Hydraulics, Limits, Platen, Strut, Vec3
+from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
 from .library import effect_entry, make_named_effect
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
 from .schema import build_section
@@ -154,7 +154,8 @@ def build_machine(
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}
-    _check_names(parameters, components, kinds)
+    floors = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".along")]
+    _check_names(parameters, components, kinds, floors)
     actuators, struts = [], []
     for name in components:
         kind = str(words[f"{name}.kind"])
@@ -185,6 +186,10 @@ def build_machine(
         hydraulics=build_section(Hydraulics, parameters, ("hydraulics",)),
         actuators=tuple(actuators),
         struts=tuple(struts),
+        floors=tuple(
+            build_section(Floor, parameters, (name,), name=name, along=_word(parameters, f"{name}.along", tuple("xyz")))
+            for name in floors
+        ),
         limits=build_section(Limits, parameters, ("limits",)),
         parameters=parameters,
         own_effects=added_effects,
@@ -220,7 +225,7 @@ _COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
 """Sections of numbers to compare with; their keys are free."""
 
 
-def _check_names(parameters: Parameters, components: list[str], kinds: set[str]) -> None:
+def _check_names(parameters: Parameters, components: list[str], kinds: set[str], floors: list[str]) -> None:
     """Refuse keys that nothing reads: a misspelt key must not be silently ignored."""
     both = {f.name for f in (*fields(Actuator), *fields(Strut)) if f.metadata}
     known = {
@@ -230,6 +235,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str])
         "machine": {"name", "title", "motion", "thrust", "controller", "sensors"},
         **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
         **{name: both | {"kind", "valves"} for name in components},
+        **{name: {f.name for f in fields(Floor)} for name in floors},
     }
     for path in (*parameters, *parameters.words):
         section, _, key = path.partition(".")

@@ -27,7 +27,7 @@ __all__ = [
     "unusable",
 ]
 
-_GROUPS = ("kind", "component", "estimates")
+_GROUPS = ("kind", "component", "floor", "estimates")
 """Sections that hold named sub-sections; the sub-section's name is the path's first part."""
 
 
@@ -236,7 +236,7 @@ def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping
         for sub, inner in table.items():
             if not isinstance(inner, dict):
                 raise ParameterError(f"{file}: {name}.{sub} must be a section [{name}.{sub}]")
-            if not sub.isidentifier():
+            if not sub.replace("_", "").isalnum():
                 raise ParameterError(f"{file}: {name}.{sub}: use letters, digits and underscores for a name")
             yield (f"{name}.{sub}" if name == "estimates" else sub), inner
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ..core.names import AXES
-from .components import Actuator, Hydraulics, Limits, Platen, Strut
+from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
 __all__ = ["MOTIONS", "Structure"]
@@ -25,6 +25,7 @@ class Structure:
     hydraulics: Hydraulics
     actuators: tuple[Actuator, ...]
     struts: tuple[Strut, ...]
+    floors: tuple[Floor, ...]
     limits: Limits
     parameters: Parameters
 
@@ -61,4 +62,5 @@ class Structure:
     @property
     def labels(self) -> dict[str, tuple[str, ...]]:
         """Names along the dimensions of its records."""
-        return {"actuator": self.actuator_names, "horizontal": self.double_acting, "strut": self.strut_names}
+        floors = {"floor": tuple(f.name for f in self.floors)} if self.floors else {}
+        return {"actuator": self.actuator_names, "horizontal": self.double_acting, "strut": self.strut_names, **floors}

@@ -97,7 +97,7 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
     Numbers that a component overrides and other geometry are fixed. A chamber is no shorter than the measured `travel`
     [m] of its kind either way; without that, than its stroke.
     """
-    sections = {"platen", "hydraulics", *(c.kind for c in machine.components)}
+    sections = {"platen", "hydraulics", *(c.kind for c in machine.components), *(f.name for f in machine.floors)}
     found: list[FreeParameter] = []
     for path, quantity in machine.parameters.items():
         section, _, name = path.partition(".")

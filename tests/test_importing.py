@@ -681,7 +681,7 @@ def test_a_typical_channel_list_is_guessed_right(tmp_path):
         ("H1 Delta P", "psi", "pressure_difference[H1]"),
         ("Humidity", "%", None),
         ("Acc 1F x", "g", "floor_acceleration[1F]"),
-        ("Roof accel Y (g)", "g", None),
+        ("Roof accel Y (g)", "g", "floor_acceleration[RF]"),
         ("F1", "kN", None),  # not floor 1, and of which actuator?
         ("Long dis cmd", "mm", "reference_displacement[x]"),
         ("AccX", "g", "platen_acceleration[x]"),

@@ -4,6 +4,7 @@ Only redundant channels are compared (`consistency`): velocity and acceleration 
 the pose, the skew of forces against pressures. Gains and offsets of forces and pressures are left to the search.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from ..data.alignment import align_record, group_delays
 from ..data.channels import LAYOUT
 from ..data.consistency import ConsistencyFinding, check_sensors
 from ..data.sensors import SensorSet
+from ..data.turned_signs import turned_signs
 from ..mechanics.plant import Plant
 
 __all__ = ["SensorFault", "correct_records", "find_sensor_faults"]
@@ -30,7 +32,7 @@ LONG = 1e-3
 class SensorFault:
     """A sensor beyond its stated range: measured = (1 + gain) true + cross-talk + offset, delayed."""
 
-    kind: str  # "gain", "offset", "drift", "delay", or "cross x": of the acceleration along x
+    kind: str  # "gain", "offset", "drift", "delay", "sign", or "cross x": of the acceleration along x
     channel: str
     column: str  # label within the channel; empty: all of it
     value: float
@@ -52,7 +54,7 @@ class SensorFault:
 def find_sensor_faults(
     plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, loose: Sequence[str] = ()
 ) -> tuple[SensorFault, ...]:
-    """Faults of redundant sensors, pooled over records; raises what `check_sensors` does.
+    """Faults of redundant sensors, pooled over records, and turned signs; raises what `check_sensors` does.
 
     Play of actuators that are `loose` shifts the means of their lengths, which are not reported.
     """
@@ -67,7 +69,14 @@ def find_sensor_faults(
     shifted = {f"actuator_displacement[{name}]" for name in loose}
     wrong = [f for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
     faults = [_fault(f, sensors) for f in wrong if f.quantity != "offset" or f.channel not in shifted]
-    return (*(f for f in faults if f is not None), *late)
+    return (*(f for f in faults if f is not None), *late, *_turned(plant, records))
+
+
+def _turned(plant: Plant, records: Sequence[xr.Dataset]) -> list[SensorFault]:
+    """Forces and pressure differences that oppose the motion they cause in most of the records."""
+    count = Counter(f.channel for record in records for f in turned_signs(record, plant.machine))
+    turned = [channel.rstrip("]").partition("[") for channel, n in count.items() if 2 * n > len(records)]
+    return [SensorFault("sign", name, label, -1.0, "1", 0.0, 0.0) for name, _, label in turned]
 
 
 def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | None:
@@ -96,11 +105,18 @@ def _late(findings: Sequence[ConsistencyFinding], sensors: SensorSet) -> list[Se
 
 
 def correct_records(records: Sequence[xr.Dataset], faults: Sequence[SensorFault]) -> list[xr.Dataset]:
-    """Records without the gains and cross-talk of these faults of the platen's sensors; delays are aligned later."""
+    """Records without the gains and cross-talk of these faults of the platen's sensors, and with signs turned back.
+
+    Delays are aligned later.
+    """
     corrected = []
     for record in records:
         out = record.copy(deep=True) if faults else record
         for fault in faults:
+            if fault.kind == "sign" and fault.channel in out:
+                variable = out[fault.channel]
+                variable.loc[{variable.dims[1]: fault.column}] *= -1.0
+                continue
             if fault.kind == "delay" or fault.channel not in out or not fault.channel.startswith("platen"):
                 continue
             values, k = out[fault.channel].values, AXES.index(fault.column)

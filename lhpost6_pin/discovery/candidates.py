@@ -118,11 +118,8 @@ def with_background(
     already is not added again.
     """
     parameters: list[FreeParameter] = []
-    stated = {effect.name for effect in machine.added_effects}
     lacking = {family.name for family in families().values() if family.background_without not in {"", *channels}}
     for one in _of_background(machine, lacking):
-        if one.name in stated:
-            continue
         absent = tuple(0.0 for _ in one.amplitudes)
         machine = one.on(machine, absent)
         parameters += one.parameters(absent, spread)
@@ -145,14 +142,16 @@ def with_warm_oil(machine: Machine, share: float) -> Machine:
 def _of_background(machine: Machine, lacking: Collection[str] = ()) -> list["Candidate"]:
     """Effects of the library's background, on all components of each kind that have what they modify.
 
-    `lacking` are further families, for want of a channel.
+    `lacking` are further families, for want of a channel. What the machine has already is left out.
     """
-    found = []
+    found, there = [], {effect.name for effect in machine.added_effects}
     for family in scaled_families(machine).values():
         names = family.components(machine) if family.search == "background" or family.name in lacking else ()
         for kind in dict.fromkeys(c.kind for c in machine.components):
             members = tuple(c.name for c in machine.components if c.kind == kind and c.name in names)
             one = Candidate(family, members, first_shape(family))
+            if one.name in there:
+                continue
             typical = tuple(s.typical for s in one.amplitudes)
             if members and any(numbers[0] for numbers in one.on(machine, typical).added_effects[-1].params):
                 found.append(one)

@@ -1,0 +1,205 @@
+"""Tables with few sensors: what replaces chamber pressures, spools and specimens, and what may not explain itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machine_cases import machine_named
+from run_cases import measured_of, shaken
+
+from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.data.channels import LAYOUT, residuals_of
+from lhpost6_pin.discovery.balances import gain_on
+from lhpost6_pin.discovery.candidates import list_candidates, with_background
+from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
+from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
+from lhpost6_pin.identification.friction_march import made_fine
+from lhpost6_pin.identification.prepare import MeasuredTest, chamber_pressures
+from lhpost6_pin.identification.residuals import evaluate_residuals, follow
+from lhpost6_pin.machine.library import families, scaled_families
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import PlatenMotion
+
+
+@pytest.fixture(scope="module")
+def table() -> Machine:
+    """One axis, a piston of equal areas."""
+    return machine_named("uniaxial")
+
+
+@pytest.fixture(scope="module")
+def test(table) -> MeasuredTest:
+    """It, shaken, with all that a simulation knows."""
+    return measured_of(shaken(table, samples=600))
+
+
+def few(test: MeasuredTest, machine: Machine) -> MeasuredTest:
+    """The same with the pressure difference alone."""
+    channels, rates = dict(test.channels), dict(test.rates)
+    for own in (channels, rates):
+        a, b = (own.pop(f"chamber_pressure_{side}") for side in "ab")
+        own["pressure_difference"] = a - b
+        own.pop("actuator_force", None)
+    return replace(test, channels=channels, rates=rates)
+
+
+# ------------------------------------------------------------------------------------------- pressures and flow
+def test_a_pressure_difference_gives_the_flow_that_both_chambers_give_together(table, test):
+    """Half the difference of the chambers' balances; their sum of pressures is that of a matched valve, nearly."""
+    plant = make_plant(table)
+    both = evaluate_residuals(plant, test, ("flow",)).flow
+    alone = evaluate_residuals(plant, few(test, table), ("flow",)).flow
+    scale = table.actuators[0].area_a * np.abs(test.motion.velocity[:, 0]).max()
+    assert alone.shape == (len(both), 1)
+    # both chambers have the same oil and nearly the same volume: what is left is the change of mean pressure
+    np.testing.assert_allclose(alone[:, 0], 0.5 * (both[:, 0] - both[:, 1]), atol=2e-2 * scale)
+
+
+def test_a_force_on_equal_areas_is_a_pressure_difference_and_on_others_none(table, test):
+    force = {"actuator_force": np.full((3, 1), 600.0)}
+    pressure = chamber_pressures(table, force)
+    assert pressure is not None
+    np.testing.assert_allclose(pressure[:, 0] - pressure[:, 1], 600.0 / table.actuators[0].area_a)
+    assert chamber_pressures(load_machine(), {"actuator_force": np.zeros((3, 10))}) is None
+    assert "flow" in residuals_of("actuator_force", {"actuator_force"})
+    assert "flow" not in residuals_of("actuator_force", {"actuator_force", "chamber_pressure_a"})
+
+
+def test_the_base_shear_of_measured_floors_is_in_the_balance(test, tmp_path):
+    floor = (
+        '\n[floor.RF]\nalong = "x"\n'
+        'mass = { value = 210.0, unit = "kg", evidence = "measured", source = "weighed", rel_sd = 0.05 }\n'
+        'point = { value = [0.0, 0.0, 2.0], unit = "m", evidence = "measured", source = "drawing" }\n'
+    )
+    path = tmp_path / "floors.toml"
+    path.write_text((models_folder() / "uniaxial.toml").read_text(encoding="utf-8") + floor)
+    machine = load_machine(path)
+    acceleration = np.linspace(-2.0, 2.0, test.samples)[:, None]
+    floored = replace(test, channels={**test.channels, "floor_acceleration": acceleration})
+    plant = make_plant(machine)
+    change = evaluate_residuals(plant, floored).wrench - evaluate_residuals(plant, test).wrench
+    np.testing.assert_allclose(change[:, 0], 210.0 * acceleration[:, 0], rtol=1e-9)
+    assert "RF.mass" in {p.name for p in machine_parameters(machine)}
+    assert machine.labels["floor"] == ("RF",)
+
+
+# ------------------------------------------------------------------------------------------- friction at rest
+def rocking(dt: float = 1 / 256, noise: float = 0.0) -> MeasuredTest:
+    """A sine of 3 Hz with a rest before it, as a displacement with noise shows it."""
+    motion = rocking_motion(dt, 1024)
+    path = motion.displacement.copy()
+    motion.displacement[:, 0] += noise * np.random.default_rng(0).standard_normal(1024)
+    return MeasuredTest("rocking", dt, motion, {}, path=path)
+
+
+def test_where_noise_shakes_presliding_rests_weigh_nothing_and_slip_is_marched_finely(table):
+    stiff = make_plant(table.with_params({"drive.seal_yield": 5e-6}))
+    test = made_fine(stiff, rocking(noise=1e-6))
+    assert test.weight is not None and test.substeps > 1
+    t = test.dt * np.arange(test.samples)
+    assert np.all(test.weight[t < 0.9] == 0.0)
+    fast = (t > 1.0) & (np.abs(test.motion.velocity[:, 0]) > 0.015)
+    assert np.all(test.weight[fast] > 0.99)
+    loose = made_fine(make_plant(table.with_params({"drive.seal_yield": 2e-3})), rocking(noise=1e-6))
+    assert loose.weight is None and loose.substeps == 1
+
+
+def test_a_fine_march_is_the_march_of_a_record_sampled_as_finely(table):
+    """Friction that yields within a turn-back, at 256 Hz with substeps against 4096 Hz without."""
+    plant = make_plant(table.with_params({"drive.seal_yield": 5e-6}))
+    coarse, fine = rocking(), rocking(dt=1 / 4096)
+    fine = replace(fine, motion=rocking_motion(1 / 4096, 16 * 1023 + 1), path=None)
+    row = plant.rows[plant.rows["state"] >= 0]
+    state = int(next(r["state"] for r in row if r["spool"] < 0))
+    wanted = follow(plant, fine).z[:, state]
+    smooth = np.convolve(wanted, np.ones(17) / 17, "same")[::16]  # the mean over one interval, as the march gives it
+    found = follow(plant, replace(coarse, path=None, substeps=16)).z[:, state]
+    rough = follow(plant, replace(coarse, path=None)).z[:, state]
+    inside = slice(280, -4)
+    error, without = (np.sqrt(np.mean((z - smooth)[inside] ** 2)) for z in (found, rough))
+    assert error < 0.02 and without > 3.0 * error  # cubic interpolation of 3 Hz at 256 Hz: micrometres of 2 mm
+
+
+def rocking_motion(dt: float, samples: int) -> PlatenMotion:
+    """The motion of `rocking` at another rate."""
+    t = np.arange(samples) * dt
+    turn, motion = 2.0 * np.pi * 3.0, [np.zeros((samples, 6)) for _ in range(3)]
+    phase = turn * np.maximum(t - 1.0, 0.0)
+    motion[0][:, 0] = 2e-3 * (1.0 - np.cos(phase))
+    motion[1][:, 0] = 2e-3 * turn * np.sin(phase)
+    motion[2][:, 0] = 2e-3 * turn**2 * np.cos(phase) * (t > 1.0)
+    return PlatenMotion(*motion)
+
+
+# ------------------------------------------------------------------------------------------- library and priors
+def test_the_library_has_the_size_of_the_machine_and_is_that_of_the_lhpost6_itself(table):
+    assert scaled_families(load_machine()) == families()
+    heavier = [1.02 * mass for mass in load_machine().platen.mass]
+    fitted = load_machine().with_params({"platen.mass": heavier})
+    small, large = scaled_families(table), families()
+    assert scaled_families(fitted)["added_mass"] == scaled_families(load_machine())["added_mass"]
+    friction = [group["stribeck_friction"].shapes for group in (small, large)]
+    force = table.hydraulics.supply_pressure * table.actuators[0].area_a
+    assert friction[0][0].typical < 0.05 * force < friction[1][0].typical * 10
+    assert friction[0][1] == friction[1][1]  # a Stribeck speed is that of the film, not of the table
+
+
+def test_a_coefficient_beyond_its_source_is_refused(table):
+    with pytest.raises(ParameterError, match=r"coefficient = 0.95 1 is not between 0 and 0.05"):
+        make_plant(table.with_effect("load_dependent_friction", ("A1",), coefficient=0.95))
+
+
+def test_a_wide_prior_is_one_of_the_logarithm(table):
+    wide = table.with_params({"drive.seal_yield": {"value": 5e-5, "rel_sd": 2.0}})
+    found = {p.name: p for p in machine_parameters(wide)}
+    assert found["drive.seal_yield"].form == "log" and found["drive.viscous"].form == "factor"
+    assert found["drive.seal_yield"].sd == pytest.approx(np.log(3.0))
+
+
+def test_where_spools_are_not_measured_their_lag_is_fitted_and_never_a_candidate(table):
+    blind = {"platen_displacement", "pressure_difference", "valve_command"}
+    names = {one.name for one in with_background(table, 1.5, blind)[1]}
+    assert "spool_lag_A1.time" in names
+    assert "spool_lag_A1.time" not in {one.name for one in with_background(table, 1.5, LAYOUT)[1]}
+    listed = {c.family.name for group in list_candidates(table, blind) for c in group}
+    assert not listed & {"spool_lag", "transport_delay"}
+    assert {"spool_lag", "transport_delay"} <= {c.family.name for group in list_candidates(table) for c in group}
+
+
+def test_a_machine_that_has_an_effect_already_gets_no_second_one_of_its_name(table):
+    """Once searched with its own model.toml, a machine ended in `an effect named ... is in this machine already`."""
+    there = table.with_effect("stribeck_friction", ("A1",), name="stribeck_friction_A1")
+    assert "stribeck_friction_A1" not in {c.name for group in list_candidates(there) for c in group}
+    again = with_background(there, 1.5, LAYOUT)[0]
+    assert with_background(again, 1.5, LAYOUT)[1] == ()
+
+
+# ------------------------------------------------------------------------------------------- held-out tests
+class Held:
+    """Tests held out, as `gain_on` sees them."""
+
+    whitener = Whitener(np.array([0.0, 10.0, 20.0]), np.ones((1, 2, 1, 1), np.complex128))
+    frequency = (np.linspace(0.1, 19.9, 400),)
+
+
+class Left:
+    """A residual."""
+
+    def __init__(self, bins: np.ndarray) -> None:
+        """Of one test, (m, 1)."""
+        self.whitened = [bins]
+
+
+@pytest.mark.parametrize(("share", "closes"), [(1.0, True), (0.0, False), (-1.0, False)])
+def test_only_an_effect_that_is_there_gains_on_held_out_tests_what_its_change_promises(share, closes):
+    """Noise of unit power and an effect three times as large; a change of that size, with it, across it, against it."""
+    rng = np.random.default_rng(2)
+    noise, own, other = (rng.standard_normal((400, 1, 2)) @ np.array([1.0, 1.0j]) / np.sqrt(2.0) for _ in range(3))
+    effect = 3.0 * own
+    change = share * effect + (3.0 * other if share == 0.0 else 0.0)
+    gain, expected = gain_on(Held, Left(noise + effect), Left(noise + effect - change), np.array([True]))
+    assert expected > 100.0
+    assert (gain > 0.3 * expected) == closes
+    assert closes or gain < 0.0

@@ -169,7 +169,7 @@ def test_any_machine_moves_where_its_spools_drive_it_in_both_engines(name, schem
     assert all(r.trouble is None for r in runs)
     moved = motion[0].displacement[-1]
     driven = {"uniaxial": [0], "biaxial": [0, 1]}.get(name, [2])
-    direction = -1.0 if name in ("uniaxial", "biaxial") else 1.0  # their walls are on the positive side
+    direction = -1.0 if name == "uniaxial" else 1.0  # its wall is on the +X side
     least = (direction * moved[driven]).min()
     assert least > 1e-5
     # symmetric; points of the six-legged are rounded to 0.1 mm

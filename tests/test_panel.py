@@ -74,7 +74,7 @@ def test_a_panel_that_is_not_there_is_named(tmp_path):
 
 
 def test_an_unknown_panel_is_answered_with_the_names_that_exist():
-    names = "lhpost6, uniaxial, untuned"
+    names = "biaxial, cautious, hexapod, lhpost6, uniaxial, untuned"
     with pytest.raises(UnknownNameError, match=f"no controller settings named 'nobody'; valid names: {names}"):
         load_controller("nobody")
 

@@ -129,12 +129,12 @@ def discover(
         unproven = unproven_effects(found, held_problem)
     verdict = judge(found, beside, replacing, faults, unproven)
     ambiguous = propose and verdict.word == "ambiguous"
-    tests = next_tests(found, load_controller("lhpost6"), sensors) if ambiguous else ()
+    tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()
     checkpoint.remove()
     report(1.0)
     function = verdict.residual_function
     for one in found.added:
-        if one.candidate.name in unproven:
+        if one.candidate.name in verdict.dropped:
             found = without_effect(found, one.candidate)
     fitted = fitted_machine(found.refit if any(function is one for one in replacing) else found.solution)
     return Discovery(

@@ -5,10 +5,12 @@ expected margin is the log-likelihood by which the machine with the other effect
 that effect refitted, to first order.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import xarray as xr
 from joblib import Parallel, delayed
 
 from ..control import ControllerSettings
@@ -41,9 +43,11 @@ class NextTest:
 def next_tests(found: Search, settings: ControllerSettings, sensors: SensorSet) -> tuple[NextTest, ...]:
     """For every added effect and each of its rivals, the menu's tests by falling margin."""
     tests, ranked = tests_of(load_procedure(MENU)), list[NextTest]()
+    measured = {*found.problem.tests[0].share, *found.problem.tests[0].channels}
     for added in found.added:
         for rival in added.rivals:
-            trial = partial(_trial, added.contest[0], rival, settings, sensors, found.calibration, found.numbers)
+            given = settings, sensors, found.calibration, found.numbers, measured
+            trial = partial(_trial, added.contest[0], rival, *given)
             trials = Parallel(n_jobs=found.problem.jobs, prefer="threads")(delayed(trial)(test) for test in tests)
             ranked += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
     return tuple(ranked)
@@ -56,19 +60,32 @@ def _trial(
     sensors: SensorSet,
     calibration: Parameters,
     numbers: Parameters,
+    measured: Collection[str],
     test: str,
 ) -> NextTest:
-    """Simulate a test on the machine with the one effect, and fit it with the other."""
+    """Simulate a test on the machine with the one effect, and fit it with the other, by the channels `measured`."""
     names = one.candidate.family.named, rival.candidate.family.named
     quiet = replace(sensors, noise={})
     try:
         run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
         return NextTest(test, names, float("nan"), informative=False)
-    problem = prepare_problem(rival.machine, run.records, sensors, calibration, kinds=RESIDUALS, jobs=1)
+    records = [_as_measured(record, measured) for record in run.records]
+    problem = prepare_problem(rival.machine, records, sensors, calibration, kinds=RESIDUALS, jobs=1)
     problem = problem.with_machine(problem.machine, (*problem.parameters, *_own_parameters(rival, numbers)))
     margin = _margin(NormalEquations(problem, np.zeros(len(problem.prior)), lambda share: None))
     return NextTest(test, names, margin, informative=margin >= numbers.number("accept.apart"))
+
+
+def _as_measured(record: xr.Dataset, measured: Collection[str]) -> xr.Dataset:
+    """A simulated record with the channels of a measured one."""
+    if "pressure_difference" in measured:
+        a, b = record["chamber_pressure_a"], record["chamber_pressure_b"]
+        difference = a.values[:, np.isin(a["actuator"], b["horizontal"])] - b.values
+        record = record.assign(pressure_difference=b.copy(data=difference))
+    if "valve_command" in measured:
+        record = record.assign(valve_command=record["spool_command"])
+    return record[[name for name in record.data_vars if name in measured]]
 
 
 def _own_parameters(rival: FittedCandidate, numbers: Parameters) -> tuple[FreeParameter, ...]:

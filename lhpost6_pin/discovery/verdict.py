@@ -76,6 +76,7 @@ class Verdict:
     where: tuple[Spot, ...] = ()  # where most of the unexplained residual is, by falling share
     unproven: tuple[tuple[str, float], ...] = ()  # families rejected on held-out tests, with the gain there
     bounded: tuple[str, ...] = ()  # unknowns at a bound, which are no estimates
+    dropped: frozenset[str] = frozenset()  # effects by name that are at a bound, or unproven: no part of the model
 
 
 def judge(
@@ -115,11 +116,11 @@ def judge(
     function, rejected = reject_effects(kept, beside, replacing, numbers)
     rejected |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found)}
     bounded = _at_bounds(found)
-    rejected |= {one.candidate.name for one in kept if _amplitude(one) in bounded}
+    at_bound = {one.candidate.name for one in kept if _amplitude(one) in bounded} - rejected
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or _more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
-    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected])
+    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | at_bound])
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
     word: Word = "not_testable" if blind else "parameters_only" if changed else "none"
@@ -130,7 +131,8 @@ def judge(
     elif sensors:
         word = "sensor"
     spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
-    return Verdict(word, effects, changed, sensors, function, hidden, nearest, spots, failed, bounded)
+    dropped = frozenset({*unproven, *at_bound})
+    return Verdict(word, effects, changed, sensors, function, hidden, nearest, spots, failed, bounded, dropped)
 
 
 def _amplitude(one: AddedEffect) -> str:

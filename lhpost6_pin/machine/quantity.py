@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeAlias
 
 from ..core.errors import ParameterError, instead_of
@@ -41,13 +42,19 @@ class Quantity:
         return self.evidence == "assumed"
 
 
+@cache
+def _registry() -> Any:
+    """Units by name; one of our own: the application's is set up lazily, which threads cannot share."""
+    import pint  # slow to import and needed only where a unit is not the SI one
+
+    return pint.UnitRegistry()
+
+
 def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
     """Convert `value` from `unit` to `wanted`; raises ParameterError naming `key` if the dimensions differ."""
     if unit == wanted:
         return value
-    import pint  # slow to import and needed only where a unit is not the SI one
-
-    registry: Any = pint.get_application_registry()
+    registry = _registry()
     try:
         factor = registry.Quantity(1.0, _pint_spelling(unit)).to(_pint_spelling(wanted)).magnitude
     except Exception as error:  # pint raises a dozen types for a bad unit

@@ -266,7 +266,7 @@ def test_a_simulated_campaign_can_be_loaded_and_is_not_added_to(lhpost6, tmp_pat
     swing = float(np.ptp(record["platen_displacement"].values[:, 0]))
     assert swing == pytest.approx(2 * 0.3 * 0.2, rel=0.1)  # a triangle of 0.2 m scaled; it is tracked to some per cent
     assert refused(lhpost6(*asked), "holds records already")
-    assert refused(lhpost6("calibrate", tmp_path, "--sensors", "nobody"), "nobody")
+    assert refused(lhpost6("calibrate", tmp_path, "--machine", "uniaxial", "--sensors", "nobody"), "nobody")
 
 
 def test_tests_that_a_campaign_has_not_and_folders_that_are_none_are_named(lhpost6, tmp_path):

@@ -128,7 +128,7 @@ def test_one_axis_comes_apart_too(tmp_path):
     machine = machine_named("uniaxial")
     clean = record_of_run(every_step(machine, 1.6, size=0.04), {"test": "one"})
     clean = clean.isel(time=slice(None, None, 4)).assign_attrs(sample_rate_hz=RATE / 4)
-    found = decompose_record(machine, add_noise(clean, SENSORS, np.random.default_rng(0)))
+    found = decompose_record(machine, add_noise(clean, SENSORS, np.random.default_rng(0)), sensors=SENSORS)
     agreement = find_agreement(found)
     assert agreement.noise_ratio[0] == pytest.approx(1.0, abs=0.3)  # 2 x 33 Hz x 1.1 s: 8 % each
     page = write_decompose_report(found, agreement, find_work(found), tmp_path / "page.html")

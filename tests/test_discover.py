@@ -523,7 +523,8 @@ def test_the_next_test_tells_apart_what_it_excites(machine, sensors):
     one = FittedCandidate(rubs, 0.0, rubs.on(machine, (9e3,)))
     rival = FittedCandidate(drags, 1.0, drags.on(machine, (2e4,)))
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
-    given = load_controller("lhpost6"), sensors, calibration_numbers(), numbers, LAYOUT, "SMALL_X"
+    measured = {*sensors.noise, "spool_command"}
+    given = load_controller("lhpost6"), sensors, calibration_numbers(), numbers, measured, "SMALL_X"
     itself, other = (_trial(one, r, *given).margin for r in (one, rival))
     # itself: what half a step of the simulation leaves; twice the least difference that decides
     assert other > 2.0 * numbers.number("accept.apart") + itself

@@ -112,7 +112,7 @@ def decompose(
     measured = load_record(record)
     folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces")
     known = None
-    if is_measured(measured):
+    if is_measured(measured) or sensors:
         known = find_sensors(table, [measured], sensors, opt.measuring(record.parent, machine.machine))
     found = decompose_record(table, measured, known, cutoff=cutoff, align=not no_align)
     agreement, work = find_agreement(found), find_work(found)

@@ -178,8 +178,8 @@ def list_candidates(machine: Machine, channels: Collection[str] = LAYOUT) -> tup
         names = [s.name for s in shapes]
         for values in product(*(s.start for s in shapes)):
             shape = tuple(zip(names, values, strict=True))
-            each = (Candidate(family, group, shape) for group in family.groups(machine))
-            found.append(tuple(one for one in each if one.name not in there))
+            each = tuple(Candidate(family, group, shape) for group in family.groups(machine))
+            found.append(() if there & {one.name for one in each} else each)  # evaluated together, by name
     return tuple(group for group in found if group)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.arrays import Array, Complex
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
@@ -52,10 +53,7 @@ class Reweighting:
             squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
             means, counts = mean_squares(self.problem.whitener, squares, f)
             whole += negative_log_likelihood(means, counts), squares.sum(axis=0)
-            excess = np.maximum(means / self.doubt, 1.0)
-            first = int(f[0] == 0.0)  # the band of the means alone
-            for k, part in enumerate((slice(0, first), slice(first, None))):
-                beyond[k] += negative_log_likelihood(excess[part], counts[part]) - counts[part].sum()
+            beyond += _beyond_noise(means, counts, f, self.doubt)
         return whole, beyond, 0.5 * float(np.sum((b.place + change) ** 2))
 
     def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
@@ -70,6 +68,13 @@ class Reweighting:
         return Lowered(float(fall.sum()) + prior - then, float(beyond.sum()), share, of_first)
 
 
+def _beyond_noise(means: Array, counts: NDArray[np.intp], f: Array, doubt: float) -> Array:
+    """Log-likelihood (2, c), of means and of variation, of a test's `mean_squares` beyond `doubt` times noise."""
+    excess, first = np.maximum(means / doubt, 1.0), int(f[0] == 0.0)  # the band of the means alone
+    parts = (slice(0, first), slice(first, None))
+    return np.array([negative_log_likelihood(excess[p], counts[p]) - counts[p].sum() for p in parts])
+
+
 def share_explained(before: Search, after: Search) -> float:
     """Share of the log-likelihood beyond noise that a joint fit explains, in the column where it explains most.
 
@@ -78,13 +83,9 @@ def share_explained(before: Search, after: Search) -> float:
     doubt, problem = before.numbers.number("accept.doubt"), before.problem
 
     def beyond(residual: Sequence[Complex]) -> Array:
-        total = np.zeros((2, residual[0].shape[1]))
-        for bins, f in zip(residual, problem.frequency, strict=True):
-            means, counts = mean_squares(problem.whitener, np.abs(bins) ** 2, f)
-            excess, first = np.maximum(means / doubt, 1.0), int(f[0] == 0.0)
-            for k, part in enumerate((slice(0, first), slice(first, None))):
-                total[k] += negative_log_likelihood(excess[part], counts[part]) - counts[part].sum()
-        return total
+        pairs = zip(residual, problem.frequency, strict=True)
+        means = ((mean_squares(problem.whitener, np.abs(bins) ** 2, f), f) for bins, f in pairs)
+        return np.asarray(sum(_beyond_noise(*m, f, doubt) for m, f in means))
 
     old, new = beyond(before.residual), beyond(after.residual)
     most = np.unravel_index(np.argmax(old - new), old.shape)

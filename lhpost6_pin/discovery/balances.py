@@ -19,7 +19,6 @@ from ..identification.calibration.whitened_residuals import mean_squares, negati
 from ..identification.inverse_dynamics import leg_wrenches
 from ..identification.prepare import actuator_forces
 from ..identification.residuals import Residuals, kinds_shown
-from ..machine.machine import Machine
 from ..mechanics.plant import make_plant
 from ..mechanics.pose import plant_motion
 from .search import without_effect
@@ -40,23 +39,21 @@ class Balance:
 
 
 class HeldOut(NamedTuple):
-    """Whitened residual of the held-out tests by one model, and that model's residual in its units."""
+    """The held-out tests by one model: evaluated, and their whitened residual."""
 
+    base: OperatingPoint
     whitened: list[Complex]  # (m, c) of every test
-    plain: list[Complex]  # the same bins, not whitened
-    measured: list[Complex]  # (m, 6) measured actuator wrench at C
 
 
-def residual_at(held: Problem, machine: Machine, solution: Solution | None = None) -> HeldOut:
-    """Held-out residuals of a solution of the search, or of a machine as delivered with sensors as stated."""
+def residual_at(held: Problem, solution: Solution | None = None) -> HeldOut:
+    """Held-out residuals of a solution of the search; without one, as delivered, with sensors as stated."""
     if solution is None:
-        problem, x = held.with_machine(machine, ()), np.zeros(len(held.unknowns))
+        problem, x = held.with_machine(held.machine, ()), np.zeros(len(held.unknowns))
     else:
         own = solution.normal.problem
         problem, x = held.with_machine(own.machine, own.parameters), solution.x
     base = OperatingPoint(problem, x)
-    bins = [problem.bins(r, test)[0] for r, test in zip(base.residuals, base.tests, strict=True)]
-    return HeldOut(problem.residual(base), bins, [_measured(problem, base, t) for t in range(len(base.tests))])
+    return HeldOut(base, problem.residual(base))
 
 
 def _measured(problem: Problem, base: OperatingPoint, t: int) -> Complex:
@@ -82,9 +79,10 @@ def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance,
                 continue
             error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
             share = explained = None
-            if kind == "wrench" and (size := _squares(three[0].measured[t], held.frequency[t], forces)) > 0.0:
-                plain = [one.plain[t][:, rows] for one in three]
-                left = [_squares(bins, held.frequency[t], forces) / size for bins in plain]
+            f = held.frequency[t]
+            if kind == "wrench" and (size := _squares(_measured(held, three[0].base, t), f, forces)) > 0.0:
+                plain = [held.bins(one.base.residuals[t], one.base.tests[t])[0][:, rows] for one in three]
+                left = [_squares(bins, f, forces) / size for bins in plain]
                 share, explained = _three(np.sqrt(left)), _three(1.0 - np.array(left))
             found.append(Balance(kind, test.name, _three(np.array(error)), share, explained))
     return tuple(found)
@@ -116,18 +114,18 @@ def gain_on(held: Problem, before: HeldOut, after: HeldOut, rows: Mask) -> tuple
     return gain, expected
 
 
-def unproven_effects(found: Search, held: Problem) -> dict[str, float]:
+def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, float]:
     """Effects that do not close the gap on held-out tests, by name, with their gain of log-likelihood there.
 
-    Each is compared with everything else refitted without it, in the residuals that its family shows in. An effect that
-    the held-out tests do not excite is none of them: its expected gain is within chance.
+    `after` is the residual of the search's solution there. Each effect is compared with everything else refitted
+    without it, in the residuals that its family shows in. One that the held-out tests do not excite is none of them:
+    its expected gain is within chance.
     """
     n, unproven = found.numbers.number, {}
-    after = residual_at(held, found.problem.machine, found.solution)
     for one in found.added:
         if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
             continue  # a sensor's error
-        before = residual_at(held, held.machine, without_effect(found, one.candidate).solution)
+        before = residual_at(held, without_effect(found, one.candidate).solution)
         kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
         rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
         gain, expected = gain_on(held, before, after, rows)

@@ -124,9 +124,8 @@ def discover(
     balances: tuple[Balance, ...] = ()
     unproven: dict[str, float] = {}
     if (held_problem := begun.held_problem) is not None:
-        solutions = (None, found.refit, found.solution)
-        balances = evaluate_balances(held_problem, [residual_at(held_problem, machine, one) for one in solutions])
-        unproven = unproven_effects(found, held_problem)
+        three = [residual_at(held_problem, one) for one in (None, found.refit, found.solution)]
+        balances, unproven = evaluate_balances(held_problem, three), unproven_effects(found, held_problem, three[-1])
     verdict = judge(found, beside, replacing, faults, unproven)
     ambiguous = propose and verdict.word == "ambiguous"
     tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()

@@ -35,7 +35,7 @@ __all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]
 Verdict = Literal["ok", "suspicious", "untested"]
 
 FOLLOWING = ("platen_velocity", "platen_acceleration", "actuator_displacement")  # compared with platen_displacement
-LATE = 0.2  # rad at the end of the band: a delay below it is a coefficient of the derivative
+LATE = 0.125  # rad at the end of the band, 1 ms: a delay below it is a coefficient of the derivative
 LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise
 CONFIDENCE = 3.0  # standard deviations
 MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its correction is not accurate

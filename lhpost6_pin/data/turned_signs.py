@@ -14,6 +14,8 @@ import xarray as xr
 from ..core.arrays import Array
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
+from ..mechanics.plant import make_plant
+from ..mechanics.pose import kinematic_jacobian
 from .channels import columns_of
 from .conditioning import integrate
 from .layout_faults import RecordFinding
@@ -37,7 +39,7 @@ def turned_signs(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
         return []
     if not {"platen_displacement", "platen_acceleration"} & set(record.data_vars):
         return []
-    band, rows = Band(low, high), _rows(machine)
+    band, rows = Band(low, high), kinematic_jacobian(make_plant(machine))
     speed, along = (x @ rows.T for x in _platen_motion(record, high, dt))  # (n, actuators)
     size = np.std(along, axis=0)
     moving = size >= max(numbers.number("sign.moving") * size.max(), 1e-300)
@@ -63,17 +65,6 @@ def _platen_motion(record: xr.Dataset, high: float, dt: float) -> tuple[Array, A
         return speed, differentiate(speed, dt)
     acceleration = Band(high=high).apply(record["platen_acceleration"].values.astype(float), dt)
     return integrate(acceleration - acceleration.mean(axis=0), dt)[0], acceleration
-
-
-def _rows(machine: Machine) -> Array:
-    """Acceleration along each actuator per acceleration of the platen (n_actuators, 6), in the zero-position."""
-    rows = []
-    for actuator in machine.actuators:
-        point = np.array(actuator.platen_point)
-        u = point - np.array(actuator.base_point)
-        u /= np.linalg.norm(u)
-        rows.append(np.concatenate([u, np.cross(point, u)]))
-    return np.array(rows)
 
 
 def _mass_moved(machine: Machine, rows: Array, i: int) -> float:

@@ -119,10 +119,10 @@ def campaign(
     from ..simulation.simulated_campaign import simulate_campaign
 
     table = machine.load()
-    named = sensors or table.parameters.words.get("machine.sensors")
+    named = sensors or table.sensors
     if not named:
         log.warning("%s names no sensors file: tests are recorded with the noise of the LHPOST6's sensors", table.name)
-    settings, known = opt.find_settings(controller, table), load_sensors(str(named or "lhpost6"))
+    settings, known = opt.find_settings(controller, table), load_sensors(named or "lhpost6")
     chosen = tuple(word.strip() for word in tests.split(",")) if tests is not None else None
     if chosen is not None and len(set(chosen)) < len(chosen):
         raise ParameterError(f"--tests {tests}: names a test twice")

@@ -60,8 +60,8 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
     if not measured:
         return None
     plant, levels = make_plant(machine), noise_levels(measured)
-    named = sensors or machine.parameters.words.get("machine.sensors")
-    known: SensorSet | None = load_sensors(str(named)) if named else None
+    named = sensors or machine.sensors
+    known: SensorSet | None = load_sensors(named) if named else None
     content, reason = None, ""
     try:
         content = measured_sensors(plant, measured, levels)

@@ -76,9 +76,9 @@ def find_sensors(
 
     Raises RecordError, with the `remedy`, if these do not show the noise of a channel, or none was recorded.
     """
-    known = name or machine.parameters.words.get("machine.sensors")
+    known = name or machine.sensors
     if known:
-        return load_sensors(str(known))
+        return load_sensors(known)
     measured = [record for record in records if is_measured(record)]
     try:
         if not measured:

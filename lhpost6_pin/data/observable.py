@@ -87,10 +87,15 @@ def _valve(c: _Channels) -> Observable:
     return Observable(name, "ratio", "flow against command; null in full command, gain over the piston area")
 
 
-def _leakage(c: _Channels) -> Observable:
+def _by_flow(quantity: str, c: _Channels, of: str) -> Observable:
+    """A quantity of the balance of flow, over the piston area."""
     if c.valve and c.motion and c.pressures:
-        return Observable("leakage", "ratio", "flow without motion against pressure, over the piston area")
-    return Observable("leakage", "no", "needs pressures, displacement, and spool_position or valve_command")
+        return Observable(quantity, "ratio", of)
+    return Observable(quantity, "no", "needs pressures, displacement, and spool_position or valve_command")
+
+
+def _leakage(c: _Channels) -> Observable:
+    return _by_flow("leakage", c, "flow without motion against pressure, over the piston area")
 
 
 def _lag(c: _Channels) -> Observable:
@@ -103,9 +108,7 @@ def _lag(c: _Channels) -> Observable:
 
 
 def _oil(c: _Channels) -> Observable:
-    if c.valve and c.motion and c.pressures:
-        return Observable("oil stiffness", "ratio", "rate of pressure against flow, over area and chamber lengths")
-    return Observable("oil stiffness", "no", "needs pressures, displacement, and spool_position or valve_command")
+    return _by_flow("oil stiffness", c, "rate of pressure against flow, over area and chamber lengths")
 
 
 def _specimen(c: _Channels) -> Observable:

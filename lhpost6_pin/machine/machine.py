@@ -181,6 +181,7 @@ def build_machine(
         name=str(words.get("machine.name", "unnamed")),
         title=str(words.get("machine.title", "")),
         controller=str(words.get("machine.controller", "")),
+        sensors=str(words.get("machine.sensors", "")),
         **options,
         platen=build_section(Platen, parameters, ("platen",)),
         hydraulics=build_section(Hydraulics, parameters, ("hydraulics",)),

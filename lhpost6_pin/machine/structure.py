@@ -20,7 +20,8 @@ class Structure:
     title: str
     motion: str
     thrust: str
-    controller: str
+    controller: str  # shipped name of its settings; empty: none
+    sensors: str  # shipped name of its sensors file; empty: none
     platen: Platen
     hydraulics: Hydraulics
     actuators: tuple[Actuator, ...]

@@ -8,7 +8,6 @@ interval about it: friction that jumps between samples has no value at one of th
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import repeat
 
 import numpy as np
 
@@ -56,7 +55,7 @@ def made_fine(plant: Plant, test: MeasuredTest) -> MeasuredTest:
 
     A yield slip may turn out smaller than stated: by its uncertainty; substeps are those of a tenth of that.
     """
-    least = min(map(_least_yield, repeat(plant.machine), plant.machine.components), default=np.inf)
+    least = min((_least_yield(plant.machine, c) for c in plant.machine.components), default=np.inf)
     weight = _sliding(plant, test, least)
     if weight is None:
         return test

@@ -129,7 +129,9 @@ def evaluate_residuals(
     wrench = gas = by_cell = servo = np.zeros((test.samples, 0))
     if "wrench" in only and force is not None:
         z = with_loads(plant, path.ports, path.required, path.z, force)
-        wrench = wrench_residual(plant, path.ports, path.required, z, force) + _floor_wrench(plant, test)
+        wrench = wrench_residual(plant, path.ports, path.required, z, force)
+        if "floor_acceleration" in measured:
+            wrench += _floor_wrench(plant, measured["floor_acceleration"])
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
         gas = np.log(measured["strut_pressure"] / strut_pressures(machine, length) / gas_ratio(plant, path.z))
@@ -156,17 +158,16 @@ def _spools(plant: Plant, test: MeasuredTest) -> Array | None:
     return due_spools(plant, command, test.dt) if spool is None and command is not None else spool
 
 
-def _floor_wrench(plant: Plant, test: MeasuredTest) -> Array:
-    """Wrench (n, 6) at C [N, N m] that moves the floors of a specimen: their masses times measured accelerations.
+def _floor_wrench(plant: Plant, acceleration: Array) -> Array:
+    """Wrench (n, 6) at C [N, N m] that moves a specimen's floors: masses times `acceleration` (n, n_floors) [m/s2].
 
-    Axes of {c}: the platen turns by little. Zero without measured floors.
+    Axes of {c}: the platen turns by little.
     """
-    out, accelerations = np.zeros((test.samples, 6)), test.channels.get("floor_acceleration")
-    for k, floor in enumerate(plant.machine.floors if accelerations is not None else ()):
-        assert accelerations is not None
+    out = np.zeros((len(acceleration), 6))
+    for k, floor in enumerate(plant.machine.floors):
         along = np.eye(3)["xyz".index(floor.along)]
         moved = np.concatenate([along, np.cross(floor.point, along)])
-        out += floor.mass * accelerations[:, k, None] * np.where(np.isin(range(6), plant.axes), moved, 0.0)
+        out += floor.mass * acceleration[:, k, None] * np.where(np.isin(range(6), plant.axes), moved, 0.0)
     return out
 
 

@@ -7,6 +7,7 @@ has the same families whatever its numbers were fitted to.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from ..parameters import load_parameters
 from ..structure import Structure
-from .family import Family, families
+from .family import Family, Shape, families
 
 __all__ = ["in_size_of", "scaled_families"]
 
@@ -43,25 +44,28 @@ _STEPS = 10
 
 def in_size_of(family: Family, machine: Structure) -> Family:
     """A family with typical numbers and bounds of its amplitudes in the size of a machine."""
-    ratio = _ratios(machine)
-    shapes = []
-    for shape in family.shapes:
-        powers = _POWERS.get(shape.unit, {}) if shape.amplitude else {}
-        factor = math.prod(ratio[size] ** power for size, power in powers.items())
-        scaled = {key: factor * getattr(shape, key) for key in ("typical", "low", "high", "scale")}
-        shapes.append(shape if factor == 1.0 else replace(shape, **scaled))
-    return replace(family, shapes=tuple(shapes))
+    return scaled_families(machine)[family.name]
 
 
-def scaled_families(machine: Structure) -> dict[str, Family]:
+def scaled_families(machine: Structure) -> Mapping[str, Family]:
     """All families by name in the size of a machine."""
-    return {name: in_size_of(family, machine) for name, family in families().items()}
-
-
-def _ratios(machine: Structure) -> dict[str, float]:
-    """Sizes of a machine over those of the LHPOST6, rounded."""
     own, reference = _sizes(machine), _reference()
-    return {key: 10.0 ** (round(_STEPS * math.log10(own[key] / reference[key])) / _STEPS) for key in own}
+    return _scaled(tuple(round(_STEPS * math.log10(own[size] / reference[size])) for size in reference))
+
+
+@cache
+def _scaled(steps: tuple[int, ...]) -> Mapping[str, Family]:
+    """All families where each of the sizes of `_reference` is so many steps larger: a fit makes many machines."""
+    ratio = {size: 10.0 ** (step / _STEPS) for size, step in zip(_reference(), steps, strict=True)}
+    return {name: replace(f, shapes=tuple(_of_ratio(s, ratio) for s in f.shapes)) for name, f in families().items()}
+
+
+def _of_ratio(shape: Shape, ratio: Mapping[str, float]) -> Shape:
+    """A number of a family at ratios of a machine's sizes."""
+    powers = _POWERS.get(shape.unit, {}) if shape.amplitude else {}
+    factor = math.prod(ratio[size] ** power for size, power in powers.items())
+    scaled = {key: factor * getattr(shape, key) for key in ("typical", "low", "high", "scale")}
+    return shape if factor == 1.0 else replace(shape, **scaled)
 
 
 def _sizes(machine: Structure) -> dict[str, float]:

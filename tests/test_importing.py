@@ -775,6 +775,16 @@ def test_kinds_of_channels_that_a_layout_has_are_matched_by_their_words():
             assert remarks[0].startswith('"valve_command[A1]" = '), words
 
 
+def test_a_command_in_volts_is_a_share_of_the_full_one_that_the_machine_states():
+    for name, unit, gain in (("Voltage command (V)", None, 0.1), ("Valve cmd", "V", 0.1), ("cmd [V]", "V", 0.1)):
+        found, remarks = guess_map([columns_called([name], [unit])], ONE, ("x",), {"A1": 10.0})
+        source = found.channels["valve_command[A1]"]
+        assert (source.column, source.unit, source.gain) == (name, "1", gain)
+        assert not any("valve_command[A1]" in remark for remark in remarks)
+    _, remarks = guess_map([columns_called(["cmd [mA]"], ["mA"])], ONE, ("x",), {"A1": 10.0})
+    assert remarks[0].startswith('"valve_command[A1]" = ')
+
+
 def test_a_map_is_written_even_where_no_column_is_recognised_and_says_what_they_could_be(tmp_path):
     channels, remarks = guess_map([columns_called(["CH1", "CH 2  x", "CH3"], [None, "bar", "V"])], ONE, ("x",))
     assert not channels.channels

@@ -160,7 +160,7 @@ def test_what_is_stated_derived_and_assumed_is_told_apart():
     numbers = draft_machine("small", read_answers(SMALL, 10.0)).parameters
     assert {p for p, q in numbers.items() if q.evidence == "measured"} == {
         *("platen.mass", "drive.area_a", "drive.area_b", "drive.stroke"),
-        *("hydraulics.supply_pressure", "hydraulics.return_pressure"),
+        *("hydraulics.supply_pressure", "hydraulics.return_pressure", "drive.full_command"),
     }
     assert numbers["drive.flow"].evidence == "derived" and "0.37 m/s/V" in numbers["drive.flow"].source
     assert {"drive.seal_friction", "drive.chamber_a", "hydraulics.bulk_modulus"} <= {

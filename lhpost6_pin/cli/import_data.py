@@ -69,7 +69,8 @@ def _write_draft_map(
     from ..data.importing import find_tests, guess_map, load_raw, other_columns, save_map
 
     raws = load_raw(find_tests(files)[0].file) if many else [raw for file in files for raw in load_raw(file)]
-    found, remarks = guess_map(raws, table.labels, table.axis_names)
+    full = {a.name: a.full_command for a in table.actuators if a.full_command}
+    found, remarks = guess_map(raws, table.labels, table.axis_names, full)
     for test in find_tests(files)[1:] if many else ():
         try:
             differs = other_columns(raws, load_raw(test.file))

@@ -66,7 +66,10 @@ def new_machine(
         str | None, typer.Option(help=f"Axes of the guides, or free for a platform on six legs: {', '.join(MOTIONS)}.")
     ] = None,
     cylinder: Annotated[str | None, typer.Option(help=f"Cylinders: {' or '.join(CYLINDERS)}.")] = None,
-    voltage: Annotated[float | None, typer.Option(help="Full command of the valves [V], for a speed per volt.")] = None,
+    voltage: Annotated[
+        float | None,
+        typer.Option(help="Full command of the valves [V]."),
+    ] = None,
     title: Annotated[str, typer.Option(help="One line about the machine.")] = "",
     out: Annotated[Path | None, typer.Option(help="File to write; default: NAME.toml in this directory.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Replace the file if there is one.")] = False,

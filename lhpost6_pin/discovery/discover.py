@@ -15,6 +15,8 @@ from ..core.progress import Progress, between
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
 from ..identification.calibration import calibration_numbers
+from ..identification.calibration.curves import Curves, measured_curves
+from ..identification.calibration.fit import Solution
 from ..identification.calibration.free_parameters import plan_parameters, scatter_parameters
 from ..identification.calibration.normal_equations import NormalEquations
 from ..identification.calibration.prepare import prepare_problem
@@ -57,6 +59,7 @@ class Discovery:
     numbers: Parameters
     seed: int
     hashes: dict[str, str]  # of the records that were read, by test
+    curves: Curves  # of the held-out tests, else of those searched: as delivered, and by the fitted machine
 
 
 def discover(
@@ -135,7 +138,8 @@ def discover(
     for one in found.added:
         if one.candidate.name in verdict.dropped:
             found = without_effect(found, one.candidate)
-    fitted = fitted_machine(found.refit if any(function is one for one in replacing) else found.solution)
+    final = found.refit if any(function is one for one in replacing) else found.solution
+    fitted = fitted_machine(final)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
@@ -150,7 +154,14 @@ def discover(
         numbers=numbers,
         seed=seed,
         hashes=hashes,
+        curves=_curves(held_problem or begun.search.problem, final, found),
     )
+
+
+def _curves(problem: Problem, final: Solution, found: Search) -> Curves:
+    """Curves of a problem's tests as delivered, and by the final solution."""
+    after = "with the effects" if found.added and final is found.solution else "refitted"
+    return measured_curves({"as delivered": residual_at(problem).base, after: residual_at(problem, final).base})
 
 
 def _begin(

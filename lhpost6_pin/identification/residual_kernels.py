@@ -85,10 +85,11 @@ class MeasuredOil(NamedTuple):
 
 
 @compiled
-def oil_residuals(rows, supply, oil, ports, z, drooped, flow):
-    """Fill drooped (n,), the supply's pressure [Pa], and flow (n, n_chambers) [m3/s], which may have no columns.
+def oil_residuals(rows, supply, oil, ports, z, drooped, flow, valve):
+    """Fill drooped (n,), the supply's pressure [Pa], flow (n, n_chambers) [m3/s], which may have no columns, and valve.
 
-    rows are the actuators', oil is `MeasuredOil`, ports the path of the ports, z (n_states,) scratch.
+    rows are the actuators', oil is `MeasuredOil`, ports the path of the ports, z (n_states,) scratch. valve, as large
+    as flow, is what the valves give into each chamber [m3/s].
     """
     last = np.zeros(4)
     for k in range(oil.pressure.shape[0]):
@@ -97,7 +98,7 @@ def oil_residuals(rows, supply, oil, ports, z, drooped, flow):
         if flow.shape[1] > 0:
             for i in range(rows.size):
                 at, speed = ports.s[k, rows[i].port], ports.rate[k, rows[i].port]
-                _flow_residuals(k, rows[i], oil, (high, low), (at, speed), z, flow[k])
+                _flow_residuals(k, rows[i], oil, (high, low), (at, speed), z, (flow[k], valve[k]))
 
 
 @compiled
@@ -121,13 +122,13 @@ def _follow_supply(k, rows, oil, supply, z, last):
 
 
 @compiled
-def _flow_residuals(k, row, oil, supply, rod, z, flow):
-    """Fill a row's chambers in flow (n_chambers,): V / beta dP/dt + A dL/dt - Q [m3/s].
+def _flow_residuals(k, row, oil, supply, rod, z, filled):
+    """Fill a row's chambers in flow and valve (n_chambers,): V / beta dP/dt + A dL/dt - Q, and of Q the valve's part.
 
-    supply holds its two pressures [Pa], rod its actuator's elongation [m] and velocity [m/s].
+    supply holds its two pressures [Pa], rod its actuator's elongation [m] and velocity [m/s]; flows are in [m3/s].
     """
     p, x, i = view_hydraulic(row.numbers), oil.spool[k, row.spool], row.spool
-    (high, low), (at, speed) = supply, rod
+    (high, low), (at, speed), (flow, valve) = supply, rod, filled
     at_a, at_b = oil.chamber[i, 0], oil.chamber[i, 1]
     pressure_a, rate_a = oil.pressure[k, at_a], oil.pressure_rate[k, at_a]
     pressure_b = rate_b = 0.0
@@ -144,8 +145,10 @@ def _flow_residuals(k, row, oil, supply, rod, z, flow):
     bulk, left = oil_modulus(p, True, pressure_a)
     net = flow_a - across - out_a
     flow[at_a] = rate_a * p.area_a * (p.chamber_a + at) / bulk - left * (net - p.area_a * speed)
+    valve[at_a] = flow_a
     if at_b >= 0:
         bulk, left = oil_modulus(p, True, pressure_b)
         net = flow_b + across - out_b
         flow[at_b] = rate_b * p.area_b * (p.chamber_b - at) / bulk - left * (net + p.area_b * speed)
+        valve[at_b] = flow_b
     advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)

@@ -17,6 +17,7 @@ from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..data.alignment import due_spools
@@ -31,7 +32,7 @@ from .inverse_dynamics import with_loads
 from .prepare import MeasuredTest, actuator_forces, chamber_pressures, oil_forces
 from .residual_kernels import MeasuredOil, oil_residuals, wrench_residual
 
-__all__ = ["RESIDUALS", "Path", "Residuals", "evaluate_residuals", "follow", "kinds_shown"]
+__all__ = ["RESIDUALS", "OilBalance", "Path", "Residuals", "evaluate_residuals", "follow", "kinds_shown", "oil_balance"]
 
 
 RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
@@ -171,23 +172,43 @@ def _floor_wrench(plant: Plant, acceleration: Array) -> Array:
     return out
 
 
-def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
-    """Residuals `flow` and `supply`."""
-    n, none = test.samples, np.zeros((test.samples, 0))
-    supply = test.channels.get("supply_pressure") if "supply" in only else None
+class OilBalance(NamedTuple):
+    """Mass balance of an actuator's chambers along a test, A of every actuator, then B of the double-acting."""
+
+    flow: Array  # (n, n_chambers) V / beta dP/dt + A dL/dt - Q [m3/s]
+    valve: Array  # (n, n_chambers) flow from the valves, a part of Q [m3/s]
+    pressure: Array  # (n, n_chambers) [Pa]
+    supply: Array  # (n,) pressure of the supply, by the model [Pa]
+    spool: Array  # (n, n_actuators) spool positions [1]
+    chamber: NDArray[np.int64]  # (n_actuators, 2) columns, -1 without chamber B
+
+
+def oil_balance(plant: Plant, test: MeasuredTest, path: Path, *, flows: bool = True) -> OilBalance | None:
+    """Balance of a test's oil; without `flows` the supply's alone. None where pressures or spools are not measured."""
     pressure = chamber_pressures(plant.machine, test.channels)
     rate = chamber_pressures(plant.machine, test.rates, rates=True)
     spool = _spools(plant, test)
-    if pressure is None or rate is None or spool is None or ("flow" not in only and supply is None):
-        return none, none
+    if pressure is None or rate is None or spool is None:
+        return None
     double = np.isin(plant.machine.actuator_names, plant.machine.double_acting)
     chamber = np.full((plant.spools, 2), -1)
     chamber[:, 0] = np.arange(plant.spools)
     chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
-    flow = np.zeros((n, int(chamber.max()) + 1)) if "flow" in only else none
-    drooped, oil = np.zeros(n), MeasuredOil(chamber, pressure, rate, spool, test.dt)
+    flow, valve = np.zeros((2, test.samples, int(chamber.max()) + 1 if flows else 0))
+    drooped, oil = np.zeros(test.samples), MeasuredOil(chamber, pressure, rate, spool, test.dt)
     rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
-    oil_residuals(rows, plant.supply, oil, path.ports, z, drooped, flow)
+    oil_residuals(rows, plant.supply, oil, path.ports, z, drooped, flow, valve)
+    return OilBalance(flow, valve, pressure, drooped, spool, chamber)
+
+
+def _of_oil(plant: Plant, test: MeasuredTest, path: Path, only: tuple[str, ...]) -> tuple[Array, Array]:
+    """Residuals `flow` and `supply`."""
+    none = np.zeros((test.samples, 0))
+    supply = test.channels.get("supply_pressure") if "supply" in only else None
+    oil = oil_balance(plant, test, path, flows="flow" in only) if "flow" in only or supply is not None else None
+    if oil is None:
+        return none, none
+    flow = oil.flow
     if "flow" in only and "chamber_pressure_a" not in test.channels:
         flow = 0.5 * (flow[:, : plant.spools] - flow[:, plant.spools :])
-    return flow, none if supply is None else supply - drooped[:, None]
+    return flow, none if supply is None else supply - oil.supply[:, None]

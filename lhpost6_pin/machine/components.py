@@ -49,7 +49,7 @@ class Actuator:
 
     mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
     valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are None without chamber B,
-    pad quantities None without a bearing.
+    pad quantities None without a bearing. full_command, if stated, is the voltage of an open valve.
     """
 
     name: str
@@ -74,6 +74,7 @@ class Actuator:
     mass_across: float = quantity_field("kg", bound="nonnegative")
     area_b: float = quantity_field("m2", bound="positive", optional=True)
     chamber_b: float = quantity_field("m", bound="positive", optional=True)
+    full_command: float = quantity_field("V", bound="positive", optional=True)
     pad_friction: float = quantity_field("N", bound="nonnegative", optional=True)
     pad_yield: float = quantity_field("m", bound="positive", optional=True)
     pad_shape: float = quantity_field("1", bound="fraction", optional=True)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ...core.names import AXES
@@ -40,11 +41,12 @@ class Guess(NamedTuple):
 
 
 class _Machine(NamedTuple):
-    """What is known of the machine: names along the dimensions of its records, axes on which it moves, channels."""
+    """What is known of the machine: names along dimensions, axes that move, channels, full commands [V]."""
 
     labels: Labels
     axes: tuple[str, ...]
     known: Mapping[str, tuple[str, str | None]]
+    full: Mapping[str, float]
 
 
 def is_export(raws: Sequence[RawTest]) -> bool:
@@ -52,16 +54,21 @@ def is_export(raws: Sequence[RawTest]) -> bool:
     return all("layout_version" in raw.facts for raw in raws)
 
 
-def guess_map(raws: Sequence[RawTest], labels: Labels, moves: Sequence[str] = AXES) -> Guess:
+def guess_map(
+    raws: Sequence[RawTest],
+    labels: Labels,
+    moves: Sequence[str] = AXES,
+    full_commands: Mapping[str, float] = MappingProxyType({}),
+) -> Guess:
     """Make the map that the columns' names suggest, the first column for each channel.
 
     `labels` are the machine's; the platen `moves` in some axes, the others need no map. A column
     without a word for its axis or actuator is of the only one, where there is one. Columns that are not recognised
-    become remarks with the channels that they could be.
+    become remarks with the channels that they could be. A valve's command in volts needs its full one, by actuator [V].
     """
     words = [words_of(without_unit(name)) for raw in raws for name in raw.names]
     labels = with_labels(labels, [f"{_FLOORS}[{floor}]" for w in words if (floor := floor_in(w))])
-    machine = _Machine(labels, tuple(moves), channels_of(labels))
+    machine = _Machine(labels, tuple(moves), channels_of(labels), full_commands)
     found: dict[str, Source] = {}
     unknown: list[tuple[Source, str]] = []
     remarks: list[str] = []
@@ -71,6 +78,9 @@ def guess_map(raws: Sequence[RawTest], labels: Labels, moves: Sequence[str] = AX
         source = _source(raws, raw, name, number, unit)
         where = f"column {number} of {_file_name(raw)}"
         if channel and channel.startswith(_SHARE) and quantity_unit(unit) != "1":
+            if (gain := _share(channel, unit or name, machine)) and channel not in found:
+                found[channel] = replace(source, unit="1", gain=gain)
+                continue
             line = source_line(channel, replace(source, unit="1"))
             remarks.append(f"{line}  # add gain = 1 / full command, in the unit of {where}; 0.1 for 10 V")
         elif channel is None:
@@ -107,6 +117,16 @@ def other_columns(first: Sequence[RawTest], other: Sequence[RawTest]) -> str:
 def _is_still(label: str | None, machine: _Machine) -> bool:
     """Whether a label is an axis on which the machine does not move."""
     return label in AXES and label not in machine.axes
+
+
+def _share(channel: str, text: str, machine: _Machine) -> float | None:
+    """Share of full command that one volt of a valve's command is; None in another unit, or where that is not stated.
+
+    `text` is its unit, or the column's name with the unit in brackets at the end.
+    """
+    volts = re.split(r"[\[(]", text.strip(" )]"))[-1].strip().casefold() in ("v", "volt", "volts")
+    full = machine.full.get(channel.rpartition("[")[2].rstrip("]"))
+    return float(f"{1.0 / full:.6g}") if full and volts else None
 
 
 def _possible(source: Source, free: Sequence[str]) -> str:

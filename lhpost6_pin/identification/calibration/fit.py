@@ -23,9 +23,10 @@ from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ..residuals import RESIDUALS
+from .curves import measured_curves
 from .normal_equations import NoiseBias, NormalEquations, bounded_step, positive
 from .prepare import prepare_problem
-from .problem import Problem
+from .problem import OperatingPoint, Problem
 from .result import Calibration, Subset, calibration_numbers
 from .simulated_residuals import by_simulation
 from .whitened_residuals import mean_squares, negative_log_likelihood
@@ -81,6 +82,12 @@ def calibrate(
         rounds=found.rounds,
         converged=found.converged,
         numbers=numbers,
+        curves=measured_curves(
+            {
+                "as delivered": OperatingPoint(problem, np.zeros(len(found.x))),
+                "calibrated": OperatingPoint(problem, found.x),
+            }
+        ),
     )
 
 

@@ -9,6 +9,7 @@ from ...core.arrays import Array, Mask
 from ...core.files import models_folder
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
+from .curves import Curves
 from .free_parameters import FreeParameter, with_parameters
 from .sensor_errors import SensorUnknown
 
@@ -46,6 +47,7 @@ class Calibration:
     rounds: int
     converged: bool
     numbers: Parameters = field(repr=False)
+    curves: Curves = field(default_factory=Curves, repr=False)  # as delivered, and calibrated
 
     @property
     def sd(self) -> Array:

@@ -51,10 +51,13 @@ ASKED: Mapping[str, Asked] = {
 def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict[str, Quantity]:
     """Quantities of what was answered, by name, in SI; `voltage` [V] is the full command, for a speed per volt.
 
-    Such a speed becomes `slope`: at full command, if the valve's flow were proportional to it.
+    Such a speed becomes `slope`: at full command, if the valve's flow were proportional to it. That voltage itself is
+    among the quantities, too.
     Raises ParameterError naming the option for what cannot be read, is not positive, or is missing.
     """
     found = {}
+    if voltage is not None and not voltage > 0.0:
+        raise ParameterError(f"--voltage {voltage:g}: must be positive")
     for name, text in texts.items():
         asked, option = ASKED[name], option_of(name)
         source = f"stated to lhpost6 new-machine: {' '.join(text.split())}"
@@ -69,6 +72,8 @@ def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict
             raise ParameterError(f"{option}: {text!r} should be {' or '.join(map(str, asked.sizes))} number(s)")
         if min(numbers) < 0.0 or (min(numbers) == 0.0 and name not in ("return_pressure", "valve_delay", "friction")):
             raise ParameterError(f"{option}: {text!r} must be positive")
+    if voltage is not None:
+        found["voltage"] = Quantity(voltage, "V", "measured", f"stated to lhpost6 new-machine: --voltage {voltage:g}")
     for name, asked in ASKED.items():
         if asked.needed and name not in found:
             raise ParameterError(f"{option_of(name)} is missing: {asked.question.lower()} [{asked.unit}]")
@@ -85,8 +90,6 @@ def option_of(name: str) -> str:
 def _per_volt(text: str, voltage: float | None, option: str, source: str) -> Quantity:
     if voltage is None:
         raise ParameterError(f"{option}: {text!r} is per volt; give the command's full voltage with --voltage")
-    if not voltage > 0.0:
-        raise ParameterError(f"--voltage {voltage:g}: must be positive")
     slope = read_stated(text, "m/s/V", option, source)
     if isinstance(slope.value, tuple) or isinstance(slope.sd, tuple):
         raise ParameterError(f"{option}: {text!r} should be 1 number")

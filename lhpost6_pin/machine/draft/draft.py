@@ -32,7 +32,7 @@ _PLACES = ("platen_radius", "base_radius", "platen_spread", "base_spread", "leng
 def draft_machine(
     name: str, known: Mapping[str, Quantity], *, motion: str = "x", cylinder: str = "double-rod", title: str = ""
 ) -> Machine:
-    """Machine from quantities by the names of `asked.ASKED` (and `slope`), as `asked.read_answers` reads them.
+    """Machine from quantities by the names of `asked.ASKED` (`slope`, `voltage`), as `asked.read_answers` reads them.
 
     motion: the guided axes, or "free" for a platform on six legs. Raises ParameterError for what makes no machine.
     """
@@ -144,6 +144,7 @@ def _valve(
             "cylinder.leakage", "m3/s/Pa", areas[0] * speed / high, "full flow over supply pressure"
         ),
         "valve_delay": basis.known_or("valve_delay", "valve.delay"),
+        **({"full_command": basis.known["voltage"]} if "voltage" in basis.known else {}),
     }
     return found, speed
 

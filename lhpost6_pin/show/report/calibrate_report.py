@@ -17,6 +17,7 @@ from .calibrate_sections import (
     test_blocks,
 )
 from .control_blocks import load_of, numbers_used
+from .curve_plots import curve_blocks
 from .page import Block, Headline, Level, Page, Section, bullet_list, number, save_page
 
 __all__ = ["write_calibrate_report"]
@@ -42,6 +43,7 @@ def write_calibrate_report(calibration: Calibration, path: Path | str, command: 
             Section("parameters", "Parameters", parameter_blocks(calibration)),
             Section("sensors", "Errors of the sensors", sensor_blocks(calibration)),
             Section("misfit", "Residuals", misfit_blocks(calibration)),
+            Section("curves", "Friction and valves", curve_blocks(calibration.curves, calibration.machine)),
             Section("information", "Information per test", test_blocks(calibration)),
             Section("subsets", "Estimates by group of residuals", group_blocks(calibration)),
             Section("alike", "Parameter correlation", correlation_blocks(calibration)),

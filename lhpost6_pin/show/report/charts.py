@@ -24,19 +24,20 @@ TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # [Hz]
 BAND_COLOR = "#009e73"
 LABEL_COLOR = "rgba(255,255,255,0.8)"  # behind words on a line: curves may cross them
 CELL = 92  # [CSS px] height of one plot of a matrix
+DOT = 1.5  # size of a point over the width of a line of the same style
 BETWEEN = 66  # [CSS px] between the rows of a grid
 MATRIX_WIDTH = 720  # [CSS px] below which a matrix scrolls sideways
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Points (n,) to draw: a line, a line with markers, or bars."""
+    """Points (n,) to draw: a line, a line with markers, points alone, or bars."""
 
     name: str
     x: ArrayLike
     y: ArrayLike
     style: Mapping[str, Any]  # plotly line
-    kind: str = "lines"  # or "lines+markers", "bar"
+    kind: str = "lines"  # or "lines+markers", "markers", "bar"
 
 
 @dataclass(frozen=True)
@@ -215,6 +216,9 @@ def _trace(curve: Curve) -> dict[str, Any]:
     shared = {"name": html.escape(curve.name), "legendgroup": html.escape(curve.name)} | values
     if curve.kind == "bar":
         return shared | {"type": "bar", "marker": {"color": curve.style["color"]}}
+    if curve.kind == "markers":
+        dot = {"color": curve.style["color"], "size": DOT * curve.style["width"]}
+        return shared | {"type": "scatter", "mode": "markers", "marker": dot}
     line = {"type": "scatter", "mode": curve.kind, "line": dict(curve.style)}
     return shared | line | ({"marker": {"size": 7}} if "markers" in curve.kind else {})
 

@@ -12,6 +12,7 @@ from ...discovery.verdict_file import advice, summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .control_blocks import load_of, numbers_used
+from .curve_plots import curve_blocks
 from .discover_plots import gain_figure, gap_figure, map_blocks, residual_function_figure
 from .page import Block, Headline, Level, Page, Section, Table, bullet_list, details, number, save_page
 
@@ -51,6 +52,7 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
         sections=[
             Section("effects", "Identified effects", _effect_blocks(found)),
             Section("proof", "Errors on held-out tests", _proof_blocks(found)),
+            Section("curves", "Friction and valves", curve_blocks(found.curves, found.machine, _acted_on(found))),
             Section("where", "Misfit by channel and band", map_blocks(found)),
             Section("considered", "Candidates considered", _considered(found)),
             Section("parameters", "Parameters and sensors", _parameter_blocks(found)),
@@ -131,6 +133,11 @@ def _proof_table(proof: Proof) -> Table:
     ]
     header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
     return Table("Normalised RMS error on held-out tests (1: sensor noise)", header, rows)
+
+
+def _acted_on(found: Discovery) -> set[str]:
+    """Components that the identified effects act on."""
+    return {component for one in found.verdict.effects for component in one.components}
 
 
 def _headlines(found: Discovery) -> list[Headline]:

@@ -1,6 +1,9 @@
 """What the tests of the site share: its pages by hand, their snippets, and what a built page points to."""
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
@@ -27,6 +30,15 @@ def snippets(page: Path) -> Iterator[Snippet]:
         words = [word.lstrip(".") for word in head.split()]
         assert words, f"{page.name}: a fence without a language: {text[:60]!r}"
         yield Snippet(words[0], "slow" in words, text)
+
+
+def run_snippet(snippet: Snippet, folder: Path) -> "subprocess.CompletedProcess[str]":
+    """Run a snippet of bash or python in a folder, with `lhpost6` on the path and `$SOURCE` the repository."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    env = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "SOURCE": str(ROOT), "COLUMNS": "120"}
+    python = snippet.language == "python"
+    command = [sys.executable, "-c", snippet.text] if python else ["bash", "-c", f"set -e -o pipefail\n{snippet.text}"]
+    return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=3600)
 
 
 class Links(HTMLParser):

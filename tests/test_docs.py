@@ -1,14 +1,11 @@
 """The documentation site: it builds with strict links, has all it should, loads nothing, and its snippets run."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from doc_pages import PAGES, ROOT, Links, snippets
+from doc_pages import PAGES, ROOT, Links, run_snippet, snippets
 from test_scripts import script
 from test_structure import ORDER
 
@@ -224,16 +221,10 @@ def test_every_snippet_says_what_it_is_and_what_is_typed_into_a_console_installs
 
 def run_page(page: Path, folder: Path, *, slow: bool) -> None:
     """Run a page's snippets in order in one folder; those that take minutes only if asked."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    env = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "SOURCE": str(ROOT), "COLUMNS": "120"}
     for number, snippet in enumerate(s for s in snippets(page) if s.language in RUN):
         if snippet.slow and not slow:
             continue
-        if snippet.language == "bash":
-            command = ["bash", "-c", f"set -e -o pipefail\n{snippet.text}"]
-        else:
-            command = [sys.executable, "-c", snippet.text]
-        ended = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=3600)
+        ended = run_snippet(snippet, folder)
         said = f"{name(page)}, snippet {number + 1}:\n{snippet.text}\n{ended.stdout}\n{ended.stderr}"
         assert ended.returncode == 0, said
 

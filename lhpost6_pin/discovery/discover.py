@@ -143,7 +143,7 @@ def discover(
     return Discovery(
         campaign=campaign.name,
         machine=machine,
-        fitted=fitted if function is None else with_residual_function(fitted, function),
+        fitted=_sourced(fitted if function is None else with_residual_function(fitted, function), machine, campaign),
         used=tuple(name for i, name in enumerate(names) if i not in held),
         held_out=tuple(names[i] for i in held),
         verdict=verdict,
@@ -156,6 +156,25 @@ def discover(
         hashes=hashes,
         curves=_curves(held_problem or begun.search.problem, final, found),
     )
+
+
+def _sourced(fitted: Machine, delivered: Machine, campaign: Campaign) -> Machine:
+    """The fitted machine with the campaign as the source of every number that differs from the one delivered."""
+    source = f"fitted to campaign {campaign.name} by lhpost6 discover"
+    parameters = fitted.parameters
+    quantities = dict(parameters.quantities)
+    for path, quantity in quantities.items():
+        stated = delivered.parameters.quantities.get(path)
+        if stated is None or stated.value != quantity.value:
+            was = f"; was {stated.value} ({stated.source})" if stated else ""
+            quantities[path] = replace(quantity, evidence="calibrated", source=source + was)
+    effects = {}
+    for name, entry in parameters.effects.items():
+        if entry != delivered.parameters.effects.get(name):
+            own = {key: replace(q, evidence="calibrated", source=source) for key, q in entry.values.items()}
+            entry = replace(entry, values=own)
+        effects[name] = entry
+    return replace(fitted, parameters=replace(parameters, quantities=quantities, effects=effects))
 
 
 def _curves(problem: Problem, final: Solution, found: Search) -> Curves:

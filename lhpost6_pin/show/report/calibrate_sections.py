@@ -216,6 +216,7 @@ def _plain(value: float) -> str:
 def change_of(calibration: Calibration, i: int) -> str:
     """Change of parameter i from nominal, signed: relative, or in its unit."""
     parameter, coordinate = calibration.parameters[i], float(calibration.estimate[i])
-    if parameter.form == "factor":
-        return f"{'+' * (coordinate > 0)}{percent(coordinate)}"
+    if parameter.form != "shift":
+        change = parameter.at(coordinate) / parameter.value - 1.0
+        return f"{'+' * (change > 0)}{percent(change)}"
     return f"{'+' * (coordinate > 0)}{number(coordinate)}\N{NO-BREAK SPACE}{parameter.unit}"

@@ -75,19 +75,19 @@ def test_it_names_what_was_hidden_and_nothing_else(followed):
     """Friction falling with speed, and the valve's null within a tenth (issue 22)."""
     rows = re.findall(r"^\| `([\w.]+)` \| (\S+) \| (.+) \|$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     assert len(rows) == 5
-    verdict = json.loads((followed.folder / "discovery" / "verdict.json").read_text())
+    verdict = json.loads((followed.folder / "found" / "verdict.json").read_text())
     assert {one["family"] for one in verdict["effects"]} == {"stribeck_friction", "spool_null_bias"}
     found = {name: value for one in verdict["effects"] for name, value in one["parameters"].items()}
     found |= verdict["parameters_changed"]
     for name, hidden, unit in rows:
         assert found[name]["value"] == pytest.approx(float(hidden), rel=0.1), name
         assert found[name]["unit"] == unit
-    model = (followed.folder / "discovery" / "model.toml").read_text()
+    model = (followed.folder / "found" / "model.toml").read_text()
     assert "fitted to campaign campaign by lhpost6 discover" in model and "given by hand" not in model
 
 
 def test_calibration_alone_leaves_the_flow_unexplained_and_both_reports_show_the_curves(followed):
-    words = [Reader(followed.folder / name / "report.html") for name in ("calibration", "discovery")]
+    words = [Reader(followed.folder / name / "report.html") for name in ("calibration", "found")]
     assert re.search(r"above sensor noise: an effect is missing", words[0].words)
     for page in words:
         assert {"friction-curves", "valve-curves"} <= set(page.figures)

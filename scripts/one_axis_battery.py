@@ -26,7 +26,8 @@ from battery.sealing import seal, unseal
 from joblib import Parallel, delayed
 
 from lhpost6_pin.core.files import write_whole
-from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.data.campaign import load_campaign
+from lhpost6_pin.data.measured_sensors import find_sensors
 from lhpost6_pin.machine.machine import load_machine
 
 TOGETHER = 10
@@ -44,7 +45,9 @@ LEAST = 0.5
 
 def search_case(home: Path) -> None:
     """Search a case with the machine and sensors files of its lab."""
-    search(home, load_machine(home / "machine.toml"), load_sensors(home / "sensors.toml"), phases=(1,))
+    machine = load_machine(home / "machine.toml")
+    sensors = find_sensors(machine, load_campaign(home, machine).records, home / "sensors.toml")
+    search(home, machine, sensors, phases=(1,))
 
 
 def shares(pairs: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:

@@ -9,6 +9,7 @@ tells, a mass or a friction, and no record separates the two.
 import json
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,9 +31,11 @@ from .rests import rest_numbers
 from .sensors import SensorSet, load_sensors, make_sensors, recorded_spectrum
 
 __all__ = ["NoiseComparison", "compare_noise", "find_sensors", "measured_sensors", "save_sensors"]
+__all__ += ["with_measured_noise"]
 
 log = logging.getLogger(__name__)
 
+SHAKEN = 2.0  # density of noise over that of the resolution, below which a rest shows less noise than a motion does
 MOST_BITS = 24  # no recorder has more: finer steps are those of computed numbers
 
 
@@ -74,12 +77,14 @@ def find_sensors(
 ) -> SensorSet:
     """Sensors by name or file; else those that the machine file names; else as the records themselves show them.
 
+    Noise that a file states and measured records contradict is replaced by what they show.
+
     Raises RecordError, with the `remedy`, if these do not show the noise of a channel, or none was recorded.
     """
     known = name or machine.sensors
-    if known:
-        return load_sensors(known)
     measured = [record for record in records if is_measured(record)]
+    if known:
+        return with_measured_noise(load_sensors(known), measured)
     try:
         if not measured:
             raise RecordError("the records are simulated without noise")
@@ -90,6 +95,37 @@ def find_sensors(
         raise RecordError(f"{why}; give one with --sensors: {way}") from None
     log.warning("sensors: %s, %s", content.words["sensors.name"], content["sampling.rate"].source)
     return make_sensors(content)
+
+
+def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> SensorSet:
+    """The same sensors with the noise of measured records where theirs differs from it by more than a quarter.
+
+    Of six axes it is the mean, in proportion. Channels whose noise these records hide, or that rest between two steps of
+    the converter, and those that the file states free of noise, stay as stated.
+    """
+    numbers = rest_numbers()
+    most, levels = numbers.number("assumed.agrees"), noise_levels(records, numbers) if records else None
+    if levels is None:
+        return sensors
+    found, quantities = dict[str, float](), dict(sensors.parameters.quantities)
+    for name, one in levels.channels.items():
+        varies = one.density > 0
+        if one.density[varies].mean() < SHAKEN * one.quantum:
+            continue
+        f = np.linspace(one.low, one.high, 33)
+        due = recorded_spectrum(sensors, name, f, levels.rate).mean(axis=0)
+        stated = float(np.broadcast_to(due, one.density.shape)[varies].mean())
+        ratio = np.sqrt(one.density[varies].mean() / stated) if stated else 1.0
+        if not 1 / most <= ratio <= most:
+            found[name] = float(ratio)
+            old = quantities[f"noise.{name}"]
+            sd = (np.atleast_1d(old.value) * ratio).tolist()
+            quantities[f"noise.{name}"] = _measured(sd if len(sd) > 1 else sd[0], old.unit, levels.source)
+    if not found:
+        return sensors
+    said = ", ".join(f"{name} {ratio:.2g}" for name, ratio in found.items())
+    log.warning("sensors: %s: noise replaced by %s (times stated: %s)", sensors.name, levels.source, said)
+    return make_sensors(replace(sensors.parameters, quantities=quantities), sensors.name)
 
 
 def measured_sensors(

@@ -144,8 +144,11 @@ def _at_bounds(found: Search) -> tuple[str, ...]:
     """Unknowns at a bound: not estimates."""
     x, problem = found.solution.x, found.problem
     low, high = bounds_of(problem, found.calibration)
+    natural = np.zeros(len(x), bool)
+    natural[: len(problem.parameters)] = [p.natural for p in problem.parameters]
     near = AT_BOUND * problem.prior
-    return tuple(n for n, a, b, c, d in zip(problem.names, x, low, high, near, strict=True) if a <= b + d or a >= c - d)
+    ends = (x <= low + near) & ~(natural & (low == problem.lowest)) | (x >= high - near)
+    return tuple(name for name, end in zip(problem.names, ends, strict=True) if end)
 
 
 def _deviations(found: Search, own: tuple[str, ...]) -> Array:

@@ -28,6 +28,7 @@ from ..laws import (
     smooth_ball,
     spring,
     stribeck,
+    stribeck_lag,
     viscous,
     warm_up,
 )
@@ -102,6 +103,8 @@ def force_called(row, s, sd, z):
     if row.law == 21:
         return stribeck.force(views.view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
     if row.law == 22:
+        return stribeck_lag.force(views.view_stribeck_lag(row.numbers), z[row.state]), 0.0, 0.0
+    if row.law == 23:
         return warm_up.force(views.view_warm_up(row.numbers), z[row.state], z[row.state + 1]), 0.0, 0.0
     return 0.0, 0.0, 0.0
 
@@ -207,6 +210,8 @@ def advance_called(row, s, ds, dt, z):
     elif row.law == 21:
         z[row.state] = stribeck.advance(views.view_stribeck(row.numbers), ds[row.port], z[row.state])
     elif row.law == 22:
+        z[row.state] = stribeck_lag.advance(views.view_stribeck_lag(row.numbers), ds[row.port], dt, z[row.state])
+    elif row.law == 23:
         z[row.state], z[row.state + 1] = warm_up.advance(
             views.view_warm_up(row.numbers), ds[row.port], dt, z[row.state], z[row.state + 1]
         )
@@ -271,6 +276,8 @@ def rates(row, s, sd, z, zd):
     elif row.law == 21:
         zd[row.state] = stribeck.rates(views.view_stribeck(row.numbers), sd[row.port], z[row.state])
     elif row.law == 22:
+        zd[row.state] = stribeck_lag.rates(views.view_stribeck_lag(row.numbers), sd[row.port], z[row.state])
+    elif row.law == 23:
         zd[row.state], zd[row.state + 1] = warm_up.rates(
             views.view_warm_up(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
         )

@@ -23,6 +23,7 @@ from ..laws import (
     smooth_ball,
     spring,
     stribeck,
+    stribeck_lag,
     viscous,
     warm_up,
 )
@@ -194,6 +195,12 @@ def view_spring(numbers):
 def view_stribeck(numbers):
     """Parameters of `stribeck`."""
     return stribeck.Stribeck(numbers[0], numbers[1], numbers[2], numbers[3])
+
+
+@compiled_inline
+def view_stribeck_lag(numbers):
+    """Parameters of `stribeck_lag`."""
+    return stribeck_lag.StribeckLag(numbers[0], numbers[1], numbers[2])
 
 
 @compiled_inline

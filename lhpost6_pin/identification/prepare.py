@@ -48,6 +48,9 @@ class Policy(NamedTuple):
     pressure_cutoff: float | None = None  # up to which pressures are differentiated [Hz]; None: they are not
 
 
+PRESSURE_ORDER = 16
+"""Order of the low-pass of differentiated channels: at half its cutoff it takes less than 2e-5."""
+
 EQUAL_AREAS = 0.01
 """Relative difference of a piston's areas up to which its rod counts as double."""
 
@@ -88,15 +91,15 @@ def chamber_pressures(machine: Machine, channels: Mapping[str, Array], *, rates:
     """Chamber pressures (n, n_chambers) [Pa], A of every actuator, then B of the double-acting; None if not measured.
 
     Where only the pressure difference is measured, or the force of a piston of equal areas, both add up to supply and
-    return pressure, as a valve whose ports match the piston's areas makes them (Merritt 1967, Section 5.2). With
-    `rates` the channels are rates [Pa/s].
+    return pressure, as a valve whose ports match the piston's areas makes them (Merritt 1967, Section 5.2). The force of
+    a load cell lacks the share that moves piston and rod. With `rates` the channels are rates [Pa/s].
     """
     sides = [channels[name] for name in ("chamber_pressure_a", "chamber_pressure_b") if name in channels]
     if "chamber_pressure_a" in channels:
         return np.hstack(sides)
     difference, force = channels.get("pressure_difference"), channels.get("actuator_force")
     if difference is None and force is not None and equal_areas(machine):
-        difference = force / [a.area_a for a in machine.actuators]
+        difference = force / [a.area_a * (1.0 - (a.load_cell_share or 0.0)) for a in machine.actuators]
     if difference is None:
         return None
     level = 0.5 * (machine.hydraulics.supply_pressure + machine.hydraulics.return_pressure) * (not rates)
@@ -179,7 +182,7 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}
     cutoff, rates = policy.pressure_cutoff, {}
     if cutoff is not None:
-        rates = {n: differentiate(x, dt, cutoff) for n, x in channels.items() if LAYOUT[n].differentiated}
+        rates = {n: differentiate(x, dt, cutoff, PRESSURE_ORDER) for n, x in channels.items() if LAYOUT[n].differentiated}
     name = str(record.attrs.get("test", "test"))
     if sensors is None or (not is_measured(record) and set(MOTION) <= set(record.data_vars)):
         motion = PlatenMotion(*(record[channel].values.astype(float) for channel in MOTION))

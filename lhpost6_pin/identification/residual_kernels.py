@@ -5,6 +5,7 @@ pressures and spools are measured; flow through lines and from the supply is mar
 kernels.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath
 from ..simulation.ledger import add_at_c, add_row_at_c
 
-__all__ = ["MeasuredOil", "oil_residuals", "row_wrenches", "wrench_residual"]
+__all__ = ["MeasuredOil", "oil_residuals", "part_pressures", "row_wrenches", "wrench_residual"]
 
 
 def wrench_residual(plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array) -> Array:
@@ -82,6 +83,41 @@ class MeasuredOil(NamedTuple):
     pressure_rate: Array  # (n, n_chambers) [Pa/s]
     spool: Array  # (n, n_actuators) [1]
     dt: float  # [s]
+
+
+@compiled
+def part_pressures(rows, oil, ports, room):
+    """Add to the chamber pressures and rates of `oil`, in place, the mean pressure that their difference brings.
+
+    Both chambers were set to one mean, of which `room` (n_actuators,) [Pa] is left to the supply and to the return. Off
+    mid-stroke their volumes differ: compressed by the same flow Q, the smaller one changes more, and the valve's ports
+    restore the mean e at the pace at which pressure drops share the flow:
+
+        de/dt = (V_B - V_A) / (2 (V_A + V_B)) d(P_A - P_B)/dt - r e,   r = beta |Q| / (4 drop) (1 / V_A + 1 / V_B)
+
+    Q follows from continuity of the difference. Derived from Eqs. 4-3 to 4-5 to first order in e.
+    """
+    for i in range(rows.size):
+        p, port = view_hydraulic(rows[i].numbers), rows[i].port
+        a, b = oil.chamber[rows[i].spool]
+        mean, pull = 0.0, 0.0
+        for k in range(oil.pressure.shape[0]):
+            at, speed = ports.s[k, port], ports.rate[k, port]
+            long_a, long_b = p.chamber_a + at, p.chamber_b - at
+            apart, rate = oil.pressure[k, a] - oil.pressure[k, b], oil.pressure_rate[k, a] - oil.pressure_rate[k, b]
+            softness = oil_modulus(p, True, 0.5 * (oil.pressure[k, a] + oil.pressure[k, b]))[0] / long_a
+            softness = softness * (long_a + long_b) / long_b / p.area_a
+            flow = p.area_a * speed + p.leakage * apart + rate / softness
+            drop = max(room[i] - 0.5 * math.copysign(apart, apart * flow), 0.05 * room[i])
+            pace = 0.25 * abs(flow) / drop * softness
+            before, pull = pull, 0.5 * rate * (long_b - long_a) / (long_a + long_b)
+            if k > 0:
+                kept = math.exp(-pace * oil.dt)
+                held = -math.expm1(-pace * oil.dt) / pace if pace > 0.0 else oil.dt
+                mean = kept * mean + 0.5 * (before + pull) * held
+            for side in (a, b):
+                oil.pressure[k, side] += mean
+                oil.pressure_rate[k, side] += pull - pace * mean
 
 
 @compiled

@@ -30,7 +30,7 @@ from ..mechanics.required_wrench import require_alike, required_wrench
 from .friction_march import march_finely
 from .inverse_dynamics import with_loads
 from .prepare import MeasuredTest, actuator_forces, chamber_pressures, oil_forces
-from .residual_kernels import MeasuredOil, oil_residuals, wrench_residual
+from .residual_kernels import MeasuredOil, oil_residuals, part_pressures, wrench_residual
 
 __all__ = ["RESIDUALS", "OilBalance", "Path", "Residuals", "evaluate_residuals", "follow", "kinds_shown", "oil_balance"]
 
@@ -197,6 +197,10 @@ def oil_balance(plant: Plant, test: MeasuredTest, path: Path, *, flows: bool = T
     flow, valve = np.zeros((2, test.samples, int(chamber.max()) + 1 if flows else 0))
     drooped, oil = np.zeros(test.samples), MeasuredOil(chamber, pressure, rate, spool, test.dt)
     rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
+    if "chamber_pressure_a" not in test.channels:
+        hydraulics = plant.machine.hydraulics
+        half = 0.5 * (hydraulics.supply_pressure - hydraulics.return_pressure)
+        part_pressures(rows, oil, path.ports, np.full(plant.spools, half))
     oil_residuals(rows, plant.supply, oil, path.ports, z, drooped, flow, valve)
     return OilBalance(flow, valve, pressure, drooped, spool, chamber)
 

@@ -49,7 +49,8 @@ class Actuator:
 
     mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
     valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are None without chamber B,
-    pad quantities None without a bearing. full_command, if stated, is the voltage of an open valve.
+    pad quantities None without a bearing. full_command, if stated, is the voltage of an open valve. `load_cell_share`
+    is the share of the oil's force that moves what is ahead of a load cell, piston and rod.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Actuator:
     pad_friction: float = quantity_field("N", bound="nonnegative", optional=True)
     pad_yield: float = quantity_field("m", bound="positive", optional=True)
     pad_shape: float = quantity_field("1", bound="fraction", optional=True)
+    load_cell_share: float = quantity_field("1", bound="fraction", optional=True)
 
 
 @dataclass(frozen=True)

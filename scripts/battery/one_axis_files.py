@@ -184,10 +184,11 @@ def machine_text(case: Case) -> str:
         _row("valve_delay", s["valve_delay"], "s", "data sheet", sd["valve_delay"]),
         _row("seal_friction", s["seal_friction"], "N", "seals and guides", sd["seal_friction"]),
         _row("seal_yield", s["seal_yield"], "m", "as other seals", sd["seal_yield"]),
-        _row("seal_shape", 0.1, "1", "as other seals", 0.3),
+        _row("seal_shape", 0.1, "1", "as other seals", sd["seal_shape"]),
         _row("viscous", s["viscous"], "N s/m", "estimate", sd["viscous"]),
         _row("mass_along", 0.0, "kg", "counted in the platen's, or ahead of the load cell"),
         _row("mass_across", 0.0, "kg", "guided"),
+        _row("load_cell_share", 0.03, "1", "piston and rod, estimate", sd["load_cell_share"]),
     ]
     body = [
         _row("mass", [s["mass"]] * 3, "kg", "estimate", sd["mass"]),

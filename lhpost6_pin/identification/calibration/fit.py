@@ -121,13 +121,15 @@ def solve(
     Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
     already evaluated. A frugal search evaluates derivatives by nearly linear unknowns only at `start`, all others while
     steps gain much and nothing is `known`; a `settled` one only those that `known` lacks, and those `near` (p,) them.
+    With few unknowns no search is frugal.
     """
+    frugal = frugal and len(start) > numbers.number("fit.few")
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
     # residuals are nearly linear in shifts of points in plan, and in gains and offsets
     bent = np.array([*(not k.mirrored for k in problem.parameters), *(u.kind == "delay" for u in problem.unknowns)])
-    again = bent if frugal and not settled else fresh | near
+    again = bent if frugal and not settled else fresh | near | (not frugal)
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: NoiseBias | None = None
     normal: NormalEquations | None = None

@@ -24,7 +24,7 @@ __all__ += ["with_parameters"]
 
 Paths = tuple[tuple[str, int], ...]
 
-_OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus")
+_OIL = ("flow", "flow_curve", "leakage", "chamber_a", "chamber_b", "bulk_modulus", "load_cell_share")
 _GAS = ("pressure", "polytropic_index")
 _GEOMETRY = ("wrench", "flow", "gas")
 _MECHANICAL = (
@@ -38,6 +38,15 @@ _LEAST = 0.05
 
 _WIDE = 0.7
 """Relative standard deviation from which a prior is one of the logarithm."""
+
+_STRAIGHT = 0.01
+"""Flow curve of a valve whose gain is straight within half a per cent: its natural end."""
+
+_SHARES = ("seal_shape", "pad_shape", "load_cell_share")
+"""Numbers between zero and one."""
+
+_WHOLE = 0.99
+"""Largest of these, with room for a difference."""
 
 _ROOM = 1.001
 """Least length of a chamber over the stroke."""
@@ -65,6 +74,7 @@ class FreeParameter:
     step: float | None = None  # of the coordinate, for derivatives; None: the comparison's share of sd
     of: str = ""  # the kind's number that a component's own is a factor of
     place: int = -1  # actuator on whose residuals alone it acts; -1: on all
+    natural: bool = False  # its lowest value is an estimate like any other
     mirrored: bool = False  # points move symmetrically about the axis, those on it stay
 
     @property
@@ -108,12 +118,17 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
         masses = {f"platen.mass[{axis}]" for axis in machine.motion}
         found = [p for p in found if p.name in masses or not p.name.startswith("platen.")]
         found = [p for p in found if not p.name.endswith("_height")]
-    return tuple(_with_room(p, machine, travel or {}) for p in found)
+    return tuple(_with_limits(p, machine, travel or {}) for p in found)
 
 
-def _with_room(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:
-    """A chamber is at least as long as its piston's travel."""
+def _with_limits(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:
+    """A chamber is at least as long as its piston's travel, a flow curve no straighter than straight, a share no whole."""
     kind, _, name = parameter.name.partition(".")
+    if name == "flow_curve":
+        straight = parameter.coordinate(min(_STRAIGHT, parameter.value))
+        return replace(parameter, lowest=max(parameter.lowest, straight), natural=True)
+    if name in _SHARES:
+        return replace(parameter, highest=parameter.coordinate(_WHOLE))
     if not name.startswith("chamber_"):
         return parameter
     stroke = max(a.stroke for a in machine.actuators if a.kind == kind)

@@ -87,7 +87,7 @@ class Problem:
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
-        self._set(machine, machine_parameters(machine, _travel(plant, tests)))
+        self._set(machine, _shown(machine_parameters(machine, _travel(plant, tests)), tests[0]))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t)[1] for r, t in zip(clean, tests, strict=True)]
@@ -300,6 +300,12 @@ class OperatingPoint:
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
+
+
+def _shown(parameters: Sequence[FreeParameter], test: MeasuredTest) -> tuple[FreeParameter, ...]:
+    """Parameters without those of a load cell where pressures are measured."""
+    measured = {"chamber_pressure_a", "pressure_difference"} & test.channels.keys()
+    return tuple(p for p in parameters if not (measured and p.name.endswith(".load_cell_share")))
 
 
 def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:

@@ -57,6 +57,7 @@ def cylinder_numbers(basis: Basis, areas: tuple[Quantity, Quantity], force: floa
         "viscous": basis.assumed("cylinder.viscous", "N s/m", force, rated),
         "mass_along": none,
         "mass_across": none,
+        "load_cell_share": basis.typical["cylinder.load_cell_share"],
     }
 
 

@@ -17,7 +17,7 @@ from ..machine.parameters import Parameters
 from .scores import Background, Score
 from .search_state import Search
 
-__all__ = ["Lowered", "Reweighting", "gate", "refusal", "share_explained"]
+__all__ = ["Lowered", "Reweighting", "form_share", "gate", "refusal", "share_explained"]
 __all__ += ["squares_by_column"]
 
 
@@ -100,6 +100,11 @@ def squares_by_column(residual: Sequence[Complex]) -> Array:
 def gate(family: Family, numbers: Parameters) -> float:
     """Least gain of log-likelihood for a candidate of a family."""
     return numbers.number("accept.confusable" if family.confusable else "accept.gain")
+
+
+def form_share(family: Family, numbers: Parameters) -> float:
+    """Share of what an effect explains up to which the residual is attributed to its form."""
+    return numbers.number("verdict.rest_friction" if family.confusable else "verdict.rest")
 
 
 def refusal(families: Sequence[Family], one: Score, less: Lowered, numbers: Parameters) -> str:

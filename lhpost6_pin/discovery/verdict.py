@@ -16,7 +16,7 @@ from ..identification.calibration import FreeParameter
 from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.parameters import Parameters
-from .acceptance import squares_by_column
+from .acceptance import form_share, squares_by_column
 from .localise import Spot, worst_spots
 from .residual_function import ResidualFunction
 from .search_state import AddedEffect, Search
@@ -232,8 +232,10 @@ def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:
 
 def _more_than_noise(found: Search) -> bool:
     """Whether the residual exceeds noise by more than errors in the form of the effects found explain."""
-    limit, share, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "verdict.rest", "accept.doubt"))
+    limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
     for kind in found.problem.kinds:
+        families = [one.candidate.family for one in found.added if kind in one.candidate.family.shows_in]
+        share = max((form_share(f, found.numbers) for f in families), default=found.numbers.number("verdict.rest"))
         rows = found.problem.rows(kind) & ~_impacted(found)
         if not rows.any():
             continue
@@ -261,7 +263,8 @@ def _excess(residual: Sequence[Complex], doubt: float) -> float:
 
 def _leaves_much(added: AddedEffect, found: Search) -> bool:
     """Whether an effect leaves much of the residual unexplained in the columns where it explains most."""
-    limit, share, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "verdict.rest", "accept.doubt"))
+    limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
+    share = form_share(added.candidate.family, found.numbers)
     where = (added.fall > 0.1 * added.fall.max()) & ~_impacted(found)
     left = squares_by_column(found.residual)[where]
     noise = float(sum(len(r) for r in found.residual) * left.size)
@@ -297,7 +300,8 @@ def reject_effects(
     legs, rejected = set(function.components), set()
     for one in forces:
         there = set(one.candidate.components)
-        if function.gain < n("verdict.rest" if legs <= there else "verdict.elsewhere") * one.gain:
+        share = form_share(one.candidate.family, numbers) if legs <= there else n("verdict.elsewhere")
+        if function.gain < share * one.gain:
             return None, set()
         if function.gain > (n("accept.again") if legs & there else 1.0) * one.gain:
             rejected.add(one.candidate.name)

@@ -100,8 +100,8 @@ def find_sensors(
 def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> SensorSet:
     """The same sensors with the noise of measured records where theirs differs from it by more than a quarter.
 
-    Of six axes it is the mean, in proportion. Channels whose noise these records hide, or that rest between two steps of
-    the converter, and those that the file states free of noise, stay as stated.
+    Of six axes it is the mean, in proportion. Channels whose noise these records hide, or that rest between two steps
+    of the converter, and those that the file states free of noise, stay as stated.
     """
     numbers = rest_numbers()
     most, levels = numbers.number("assumed.agrees"), noise_levels(records, numbers) if records else None

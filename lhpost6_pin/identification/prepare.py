@@ -91,8 +91,8 @@ def chamber_pressures(machine: Machine, channels: Mapping[str, Array], *, rates:
     """Chamber pressures (n, n_chambers) [Pa], A of every actuator, then B of the double-acting; None if not measured.
 
     Where only the pressure difference is measured, or the force of a piston of equal areas, both add up to supply and
-    return pressure, as a valve whose ports match the piston's areas makes them (Merritt 1967, Section 5.2). The force of
-    a load cell lacks the share that moves piston and rod. With `rates` the channels are rates [Pa/s].
+    return pressure, as a valve whose ports match the piston's areas makes them (Merritt 1967, Section 5.2). The force
+    of a load cell lacks the share that moves piston and rod. With `rates` the channels are rates [Pa/s].
     """
     sides = [channels[name] for name in ("chamber_pressure_a", "chamber_pressure_b") if name in channels]
     if "chamber_pressure_a" in channels:
@@ -182,7 +182,8 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}
     cutoff, rates = policy.pressure_cutoff, {}
     if cutoff is not None:
-        rates = {n: differentiate(x, dt, cutoff, PRESSURE_ORDER) for n, x in channels.items() if LAYOUT[n].differentiated}
+        derived = {n: x for n, x in channels.items() if LAYOUT[n].differentiated}
+        rates = {n: differentiate(x, dt, cutoff, PRESSURE_ORDER) for n, x in derived.items()}
     name = str(record.attrs.get("test", "test"))
     if sensors is None or (not is_measured(record) and set(MOTION) <= set(record.data_vars)):
         motion = PlatenMotion(*(record[channel].values.astype(float) for channel in MOTION))

@@ -3,9 +3,9 @@
     f = -F_s Z,  dZ/dt = |v| / Y (exp(-(v/v_s)^2) sgn v - Z)
 
 F_s [N] lost in motion, v, v_s [m/s], Y [m] the slip in which bristles bend; Z [1]. Steady sliding gives Stribeck's
-curve; a reversal within less slip than Y shows less of it (frictional lag). Beside friction of Dahl's form with the same
-Y the sum has the steady curve of LuGre's model, Canudas-de-Wit et al. (1995), and its lag, with Y in place of Y times
-the curve. Stored energy: none is declared, all work counts as dissipated.
+curve; a reversal within less slip than Y shows less of it (frictional lag). Beside friction of Dahl's form with the
+same Y the sum has the steady curve of LuGre's model, Canudas-de-Wit et al. (1995), and its lag, with Y in place of Y
+times the curve. Stored energy: none is declared, all work counts as dissipated.
 """
 
 import math

@@ -122,7 +122,7 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
 
 
 def _with_limits(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:
-    """A chamber is at least as long as its piston's travel, a flow curve no straighter than straight, a share no whole."""
+    """A chamber is no shorter than its piston's travel, a flow curve at best straight, a share below one."""
     kind, _, name = parameter.name.partition(".")
     if name == "flow_curve":
         straight = parameter.coordinate(min(_STRAIGHT, parameter.value))

@@ -1,13 +1,13 @@
 """Columns of numbers in text without names: one series, written down or along the rows, or several side by side."""
 
-from collections.abc import Mapping
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from ..core.errors import MotionError
 from ..core.number_table import Dialect, has_decimal_comma, is_number, read_rows
-from .components import Channels, Component, direction_of_file
+from .components import Component, Stated, direction_of_file
 from .motion_units import to_si
 from .text import READABLE, Rows, number_rows
 from .time_steps import uniform_step
@@ -29,14 +29,7 @@ def begins_with_numbers(text: str) -> bool:
     return any(_is_numeric(line) for _, line in without_comments(text[:4000])[:1])
 
 
-def read_columns(
-    text: str,
-    where: str,
-    *,
-    time_step: float | None = None,
-    units: "str | Mapping[str, str] | None" = None,
-    channels: Channels | None = None,
-) -> list[Component]:
+def read_columns(text: str, where: str, **stated: Unpack[Stated]) -> list[Component]:
     """Components of a file of numbers, below any lines of text.
 
     A first column that increases throughout is time [s]; without one, `time_step` [s] is needed. `units` is one for all
@@ -44,6 +37,7 @@ def read_columns(
     series written along the rows; a single column needs none. Raises MotionError naming the file, line or what is
     missing.
     """
+    time_step, units = stated.get("time_step"), stated.get("units")
     rows = without_comments(text)
     rows = rows[next((k for k, (_, line) in enumerate(rows) if _is_numeric(line)), len(rows)) :]
     if len(rows) < 2 and not (rows and len(_fields(rows[0][1])) > 1):
@@ -56,7 +50,7 @@ def read_columns(
             "unit, as --unit g, and unless the first column is time the step, as --dt 0.01"
         )
     counts = [len(_fields(line)) for _, line in rows]
-    wanted = {axis: str(column) for axis, column in (channels or {}).items()}
+    wanted = {axis: str(column) for axis, column in (stated.get("channels") or {}).items()}
     ragged = counts[0] > 1 and counts[-1] < counts[0] and len(set(counts[:-1])) == 1
     if _ALONG_ROWS in wanted.values() or (ragged and not wanted):
         if len(wanted) > 1:

@@ -2,14 +2,15 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
 from ..core.errors import MotionError
 from .motion import AXES, GroundMotion, make_motion
 
-__all__ = ["Channels", "Component", "Direction", "assemble", "axis_and_sign", "direction_of", "direction_of_file"]
+__all__ = ["Channels", "Component", "Direction", "Stated", "assemble", "axis_and_sign", "direction_of"]
+__all__ += ["direction_of_file"]
 
 Channels = Mapping[str, int | str]
 """Channel or column, by number or name, of each axis: `{"x": 2, "y": 1}`."""
@@ -30,6 +31,14 @@ _BEARING = re.compile(r"([ns])(\d{1,2})([ew])")  # S00E: from south to east by 0
 _SEED = re.compile(r"[bcehs][hln]([zne])")  # channel codes of seismology: HNZ, BLE
 _CARDINAL = {90.0: ("x", 1), 270.0: ("x", -1), 0.0: ("y", 1), 180.0: ("y", -1)}
 _NEARLY_PARALLEL = 0.05  # sine of the angle between two components: they tell one direction only
+
+
+class Stated(TypedDict, total=False):
+    """What is stated of a file of columns that it may not say itself."""
+
+    time_step: float | None  # [s]
+    units: str | Mapping[str, str] | None  # one for all values, or one for each axis
+    channels: Channels | None
 
 
 class Component(NamedTuple):

@@ -3,13 +3,14 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from ..core.errors import MotionError, meant
 from ..core.number_table import Dialect, read_rows
 from .columns import COMMAS, without_comments
-from .components import Channels, Component, assemble
+from .components import Channels, Component, Stated, assemble
 from .motion import AXES, GroundMotion
 from .motion_units import to_si
 from .text import read_text
@@ -38,27 +39,13 @@ def is_csv(text: str) -> bool:
     return known and dialect.count(rows[1]) == len(names)
 
 
-def load_csv(
-    path: "Path | str",
-    *,
-    name: str | None = None,
-    time_step: float | None = None,
-    units: "str | Mapping[str, str] | None" = None,
-    channels: Channels | None = None,
-) -> GroundMotion:
+def load_csv(path: "Path | str", *, name: str | None = None, **stated: Unpack[Stated]) -> GroundMotion:
     """Read a CSV file into one motion, as `read_csv` says."""
-    found = read_csv(read_text(path), str(path), time_step=time_step, units=units, channels=channels)
+    found = read_csv(read_text(path), str(path), **stated)
     return assemble(found, name or Path(path).stem, f"CSV file {Path(path).name}")
 
 
-def read_csv(
-    text: str,
-    where: str,
-    *,
-    time_step: float | None = None,
-    units: "str | Mapping[str, str] | None" = None,
-    channels: Channels | None = None,
-) -> list[Component]:
+def read_csv(text: str, where: str, **stated: Unpack[Stated]) -> list[Component]:
     """Components of a CSV file.
 
     The header row names the columns: a time column (`time`, `t`, `time_s`, `time [ms]`) and one for each axis
@@ -84,9 +71,9 @@ def read_csv(
     table = read_rows(rows, names, dialect, where, error=MotionError, commas=COMMAS, correct=remedy)
     clock = next((i for i, column in enumerate(names) if _TIME.fullmatch(column)), None)
     found = []
-    step = _time_step(table, clock, names, time_step, where)
-    for axis, column in _columns(names, clock, channels, f"{where}, line {start}").items():
-        unit = _unit(_COLUMN.fullmatch(names[column]), axis, units)
+    step = _time_step(table, clock, names, stated.get("time_step"), where)
+    for axis, column in _columns(names, clock, stated.get("channels"), f"{where}, line {start}").items():
+        unit = _unit(_COLUMN.fullmatch(names[column]), axis, stated.get("units"))
         if not unit:
             raise MotionError(
                 f"{where}, line {start}: column {names[column]!r} has no unit; write it in the name "

@@ -21,7 +21,7 @@ from lhpost6_pin.data.rests import find_rests
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import Band, align, differentiate
 from lhpost6_pin.data.turned_signs import turned_signs
-from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
 
 TABLE = load_machine("uniaxial")
@@ -246,8 +246,8 @@ def test_a_turned_accelerometer_is_not_taken_for_a_turned_pressure(tests):
 # What sensors can tell ------------------------------------------------------------------------------------------------
 
 
-def told(present: set[str], derived: str = "") -> dict[str, str]:
-    return {one.quantity: one.verdict for one in observable(TABLE, present, derived)}
+def told(present: set[str], machine: Machine = TABLE) -> dict[str, str]:
+    return {one.quantity: one.verdict for one in observable(machine, present)}
 
 
 def test_scales_are_told_by_a_force_and_ratios_by_pressures():
@@ -257,11 +257,12 @@ def test_scales_are_told_by_a_force_and_ratios_by_pressures():
     few = told({*bare, "pressure_difference"})
     assert few["moving mass"] == few["friction law"] == few["leakage"] == few["specimen"] == "ratio"
     assert told({*bare, "pressure_difference", "actuator_force"})["moving mass"] == "yes"
-    assert (
-        told({*bare, "chamber_pressure_a", "chamber_pressure_b", "actuator_force"}, "actuator_force")["moving mass"]
-        == "ratio"
-    )  # a force derived from pressures is no sensor
+    assert told({*bare, "chamber_pressure_a", "chamber_pressure_b"})["moving mass"] == "ratio"
     assert told({*bare, "floor_acceleration"})["specimen"] == "yes"
+    cell = told({*bare, "actuator_force"})  # of a piston of equal areas, it is the pressure difference
+    assert cell["moving mass"] == "yes" and cell["valve gain and null"] == cell["leakage"] == "ratio"
+    single = TABLE.with_params({f"{TABLE.actuators[0].kind}.area_b": 0.7 * TABLE.actuators[0].area_a})
+    assert told({*bare, "actuator_force"}, single)["leakage"] == "no"
     assert told({"spool_command", "spool_position"})["valve delay and lag"] == "yes"
     assert "gas of the struts" not in told(bare) and "gas of the struts" in {
         one.quantity for one in observable(load_machine(), bare)

@@ -112,9 +112,9 @@ def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out:
     save_record(record, path)
     sources, findings = described_sources(raws, channels), check_dataset(record, table)
     entries = {
-        name: {"from": sources.get(name, "derived"), "unit": unit, "least": values.min(), "most": values.max()}
+        name: {"from": sources[name], "unit": unit, "least": values.min(), "most": values.max()}
         for name, unit, values in channel_units(record)
-        if name in sources or values.any()  # else an axis held by guides
+        if name in sources  # else an axis held by guides
     }
 
     def show() -> None:

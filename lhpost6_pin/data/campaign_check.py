@@ -76,7 +76,7 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
         stated=known.name if known else "",
         noise=compare_noise(levels, known),
         findings=None if used is None else check_sensors(plant, measured, used),
-        observable=observable(machine, present, str(measured[0].attrs.get("derived", ""))),
+        observable=observable(machine, present),
         content=content,
         reason=reason,
     )

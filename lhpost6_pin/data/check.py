@@ -104,9 +104,14 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
             further = "" if name in LAYOUT else ", not of the layout"
             yield str(name), None, f"{units}, {' x '.join(map(str, variable.shape))}, {extent}{further}", ""
     for job in sorted({job for channel in LAYOUT.values() for job in channel.needed_by}):
-        missing = [name for name, it in LAYOUT.items() if job in it.needed_by and name not in dataset]
+        missing = [name for name, it in LAYOUT.items() if job in it.needed_by and not _given(dataset, name)]
         if missing:
             yield "", None, f"{job} is not possible without {', '.join(missing)}", ""
+
+
+def _given(dataset: xr.Dataset, name: str) -> bool:
+    """Whether a record has a channel, or one that takes its place in the wrench."""
+    return name in dataset or any(it.replaces == name and other in dataset for other, it in LAYOUT.items())
 
 
 # -------------------------------------------------------------------------------------------- values

@@ -14,6 +14,9 @@ __all__ = ["Observable", "observable"]
 Verdict = Literal["yes", "ratio", "no"]
 
 
+_OIL = "pressures, or a load cell on a piston of equal areas"
+
+
 class Observable(NamedTuple):
     """One quantity: whether its value can be told, only a ratio or a sum, or nothing; and why."""
 
@@ -41,6 +44,11 @@ class _Channels(NamedTuple):
         return self.any("pressure_difference") or (self.any("chamber_pressure_a") and both)
 
     @property
+    def difference(self) -> bool:
+        """Whether the pressure difference is known: measured, or from the load cell of a piston of equal areas."""
+        return self.pressures or (self.force and self.machine.equal_areas)
+
+    @property
     def force(self) -> bool:
         return self.any("actuator_force")
 
@@ -49,9 +57,9 @@ class _Channels(NamedTuple):
         return self.any("spool_position", "valve_command")
 
 
-def observable(machine: Machine, present: Collection[str], derived: str = "") -> tuple[Observable, ...]:
-    """What the channels `present` in every test can tell; a channel named in `derived` is no sensor of its own."""
-    have = _Channels(machine, [name for name in present if name not in derived])
+def observable(machine: Machine, present: Collection[str]) -> tuple[Observable, ...]:
+    """What the channels `present` in every test can tell."""
+    have = _Channels(machine, present)
     rules = (_mass, _friction, _valve, _leakage, _lag, _oil, _specimen, _supply, _struts, _accelerometer)
     return tuple(found for rule in rules if (found := rule(have)))
 
@@ -82,16 +90,16 @@ def _valve(c: _Channels) -> Observable:
     name = "valve gain and null"
     if not (c.valve and c.motion):
         return Observable(name, "no", "needs spool_position or valve_command, and displacement")
-    if not c.pressures:
-        return Observable(name, "no", "needs pressures: without them the load shifts the flow as a null does")
+    if not c.difference:
+        return Observable(name, "no", f"needs {_OIL}: without them the load shifts the flow as a null does")
     return Observable(name, "ratio", "flow against command; null in full command, gain over the piston area")
 
 
 def _by_flow(quantity: str, c: _Channels, of: str) -> Observable:
     """A quantity of the balance of flow, over the piston area."""
-    if c.valve and c.motion and c.pressures:
+    if c.valve and c.motion and c.difference:
         return Observable(quantity, "ratio", of)
-    return Observable(quantity, "no", "needs pressures, displacement, and spool_position or valve_command")
+    return Observable(quantity, "no", f"needs displacement, spool_position or valve_command, and {_OIL}")
 
 
 def _leakage(c: _Channels) -> Observable:

@@ -65,7 +65,12 @@ def open_record(path: Path | str) -> xr.Dataset:
 
 
 def _brought_up(dataset: xr.Dataset) -> xr.Dataset:
-    """A record in the current layout; a missing or unknown version is left to `layout_faults`."""
+    """A record in the current layout; a missing or unknown version is left to `layout_faults`.
+
+    A force that an earlier import computed from pressures is left out: it is no sensor of its own.
+    """
+    if "actuator_force" in str(dataset.attrs.pop("derived", "")):
+        dataset = dataset.drop_vars("actuator_force", errors="ignore")
     stated = dataset.attrs.get("layout_version", LAYOUT_VERSION)
     for version in range(int(stated) if is_number(stated) and stated >= 1 else LAYOUT_VERSION, LAYOUT_VERSION):
         dataset = STEPS[version](dataset).assign_attrs(layout_version=version + 1, written_in_layout=stated)

@@ -16,7 +16,7 @@ from ..core.names import AXES
 from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.pose import forward_kinematics, kinematic_jacobian, leg_displacements
-from .alignment import due_spools
+from .alignment import due_spools, hydraulic_force
 from .channels import LAYOUT, channel_name, columns_of
 from .conditioning import resolution
 from .records import sample_interval
@@ -124,12 +124,13 @@ def loose_lengths(
 ) -> Iterator[tuple[str, SensorComparison, Array]]:
     """Lengths of double-acting actuators against the platen's pose, each with the contact side (n,) of a loose pin.
 
-    The side, -1 to 1, follows from the measured force; `closing` [N] of it closes most of the play (`laws.play`).
+    The side, -1 to 1, follows from the force, measured or of pressures; `closing` [N] of it closes most of the play.
     """
     view = _View(plant, record, sensors)
-    if not view.has("actuator_force"):
+    measured = view.has("actuator_force")
+    if not (measured or view.has("chamber_pressure_a", "chamber_pressure_b")):
         return
-    force = view.values("actuator_force")
+    force = view.values("actuator_force") if measured else hydraulic_force(plant.machine, record)
     side = view.signal(force / np.sqrt(force**2 + closing**2))
     each = zip(plant.machine.actuator_names, _lengths(view), side.T, strict=False)  # none without lengths
     yield from (one for one in each if one[0] in plant.machine.double_acting)

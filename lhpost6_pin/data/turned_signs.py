@@ -77,7 +77,7 @@ def _forces(record: xr.Dataset, machine: Machine) -> Iterator[tuple[str, str, Ar
     """Channel, actuator and force (n,) [N], measured or of a pressure difference."""
     areas = {a.name: a.area_a for a in machine.actuators}
     for name, dim in (("actuator_force", "actuator"), ("pressure_difference", "horizontal")):
-        if name in record and name not in str(record.attrs.get("derived", "")):
+        if name in record:
             for label, x in zip(map(str, record[dim].values), columns_of(record[name]).T, strict=True):
                 if label in areas:
                     yield name, label, x * (areas[label] if dim == "horizontal" else 1.0)

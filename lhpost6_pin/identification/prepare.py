@@ -31,7 +31,7 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
-__all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable", "equal_areas"]
+__all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
 __all__ += ["prepare_test", "source_of"]
 
 
@@ -50,9 +50,6 @@ class Policy(NamedTuple):
 
 PRESSURE_ORDER = 16
 """Order of the low-pass of differentiated channels: at half its cutoff it takes less than 2e-5."""
-
-EQUAL_AREAS = 0.01
-"""Relative difference of a piston's areas up to which its rod counts as double."""
 
 AS_RECORDED = Policy(align=False)
 EACH_TEST = Policy(align=True)
@@ -98,18 +95,12 @@ def chamber_pressures(machine: Machine, channels: Mapping[str, Array], *, rates:
     if "chamber_pressure_a" in channels:
         return np.hstack(sides)
     difference, force = channels.get("pressure_difference"), channels.get("actuator_force")
-    if difference is None and force is not None and equal_areas(machine):
+    if difference is None and force is not None and machine.equal_areas:
         difference = force / [a.area_a * (1.0 - (a.load_cell_share or 0.0)) for a in machine.actuators]
     if difference is None:
         return None
     level = 0.5 * (machine.hydraulics.supply_pressure + machine.hydraulics.return_pressure) * (not rates)
     return np.hstack([level + 0.5 * difference, level - 0.5 * difference])
-
-
-def equal_areas(machine: Machine) -> bool:
-    """Whether every piston has the same area on both sides: its force is that of the pressure difference."""
-    areas = [(a.area_a, a.area_b) for a in machine.actuators]
-    return all(b is not None and abs(b / a - 1.0) <= EQUAL_AREAS for a, b in areas)
 
 
 def actuator_forces(machine: Machine, channels: Mapping[str, Array]) -> Array | None:
@@ -176,8 +167,6 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     """
     record = _decimated(record, policy.rate)
     dt = sample_interval(record)
-    if "actuator_force" in str(record.attrs.get("derived", "")):  # from pressures: no sensor of its own
-        record = record.drop_vars("actuator_force")
     columns = {n: record[n].values for n, c in LAYOUT.items() if n in record and c.residuals and c.role != "motion"}
     channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}
     cutoff, rates = policy.pressure_cutoff, {}

@@ -11,6 +11,9 @@ __all__ = ["MOTIONS", "Structure"]
 MOTIONS = ("free", "x", "y", "z", "xy", "xz", "yz", "xyz")
 """Freedom of a platen: six degrees of freedom, or displacements along guides, which hold it against turning."""
 
+EQUAL_AREAS = 0.01
+"""Relative difference of a piston's areas up to which its rod counts as double."""
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -54,6 +57,12 @@ class Structure:
     def double_acting(self) -> tuple[str, ...]:
         """Names of the actuators that have a chamber B; the `horizontal` dimension of records."""
         return tuple(a.name for a in self.actuators if a.area_b is not None)
+
+    @property
+    def equal_areas(self) -> bool:
+        """Whether every piston has the same area on both sides: its force is that of the pressure difference."""
+        areas = [(a.area_a, a.area_b) for a in self.actuators]
+        return all(b is not None and abs(b / a - 1.0) <= EQUAL_AREAS for a, b in areas)
 
     @property
     def axis_names(self) -> tuple[str, ...]:

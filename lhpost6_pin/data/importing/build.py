@@ -11,7 +11,6 @@ from ...core.arrays import Array
 from ...core.errors import RecordError
 from ...core.names import AXES
 from ...machine.machine import Machine
-from ..alignment import oil_force
 from ..channels import LAYOUT, channel_unit
 from ..records import make_record
 from .channel_map import ChannelMap, channels_of, check_map, find_column, still_channels, with_labels
@@ -30,9 +29,8 @@ def make_imported_record(
 ) -> xr.Dataset:
     """Make a record from the raw columns of one test.
 
-    `labels` are the machine's, by dimension (`actuator`, `horizontal`, `strut`). With a `machine`, actuator forces that
-    are not mapped are derived from the chamber pressures, and axes in which it cannot move are zero. Attributes list
-    what was filled, held constant or derived.
+    `labels` are the machine's, by dimension (`actuator`, `horizontal`, `strut`). With a `machine`, axes in which it
+    cannot move are zero. Attributes list what was filled or held constant.
     Raises RecordError naming map and key, or file, channel and sample.
     """
     labels = with_labels(labels, list(channels.channels))
@@ -68,10 +66,6 @@ def make_imported_record(
             together.setdefault(variable, []).append(columns[name])
     variables = {v: np.column_stack(c) if len(LAYOUT[v].dims) > 1 else c[0] for v, c in together.items()}
     attrs = _attrs(raws, channels, used)
-    pressures = ("chamber_pressure_a", *(("chamber_pressure_b",) if machine and machine.double_acting else ()))
-    if machine and "actuator_force" not in variables and set(pressures) <= set(variables):
-        variables["actuator_force"] = oil_force(machine, *(variables[name] for name in pressures))
-        attrs["derived"] = "actuator_force from chamber pressures times piston areas"
     if filled:
         attrs["filled"] = "interpolated samples: " + "; ".join(filled)
     if constant:

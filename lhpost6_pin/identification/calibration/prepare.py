@@ -13,7 +13,7 @@ from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
-from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, equal_areas, prepare_test
+from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
 from .whitened_residuals import spectrum_of
 
@@ -101,7 +101,7 @@ def _refuse_channels(test: str, record: xr.Dataset, machine: Machine) -> None:
         what = "neither actuator_force nor chamber_pressure_a nor pressure_difference"
         raise RecordError(f"{test}: has {what}; give at least one of them")
     if "pressure_difference" in record and "chamber_pressure_a" not in record:
-        if not equal_areas(machine):
+        if not machine.equal_areas:
             why = "of pistons whose areas differ does not determine their force"
             raise RecordError(f"{test}: pressure_difference {why}; give both chamber pressures")
     if machine.double_acting and ("chamber_pressure_a" in record) != ("chamber_pressure_b" in record):

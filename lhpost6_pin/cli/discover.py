@@ -40,12 +40,13 @@ def discover(
     from ..data.measured_sensors import find_sensors
     from ..discovery import discover as search
     from ..discovery import verdict_entries
+    from ..identification.calibration import usable_tests
     from ..machine.machine import load_machine
     from ..show.report.discover_report import save_discovery
     from ..show.result_tables import print_discovery
 
     table = load_machine(machine, model)
-    tests = load_campaign(campaign, table)
+    tests = usable_tests(load_campaign(campaign, table))
     known = find_sensors(table, tests.records, sensors, measuring(campaign, machine))
     held = None if hold_out is None else [] if hold_out == ["none"] else hold_out
     folder = folder_for(out, f"{tests.name}_discovery")

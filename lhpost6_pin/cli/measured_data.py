@@ -1,5 +1,6 @@
 """Commands for measured data: check, export, decompose, validate, calibrate."""
 
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from ..data.campaign import Campaign
 
 __all__ = ["calibrate", "check", "decompose", "export", "validate"]
 
@@ -29,7 +30,6 @@ def check(
     from ..data.campaign_check import check_campaign
     from ..data.check import check_record
     from ..data.measured_sensors import save_sensors
-    from ..data.records import load_record
     from ..show.check_tables import check_entries, print_check
     from ..show.results import finding_entries
     from ..show.tables import print_findings
@@ -39,9 +39,11 @@ def check(
         raise ParameterError(f"{sensors_out}: exists and may have been edited; remove it, or name another")
     files = sorted(file.glob("*.nc")) or [file]
     found = {str(path): check_record(path, table) for path in files}
-    wrong = any(f.severity == "error" for findings in found.values() for f in findings)
+    wrong = {path for path, findings in found.items() if any(f.severity == "error" for f in findings)}
+    tests = None
     try:
-        checked = check_campaign(table, [_named(load_record(path), path) for path in files], sensors)
+        tests = _comparable(files, wrong)
+        checked = check_campaign(table, tests.records, sensors)
     except RecordError:
         if not wrong:
             raise
@@ -60,15 +62,39 @@ def check(
         if checked is not None:
             print_check(checked)
 
-    print_result(json, lambda: {**finding_entries(found), **check_entries(checked)}, show, written)
+    skipped = {one.test: one.why for one in tests.skipped} if tests else {}
+    print_result(json, lambda: {**finding_entries(found), **check_entries(checked), "skipped": skipped}, show, written)
     if wrong:
         raise typer.Exit(1)
 
 
-def _named(record: "xr.Dataset", path: Path) -> "xr.Dataset":
-    """A record called by its file if it has no name."""
-    record.attrs.setdefault("test", path.stem)
-    return record
+def _comparable(files: Sequence[Path], wrong: Collection[str]) -> "Campaign":
+    """Records that can be read, without those that calibrate and discover skip, unless these are all.
+
+    Raises RecordError if none can be read, or for one that cannot although it is not among the `wrong` files.
+    """
+    from ..data.campaign import Campaign, SkippedTest
+    from ..data.records import load_record
+    from ..identification.calibration import usable_tests
+
+    records, skipped = [], []
+    for path in files:
+        try:
+            record = load_record(path)
+        except RecordError as error:
+            if str(path) not in wrong or len(files) == 1:
+                raise
+            skipped.append(SkippedTest(path.stem, str(error)))
+            continue
+        record.attrs.setdefault("test", path.stem)
+        records.append(record)
+    if not records:
+        raise RecordError(skipped[0].why)
+    whole = Campaign(files[0].parent.name, tuple(records), tuple(skipped))
+    try:
+        return usable_tests(whole)
+    except RecordError:  # none of them: noise and signs may be checked all the same
+        return whole
 
 
 @command()
@@ -174,19 +200,21 @@ def calibrate(
     from ..data.campaign import load_campaign
     from ..data.measured_sensors import find_sensors
     from ..identification.calibration import calibrate as calibrate_machine
+    from ..identification.calibration import usable_tests
     from ..identification.calibration.override import save_override
     from ..show.report import write_calibrate_report
     from ..show.result_tables import print_calibration
     from ..show.results import calibration_entries
 
     table = machine.load()
-    tests = load_campaign(campaign, table)
+    tests = usable_tests(load_campaign(campaign, table))
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_calibration")
     with progress_bar(f"calibrating {table.name} on {tests.name}") as progress:
         found = calibrate_machine(
-            table, tests.records, known, campaign=tests.name, seed=seed, jobs=jobs, progress=progress
-        )
+            *(table, tests.records, known),
+            campaign=tests.name, skipped=tests.skipped, seed=seed, jobs=jobs, progress=progress,
+        )  # fmt: skip
     files = [folder / name for name in ("override.toml", "report.html")]
     save_override(found, files[0])
     write_calibrate_report(found, files[1], command=repeating_command())

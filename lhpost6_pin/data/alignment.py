@@ -70,6 +70,8 @@ def phase_delay(reference: ArrayLike, signal: ArrayLike, dt: float, band: Band =
     f, cross = sp.csd(ref, sig, **each)
     power = sp.welch(ref, **each)[1] * sp.welch(sig, **each)[1]
     used = (f >= band.low) & (f <= band.high)
+    if not used.any():  # too short a record to show any
+        return np.zeros(ref.shape[1]), np.full(ref.shape[1], np.inf)
     omega, cross, power = 2 * np.pi * f[used, None], cross[used], power[used]
     power = np.where(power > LEAKAGE**2 * power.max(axis=0), power, 0.0)
     m = len(ref) / length

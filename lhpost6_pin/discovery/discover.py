@@ -12,11 +12,11 @@ from ..control import load_controller
 from ..core.errors import RecordError, UnknownNameError
 from ..core.files import models_folder
 from ..core.progress import Progress, between
-from ..data.campaign import Campaign
+from ..data.campaign import Campaign, SkippedTest
 from ..data.sensors import SensorSet
-from ..identification.calibration import calibration_numbers
 from ..identification.calibration.curves import Curves, measured_curves
 from ..identification.calibration.fit import Solution
+from ..identification.calibration import calibration_numbers, usable_tests
 from ..identification.calibration.free_parameters import plan_parameters, scatter_parameters
 from ..identification.calibration.normal_equations import NormalEquations
 from ..identification.calibration.prepare import prepare_problem
@@ -51,6 +51,7 @@ class Discovery:
     fitted: Machine  # with the effects found and all numbers fitted; a residual function is in it, switched off
     used: tuple[str, ...]  # tests that were searched
     held_out: tuple[str, ...]  # tests that were not
+    skipped: tuple[SkippedTest, ...]  # tests that could not be used
     verdict: Verdict
     search: Search
     proof: Proof | None  # None where no test was held out
@@ -83,17 +84,18 @@ def discover(
     ambiguous. The folder `unfinished` holds a checkpoint until the search ends; an interrupted search with the same
     inputs resumes from it and reaches the same verdict.
 
-    Raises UnknownNameError for a test that is not in the campaign; RecordError where no test is left to search; and
-    what `calibrate` raises.
+    Tests that cannot be compared are skipped (`usable_tests`). Raises UnknownNameError for a test that is not in the
+    campaign; RecordError where no test is left to search; and what `calibrate` raises.
     """
     report, (numbers, calibration) = progress or (lambda share: None), discovery_numbers()
+    campaign = usable_tests(campaign)
     names = [str(r.attrs.get("test", i)) for i, r in enumerate(campaign.records)]
     plant = make_plant(machine)
     lost = lost_motion(plant, campaign.records, sensors, numbers)
     faults = find_sensor_faults(plant, campaign.records, sensors, [one.component for one in lost])
     records = correct_records(campaign.records, faults)
     hashes = {name: _hash(record) for name, record in zip(names, campaign.records, strict=True)}
-    held = _held_out(names, hold_out)
+    held = _held_out(names, hold_out, campaign.skipped)
     checkpoint = make_checkpoint(unfinished, machine, sensors, hashes, hold_out, seed)
     begun = checkpoint.read()
     if begun is None:
@@ -146,6 +148,7 @@ def discover(
         fitted=_sourced(fitted if function is None else with_residual_function(fitted, function), machine, campaign),
         used=tuple(name for i, name in enumerate(names) if i not in held),
         held_out=tuple(names[i] for i in held),
+        skipped=campaign.skipped,
         verdict=verdict,
         search=found,
         proof=proof,
@@ -214,8 +217,11 @@ def discovery_numbers() -> tuple[Parameters, Parameters]:
     return numbers, replace(common, quantities={**common.quantities, **own})
 
 
-def _held_out(names: Sequence[str], wanted: Sequence[str] | None) -> tuple[int, ...]:
+def _held_out(names: Sequence[str], wanted: Sequence[str] | None, skipped: Sequence[SkippedTest]) -> tuple[int, ...]:
     """Places of the tests to hold out."""
+    for one in skipped:
+        if one.test in (wanted or ()):
+            raise RecordError(f"{one.test}: cannot be held out: {one.why}")
     for name in wanted or ():
         if name not in names:
             raise UnknownNameError("test of the campaign", name, list(names))

@@ -8,6 +8,7 @@ from typing import Any
 from .. import __version__
 from ..core.files import write_whole
 from ..core.jsonable import as_json
+from ..data.campaign import skipped_summary
 from ..machine.library import find_family
 from .discover import Discovery
 from .held_out import FLOOR
@@ -69,6 +70,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "machine": found.machine.name,
         "tests": list(found.used),
         "held_out": list(found.held_out),
+        "skipped": {one.test: one.why for one in found.skipped},
         "seed": found.seed,
         "versions": {"lhpost6_pin": __version__},
         "inputs": found.hashes,
@@ -143,6 +145,8 @@ def summary(found: Discovery) -> str:
         text += f" {worse}"
     if verdict.bounded:
         text += f" At the bound of their ranges, and no estimates: {', '.join(verdict.bounded)}."
+    if found.skipped:
+        text += f" {skipped_summary(found.skipped)}"
     if verdict.effects and found.proof is None:
         return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
     return text

@@ -1,5 +1,6 @@
 """Results of commands in a terminal: the tables of their reports."""
 
+from ..data.campaign import skipped_summary
 from ..discovery import Discovery
 from ..identification.calibration import Calibration
 from ..identification.calibration.calibration_summary import (
@@ -69,6 +70,7 @@ def print_calibration(calibration: Calibration) -> None:
         *cut_strokes(calibration),
         correlation_summary(calibration),
         contradiction_summary(calibration),
+        skipped_summary(calibration.skipped),
         f"converged after {rounds}"
         if calibration.converged
         else f"not converged in {rounds}: the tests carry too little information; add tests or excite more",

@@ -202,6 +202,7 @@ def calibration_entries(found: Calibration) -> Entries:
     }
     return {
         **_picked(found, "campaign", "converged", "rounds"),
+        "skipped": {one.test: one.why for one in found.skipped},
         "parameters": parameters,
         "sensors": sensors,
         "misfit": misfits,

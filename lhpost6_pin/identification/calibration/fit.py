@@ -19,6 +19,7 @@ import xarray as xr
 from ...core.arrays import Array, Complex, Mask
 from ...core.names import AXES
 from ...core.progress import Progress, between, split
+from ...data.campaign import SkippedTest
 from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
@@ -44,6 +45,7 @@ def calibrate(
     sensors: SensorSet,
     *,
     campaign: str = "campaign",
+    skipped: Sequence[SkippedTest] = (),
     seed: int = 0,
     jobs: int = -1,
     progress: Progress | None = None,
@@ -51,8 +53,9 @@ def calibrate(
     """Calibrate a machine jointly by all tests of a campaign.
 
     Records are of one machine in one state, with the same channels; each may have its own sample rate. Servovalves are
-    open as in the first. Deterministic for a seed (of the simulated noise), independent of the number of `jobs`
-    (threads; -1: one a core). `progress` is called with the share done.
+    open as in the first. `skipped` are tests that are not among them (`usable_tests`), for the result. Deterministic
+    for a seed (of the simulated noise), independent of the number of `jobs` (threads; -1: one a core). `progress` is
+    called with the share done.
 
     Raises RecordError for a record that breaks the layout, is of another machine, or was made with a specimen that the
     machine has not; that lacks platen_displacement, or both forces and pressures; that differs from the others in its
@@ -69,6 +72,7 @@ def calibrate(
     return Calibration(
         machine=problem.machine,
         campaign=campaign,
+        skipped=tuple(skipped),
         tests=tuple(str(r.attrs.get("test", i)) for i, r in enumerate(records)),
         parameters=problem.parameters,
         unknowns=problem.unknowns,

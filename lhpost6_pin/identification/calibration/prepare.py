@@ -1,7 +1,6 @@
 """Preparation of a campaign for a fit: checked, aligned, fused, with noisier copies of every test."""
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -15,7 +14,7 @@ from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
 from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
-from .whitened_residuals import spectrum_of
+from .usable_tests import too_short
 
 __all__ = ["policy_of", "prepare_problem"]
 
@@ -78,7 +77,8 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
             raise RecordError(f"{test}: {faults[0]}")
         machine.refuse_unmounted(record.attrs, test)
         _refuse_channels(test, record, machine)
-        _refuse_short(test, record, comparison)
+        if why := too_short(record, comparison.bands, comparison.edge):
+            raise RecordError(f"{test}: {why}; remove it from the campaign")
         if lacking := [c for c in calibrated_channels() if c not in record and any(c in other for other in records)]:
             what = f"{test} has no {', '.join(lacking)}, which other tests have"
             raise RecordError(f"{what}; remove that test from the campaign, or the channel from all tests")
@@ -111,16 +111,3 @@ def _refuse_channels(test: str, record: xr.Dataset, machine: Machine) -> None:
         for sample, column in below[:1]:
             what = f"{channel_name(record['strut_pressure'], int(column))} is not above zero at sample {sample}"
             raise RecordError(f"{test}: {what}; give absolute pressures, or remove the channel from all tests")
-
-
-def _refuse_short(test: str, record: xr.Dataset, comparison: ResidualBands) -> None:
-    n, bands = record.sizes["time"], comparison.bands
-    length = float(record["time"][-1] - record["time"][0])
-    dt = length / (n - 1)
-    f = np.zeros(0)
-    if n > 2 * round(comparison.edge / dt):
-        f = spectrum_of(np.zeros((n, 1)), dt, bands[0], bands[-1], comparison.edge)[1]
-    for low, high in pairwise(bands):
-        if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
-            what = f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
-            raise RecordError(f"{test}: {what}; remove it from the campaign")

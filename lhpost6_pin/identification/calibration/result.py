@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core.arrays import Array, Mask
 from ...core.files import models_folder
+from ...data.campaign import SkippedTest
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
 from .curves import Curves
@@ -48,6 +49,7 @@ class Calibration:
     converged: bool
     numbers: Parameters = field(repr=False)
     curves: Curves = field(default_factory=Curves, repr=False)  # as delivered, and calibrated
+    skipped: tuple[SkippedTest, ...] = ()  # tests that were not used
 
     @property
     def sd(self) -> Array:

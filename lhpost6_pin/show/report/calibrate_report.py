@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...data.campaign import skipped_summary
 from ...identification.calibration import Calibration
 from ...identification.calibration.calibration_summary import chance, range_summary
 from ...identification.calibration.result import beyond, changed_parameters, contradictions, out_of_range, verdict_on
@@ -90,6 +91,7 @@ def _verdict(calibration: Calibration) -> tuple[str, Level]:
     if bounded:
         level = "attention"
         sentences.append(f"At the bound of the fit, which indicates another cause: {', '.join(bounded)}.")
+    sentences += filter(None, [skipped_summary(calibration.skipped)])
     return " ".join(sentences), level if calibration.converged else "bad"
 
 

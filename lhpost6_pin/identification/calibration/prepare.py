@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ...core.errors import RecordError, SimulationError
-from ...data.channels import calibrated_channels, channel_name
+from ...data.channels import calibrated_channels, channel_name, columns_of
 from ...data.layout_faults import layout_faults
 from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
@@ -40,7 +40,7 @@ def prepare_problem(
     n = numbers.number
     comparison = ResidualBands(numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"))
     _refuse(machine, records, comparison)
-    _refuse_free_of_noise(records, sensors)
+    _refuse_free_of_noise(machine, records, sensors)
     machine = machine.as_tested(records[0].attrs, "the first test")
     plant = make_plant(machine)
     policy = policy_of(numbers)
@@ -84,10 +84,23 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
             raise RecordError(f"{what}; remove that test from the campaign, or the channel from all tests")
 
 
-def _refuse_free_of_noise(records: Sequence[xr.Dataset], sensors: SensorSet) -> None:
+def _refuse_free_of_noise(machine: Machine, records: Sequence[xr.Dataset], sensors: SensorSet) -> None:
     """Raise RecordError for measured channels whose noise the sensors do not state: nothing could be weighed by it."""
-    present = [name for name in calibrated_channels() if any(name in r and np.ptp(r[name].values) > 0 for r in records)]
-    if lacking := [name for name in present if not np.any(sensors.noise.get(name, 0.0))]:
+    lacking = []
+    for name, channel in calibrated_channels().items():
+        moved = [np.ptp(columns_of(r[name]), axis=0) > 0 for r in records if name in r]
+        if not moved:
+            continue
+        moves = np.any(moved, axis=0)
+        if "axis" in channel.dims:
+            moves &= np.isin(np.arange(len(moves)), machine.axes)
+        noise = np.broadcast_to(sensors.noise.get(name, np.zeros(1)), len(moves))
+        bare = np.flatnonzero(moves & (noise == 0.0))
+        each = [channel_name(records[0][name], int(i)) for i in bare]
+        lacking += each if noise[moves].any() else each and [name]
+    if any("valve_command" in r for r in records) and "valve_command" not in sensors.noise:
+        lacking.append("valve_command (0 where it is recorded as it is given)")
+    if lacking:
         what = f"sensors {sensors.name}: no noise is stated for {', '.join(lacking)}, which these tests measure"
         how = "add it to the sensors file; `lhpost6 check CAMPAIGN --sensors-out FILE` measures it"
         raise RecordError(f"{what}; {how}")

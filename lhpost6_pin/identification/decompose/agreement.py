@@ -18,6 +18,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...data.alignment import phase_delay
+from ...data.channels import LAYOUT
 from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band, correlation, differentiate, peak_ratio, rrmse
 from ...mechanics.plant import make_plant
@@ -148,18 +149,17 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
     """Change (n, 6) of the residual by one standard deviation of each calibration error."""
     whole, record = found.whole, found.record
     unit = leg_wrenches(found.plant, whole.states.q, np.ones((len(whole.states.time), whole.actuators)))
-    group = "actuator_force" if "actuator_force" in record else "chamber_pressure"
+    ways = (("actuator_force",), ("chamber_pressure_a", "chamber_pressure_b"), ("pressure_difference",))
+    channels = next(way for way in ways if way[0] in record)  # as `actuator_forces` prefers them
     for k, actuator in enumerate(found.plant.machine.actuators):
-        columns = [("actuator_force", 1.0, whole.component_force[:, k])]
-        if group == "chamber_pressure":
-            columns = [("chamber_pressure_a", actuator.area_a, record["chamber_pressure_a"].values[:, k])]
-            if actuator.area_b is not None:
-                values = record["chamber_pressure_b"].sel(horizontal=actuator.name).values
-                columns.append(("chamber_pressure_b", actuator.area_b, values))
-        for channel, area, values in columns:
+        areas = (1.0,) if channels == ways[0] else (actuator.area_a, actuator.area_b)
+        for channel, area in zip(channels, areas, strict=False):
+            if area is None:
+                continue
+            values = record[channel].sel({LAYOUT[channel].dims[1]: actuator.name}).values
             yield unit[:, k] * (area * sensors.gain_sd(channel) * values[:, None])
             yield unit[:, k] * (area * sensors.offset_sd(channel))
-    skew = np.hypot(sensors.delay_sd(group), sensors.delay_sd("platen_displacement"))
+    skew = np.hypot(sensors.delay_sd(LAYOUT[channels[0]].group or channels[0]), sensors.delay_sd("platen_displacement"))
     yield skew * differentiate(whole.measured, found.dt, sensors.band.high)
     used = [name for name in ("actuator_displacement", "platen_displacement", "platen_acceleration") if name in record]
     gain = max(sensors.gain_sd(name) for name in used)

@@ -146,11 +146,13 @@ def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tup
     if force is None:
         if "chamber_pressure_a" in test.channels:
             require(record, "chamber_pressure_b")
-        raise RecordError(
-            f"{source_of(record)}: has neither actuator_force nor chamber_pressure_a; forces come from one of them"
-        )
-    by_pressures = "Actuator forces from their chamber pressures, P_A A_1 − P_B A_2."
-    notes = ["Actuator forces as measured." if "actuator_force" in test.channels else by_pressures]
+        what = "neither actuator_force nor chamber_pressure_a nor pressure_difference"
+        raise RecordError(f"{source_of(record)}: has {what}; forces come from one of them")
+    notes = ["Actuator forces as measured."]
+    if "actuator_force" not in test.channels:
+        notes = ["Actuator forces from their chamber pressures, P_A A_1 − P_B A_2."]
+        if "chamber_pressure_a" not in test.channels:
+            notes = ["Actuator forces from their pressure differences, (P_A − P_B) A."]
     struts = test.channels.get("strut_pressure") if plant.machine.struts else None
     if plant.machine.struts and struts is None:
         notes.append("Strut pressures were not measured: struts as modelled.")

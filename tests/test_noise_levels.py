@@ -253,9 +253,10 @@ def told(present: set[str], machine: Machine = TABLE) -> dict[str, str]:
 def test_scales_are_told_by_a_force_and_ratios_by_pressures():
     bare = {"platen_displacement", "valve_command"}
     assert told(bare)["moving mass"] == told(bare)["valve gain and null"] == told(bare)["leakage"] == "no"
-    assert told(bare)["valve delay and lag"] == "ratio"
+    assert told(bare)["valve delay and lag"] == "no"  # a load that varies delays the motion, too
     few = told({*bare, "pressure_difference"})
-    assert few["moving mass"] == few["friction law"] == few["leakage"] == few["specimen"] == "ratio"
+    partly = ("moving mass", "friction law", "leakage", "specimen", "valve delay and lag")
+    assert {few[quantity] for quantity in partly} == {"ratio"}
     assert told({*bare, "pressure_difference", "actuator_force"})["moving mass"] == "yes"
     assert told({*bare, "chamber_pressure_a", "chamber_pressure_b"})["moving mass"] == "ratio"
     assert told({*bare, "floor_acceleration"})["specimen"] == "yes"

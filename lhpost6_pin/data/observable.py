@@ -110,6 +110,8 @@ def _lag(c: _Channels) -> Observable:
     name = "valve delay and lag"
     if c.any("spool_command") and c.any("spool_position"):
         return Observable(name, "yes", "spool_position against spool_command")
+    if c.any("valve_command") and c.motion and not c.difference:
+        return Observable(name, "no", f"needs {_OIL}: without them a load that varies delays the motion, too")
     if c.any("valve_command") and c.motion:
         return Observable(name, "ratio", "only their sum: the spool between command and motion is not measured")
     return Observable(name, "no", "needs a command, and the spool or the motion that it causes")

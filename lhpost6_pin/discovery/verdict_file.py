@@ -130,7 +130,7 @@ def summary(found: Discovery) -> str:
         text = {
             "none": "no missing effect; no parameter differs from the machine file.",
             "not_testable": f"no missing effect, but {len(verdict.untestable)} families are not testable with this "
-            "campaign: it needs more excitation.",
+            "campaign: it needs more excitation, or sensors that tell of them (lhpost6 check).",
             "parameters_only": f"no missing effect; {len(verdict.changed)} parameters differ: "
             f"{', '.join(verdict.changed)}.",
             "sensor": "no missing effect; sensors beyond their stated ranges: "

@@ -8,6 +8,7 @@ import xarray as xr
 from ...core.errors import RecordError, SimulationError
 from ...data.channels import calibrated_channels, channel_name, columns_of
 from ...data.layout_faults import layout_faults
+from ...data.observable import observable
 from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
@@ -111,8 +112,10 @@ def _refuse_channels(test: str, record: xr.Dataset, machine: Machine) -> None:
         why = "lengths do not replace it, since the geometry behind them is calibrated"
         raise RecordError(f"{test}: has no platen_displacement; {why}")
     if not {"actuator_force", "chamber_pressure_a", "pressure_difference"} & set(record.data_vars):
-        what = "neither actuator_force nor chamber_pressure_a nor pressure_difference"
-        raise RecordError(f"{test}: has {what}; give at least one of them")
+        what = "neither actuator_force nor chamber_pressure_a nor pressure_difference; give at least one of them"
+        told = observable(machine, set(map(str, record.data_vars)))
+        hidden, shown = (", ".join(o.quantity for o in told if (o.verdict == "no") == no) for no in (True, False))
+        raise RecordError(f"{test}: has {what}. These sensors cannot tell: {hidden}; they tell: {shown or 'nothing'}")
     if "pressure_difference" in record and "chamber_pressure_a" not in record:
         if not machine.equal_areas:
             why = "of pistons whose areas differ does not determine their force"

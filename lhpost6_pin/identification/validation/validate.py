@@ -109,8 +109,8 @@ def validate(
     found = Parallel(n_jobs=jobs, prefer="threads")(delayed(one)(record) for record in campaign.records)
     every = tuple(phase for test in found for phase in test)
     if all(phase.reason for phase in every):
-        why = "; ".join(dict.fromkeys(f"{p.test}, {PHASES[p.number]}: {p.reason}" for p in every))
-        raise RecordError(f"{campaign.name}: no phase of any test is possible: {why}")
+        first = "; ".join(f"{PHASES[p.number]}: {p.reason}" for p in found[0])
+        raise RecordError(f"{campaign.name}: no phase of any test is possible; {found[0][0].test}: {first}")
     valves = find_valves(machine, enough, numbers)
     return Validation(campaign.name, machine, sensors, numbers, skews, valves, every)
 

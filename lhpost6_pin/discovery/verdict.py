@@ -5,7 +5,7 @@ family (seven times the leakage: worn seals).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.stats import chi2, norm
 from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration import FreeParameter
 from ..identification.calibration.normal_equations import bounds_of
+from ..identification.calibration.scale import Scale, ratios
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.parameters import Parameters
 from .acceptance import form_share, squares_by_column
@@ -25,6 +26,7 @@ from .sensor_findings import SensorFault
 __all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
 Functions = Sequence[ResidualFunction]
+MASS = "added_mass"  # family of masses beyond their priors
 AT_BOUND = 1e-3  # of an unknown's prior deviation: nearer to a bound it counts as at it
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
 
@@ -76,6 +78,8 @@ class Verdict:
     where: tuple[Spot, ...] = ()  # where most of the unexplained residual is, by falling share
     unproven: tuple[tuple[str, float], ...] = ()  # families rejected on held-out tests, with the gain there
     bounded: tuple[str, ...] = ()  # unknowns at a bound, which are no estimates
+    scale: Scale | None = None  # that nothing measured fixes
+    ratios: Mapping[str, Estimate] = field(default_factory=dict)  # to that scale, of what was estimated
     dropped: frozenset[str] = frozenset()  # effects by name that are at a bound, or unproven: no part of the model
 
 
@@ -104,15 +108,18 @@ def judge(
         if one.candidate.release == u.name
     )
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
-    kept = [one for one in found.added if one.candidate.name not in {s.name for s in released}]
+    rescaled = _rescaled(found)
+    kept = [one for one in found.added if one.candidate.name not in {s.name for s in released} | rescaled]
     failed = tuple(
         (one.candidate.family.named, unproven[one.candidate.name]) for one in kept if one.candidate.name in unproven
     )
     kept = [one for one in kept if one.candidate.name not in unproven]
     sure = np.abs(x) > calibration.number("report.deviations") * sd
     material = np.abs(x) > calibration.number("report.material") * problem.stated
-    names = (parameter.name for i, parameter in enumerate(problem.parameters) if sure[i] and material[i])
-    changed = {name: estimates[name] for name in names if not name.startswith(own) and name not in problem.free}
+    differs = {p.name for i, p in enumerate(problem.parameters) if sure[i] and material[i]}
+    differs -= {name for name in differs if name.startswith(own) or name in problem.free}
+    differs |= {_amplitude(one) for one in found.added if one.candidate.name in rescaled}
+    changed = {name: estimate for name, estimate in estimates.items() if name in differs}
     function, rejected = reject_effects(kept, beside, replacing, numbers)
     rejected |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found)}
     bounded = _at_bounds(found)
@@ -132,7 +139,24 @@ def judge(
         word = "sensor"
     spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
     dropped = frozenset({*unproven, *at_bound})
-    return Verdict(word, effects, changed, sensors, function, hidden, nearest, spots, failed, bounded, dropped)
+    told = changed | {n: e for n, e in estimates.items() if n.startswith(own) and not n.startswith(tuple(dropped))}
+    scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in told.items() if n not in bounded))
+    return Verdict(
+        *(word, effects, changed, sensors, function, hidden, nearest, spots, failed, bounded),
+        scale=problem.scale,
+        ratios={name: Estimate(*ratio) for name, ratio in scaled.items()},
+        dropped=dropped,
+    )
+
+
+def _rescaled(found: Search) -> set[str]:
+    """Masses added or released from their priors where only their ratio to a stated number is known, by name.
+
+    What has changed is that ratio: the number may be wrong, or the mass.
+    """
+    scale = found.problem.scale
+    names = {one.candidate.name for one in found.added if one.candidate.family.named == MASS}
+    return names if scale is not None and scale.unit else set()
 
 
 def _amplitude(one: AddedEffect) -> str:

@@ -9,6 +9,7 @@ from .. import __version__
 from ..core.files import write_whole
 from ..core.jsonable import as_json
 from ..data.campaign import skipped_summary
+from ..identification.calibration.scale import scale_summary
 from ..machine.library import find_family
 from .discover import Discovery
 from .held_out import FLOOR
@@ -50,6 +51,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
             for one in verdict.effects
         ],
         "parameters_changed": {name: _interval(value) for name, value in verdict.changed.items()},
+        "scale": _scale(found),
         "sensor_findings": [
             {"name": s.name, "family": s.family, **_interval(s.estimate), "stated_range": s.stated}
             for s in verdict.sensors
@@ -89,6 +91,16 @@ def advice(found: Discovery) -> list[str]:
 
 def _interval(value: Estimate) -> dict[str, Any]:
     return {"value": value.value, "unit": value.unit, "ci90": [value.low, value.high]}
+
+
+def _scale(found: Discovery) -> dict[str, Any] | None:
+    """What the scale is taken from that nothing measured fixes, and the ratios that can be told."""
+    scale = found.verdict.scale
+    if scale is None:
+        return None
+    stated = {"value": scale.value, "unit": scale.unit} if scale.unit else {}
+    each = {name: _interval(ratio) for name, ratio in found.verdict.ratios.items()}
+    return {"fixed_by": scale.name, **stated, "why": scale_summary(scale), "ratios": each}
 
 
 def _unexplained(found: Discovery) -> dict[str, Any] | None:
@@ -145,6 +157,8 @@ def summary(found: Discovery) -> str:
         text += f" {worse}"
     if verdict.bounded:
         text += f" At the bound of their ranges, and no estimates: {', '.join(verdict.bounded)}."
+    if verdict.scale is not None:
+        text += f" {scale_summary(verdict.scale)}"
     if found.skipped:
         text += f" {skipped_summary(found.skipped)}"
     if verdict.effects and found.proof is None:

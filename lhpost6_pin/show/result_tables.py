@@ -9,12 +9,13 @@ from ..identification.calibration.calibration_summary import (
     cut_strokes,
     range_summary,
 )
+from ..identification.calibration.scale import scale_summary
 from ..identification.decompose import Decomposed, WrenchAgreement
 from ..identification.validation import Validation
 from ..tuning.iterate import Iterated
 from ..tuning.sine import SineTest
 from ..tuning.tune import Tuning
-from .report.calibrate_sections import misfit_table, parameter_table, sensor_table
+from .report.calibrate_sections import misfit_table, parameter_table, ratio_tables, sensor_table
 from .report.control_blocks import gain_table
 from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
@@ -71,6 +72,8 @@ def print_calibration(calibration: Calibration) -> None:
         correlation_summary(calibration),
         contradiction_summary(calibration),
         skipped_summary(calibration.skipped),
+        scale_summary(calibration.scale),
+        *ratio_tables(calibration),
         f"converged after {rounds}"
         if calibration.converged
         else f"not converged in {rounds}: the tests carry too little information; add tests or excite more",

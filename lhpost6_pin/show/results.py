@@ -11,6 +11,7 @@ from ..core.names import AXES
 from ..data.layout_faults import RecordFinding
 from ..identification.calibration import Calibration
 from ..identification.calibration.result import verdict_on
+from ..identification.calibration.scale import scale_summary
 from ..identification.decompose import Decomposed, WrenchAgreement
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
@@ -203,6 +204,9 @@ def calibration_entries(found: Calibration) -> Entries:
     return {
         **_picked(found, "campaign", "converged", "rounds"),
         "skipped": {one.test: one.why for one in found.skipped},
+        "scale": None
+        if found.scale is None
+        else {"fixed_by": found.scale.name, "why": scale_summary(found.scale), "ratios": found.ratios()},
         "parameters": parameters,
         "sensors": sensors,
         "misfit": misfits,

@@ -73,6 +73,7 @@ def calibrate(
         machine=problem.machine,
         campaign=campaign,
         skipped=tuple(skipped),
+        scale=problem.scale,
         tests=tuple(str(r.attrs.get("test", i)) for i, r in enumerate(records)),
         parameters=problem.parameters,
         unknowns=problem.unknowns,

@@ -113,12 +113,24 @@ def machine_parameters(machine: Machine, travel: Mapping[str, float] | None = No
         section, _, name = path.partition(".")
         if section in sections and quantity.sd is not None and name != "bearing_plane":
             found += _parameters_of(path, name, quantity)
-    found += _points(machine, (2,))
+    found = [*_with_one_area(machine, found), *_points(machine, (2,))]
     if machine.motion != "free":  # a guided platen: masses along its guides, no inertia, no geometry
         masses = {f"platen.mass[{axis}]" for axis in machine.motion}
         found = [p for p in found if p.name in masses or not p.name.startswith("platen.")]
         found = [p for p in found if not p.name.endswith("_height")]
     return tuple(_with_limits(p, machine, travel or {}) for p in found)
+
+
+def _with_one_area(machine: Machine, found: Sequence[FreeParameter]) -> Iterator[FreeParameter]:
+    """The parameters; of a piston of equal areas, both are one."""
+    kinds = {a.kind for a in machine.actuators if a.area_b == a.area_a}
+    for parameter in found:
+        kind, _, name = parameter.name.rpartition(".")
+        if kind in kinds and name == "area_a":
+            paths = ((f"{kind}.area_a", -1), (f"{kind}.area_b", -1))
+            yield replace(parameter, name=f"{kind}.area", paths=paths)
+        elif not (kind in kinds and name == "area_b"):
+            yield parameter
 
 
 def _with_limits(parameter: FreeParameter, machine: Machine, travel: Mapping[str, float]) -> FreeParameter:

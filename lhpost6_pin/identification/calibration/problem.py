@@ -22,6 +22,7 @@ from ..friction_march import made_fine
 from ..prepare import MeasuredTest
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
+from .scale import find_scale, without_held
 from .sensor_errors import SensorUnknown, corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
 
@@ -87,8 +88,10 @@ class Problem:
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
-        self._set(machine, _shown(machine_parameters(machine, _travel(plant, tests)), tests[0]))
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
+        self.scale = find_scale(machine, tests[0], clean[0])
+        free = _shown(machine_parameters(machine, _travel(plant, tests)), tests[0])
+        self._set(machine, without_held(free, self.scale))
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t)[1] for r, t in zip(clean, tests, strict=True)]
         noise = self._noise(plant, clean)

@@ -12,6 +12,7 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
 from .curves import Curves
 from .free_parameters import FreeParameter, with_parameters
+from .scale import Ratio, Scale, ratios
 from .sensor_errors import SensorUnknown
 
 __all__ = ["Calibration", "Contradiction", "Subset", "Verdict", "beyond", "calibration_numbers", "changed_parameters"]
@@ -50,6 +51,7 @@ class Calibration:
     numbers: Parameters = field(repr=False)
     curves: Curves = field(default_factory=Curves, repr=False)  # as delivered, and calibrated
     skipped: tuple[SkippedTest, ...] = ()  # tests that were not used
+    scale: Scale | None = None  # that nothing measured fixes
 
     @property
     def sd(self) -> Array:
@@ -90,6 +92,12 @@ class Calibration:
         reach = float(norm.ppf(0.5 + 0.5 * probability)) * self.sd[i]
         low, high = (self.parameters[i].at(self.estimate[i] + side * reach) for side in (-1.0, 1.0))
         return min(low, high), max(low, high)
+
+    def ratios(self) -> dict[str, Ratio]:
+        """Ratios of identifiable parameters to a number of the machine whose scale nothing measured fixes."""
+        told = [i for i, _ in enumerate(self.parameters) if self.informed[i]]
+        each = ((self.parameters[i], self.estimate[i], self.interval(i)) for i in told)
+        return ratios(self.scale, ((p.name, p.unit, p.at(float(x)), *ends) for p, x, ends in each))
 
     def correlated_pairs(self) -> list[tuple[str, str, float]]:
         """Strongly correlated pairs of unknowns with their correlation, strongest first."""

@@ -5,6 +5,9 @@
 Commands are held for a sample of the controller, while the valves' delay is not a multiple of it: each spool of a
 record may be up to half such a sample early or late, in addition to the delay of its group.
 
+The gain of a sensor that alone fixes the scale of numbers that are free (the only one of force on an axis, the only one
+of motion, a floor's) is none of them: it cannot be told from these numbers.
+
 Displacement, velocity and acceleration of the platen are fused into one motion; each channel's gain acts on its share
 of the motion, to first order. Skews between them have been removed; other delays are relative to the platen's motion.
 """
@@ -24,6 +27,7 @@ from ...data.signals import align
 from ...machine.machine import Machine
 from ...mechanics.pose import PlatenMotion
 from ..prepare import MeasuredTest
+from .scale import measures_alone
 
 __all__ = ["SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
 
@@ -62,7 +66,8 @@ def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) ->
             ("gain", sensors.gain_sd(name), "1"),
             ("offset", sensors.offset_sd(name), channel_unit(name)),
         ):
-            for i, label in enumerate(columns if kind in channel.errors and sd > 0.0 else ()):
+            free = sd > 0.0 and not (kind == "gain" and _scales_alone(machine, name, test))
+            for i, label in enumerate(columns if kind in channel.errors and free else ()):
                 if channel.role != "motion" or np.any(test.motion.displacement[:, i]):  # else a guided platen
                     add(kind, name, i, label, sd, unit, _together(machine, kind, name, i, label, present))
     for group, sd in _delays(sensors, channels).items():
@@ -73,6 +78,15 @@ def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) ->
             for i, label in enumerate(labels[channel.dims[1]]):
                 add("delay", name, i, label, held, "s", (f"delay of a {name}", i))
     return tuple(found)
+
+
+def _scales_alone(machine: Machine, name: str, test: MeasuredTest) -> bool:
+    """Whether nothing but a sensor fixes the scale of free numbers: the only one of force, of motion, or of floors."""
+    if name == "floor_acceleration":  # in proportion to masses that are free
+        return any(machine.parameters[f"{floor.name}.mass"].sd is not None for floor in machine.floors)
+    if LAYOUT[name].role == "motion":
+        return len(test.share) == 1
+    return measures_alone(machine, name, test.channels)
 
 
 def _delays(sensors: SensorSet, channels: Mapping[str, Channel]) -> dict[str, float]:

@@ -8,6 +8,7 @@ from ...data.campaign import skipped_summary
 from ...identification.calibration import Calibration
 from ...identification.calibration.calibration_summary import chance, range_summary
 from ...identification.calibration.result import beyond, changed_parameters, contradictions, out_of_range, verdict_on
+from ...identification.calibration.scale import scale_summary
 from .calibrate_sections import (
     change_of,
     correlation_blocks,
@@ -91,7 +92,7 @@ def _verdict(calibration: Calibration) -> tuple[str, Level]:
     if bounded:
         level = "attention"
         sentences.append(f"At the bound of the fit, which indicates another cause: {', '.join(bounded)}.")
-    sentences += filter(None, [skipped_summary(calibration.skipped)])
+    sentences += filter(None, [skipped_summary(calibration.skipped), scale_summary(calibration.scale)])
     return " ".join(sentences), level if calibration.converged else "bad"
 
 

@@ -75,7 +75,17 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
         f"nominal. Unchanged: less, and identifiable (predicted deviation below {informed:g} of the prior's). Not "
         "informed: mostly the prior. A height is the mean over the components of its kind, which move together."
     )
-    return [forest_figure(calibration), how, parameter_table(calibration), *cut_strokes(calibration)]
+    tables = (parameter_table(calibration), *ratio_tables(calibration))
+    return [forest_figure(calibration), how, *tables, *cut_strokes(calibration)]
+
+
+def ratio_tables(calibration: Calibration) -> list[Table]:
+    """Return the ratios that can be told, where nothing measured fixes a scale."""
+    each = calibration.ratios()
+    if calibration.scale is None or not each:
+        return []
+    rows = [(name, _plain(r.value), r.unit, f"{_plain(r.low)} to {_plain(r.high)}") for name, r in each.items()]
+    return [Table(f"Ratios to {calibration.scale.name}", ("Parameter", "Ratio", "Unit", INTERVAL), rows)]
 
 
 def sensor_table(calibration: Calibration, *, significant: bool = True) -> Table:

@@ -1,7 +1,7 @@
 """The report of a discovery: identified effects, held-out errors, misfit map, candidates considered."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ...discovery import Discovery, save_verdict
@@ -77,6 +77,8 @@ def discovery_tables(found: Discovery) -> list[Table]:
     changed = []
     if verdict.changed:
         changed.append(_estimates("Recalibrated parameters", "Parameter", verdict.changed, verdict.bounded))
+    if verdict.scale and verdict.ratios:
+        changed.append(_estimates(f"Ratios to {verdict.scale.name}", "Number", verdict.ratios))
     sensors = [_sensor_table(verdict.sensors)] if verdict.sensors else []
     proof = [_proof_table(found.proof)] if found.proof else []
     balances = [_balance_table(found.balances)] if found.balances else []
@@ -113,7 +115,7 @@ def _effect_table(one: EffectFinding) -> Table:
     )
 
 
-def _estimates(caption: str, what: str, estimates: dict[str, Estimate], bounded: Sequence[str] = ()) -> Table:
+def _estimates(caption: str, what: str, estimates: Mapping[str, Estimate], bounded: Sequence[str] = ()) -> Table:
     rows = [
         (n, f"{e.value:.5g}", "at its bound" if n in bounded else f"{e.low:.5g} to {e.high:.5g}", e.unit)
         for n, e in estimates.items()

@@ -6,7 +6,8 @@ zero where they were: only ratios to one of these numbers can be told. The best 
 of a sensor that alone measures what it scales (`sensor_errors`).
 """
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -68,18 +69,15 @@ def find_scale(machine: Machine, test: MeasuredTest, residuals: Residuals) -> Sc
     pairs = ((residuals.wrench, after.wrench), (residuals.flow, after.flow))
     if not all(_grows(before, later) for before, later in pairs):
         return None
-    kinds = list(dict.fromkeys(a.kind for a in machine.actuators))
-    areas = {f"{kind}{name}": machine.parameters[f"{kind}{name}"] for kind in kinds for name in _AREAS
-             if f"{kind}{name}" in machine.parameters}  # fmt: skip
-    area = next(iter(areas.values()))
-    known = Scale(f"{' and '.join(f'{kind}.area' for kind in kinds)}", float(np.max(area.value)), area.unit,
-                  max(map(_deviation, areas.values())), (*_FORCES, *_FLOWS), tuple(areas))  # fmt: skip
-    if len(machine.axes) == 1 and len(kinds) == 1:
+    areas = dict(_areas(machine))
+    area, names = next(iter(areas.values())), dict.fromkeys(f"{path.rpartition('.')[0]}.area" for path in areas)
+    value, deviation = float(np.max(area.value)), max(map(_deviation, areas.values()))
+    known = Scale(" and ".join(names), value, area.unit, deviation, (*_FORCES, *_FLOWS), tuple(areas))
+    if len(machine.axes) == len(names) == 1:
         mass, axis = machine.parameters["platen.mass"], machine.axes[0]
         if (own := _deviation(mass, axis)) < known.deviation:
             name = f"platen.mass[{'xyz'[axis]}]"
-            value = float(np.broadcast_to(mass.value, 3)[axis])
-            return Scale(name, value, mass.unit, own, (*known.members, area.unit), (name,))
+            return Scale(name, machine.platen.mass[axis], mass.unit, own, (*known.members, area.unit), (name,))
     return known
 
 
@@ -126,6 +124,15 @@ def scale_summary(scale: Scale | None) -> str:
         f"leakage scale with the piston area. {scale.name} is held as stated ({stated}); if it is wrong, so are they, "
         "by the same factor."
     )
+
+
+def _areas(machine: Machine) -> Iterator[tuple[str, Quantity]]:
+    """Piston areas by path: of each actuator, or of its kind."""
+    for actuator, side in product(machine.actuators, _AREAS):
+        for path in (f"{actuator.name}{side}", f"{actuator.kind}{side}"):
+            if path in machine.parameters:
+                yield path, machine.parameters[path]
+                break
 
 
 def _grows(before: Array, after: Array) -> bool:

@@ -14,9 +14,9 @@ from ..core.files import models_folder
 from ..core.progress import Progress, between
 from ..data.campaign import Campaign, SkippedTest
 from ..data.sensors import SensorSet
+from ..identification.calibration import calibration_numbers, usable_tests
 from ..identification.calibration.curves import Curves, measured_curves
 from ..identification.calibration.fit import Solution
-from ..identification.calibration import calibration_numbers, usable_tests
 from ..identification.calibration.free_parameters import plan_parameters, scatter_parameters
 from ..identification.calibration.normal_equations import NormalEquations
 from ..identification.calibration.prepare import prepare_problem

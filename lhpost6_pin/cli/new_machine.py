@@ -46,6 +46,7 @@ class Answers:
     rated_drop: Annotated[str | None, _option("rated_drop")] = None
     valve_delay: Annotated[str | None, _option("valve_delay")] = None
     friction: Annotated[str | None, _option("friction")] = None
+    presliding: Annotated[str | None, _option("presliding")] = None
     bulk_modulus: Annotated[str | None, _option("bulk_modulus")] = None
     platen_radius: Annotated[str | None, _option("platen_radius")] = None
     base_radius: Annotated[str | None, _option("base_radius")] = None

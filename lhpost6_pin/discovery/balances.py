@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration.fit import Solution
+from ..identification.calibration.measured_wrench import measured_bins
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
-from ..identification.inverse_dynamics import leg_wrenches
-from ..identification.prepare import actuator_forces
-from ..identification.residuals import Residuals, kinds_shown
+from ..identification.residuals import kinds_shown
 from ..mechanics.plant import make_plant
-from ..mechanics.pose import plant_motion
 from .search import without_effect
 from .search_state import Search
 
@@ -56,18 +54,6 @@ def residual_at(held: Problem, solution: Solution | None = None) -> HeldOut:
     return HeldOut(base, problem.residual(base))
 
 
-def _measured(problem: Problem, base: OperatingPoint, t: int) -> Complex:
-    """Bins (m, 6) of the measured actuator wrench at C."""
-    test, plant = base.tests[t], base.plant
-    force = actuator_forces(plant.machine, test.channels)
-    if force is None or not problem.rows("wrench").any():
-        return np.zeros((len(problem.frequency[t]), 6), np.complex128)
-    wrench = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)
-    none = np.zeros((len(wrench), 0))
-    stacked = Residuals(wrench, none, none, none, none, none)
-    return problem.bins(stacked, test)[0][:, problem.rows("wrench")]
-
-
 def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance, ...]:
     """Balances of the held-out tests by three models."""
     found, axes = [], make_plant(held.machine).axes
@@ -80,7 +66,11 @@ def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance,
             error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
             share = explained = None
             f = held.frequency[t]
-            if kind == "wrench" and (size := _squares(_measured(held, three[0].base, t), f, forces)) > 0.0:
+            if (
+                kind == "wrench"
+                and (size := _squares(measured_bins(held, three[0].base.plant, three[0].base.tests[t], t), f, forces))
+                > 0.0
+            ):
                 plain = [held.bins(one.base.residuals[t], one.base.tests[t])[0][:, rows] for one in three]
                 left = [_squares(bins, f, forces) / size for bins in plain]
                 share, explained = _three(np.sqrt(left)), _three(1.0 - np.array(left))

@@ -9,8 +9,8 @@ import numpy as np
 from ..core.arrays import Array
 from ..data.channels import LAYOUT
 from ..identification.calibration import FreeParameter
+from ..identification.calibration.effect_parameters import effect_parameters
 from ..identification.calibration.problem import Problem
-from ..identification.residuals import RESIDUALS
 from ..machine.library import Family, Shape, families, find_family, in_size_of, scaled_families
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
@@ -89,24 +89,7 @@ class Candidate:
         Logarithms of shapes have a prior deviation `factor`; where it is zero, shapes are fixed.
         """
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
-        found = []
-        for s in self.family.shapes:
-            value = values[s.name]
-            relative = not s.amplitude and s.low > 0.0
-            if not s.amplitude and factor == 0.0:
-                continue
-            parameter = FreeParameter(
-                name=f"{self.name}.{s.name}",
-                paths=((f"effect.{self.name}.{s.name}", -1),),
-                unit=s.unit,
-                value=value,
-                sd=spread * s.typical if s.amplitude else factor if relative else s.scale,
-                form="log" if relative else "shift",
-                shows_in=tuple(k for k in self.family.shows_in if k in RESIDUALS),
-                step=s.typical if s.amplitude else None,
-            )
-            found.append(parameter.within(s.low, s.high))
-        return tuple(found)
+        return effect_parameters(self.family, self.name, values, spread, factor)
 
 
 def with_background(

@@ -28,6 +28,7 @@ from ..mechanics.plant import make_plant
 from .balances import Balance, evaluate_balances, residual_at, unproven_effects
 from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
+from .friction_form import with_friction_form
 from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
@@ -109,9 +110,11 @@ def discover(
             jobs=jobs,
         )
         report(0.1)
-        part = between(report, 0.1, 0.38)
+        part = between(report, 0.1, 0.36)
         begun = _begin(problem, held, numbers, calibration, hold_one_out=hold_out is None, progress=part)
-        begun = begun._replace(search=with_lost_motion(begun.search, lost, between(report, 0.38, 0.4)))
+        begun = begun._replace(search=with_lost_motion(begun.search, lost, between(report, 0.36, 0.38)))
+        rubbed, held_problem = with_friction_form(begun.search, begun.held_problem, between(report, 0.38, 0.4))
+        begun = begun._replace(search=rubbed, held_problem=held_problem)
         checkpoint.write(begun)
     machine, held = begun.machine, begun.held
     found, linear = search(

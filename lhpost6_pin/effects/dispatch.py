@@ -9,6 +9,7 @@ from ..core.compiled import compiled, compiled_inline
 from ..laws import (
     asymmetric,
     backlash,
+    backlash_instead,
     ball,
     bouc_wen_1d,
     bouc_wen_2d,
@@ -52,34 +53,40 @@ def force_called(row, s, sd, z):
     if row.law == 6:
         return backlash.force(views.view_backlash(row.numbers), z[row.state]), 0.0, 0.0
     if row.law == 7:
-        return ball.force(views.view_ball(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2])
+        return (
+            backlash_instead.force(views.view_backlash_instead(row.numbers), z[row.state], z[row.state + 1]),
+            0.0,
+            0.0,
+        )
     if row.law == 8:
-        return by_memory.force(views.view_by_memory(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+        return ball.force(views.view_ball(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2])
     if row.law == 9:
-        return by_position.force(views.view_by_position(row.numbers), s[row.port]), 0.0, 0.0
+        return by_memory.force(views.view_by_memory(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
     if row.law == 10:
-        return by_speed.force(views.view_by_speed(row.numbers), sd[row.port]), 0.0, 0.0
+        return by_position.force(views.view_by_position(row.numbers), s[row.port]), 0.0, 0.0
     if row.law == 11:
-        return constant.force(views.view_constant(row.numbers)), 0.0, 0.0
+        return by_speed.force(views.view_by_speed(row.numbers), sd[row.port]), 0.0, 0.0
     if row.law == 12:
+        return constant.force(views.view_constant(row.numbers)), 0.0, 0.0
+    if row.law == 13:
         first, second = dahl_instead.force(
             views.view_dahl_instead(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2], z[row.state + 3]
         )
         return first, second, 0.0
-    if row.law == 13:
-        return drag.force(views.view_drag(row.numbers), sd[row.port]), 0.0, 0.0
     if row.law == 14:
-        return end_stop.force(views.view_end_stop(row.numbers), s[row.port]), 0.0, 0.0
+        return drag.force(views.view_drag(row.numbers), sd[row.port]), 0.0, 0.0
     if row.law == 15:
-        return gas_heat.force(views.view_gas_heat(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+        return end_stop.force(views.view_end_stop(row.numbers), s[row.port]), 0.0, 0.0
     if row.law == 16:
-        return gas_leak.force(views.view_gas_leak(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+        return gas_heat.force(views.view_gas_heat(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
     if row.law == 17:
+        return gas_leak.force(views.view_gas_leak(row.numbers), s[row.port], z[row.state]), 0.0, 0.0
+    if row.law == 18:
         first, second = load_friction.force(
             views.view_load_friction(row.numbers), _load(row, z), z[row.state], z[row.state + 1]
         )
         return first, second, 0.0
-    if row.law == 18:
+    if row.law == 19:
         return oscillator.force(
             views.view_oscillator(row.numbers),
             sd[row.port],
@@ -88,23 +95,23 @@ def force_called(row, s, sd, z):
             z[row.state],
             z[row.state + 1],
         )
-    if row.law == 19:
+    if row.law == 20:
         return smooth_ball.force(
             views.view_smooth_ball(row.numbers),
             sd[row.port],
             sd[row.port_2],
             (sd[row.port_3] if row.port_3 >= 0 else 0.0),
         )
-    if row.law == 20:
+    if row.law == 21:
         first, second = spring.force(
             views.view_spring(row.numbers), s[row.port], (s[row.port_2] if row.port_2 >= 0 else 0.0)
         )
         return first, second, 0.0
-    if row.law == 21:
-        return stribeck.force(views.view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
     if row.law == 22:
-        return stribeck_lag.force(views.view_stribeck_lag(row.numbers), z[row.state]), 0.0, 0.0
+        return stribeck.force(views.view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
     if row.law == 23:
+        return stribeck_lag.force(views.view_stribeck_lag(row.numbers), z[row.state]), 0.0, 0.0
+    if row.law == 24:
         return warm_up.force(views.view_warm_up(row.numbers), z[row.state], z[row.state + 1]), 0.0, 0.0
     return 0.0, 0.0, 0.0
 
@@ -162,6 +169,10 @@ def advance_called(row, s, ds, dt, z):
     elif row.law == 6:
         z[row.state] = backlash.advance(views.view_backlash(row.numbers), ds[row.port], z[row.state])
     elif row.law == 7:
+        z[row.state], z[row.state + 1] = backlash_instead.advance(
+            views.view_backlash_instead(row.numbers), ds[row.port], z[row.state], z[row.state + 1]
+        )
+    elif row.law == 8:
         z[row.state], z[row.state + 1], z[row.state + 2] = ball.advance(
             views.view_ball(row.numbers),
             ds[row.port],
@@ -171,9 +182,9 @@ def advance_called(row, s, ds, dt, z):
             z[row.state + 1],
             z[row.state + 2],
         )
-    elif row.law == 8:
+    elif row.law == 9:
         z[row.state] = by_memory.advance(views.view_by_memory(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
-    elif row.law == 12:
+    elif row.law == 13:
         z[row.state], z[row.state + 1], z[row.state + 2], z[row.state + 3] = dahl_instead.advance(
             views.view_dahl_instead(row.numbers),
             ds[row.port],
@@ -184,11 +195,11 @@ def advance_called(row, s, ds, dt, z):
             z[row.state + 2],
             z[row.state + 3],
         )
-    elif row.law == 15:
-        z[row.state] = gas_heat.advance(views.view_gas_heat(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
     elif row.law == 16:
-        z[row.state] = gas_leak.advance(views.view_gas_leak(row.numbers), dt, z[row.state])
+        z[row.state] = gas_heat.advance(views.view_gas_heat(row.numbers), s[row.port], ds[row.port], dt, z[row.state])
     elif row.law == 17:
+        z[row.state] = gas_leak.advance(views.view_gas_leak(row.numbers), dt, z[row.state])
+    elif row.law == 18:
         z[row.state], z[row.state + 1] = load_friction.advance(
             views.view_load_friction(row.numbers),
             ds[row.port],
@@ -197,7 +208,7 @@ def advance_called(row, s, ds, dt, z):
             z[row.state],
             z[row.state + 1],
         )
-    elif row.law == 18:
+    elif row.law == 19:
         z[row.state], z[row.state + 1] = oscillator.advance(
             views.view_oscillator(row.numbers),
             ds[row.port],
@@ -207,11 +218,11 @@ def advance_called(row, s, ds, dt, z):
             z[row.state],
             z[row.state + 1],
         )
-    elif row.law == 21:
-        z[row.state] = stribeck.advance(views.view_stribeck(row.numbers), ds[row.port], z[row.state])
     elif row.law == 22:
-        z[row.state] = stribeck_lag.advance(views.view_stribeck_lag(row.numbers), ds[row.port], dt, z[row.state])
+        z[row.state] = stribeck.advance(views.view_stribeck(row.numbers), ds[row.port], z[row.state])
     elif row.law == 23:
+        z[row.state] = stribeck_lag.advance(views.view_stribeck_lag(row.numbers), ds[row.port], dt, z[row.state])
+    elif row.law == 24:
         z[row.state], z[row.state + 1] = warm_up.advance(
             views.view_warm_up(row.numbers), ds[row.port], dt, z[row.state], z[row.state + 1]
         )
@@ -231,6 +242,10 @@ def rates(row, s, sd, z, zd):
     elif row.law == 6:
         zd[row.state] = backlash.rates(views.view_backlash(row.numbers), sd[row.port], z[row.state])
     elif row.law == 7:
+        zd[row.state], zd[row.state + 1] = backlash_instead.rates(
+            views.view_backlash_instead(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
+        )
+    elif row.law == 8:
         zd[row.state], zd[row.state + 1], zd[row.state + 2] = ball.rates(
             views.view_ball(row.numbers),
             sd[row.port],
@@ -240,9 +255,9 @@ def rates(row, s, sd, z, zd):
             z[row.state + 1],
             z[row.state + 2],
         )
-    elif row.law == 8:
+    elif row.law == 9:
         zd[row.state] = by_memory.rates(views.view_by_memory(row.numbers), s[row.port], z[row.state])
-    elif row.law == 12:
+    elif row.law == 13:
         zd[row.state], zd[row.state + 1], zd[row.state + 2], zd[row.state + 3] = dahl_instead.rates(
             views.view_dahl_instead(row.numbers),
             sd[row.port],
@@ -252,11 +267,11 @@ def rates(row, s, sd, z, zd):
             z[row.state + 2],
             z[row.state + 3],
         )
-    elif row.law == 15:
-        zd[row.state] = gas_heat.rates(views.view_gas_heat(row.numbers), s[row.port], z[row.state])
     elif row.law == 16:
-        zd[row.state] = gas_leak.rates(views.view_gas_leak(row.numbers), z[row.state])
+        zd[row.state] = gas_heat.rates(views.view_gas_heat(row.numbers), s[row.port], z[row.state])
     elif row.law == 17:
+        zd[row.state] = gas_leak.rates(views.view_gas_leak(row.numbers), z[row.state])
+    elif row.law == 18:
         zd[row.state], zd[row.state + 1] = load_friction.rates(
             views.view_load_friction(row.numbers),
             sd[row.port],
@@ -264,7 +279,7 @@ def rates(row, s, sd, z, zd):
             z[row.state],
             z[row.state + 1],
         )
-    elif row.law == 18:
+    elif row.law == 19:
         zd[row.state], zd[row.state + 1] = oscillator.rates(
             views.view_oscillator(row.numbers),
             sd[row.port],
@@ -273,11 +288,11 @@ def rates(row, s, sd, z, zd):
             z[row.state],
             z[row.state + 1],
         )
-    elif row.law == 21:
-        zd[row.state] = stribeck.rates(views.view_stribeck(row.numbers), sd[row.port], z[row.state])
     elif row.law == 22:
-        zd[row.state] = stribeck_lag.rates(views.view_stribeck_lag(row.numbers), sd[row.port], z[row.state])
+        zd[row.state] = stribeck.rates(views.view_stribeck(row.numbers), sd[row.port], z[row.state])
     elif row.law == 23:
+        zd[row.state] = stribeck_lag.rates(views.view_stribeck_lag(row.numbers), sd[row.port], z[row.state])
+    elif row.law == 24:
         zd[row.state], zd[row.state + 1] = warm_up.rates(
             views.view_warm_up(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
         )
@@ -290,12 +305,12 @@ def power(row, s, z, work):
         return nitrogen_strut.power(views.view_nitrogen_strut(row.numbers), s[row.port])
     if row.law == 6:
         return backlash.power(views.view_backlash(row.numbers), z[row.state], work)
-    if row.law == 14:
-        return end_stop.power(views.view_end_stop(row.numbers), s[row.port])
     if row.law == 15:
-        return gas_heat.power(views.view_gas_heat(row.numbers), s[row.port], z[row.state])
+        return end_stop.power(views.view_end_stop(row.numbers), s[row.port])
     if row.law == 16:
+        return gas_heat.power(views.view_gas_heat(row.numbers), s[row.port], z[row.state])
+    if row.law == 17:
         return gas_leak.power(views.view_gas_leak(row.numbers), s[row.port], z[row.state])
-    if row.law == 20:
+    if row.law == 21:
         return spring.power(views.view_spring(row.numbers), s[row.port], (s[row.port_2] if row.port_2 >= 0 else 0.0))
     return -work, 0.0

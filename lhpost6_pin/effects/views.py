@@ -4,6 +4,7 @@ from ..core.compiled import compiled_inline
 from ..laws import (
     asymmetric,
     backlash,
+    backlash_instead,
     ball,
     bouc_wen_1d,
     bouc_wen_2d,
@@ -105,6 +106,12 @@ def view_asymmetric(numbers):
 def view_backlash(numbers):
     """Parameters of `backlash`."""
     return backlash.Backlash(numbers[0], numbers[1], numbers[2])
+
+
+@compiled_inline
+def view_backlash_instead(numbers):
+    """Parameters of `backlash_instead`."""
+    return backlash_instead.BacklashInstead(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
 
 
 @compiled_inline

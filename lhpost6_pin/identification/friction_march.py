@@ -20,7 +20,7 @@ from ..mechanics.port_path import PortPath
 from .inverse_dynamics import march_states
 from .prepare import MeasuredTest
 
-__all__ = ["made_fine", "march_finely"]
+__all__ = ["least_yield", "made_fine", "march_finely"]
 
 SHAKEN = 0.1
 """Noise of a displacement over a friction's yield slip from which it shakes presliding: 0.05 on the LHPOST6."""
@@ -55,7 +55,7 @@ def made_fine(plant: Plant, test: MeasuredTest) -> MeasuredTest:
 
     A yield slip may turn out smaller than stated: by its uncertainty; substeps are those of a tenth of that.
     """
-    least = min((_least_yield(plant.machine, c) for c in plant.machine.components), default=np.inf)
+    least = min((least_yield(plant.machine, c) for c in plant.machine.components), default=np.inf)
     weight = _sliding(plant, test, least)
     if weight is None:
         return test
@@ -64,7 +64,7 @@ def made_fine(plant: Plant, test: MeasuredTest) -> MeasuredTest:
     return replace(test, weight=weight, substeps=min(max(count, 1), MOST))
 
 
-def _least_yield(machine: Machine, component: Actuator | Strut) -> float:
+def least_yield(machine: Machine, component: Actuator | Strut) -> float:
     """Yield slip [m] that a component's friction may have: the stated one less two deviations, as a factor."""
     least = np.inf
     for key in ("seal_yield", "pad_yield"):

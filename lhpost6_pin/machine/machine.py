@@ -15,7 +15,7 @@ from ..core.names import AXES
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
-from .library import effect_entry, make_named_effect
+from .library import effect_entry, make_named_effect, size_of
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
 from .schema import build_section
 from .specimen import Specimen, find_specimen
@@ -56,6 +56,7 @@ class Machine(Structure):
         """Return a copy with parameters replaced: a mapping by path, a small TOML file, or keywords.
 
         In a keyword the dot of a path is two underscores: ``with_params(platen__mass=[1e5, 1e5, 1e5])``.
+        The library keeps the size of this machine, however far its numbers are fitted from priors that may be wide.
         Raises ParameterError or UnknownNameError that name the key.
         """
         parameters = self.parameters
@@ -63,7 +64,7 @@ class Machine(Structure):
             parameters = override_parameters(parameters, changes)
         if keywords:
             parameters = override_parameters(parameters, {k.replace("__", "."): v for k, v in keywords.items()})
-        return build_machine(parameters, self.own_effects, self.specimen)
+        return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
 
     def with_effect(
         self, effect: Effect | str, components: Sequence[str] = (), *, name: str = "", **values: float
@@ -144,7 +145,10 @@ def load_machine(
 
 
 def build_machine(
-    parameters: Parameters, added_effects: tuple[Effect, ...] = (), specimen: Specimen | None = None
+    parameters: Parameters,
+    added_effects: tuple[Effect, ...] = (),
+    specimen: Specimen | None = None,
+    size: tuple[int, ...] | None = None,
 ) -> Machine:
     """Give typed objects to a flat mapping of quantities; raises ParameterError."""
     words = parameters.words
@@ -193,6 +197,7 @@ def build_machine(
         ),
         limits=build_section(Limits, parameters, ("limits",)),
         parameters=parameters,
+        size=size,
         own_effects=added_effects,
         specimen=specimen,
     )

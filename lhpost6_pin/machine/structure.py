@@ -32,6 +32,7 @@ class Structure:
     floors: tuple[Floor, ...]
     limits: Limits
     parameters: Parameters
+    size: tuple[int, ...] | None = None  # that families of the library scale with (`library.size_of`); None: its own
 
     @property
     def axes(self) -> tuple[int, ...]:

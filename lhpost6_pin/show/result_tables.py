@@ -5,8 +5,10 @@ from ..discovery import Discovery
 from ..identification.calibration import Calibration
 from ..identification.calibration.calibration_summary import (
     contradiction_summary,
+    convergence_summary,
     correlation_summary,
     cut_strokes,
+    friction_summary,
     range_summary,
 )
 from ..identification.calibration.scale import scale_summary
@@ -19,6 +21,7 @@ from .report.calibrate_sections import misfit_table, parameter_table, ratio_tabl
 from .report.control_blocks import gain_table
 from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
+from .report.friction_section import friction_table
 from .report.iterate_report import iteration_tables
 from .report.page import Table
 from .report.sine_report import sine_table
@@ -61,8 +64,8 @@ def print_sine(test: SineTest) -> None:
 
 
 def print_calibration(calibration: Calibration) -> None:
-    """Print parameters, significant sensor errors, misfits and convergence."""
-    off, rounds = sensor_table(calibration), f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
+    """Print parameters, significant sensor errors, misfits, forms of friction and convergence."""
+    off, friction = sensor_table(calibration), friction_table(calibration)
     print_blocks(
         parameter_table(calibration),
         off,
@@ -74,9 +77,8 @@ def print_calibration(calibration: Calibration) -> None:
         skipped_summary(calibration.skipped),
         scale_summary(calibration.scale),
         *ratio_tables(calibration),
-        f"converged after {rounds}"
-        if calibration.converged
-        else f"not converged in {rounds}: the tests carry too little information; add tests or excite more",
+        *((friction, friction_summary(calibration)) if friction else ()),
+        convergence_summary(calibration),
     )
 
 

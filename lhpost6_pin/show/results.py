@@ -172,6 +172,23 @@ def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
     return {"compared_up_to_hz": found.comparison.band.high, "axes": axes}
 
 
+def _friction_entries(found: Calibration) -> Entries | None:
+    """Forms of friction with their errors on held-out tests."""
+    if found.friction is None:
+        return None
+    forms = {
+        form.name: {
+            "title": form.title,
+            "held_out": {
+                test: {"r2": r2, "error": error}
+                for test, r2, error in zip(found.friction.tests, form.explained, form.error, strict=True)
+            },
+        }
+        for form in found.friction.forms
+    }
+    return {"preferred": found.friction.best.name, "suffices": found.friction.suffices, "forms": forms}
+
+
 def calibration_entries(found: Calibration) -> Entries:
     """Parameters with intervals and verdicts, sensor errors, misfits of every test."""
     parameters, first = {}, len(found.parameters)
@@ -211,4 +228,5 @@ def calibration_entries(found: Calibration) -> Entries:
         "sensors": sensors,
         "misfit": misfits,
         "alike": [{"pair": [a, b], "correlation": c} for a, b, c in found.correlated_pairs()],
+        "friction": _friction_entries(found),
     }

@@ -29,7 +29,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "friction": ("stribeck", "asymmetric", "load_friction", "warm_up"),
     "dahl": ("dahl_instead",),
     "ball": ("ball", "smooth_ball"),
-    "backlash": ("backlash",),
+    "backlash": ("backlash", "backlash_instead"),
     "spring": ("spring", "end_stop", "drag"),
     "tabulated": ("tabulated", "by_position", "by_speed", "by_memory"),
     "leaks": ("leaks",),

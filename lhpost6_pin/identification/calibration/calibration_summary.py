@@ -5,7 +5,8 @@ import numpy as np
 from .free_parameters import parameter_changes
 from .result import Calibration, contradictions, out_of_range
 
-__all__ = ["chance", "contradiction_summary", "correlation_summary", "cut_strokes", "range_summary"]
+__all__ = ["chance", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
+__all__ += ["friction_summary", "lacking", "range_summary"]
 
 
 def cut_strokes(calibration: Calibration) -> list[str]:
@@ -26,6 +27,40 @@ def range_summary(calibration: Calibration) -> str:
     if not wrong:
         return "all within their stated ranges"
     return f"beyond their stated ranges: {', '.join(calibration.names[i] for i in wrong)}"
+
+
+def lacking(calibration: Calibration) -> bool:
+    """Whether these tests show more than noise that the calibrated model does not explain."""
+    return bool(np.nanmax(calibration.misfit_after) > calibration.noise_alone)
+
+
+def convergence_summary(calibration: Calibration) -> str:
+    """Whether the fit converged; if not, whether for want of an effect or of information; and what to do next."""
+    rounds = f"{calibration.rounds} round{'s' * (calibration.rounds != 1)}"
+    then = (
+        "the model lacks something that these tests show, a sensor is wrong, or the stated noise is too small; "
+        "`lhpost6 check` judges sensors and noise, `lhpost6 discover` names what is missing"
+    )
+    if calibration.converged:
+        return f"converged after {rounds}" + (f"; misfit is left: {then}" if lacking(calibration) else "")
+    if lacking(calibration):
+        return f"not converged in {rounds}, while misfit is left: {then}"
+    return f"not converged in {rounds}: these tests carry too little information; add tests or excite more"
+
+
+def friction_summary(calibration: Calibration) -> str:
+    """Which form of friction the tests prefer, and whether the machine's own suffices; empty where not compared."""
+    found = calibration.friction
+    if found is None:
+        return ""
+    own, best = found.own, found.best
+    errors = [f"{100.0 * form.error.mean():.3g} %" for form in (own, best)]
+    if found.suffices:
+        return f"The machine's own form of friction suffices: none is clearly better than its mean error, {errors[0]}."
+    return (
+        f"The machine's own form of friction does not suffice: these tests prefer {best.title}, mean error {errors[1]} "
+        f"in place of {errors[0]}. `lhpost6 discover` tests it against other effects and adds it to the machine."
+    )
 
 
 def correlation_summary(calibration: Calibration) -> str:

@@ -25,6 +25,7 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ..residuals import RESIDUALS
 from .curves import measured_curves
+from .friction_forms import compare_friction
 from .normal_equations import NoiseBias, NormalEquations, bounded_step, positive
 from .prepare import prepare_problem
 from .problem import OperatingPoint, Problem
@@ -93,6 +94,7 @@ def calibrate(
                 "calibrated": OperatingPoint(problem, found.x),
             }
         ),
+        friction=compare_friction(problem, numbers),
     )
 
 

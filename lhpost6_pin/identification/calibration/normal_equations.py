@@ -191,4 +191,6 @@ def bounded_step(normal: NormalEquations, posterior: Array, x: Array, problem: P
     freely = np.linalg.solve(factor.T, wanted)
     if np.all((freely >= low) & (freely <= high)):
         return np.asarray(freely * prior)
-    return np.asarray(lsq_linear(factor.T, wanted, bounds=(low, high)).x * prior)
+    step = lsq_linear(factor.T, wanted, bounds=(low, high)).x
+    inside = (place >= least) & (place <= most)  # the intervals are a little wider than the bounds: steps would add up
+    return np.asarray(np.where(inside, np.clip(step, least - place, most - place), step) * prior)

@@ -12,6 +12,7 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
 from .curves import Curves
 from .free_parameters import FreeParameter, with_parameters
+from .friction_forms import FrictionForms
 from .scale import Ratio, Scale, ratios
 from .sensor_errors import SensorUnknown
 
@@ -52,6 +53,7 @@ class Calibration:
     curves: Curves = field(default_factory=Curves, repr=False)  # as delivered, and calibrated
     skipped: tuple[SkippedTest, ...] = ()  # tests that were not used
     scale: Scale | None = None  # that nothing measured fixes
+    friction: FrictionForms | None = None  # forms compared on held-out tests; None where that does not apply
 
     @property
     def sd(self) -> Array:

@@ -50,7 +50,7 @@ def usable_tests(campaign: Campaign) -> Campaign:
 
 
 def too_short(record: xr.Dataset, bands: Sequence[float], edge: float) -> str:
-    """Why a record is too short or slow to fill all bands [Hz], `edge` [s] cut off at both ends; empty if it is not."""
+    """Why a record is too short or slow for the bands [Hz] from one period on, `edge` [s] cut off at both ends; or empty."""
     n = record.sizes["time"]
     if n < 2:
         return f"{n} sample{'s' * (n != 1)} are no test"
@@ -59,8 +59,9 @@ def too_short(record: xr.Dataset, bands: Sequence[float], edge: float) -> str:
     f = np.zeros(0)
     if n > 2 * round(edge / dt):
         f = spectrum_of(np.zeros((n, 1)), dt, bands[0], bands[-1], edge)[1]
+    slowest = f[1] if len(f) > 1 else 0.0
     for low, high in pairwise(bands):
-        if not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
+        if high > slowest and not np.any((f >= low) & ((f < high) | (f == bands[-1]))):
             return f"{length:.3g} s at {1 / dt:.4g} Hz leave nothing to compare between {low:g} and {high:g} Hz"
     return ""
 

@@ -133,6 +133,8 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
         band = _band(edges, f)
         for b in range(count):
             rows = np.concatenate([(bins * whole)[band == b] for bins in realisations], dtype=np.complex128)
+            if len(rows) == 0:  # the test is shorter than a period of that band
+                continue
             power = np.mean(np.abs(rows) ** 2, axis=0) / (1.0 - 2.0 / len(rows))  # its inverse is unbiased
             scale = np.sqrt(np.where(power > 0.0, power, 1.0))
             scaled[b].append(rows / scale)

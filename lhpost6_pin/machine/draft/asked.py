@@ -39,6 +39,7 @@ ASKED: Mapping[str, Asked] = {
     "rated_drop": Asked("Pa", "Pressure drop over both paths of the valve at which that flow is rated"),
     "valve_delay": Asked("s", "Delay of the valve, from command to spool"),
     "friction": Asked("N", "Friction of one actuator with its share of the guides"),
+    "presliding": Asked("m", "Slip over which that friction builds up after a reversal"),
     "bulk_modulus": Asked("Pa", "Effective bulk modulus of the oil"),
     "platen_radius": Asked("m", "Radius of the joints under the platen", when="free"),
     "base_radius": Asked("m", "Radius of the joints on the base", when="free"),

@@ -52,7 +52,9 @@ def cylinder_numbers(basis: Basis, areas: tuple[Quantity, Quantity], force: floa
         "chamber_b": chamber,
         "stroke": basis.known["stroke"],
         "seal_friction": basis.with_sd(friction, basis.spread("cylinder.friction")),
-        "seal_yield": basis.typical["cylinder.seal_yield"],
+        "seal_yield": basis.with_sd(
+            basis.known_or("presliding", "cylinder.seal_yield"), basis.spread("cylinder.seal_yield")
+        ),
         "seal_shape": basis.typical["cylinder.seal_shape"],
         "viscous": basis.assumed("cylinder.viscous", "N s/m", force, rated),
         "mass_along": none,

@@ -2,7 +2,7 @@
 
 from .family import Family, Shape, families, find_family
 from .make import effect_entry, make_effect, make_named_effect
-from .scaled import in_size_of, scaled_families
+from .scaled import in_size_of, scaled_families, size_of
 
 __all__ = [
     "Family",
@@ -14,4 +14,5 @@ __all__ = [
     "make_effect",
     "make_named_effect",
     "scaled_families",
+    "size_of",
 ]

@@ -56,6 +56,14 @@ def _presliding(machine: Structure, components: Sequence[str], values: Values) -
     return "dahl_instead", [f"{name} -" for name in components], _of_another_form(rubs, values)
 
 
+def _backlash_before(machine: Structure, components: Sequence[str], values: Values) -> Any:
+    rows = [
+        (values["share"] * c.seal_friction, *_seal(c), values["slip"], values["gap"])
+        for c in _each(machine, components)
+    ]
+    return "backlash_instead", components, rows
+
+
 def _bearing_presliding(machine: Structure, components: Sequence[str], values: Values) -> Any:
     rubs = [(c.pad_friction, c.pad_yield, c.pad_shape) for c in _each(machine, components)]
     return "dahl_instead", components, _of_another_form(rubs, values)
@@ -131,6 +139,7 @@ COMPOSED = {
     "swivel_friction": _swivel,
     "smooth_swivel_friction": _smooth_swivel,
     "presliding": _presliding,
+    "backlash_before_friction": _backlash_before,
     "bearing_presliding": _bearing_presliding,
     "mounted_spring": _mounted_spring,
     "gravity_offset": _gravity,

@@ -58,6 +58,7 @@ class Family:
         found = []
         for actuator in machine.actuators:
             acting = {"actuator", "double-acting" if actuator.area_b is not None else "single-acting"}
+            acting |= {"guided"} if machine.motion != "free" else set()
             acting |= {"bearing"} if actuator.mount == "bearing" else {"swivel"}
             if acting & set(self.acts_on):
                 found.append(actuator.name)

@@ -17,7 +17,7 @@ from ..parameters import load_parameters
 from ..structure import Structure
 from .family import Family, Shape, families
 
-__all__ = ["in_size_of", "scaled_families"]
+__all__ = ["in_size_of", "scaled_families", "size_of"]
 
 _POWERS: dict[str, dict[str, float]] = {
     "N": {"F": 1},
@@ -49,8 +49,18 @@ def in_size_of(family: Family, machine: Structure) -> Family:
 
 def scaled_families(machine: Structure) -> Mapping[str, Family]:
     """All families by name in the size of a machine."""
+    return _scaled(size_of(machine))
+
+
+def size_of(machine: Structure) -> tuple[int, ...]:
+    """Steps by which each of the sizes of `_reference` is larger in a machine, or in the one that it was fitted from.
+
+    A prior may be so wide that the numbers fitted make another size, while candidates keep their bounds.
+    """
+    if machine.size is not None:
+        return machine.size
     own, reference = _sizes(machine), _reference()
-    return _scaled(tuple(round(_STEPS * math.log10(own[size] / reference[size])) for size in reference))
+    return tuple(round(_STEPS * math.log10(own[size] / reference[size])) for size in reference)
 
 
 @cache

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...data.campaign import skipped_summary
 from ...identification.calibration import Calibration
-from ...identification.calibration.calibration_summary import chance, range_summary
+from ...identification.calibration.calibration_summary import chance, friction_summary, range_summary
 from ...identification.calibration.result import beyond, changed_parameters, contradictions, out_of_range, verdict_on
 from ...identification.calibration.scale import scale_summary
 from .calibrate_sections import (
@@ -20,6 +20,7 @@ from .calibrate_sections import (
 )
 from .control_blocks import load_of, numbers_used
 from .curve_plots import curve_blocks
+from .friction_section import friction_blocks
 from .page import Block, Headline, Level, Page, Section, bullet_list, number, save_page
 
 __all__ = ["write_calibrate_report"]
@@ -46,6 +47,7 @@ def write_calibrate_report(calibration: Calibration, path: Path | str, command: 
             Section("sensors", "Errors of the sensors", sensor_blocks(calibration)),
             Section("misfit", "Residuals", misfit_blocks(calibration)),
             Section("curves", "Friction and valves", curve_blocks(calibration.curves, calibration.machine)),
+            Section("friction", "Friction", friction_blocks(calibration)),
             Section("information", "Information per test", test_blocks(calibration)),
             Section("subsets", "Estimates by group of residuals", group_blocks(calibration)),
             Section("alike", "Parameter correlation", correlation_blocks(calibration)),
@@ -80,12 +82,15 @@ def _verdict(calibration: Calibration) -> tuple[str, Level]:
         level = "attention"
         sentences.append(
             f"The largest misfit changed from {number(before)} to {number(after)}, above sensor noise: an effect is "
-            "missing, a sensor is wrong, or the stated noise is too small."
+            "missing, a sensor is wrong, or the stated noise is too small. `lhpost6 discover` names what is missing."
         )
     else:
         sentences.append(
             f"The largest misfit changed from {number(before)} to {number(after)}, the level of sensor noise."
         )
+    if calibration.friction is not None:
+        level = level if calibration.friction.suffices else "attention"
+        sentences.append(friction_summary(calibration))
     if wrong:
         level = "attention"
         sentences.append(f"Sensor errors {range_summary(calibration)}.")

@@ -258,7 +258,7 @@ def typed(monkeypatch):
 def test_on_a_terminal_it_asks_for_what_is_not_given_and_again_for_what_cannot_be_read(typed):
     """Mass is given; 24 has no unit, 24 kg another, and the supply pressure is needed; Enter skips the rest."""
     first = ["", "", "", "24", "24 kg", "24 cm2"]  # axes, cylinders, size, three times the area
-    left = typed(*first, "+-125 mm", "", "", "14 MPa", "0 MPa", "0.37 m/s/V", "10", "", "", "")
+    left = typed(*first, "+-125 mm", "", "", "14 MPa", "0 MPa", "0.37 m/s/V", "10", "", "", "", "")
     texts = {"mass": "310 kg +- 20 %"}
     assert ask(texts, None, None, None) == ("x", "double-rod", 10.0)
     assert texts == SMALL and not left
@@ -266,7 +266,7 @@ def test_on_a_terminal_it_asks_for_what_is_not_given_and_again_for_what_cannot_b
 
 def test_of_a_platform_it_asks_for_its_legs(typed):
     texts = dict(KNOWN)
-    left = typed("free", "single-rod", *[""] * 10, "0.9 m", "1.2 m", "20 deg", "")
+    left = typed("free", "single-rod", *[""] * 11, "0.9 m", "1.2 m", "20 deg", "")
     assert ask(texts, None, None, None) == ("free", "single-rod", None)
     assert texts == {**KNOWN, "platen_radius": "0.9 m", "base_radius": "1.2 m", "platen_spread": "20 deg"}
     assert not left

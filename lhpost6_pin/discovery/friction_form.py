@@ -79,11 +79,14 @@ def _at(problem: Problem, fitted: Machine, calibration: Parameters) -> Array:
 
 
 def _floor(problem: Problem, residual: Sequence[Complex], share: float) -> Array:
-    """Scale (t, b, c) of whitened residuals with a share of their RMS, over the whole band, as further noise."""
+    """Scale (t, b, c) of whitened residuals with a share of their RMS, by band and over all bands, as further noise."""
     scale = []
     for bins, f, factor in zip(residual, problem.frequency, problem.whitener.factor, strict=True):
         diagonal = np.abs(np.diagonal(factor, axis1=-2, axis2=-1))  # (b, c), one over the noise's deviation
-        weight = diagonal[problem.whitener.band(f)]
-        plain = np.divide(np.abs(bins), weight, out=np.zeros_like(weight), where=weight > 0.0)
-        scale.append(1.0 / np.sqrt(1.0 + share**2 * np.mean(plain**2, axis=0) * diagonal**2))
+        band = problem.whitener.band(f)
+        weight = diagonal[band]
+        power = np.divide(np.abs(bins), weight, out=np.zeros_like(weight), where=weight > 0.0) ** 2
+        more = np.tile(power.mean(axis=0), (len(diagonal), 1))
+        more[np.unique(band)] += [power[band == b].mean(axis=0) for b in np.unique(band)]
+        scale.append(1.0 / np.sqrt(1.0 + share**2 * more * diagonal**2))
     return np.array(scale)

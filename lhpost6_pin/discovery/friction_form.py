@@ -16,7 +16,7 @@ import numpy as np
 from ..core.arrays import Array, Complex
 from ..core.progress import Progress, between, split
 from ..identification.calibration.fit import solve
-from ..identification.calibration.friction_forms import compare_friction, effect_of_form
+from ..identification.calibration.friction_forms import compare_friction, effect_of_form, own_suffices
 from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.problem import Problem
 from ..machine.library import find_family, in_size_of
@@ -37,7 +37,11 @@ def with_friction_form(found: Search, held: Problem | None, progress: Progress) 
     Returns the problem of the `held` tests, too, with the same share of what is left there as further noise.
     """
     numbers, problem = found.numbers, found.problem
-    forms = compare_friction(problem, found.calibration)
+    if problem.machine.motion == "free" or not problem.rows("wrench").any():
+        return found, held
+    if own_suffices(problem, fitted_machine(found.solution), found.calibration):
+        return found, held
+    forms = compare_friction(problem, found.calibration, "backlash")
     progress(0.5)
     effect = None if forms is None or forms.suffices else effect_of_form(forms.best)
     if forms is None or effect is None or find_family(effect[0]).named != "backlash":

@@ -4,10 +4,10 @@ Each form is the machine with other friction: of the library in place of its own
 of the model that friction is confused with (mass, viscous force), are fitted to the measured forces by plain least
 squares, every test with equal weight: on real tables the error of any law of friction is far above sensor noise, and
 weighing by noise would fit what is left between strokes. Errors are over the measured force, over the compared band
-without the mean; each test is predicted by a fit to the others.
+without the mean; each test is predicted by a fit to the others, to first order from the fit to all.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
@@ -26,7 +26,7 @@ from .free_parameters import FreeParameter, with_parameters
 from .measured_wrench import measured_bins
 from .problem import Problem
 
-__all__ = ["FormError", "FrictionForms", "compare_friction", "effect_of_form"]
+__all__ = ["FormError", "FrictionForms", "compare_friction", "effect_of_form", "own_suffices"]
 
 FEWEST = 3  # tests, of which one is held out
 OWN = "bouc_wen"
@@ -99,10 +99,18 @@ class FrictionForms:
         return next(form for form in self.forms if form.name == OWN)
 
 
-def compare_friction(problem: Problem, numbers: Parameters) -> FrictionForms | None:
+def own_suffices(problem: Problem, machine: Machine, numbers: Parameters) -> bool:
+    """Whether a fitted machine explains the forces of a problem's tests so well that no form of friction matters."""
+    force = _Force(problem, machine)
+    squares = [float(np.sum(force.residual(force.plant, t) ** 2)) for t in range(len(force.size))]
+    return float(np.exp(np.mean(np.log(np.maximum(squares, 1e-12))))) <= numbers.number("friction.enough")
+
+
+def compare_friction(problem: Problem, numbers: Parameters, first: str = "") -> FrictionForms | None:
     """Compare forms of friction on a problem's tests; `numbers` are those of `models/procedures/calibration.toml`.
 
-    None where it does not apply: a platen that is not on guides, friction of zero, no measured force, or fewer than
+    Where `first` names a form, the others are compared only if it is clearly better than the machine's own. None where
+    a comparison does not apply: a platen that is not on guides, friction of zero, no measured force, or fewer than
     three tests.
     """
     machine = problem.machine
@@ -112,9 +120,11 @@ def compare_friction(problem: Problem, numbers: Parameters) -> FrictionForms | N
     there = {effect.family for effect in machine.added_effects}
     own, start = _compared(OWN, _FORMS[OWN], problem, numbers, {})
     found = [own]
-    for name, form in _FORMS.items():
-        if name != OWN and (form.family not in there or not form.family):
-            found.append(_compared(name, form, problem, numbers, start)[0])
+    names = [name for name, form in _FORMS.items() if name != OWN and not (form.family and form.family in there)]
+    for name in sorted(names, key=lambda name: name != first):
+        found.append(_compared(name, _FORMS[name], problem, numbers, start)[0])
+        if name == first and not _better(found[-1], own, numbers):
+            break
     clear = [one for one in found if one is not own and _better(one, own, numbers)]
     rest = sorted((one for one in found if one not in clear), key=lambda one: (one is not own, one.typical))
     clear.sort(key=lambda one: one.typical)
@@ -153,19 +163,17 @@ def _compared(
     name: str, form: _Form, problem: Problem, numbers: Parameters, known: Mapping[str, float]
 ) -> tuple[FormError, dict[str, float]]:
     """A form fitted to all tests, from coordinates by name where `known`, then to all but each; its coordinates."""
-    every = list(range(len(problem.tests)))
     machine, parameters = _variants(name, form, problem, numbers)
     force = _Force(problem, machine[0])
     fits = [_Fit(force, one, own, numbers) for one, own in zip(machine, parameters, strict=True)]
-    starts = sorted(fits, key=lambda fit: fit.cost(fit.start(known), every))
+    starts = sorted(fits, key=lambda fit: fit.cost(fit.start(known))) if len(fits) > 1 else fits
     rounds = int(numbers.number("friction.rounds"))
     kept = starts[: int(numbers.number("friction.starts"))]
-    whole = [(fit, fit.solve(fit.start(known), every, rounds)) for fit in kept]
-    fit, x = min(whole, key=lambda pair: pair[0].cost(pair[1], every))
-    held = [fit.share(fit.solve(x, [k for k in every if k != t], rounds), t) for t in every]
-    fitted = [fit.share(x, t) for t in every]
+    whole = [(fit, fit.solve(fit.start(known), rounds)) for fit in kept]
+    fit, x = min(whole, key=lambda pair: pair[0].cost(pair[1])) if len(whole) > 1 else whole[0]
+    held, fitted = fit.held_out(x), [fit.share(x, t) for t in range(len(problem.tests))]
     names = [parameter.name for parameter in fit.parameters]
-    error = FormError(name, form.title, len(x), np.array(held), np.array(fitted), fit.machine_at(x))
+    error = FormError(name, form.title, len(x), held, np.array(fitted), fit.machine_at(x))
     return error, dict(zip(names, x.tolist(), strict=True))
 
 
@@ -248,38 +256,60 @@ class _Fit:
         """Squared error over squared force of a test."""
         return float(np.sum(self.force.residual(make_plant(self.machine_at(x)), t) ** 2))
 
-    def cost(self, x: Array, tests: Sequence[int]) -> float:
-        """Mean of these shares."""
-        return float(np.mean([self.share(x, t) for t in tests]))
+    def cost(self, x: Array) -> float:
+        """Mean of these shares over all tests."""
+        return float(np.mean([self.share(x, t) for t in range(len(self.force.size))]))
 
-    def rows(self, tests: Sequence[int]) -> Callable[[Array], Array]:
-        """Function of x to all rows, those of the priors last."""
+    def rows(self, x: Array) -> list[Array]:
+        """Rows of every test at x."""
+        plant = make_plant(self.machine_at(x))
+        return [self.force.residual(plant, t) for t in range(len(self.force.size))]
 
-        def evaluated(x: Array) -> Array:
-            plant = make_plant(self.machine_at(x))
-            forces = [self.force.residual(plant, t) for t in tests]
-            return np.concatenate([*forces, self.weight * x / self.prior])
+    def slopes(self, x: Array, base: Sequence[Array]) -> list[Array]:
+        """Derivatives (n, p) of every test's rows at x, where they are `base`."""
+        columns: list[list[Array]] = []
+        for i, step in enumerate(self.step):
+            to = x.copy()
+            to[i] += step if x[i] + step <= self.high[i] else -step
+            columns.append([(after - b) / (to[i] - x[i]) for after, b in zip(self.rows(to), base, strict=True)])
+        return [np.stack(each, axis=1) for each in zip(*columns, strict=True)]
 
-        return evaluated
-
-    def solve(self, start: Array, tests: Sequence[int], rounds: int) -> Array:
-        """Least squares on some tests, from x (p,)."""
+    def solve(self, start: Array, rounds: int) -> Array:
+        """Least squares on all tests, from x (p,)."""
         from scipy.optimize import least_squares
 
-        rows = self.rows(tests)
+        last: list[tuple[Array, list[Array]]] = []
+        prior = np.diag(self.weight / self.prior)
+
+        def evaluated(x: Array) -> Array:
+            last[:] = [(x.copy(), self.rows(x))]
+            return np.concatenate([*last[0][1], prior @ x])
 
         def slopes(x: Array) -> Array:
-            base, columns = rows(x), []
-            for i, step in enumerate(self.step):
-                to = x.copy()
-                to[i] += step if x[i] + step <= self.high[i] else -step
-                columns.append((rows(to) - base) / (to[i] - x[i]))
-            return np.stack(columns, axis=1)
+            base = last[0][1] if np.array_equal(last[0][0], x) else self.rows(x)
+            return np.concatenate([*self.slopes(x, base), prior])
 
         inside = np.clip(start, self.low + 1e-6 * self.prior, self.high - 1e-6 * self.prior)
-        bounds, tolerance = (self.low, self.high), 1e-5  # of a cost of some hundredths: far below its scatter
+        bounds, small = (self.low, self.high), 1e-4  # of a cost of some hundredths: below its scatter between tests
         return np.asarray(
             least_squares(
-                rows, inside, slopes, bounds, x_scale=self.prior, max_nfev=rounds, ftol=tolerance, xtol=tolerance
+                evaluated, inside, slopes, bounds, x_scale=self.prior, max_nfev=rounds, ftol=small, xtol=small
             ).x
         )
+
+    def held_out(self, x: Array) -> Array:
+        """Shares (t,) of each test by the fit to the others: one Gauss-Newton step from the fit x to all."""
+        base, scale = self.rows(x), self.prior
+        slopes = [j * scale for j in self.slopes(x, base)]
+        right = [j.T @ r for j, r in zip(slopes, base, strict=True)]
+        square = [j.T @ j for j in slopes]
+        near = 1e-3 * scale
+        free = (x > self.low + near) & (x < self.high - near)
+        prior, found = self.weight**2, []
+        for t, (own, side) in enumerate(zip(square, right, strict=True)):
+            matrix = sum(square) - own + prior * np.eye(len(x))
+            step = np.zeros(len(x))
+            wanted = -(sum(right) - side + prior * x / scale)
+            step[free] = np.linalg.solve(matrix[np.ix_(free, free)], wanted[free])
+            found.append(self.share(np.clip(x + step * scale, self.low, self.high), t))
+        return np.array(found)

@@ -50,7 +50,7 @@ def usable_tests(campaign: Campaign) -> Campaign:
 
 
 def too_short(record: xr.Dataset, bands: Sequence[float], edge: float) -> str:
-    """Why a record is too short or slow for the bands [Hz] from one period on, `edge` [s] cut off at both ends; or empty."""
+    """Why a record is too short or slow for the bands [Hz] from one period on, cut at both `edge`s [s]; or empty."""
     n = record.sizes["time"]
     if n < 2:
         return f"{n} sample{'s' * (n != 1)} are no test"

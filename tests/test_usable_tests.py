@@ -62,7 +62,7 @@ def test_a_short_test_and_one_with_a_dead_sensor_are_skipped_and_said(tests, cap
 
 def test_where_no_test_can_be_used_the_first_reason_is_given(tests):
     with pytest.raises(RecordError, match=r"no test of c can be used; short: .* leave nothing to compare"):
-        usable_tests(Campaign("c", (short_of(tests[0]), short_of(tests[1], 300))))
+        usable_tests(Campaign("c", (short_of(tests[0]), short_of(tests[1], 100))))
 
 
 def test_a_sensor_that_holds_still_in_every_test_is_not_dead_in_one(tests):

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.long
 
 MECHANICAL = {
     "stribeck_friction": (("H1", "V2"), {}),
+    "stribeck_lag": (("H1", "V2"), {}),
     "asymmetric_friction": (("H1",), {}),
     "load_dependent_friction": ((), {}),
     "friction_warm_up": ((), {"memory": 0.5}),

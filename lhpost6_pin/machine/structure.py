@@ -1,6 +1,6 @@
 """The structure of a machine: its platen, actuators, struts, oil and limits as plain data, without effects."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..core.names import AXES
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
@@ -32,7 +32,8 @@ class Structure:
     floors: tuple[Floor, ...]
     limits: Limits
     parameters: Parameters
-    size: tuple[int, ...] | None = None  # that families of the library scale with (`library.size_of`); None: its own
+    size: tuple[int, ...] | None = field(default=None, compare=False)
+    """That families of the library scale with (`library.size_of`); None: its own."""
 
     @property
     def axes(self) -> tuple[int, ...]:

@@ -26,7 +26,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "strut": ("nitrogen_strut",),
     "bouc_wen": ("bouc_wen", "bouc_wen_1d", "bouc_wen_2d"),
     "viscous": ("viscous",),
-    "friction": ("stribeck", "asymmetric", "load_friction", "warm_up"),
+    "friction": ("stribeck", "stribeck_lag", "asymmetric", "load_friction", "warm_up"),
     "dahl": ("dahl_instead",),
     "ball": ("ball", "smooth_ball"),
     "backlash": ("backlash", "backlash_instead"),

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from commands import Ended
 from hypothesis import settings
+from machine_cases import machine_named
+from run_cases import measured_of, shaken
 from sensor_cases import measured
 
 from lhpost6_pin import cli
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
+from lhpost6_pin.identification.prepare import MeasuredTest
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
@@ -97,6 +100,18 @@ def poses():
 def redundant(plant, sensors):
     """Two records of all sensors with noise and nothing wrong."""
     return [add_noise(measured(plant, seed)[0], sensors, np.random.default_rng(seed)) for seed in (0, 10)]
+
+
+@pytest.fixture(scope="session")
+def table() -> Machine:
+    """One axis, a piston of equal areas."""
+    return machine_named("uniaxial")
+
+
+@pytest.fixture(scope="session")
+def test(table) -> MeasuredTest:
+    """It, shaken, with all that a simulation knows, free of noise; its arrays are read only by agreement."""
+    return measured_of(shaken(table, samples=600))
 
 
 @pytest.fixture(scope="session")

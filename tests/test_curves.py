@@ -21,18 +21,6 @@ from lhpost6_pin.show.report.curve_plots import curve_blocks
 from lhpost6_pin.show.report.page import Figure
 
 
-@pytest.fixture(scope="module")
-def table() -> Machine:
-    """One axis, a piston of equal areas."""
-    return machine_named("uniaxial")
-
-
-@pytest.fixture(scope="module")
-def test(table) -> MeasuredTest:
-    """It, shaken, free of noise."""
-    return measured_of(shaken(table, samples=600))
-
-
 def friction_of(machine: Machine, test: MeasuredTest) -> dict[str, FrictionCurve]:
     plant = make_plant(machine)
     path = follow(plant, test)

@@ -191,6 +191,22 @@ def test_noise_is_compared_with_what_a_file_states(tests, factor, phrase):
     assert not found["platen_displacement[x]"].warning
 
 
+def test_noise_that_a_file_states_wrongly_is_replaced_by_that_of_the_records_and_no_other(tests, tmp_path, caplog):
+    content = measured_sensors(PLANT, tests)
+    stated = content.quantities["noise.pressure_difference"]
+    wrong = replace(stated, value=2.0 * stated.value)
+    save_sensors(
+        replace(content, quantities={**content.quantities, "noise.pressure_difference": wrong}),
+        path := tmp_path / "s.toml",
+    )
+    found = find_sensors(TABLE, tests, path)
+    assert "noise replaced" in caplog.text and "platen_displacement" not in caplog.text
+    # the level is a median over some hundred bins: within a few per cent
+    np.testing.assert_allclose(found.noise["pressure_difference"], stated.value, rtol=0.05)
+    for name in ("platen_displacement", "platen_acceleration"):
+        np.testing.assert_array_equal(found.noise[name], load_sensors(path).noise[name])
+
+
 def test_sensors_of_another_machine_are_measured_unless_named(tests, caplog):
     found = find_sensors(TABLE, tests)
     assert found.noise["pressure_difference"][0] == pytest.approx(8e3, rel=0.06)

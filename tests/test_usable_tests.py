@@ -134,11 +134,6 @@ def test_without_a_force_a_command_says_what_cannot_be_told(tests, lhpost6, comm
 
 
 # ------------------------------------------------------------------------------------------- scale that nothing fixes
-@pytest.fixture(scope="module")
-def moved() -> MeasuredTest:
-    return measured_of(shaken_run(TABLE, samples=600))
-
-
 def seen_by(test: MeasuredTest, *names: str) -> MeasuredTest:
     """The test with some of its channels; the pressure difference is that of the chambers."""
     channels, rates = dict(test.channels), dict(test.rates)
@@ -160,20 +155,20 @@ def known(machine: Machine, path: str, value: object, sd: object) -> Machine:
     return replace(machine, parameters=replace(machine.parameters, quantities=quantities)).with_params({})
 
 
-def test_pressures_tell_ratios_to_the_area_and_a_load_cell_its_own_scale(moved):
+def test_pressures_tell_ratios_to_the_area_and_a_load_cell_its_own_scale(test):
     pressures = ("chamber_pressure_a", "chamber_pressure_b")
     for names in (("pressure_difference",), pressures):
-        scale = scale_of(TABLE, seen_by(moved, *names))
+        scale = scale_of(TABLE, seen_by(test, *names))
         assert scale is not None and scale.name == "drive.area" and scale.unit == "m2"
         assert scale.has("N") and scale.has("m3/s/Pa") and not scale.has("m") and not scale.has("Pa")
         assert "Only ratios to drive.area can be told" in scale_summary(scale)
-    cell = scale_of(TABLE, seen_by(moved, "actuator_force"))
+    cell = scale_of(TABLE, seen_by(test, "actuator_force"))
     assert cell is not None and cell.name == "actuator_force" and "calibration of actuator_force" in scale_summary(cell)
-    assert scale_of(TABLE, seen_by(moved, "actuator_force", *pressures)) is None
+    assert scale_of(TABLE, seen_by(test, "actuator_force", *pressures)) is None
     assert scale_summary(None) == ""
 
 
-def test_forces_that_do_not_grow_with_the_area_fix_the_scale(moved):
+def test_forces_that_do_not_grow_with_the_area_fix_the_scale(test):
     """Oracle: the struts of the LHPOST6 carry weight by gas of a known charge, whatever the actuators' areas."""
     machine = load_machine()
     test = measured_of(shaken_run(machine, samples=200))
@@ -181,9 +176,9 @@ def test_forces_that_do_not_grow_with_the_area_fix_the_scale(moved):
     assert scale_of(machine, replace(test, channels=both)) is None
 
 
-def test_the_best_stated_of_area_and_mass_is_held_and_the_other_free(moved):
+def test_the_best_stated_of_area_and_mass_is_held_and_the_other_free(test):
     area, mass = TABLE.actuators[0].area_a, TABLE.platen.mass
-    test = seen_by(moved, "pressure_difference")
+    test = seen_by(test, "pressure_difference")
     for share, name, free in ((0.005, "drive.area", "platen.mass[x]"), (0.2, "platen.mass[x]", "drive.area")):
         machine = known(known(TABLE, "drive.area_a", area, share * area), "drive.area_b", area, share * area)
         every = machine_parameters(machine)
@@ -195,13 +190,13 @@ def test_the_best_stated_of_area_and_mass_is_held_and_the_other_free(moved):
     assert mass[0] == machine.platen.mass[0]
 
 
-def test_the_gain_of_the_only_sensor_of_force_is_not_free(moved, sensors):
+def test_the_gain_of_the_only_sensor_of_force_is_not_free(test, sensors):
     wide = replace(
         sensors, gain_range=dict.fromkeys(("pressure_difference", "actuator_force", "chamber_pressure_a"), 0.02)
     )
 
     def gains(*names: str) -> set[str]:
-        found = sensor_unknowns(TABLE, wide, seen_by(moved, *names))
+        found = sensor_unknowns(TABLE, wide, seen_by(test, *names))
         return {one.channel for one in found if one.kind == "gain"}
 
     assert not gains("pressure_difference") and not gains("actuator_force")

@@ -62,7 +62,7 @@ def check(
         if checked is not None:
             print_check(checked)
 
-    skipped = {one.test: one.why for one in tests.skipped} if tests else {}
+    skipped = dict(tests.skipped) if tests else {}
     print_result(json, lambda: {**finding_entries(found), **check_entries(checked), "skipped": skipped}, show, written)
     if wrong:
         raise typer.Exit(1)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..core.files import write_whole
 from ..core.names import AXES
@@ -103,18 +104,16 @@ def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> Se
     Of six axes it is the mean, in proportion. Channels whose noise these records hide, or that rest between two steps
     of the converter, and those that the file states free of noise, stay as stated.
     """
-    numbers = rest_numbers()
-    most, levels = numbers.number("assumed.agrees"), noise_levels(records, numbers) if records else None
-    if levels is None:
+    if not records:
         return sensors
+    numbers = rest_numbers()
+    most, levels = numbers.number("assumed.agrees"), noise_levels(records, numbers)
     found, quantities = dict[str, float](), dict(sensors.parameters.quantities)
     for name, one in levels.channels.items():
         varies = one.density > 0
         if one.density[varies].mean() < SHAKEN * one.quantum:
             continue
-        f = np.linspace(one.low, one.high, 33)
-        due = recorded_spectrum(sensors, name, f, levels.rate).mean(axis=0)
-        stated = float(np.broadcast_to(due, one.density.shape)[varies].mean())
+        stated = float(_stated_density(one, levels.rate, sensors)[varies].mean())
         ratio = np.sqrt(one.density[varies].mean() / stated) if stated else 1.0
         if not 1 / most <= ratio <= most:
             found[name] = float(ratio)
@@ -195,9 +194,7 @@ def _compared(one: ChannelNoise, rate: float, sensors: SensorSet | None) -> Nois
     measured, stated = (own if six else own.mean(keepdims=True)) + one.quantum, np.full(len(own), np.nan)
     tolerance = 0.0
     if sensors is not None:
-        f = np.linspace(one.low, one.high, 33)
-        spectrum = recorded_spectrum(sensors, one.channel, f, rate).mean(axis=0)
-        stated = np.broadcast_to(spectrum, one.density.shape)[varies]
+        stated = _stated_density(one, rate, sensors)[varies]
         stated = np.where(stated > 0, stated + one.quantum, 0.0)
         tolerance = float(sensors.noise_range + 3 * one.error.max())
     stated = stated[: len(measured)]
@@ -207,6 +204,12 @@ def _compared(one: ChannelNoise, rate: float, sensors: SensorSet | None) -> Nois
     sd, due = (float(np.sqrt(x[worst] * rate / 2)) for x in (measured, stated))
     uneven = 1.0 if six else float(np.sqrt(own.max() / np.median(own)))
     return NoiseComparison(channel, channel_unit(channel), sd, due, tolerance, one.corner, one.step, uneven)
+
+
+def _stated_density(one: ChannelNoise, rate: float, sensors: SensorSet) -> Array:
+    """Density (k,) of a channel's noise as a file states it, over the band in which it was measured [unit2/Hz]."""
+    f = np.linspace(one.low, one.high, 33)
+    return np.broadcast_to(recorded_spectrum(sensors, one.channel, f, rate).mean(axis=0), one.density.shape)
 
 
 # ------------------------------------------------------------------------------------------------ content

@@ -65,17 +65,20 @@ def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance,
                 continue
             error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
             share = explained = None
-            f = held.frequency[t]
-            if (
-                kind == "wrench"
-                and (size := _squares(measured_bins(held, three[0].base.plant, three[0].base.tests[t], t), f, forces))
-                > 0.0
-            ):
-                plain = [held.bins(one.base.residuals[t], one.base.tests[t])[0][:, rows] for one in three]
-                left = [_squares(bins, f, forces) / size for bins in plain]
-                share, explained = _three(np.sqrt(left)), _three(1.0 - np.array(left))
+            if kind == "wrench" and (left := _left(held, three, t, rows, forces)) is not None:
+                share, explained = _three(np.sqrt(left)), _three(1.0 - left)
             found.append(Balance(kind, test.name, _three(np.array(error)), share, explained))
     return tuple(found)
+
+
+def _left(held: Problem, three: Sequence[HeldOut], t: int, rows: Mask, forces: NDArray[np.int64]) -> Array | None:
+    """Squares of a test's residual force over those of the measured one, by three models; None where that is zero."""
+    f, base = held.frequency[t], three[0].base
+    size = _squares(measured_bins(held, base.plant, base.tests[t], t), f, forces)
+    if size == 0.0:
+        return None
+    plain = [held.bins(one.base.residuals[t], one.base.tests[t])[0][:, rows] for one in three]
+    return np.array([_squares(bins, f, forces) / size for bins in plain])
 
 
 def _squares(bins: Complex, f: Array, columns: NDArray[np.int64]) -> float:

@@ -72,7 +72,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "machine": found.machine.name,
         "tests": list(found.used),
         "held_out": list(found.held_out),
-        "skipped": {one.test: one.why for one in found.skipped},
+        "skipped": dict(found.skipped),
         "seed": found.seed,
         "versions": {"lhpost6_pin": __version__},
         "inputs": found.hashes,

@@ -89,9 +89,9 @@ class MeasuredOil(NamedTuple):
 def part_pressures(rows, oil, ports, room):
     """Add to the chamber pressures and rates of `oil`, in place, the mean pressure that their difference brings.
 
-    Both chambers were set to one mean, of which `room` (n_actuators,) [Pa] is left to the supply and to the return. Off
-    mid-stroke their volumes differ: compressed by the same flow Q, the smaller one changes more, and the valve's ports
-    restore the mean e at the pace at which pressure drops share the flow:
+    Both chambers were set to one mean, from which it is `room` [Pa] to the supply and to the return. Off mid-stroke
+    their volumes differ: compressed by the same flow Q, the smaller one changes more, and the valve's ports restore the
+    mean e at the pace at which pressure drops share the flow:
 
         de/dt = (V_B - V_A) / (2 (V_A + V_B)) d(P_A - P_B)/dt - r e,   r = beta |Q| / (4 drop) (1 / V_A + 1 / V_B)
 
@@ -105,11 +105,11 @@ def part_pressures(rows, oil, ports, room):
             at, speed = ports.s[k, port], ports.rate[k, port]
             long_a, long_b = p.chamber_a + at, p.chamber_b - at
             apart, rate = oil.pressure[k, a] - oil.pressure[k, b], oil.pressure_rate[k, a] - oil.pressure_rate[k, b]
-            softness = oil_modulus(p, True, 0.5 * (oil.pressure[k, a] + oil.pressure[k, b]))[0] / long_a
-            softness = softness * (long_a + long_b) / long_b / p.area_a
-            flow = p.area_a * speed + p.leakage * apart + rate / softness
-            drop = max(room[i] - 0.5 * math.copysign(apart, apart * flow), 0.05 * room[i])
-            pace = 0.25 * abs(flow) / drop * softness
+            bulk = oil_modulus(p, True, 0.5 * (oil.pressure[k, a] + oil.pressure[k, b]))[0]
+            stiffness = bulk / p.area_a * (1.0 / long_a + 1.0 / long_b)  # of both chambers [Pa/m3]
+            flow = p.area_a * speed + p.leakage * apart + rate / stiffness
+            drop = max(room - 0.5 * math.copysign(apart, apart * flow), 0.05 * room)
+            pace = 0.25 * abs(flow) / drop * stiffness
             before, pull = pull, 0.5 * rate * (long_b - long_a) / (long_a + long_b)
             if k > 0:
                 kept = math.exp(-pace * oil.dt)

@@ -199,8 +199,8 @@ def oil_balance(plant: Plant, test: MeasuredTest, path: Path, *, flows: bool = T
     rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
     if "chamber_pressure_a" not in test.channels:
         hydraulics = plant.machine.hydraulics
-        half = 0.5 * (hydraulics.supply_pressure - hydraulics.return_pressure)
-        part_pressures(rows, oil, path.ports, np.full(plant.spools, half))
+        room = 0.5 * (hydraulics.supply_pressure - hydraulics.return_pressure)
+        part_pressures(rows, oil, path.ports, room)
     oil_residuals(rows, plant.supply, oil, path.ports, z, drooped, flow, valve)
     return OilBalance(flow, valve, pressure, drooped, spool, chamber)
 

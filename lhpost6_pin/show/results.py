@@ -220,7 +220,7 @@ def calibration_entries(found: Calibration) -> Entries:
     }
     return {
         **_picked(found, "campaign", "converged", "rounds"),
-        "skipped": {one.test: one.why for one in found.skipped},
+        "skipped": dict(found.skipped),
         "scale": None
         if found.scale is None
         else {"fixed_by": found.scale.name, "why": scale_summary(found.scale), "ratios": found.ratios()},

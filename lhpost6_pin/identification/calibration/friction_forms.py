@@ -72,7 +72,7 @@ class FormError:
     @property
     def typical(self) -> float:
         """Squared error over squared force on held-out tests, the geometric mean: no test outweighs the others."""
-        return float(np.exp(np.mean(np.log(np.maximum(self.held_out, 1e-12)))))
+        return _geometric_mean(self.held_out)
 
     @property
     def error(self) -> Array:
@@ -102,8 +102,16 @@ class FrictionForms:
 def own_suffices(problem: Problem, machine: Machine, numbers: Parameters) -> bool:
     """Whether a fitted machine explains the forces of a problem's tests so well that no form of friction matters."""
     force = _Force(problem, machine)
-    squares = [float(np.sum(force.residual(force.plant, t) ** 2)) for t in range(len(force.size))]
-    return float(np.exp(np.mean(np.log(np.maximum(squares, 1e-12))))) <= numbers.number("friction.enough")
+    return _geometric_mean(_shares(force.rows(force.plant))) <= numbers.number("friction.enough")
+
+
+def _geometric_mean(shares: Array) -> float:
+    return float(np.exp(np.mean(np.log(np.maximum(shares, 1e-12)))))
+
+
+def _shares(rows: Sequence[Array]) -> Array:
+    """Squared error over squared force (t,) of every test, of its rows."""
+    return np.array([np.sum(each**2) for each in rows])
 
 
 def compare_friction(problem: Problem, numbers: Parameters, first: str = "") -> FrictionForms | None:
@@ -171,9 +179,9 @@ def _compared(
     kept = starts[: int(numbers.number("friction.starts"))]
     whole = [(fit, fit.solve(fit.start(known), rounds)) for fit in kept]
     fit, x = min(whole, key=lambda pair: pair[0].cost(pair[1])) if len(whole) > 1 else whole[0]
-    held, fitted = fit.held_out(x), [fit.share(x, t) for t in range(len(problem.tests))]
+    held, fitted = fit.held_out(x), _shares(fit.rows(x))
     names = [parameter.name for parameter in fit.parameters]
-    error = FormError(name, form.title, len(x), held, np.array(fitted), fit.machine_at(x))
+    error = FormError(name, form.title, len(x), held, fitted, fit.machine_at(x))
     return error, dict(zip(names, x.tolist(), strict=True))
 
 
@@ -230,6 +238,10 @@ class _Force:
         bins = self._moving(self.problem.bins(found, test)[0][:, self.columns], t).ravel()
         return np.concatenate([bins.real, bins.imag]) / np.sqrt(self.size[t])
 
+    def rows(self, plant: Plant) -> list[Array]:
+        """Those of every test."""
+        return [self.residual(plant, t) for t in range(len(self.size))]
+
 
 class _Fit:
     """Bounded least squares of one machine's friction on forces, about its stated numbers."""
@@ -258,12 +270,11 @@ class _Fit:
 
     def cost(self, x: Array) -> float:
         """Mean of these shares over all tests."""
-        return float(np.mean([self.share(x, t) for t in range(len(self.force.size))]))
+        return float(np.mean(_shares(self.rows(x))))
 
     def rows(self, x: Array) -> list[Array]:
         """Rows of every test at x."""
-        plant = make_plant(self.machine_at(x))
-        return [self.force.residual(plant, t) for t in range(len(self.force.size))]
+        return self.force.rows(make_plant(self.machine_at(x)))
 
     def slopes(self, x: Array, base: Sequence[Array]) -> list[Array]:
         """Derivatives (n, p) of every test's rows at x, where they are `base`."""

@@ -13,7 +13,7 @@ from ..core.arrays import Array
 from ..core.progress import Progress, between, split
 from ..identification.calibration.fit import solve
 from ..identification.calibration.free_parameters import FreeParameter
-from ..identification.calibration.normal_equations import NormalEquations, bounds_of
+from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
 from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained, squares_by_column
@@ -62,6 +62,8 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
         linear = linearise(found.solution, found.calibration, replicas=True)
         found = replace(found, rounds=(*found.rounds, screen(found, linear, parts[2 * k])))
         more = _more_effects(found, linear, parts[2 * k + 1]) if k < most else None
+        if more is None and k < most and found.power >= found.numbers.number("accept.settled"):
+            more = _screened_as_stated(found)
         if more is None:
             break
         found = more
@@ -70,6 +72,25 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
         found, linear = fewer, linearise(fewer.solution, found.calibration)
     progress(1.0)
     return found, linear
+
+
+def _screened_as_stated(found: Search) -> Search | None:
+    """The search with one more effect screened about the stated numbers; None if none passes there either.
+
+    Without an effect that is missing, a refit may end far off, where no small addition of it would help. It is added if
+    its joint fit explains enough of what that refit leaves beyond noise.
+    """
+    problem, stated = found.problem, np.zeros(len(found.problem.prior))
+    reports = [lambda share: None for _ in problem.replicas]
+    normal = NormalEquations(problem, stated, lambda share: None)
+    normal = normal.less(NoiseBias(normal, stated, reports))
+    solution = found.solution._replace(x=stated, at=stated, normal=normal, residual=normal.residual)
+    linear = linearise(solution, found.calibration, replicas=True)
+    screened = screen(replace(found, solution=solution), linear, lambda share: None)
+    passed = [one for one in screened.scored if not (one.refused or one.candidate.release)]
+    more = _add(replace(found, rounds=(*found.rounds[:-1], screened)), passed, lambda share: None)
+    closes = more is not None and share_explained(found, more) >= found.numbers.number("accept.closure")
+    return more if closes else None
 
 
 def _pruned(found: Search) -> Search:

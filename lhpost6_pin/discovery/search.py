@@ -61,9 +61,8 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
     for k in range(len(found.rounds), most + 1):
         linear = linearise(found.solution, found.calibration, replicas=True)
         found = replace(found, rounds=(*found.rounds, screen(found, linear, parts[2 * k])))
-        more = _more_effects(found, linear, parts[2 * k + 1]) if k < most else None
-        if more is None and k < most and found.power >= found.numbers.number("accept.settled"):
-            more = _screened_as_stated(found)
+        first, second = split(parts[2 * k + 1], 2)
+        more = (_more_effects(found, linear, first) or _screened_as_stated(found, second)) if k < most else None
         if more is None:
             break
         found = more
@@ -74,23 +73,24 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
     return found, linear
 
 
-def _screened_as_stated(found: Search) -> Search | None:
+def _screened_as_stated(found: Search, progress: Progress) -> Search | None:
     """The search with one more effect screened about the stated numbers; None if none passes there either.
 
     Without an effect that is missing, a refit may end far off, where no small addition of it would help. It is added if
-    its joint fit explains enough of what that refit leaves beyond noise.
+    its joint fit explains enough of what that refit leaves beyond noise. None, too, where it leaves little.
     """
-    problem, stated = found.problem, np.zeros(len(found.problem.prior))
-    reports = [lambda share: None for _ in problem.replicas]
-    normal = NormalEquations(problem, stated, lambda share: None)
-    normal = normal.less(NoiseBias(normal, stated, reports))
+    n, problem = found.numbers.number, found.problem
+    if found.power < n("accept.settled"):
+        return None
+    stated, (first, *more, screening, adding) = np.zeros(len(problem.prior)), split(progress, 3 + len(problem.replicas))
+    normal = NormalEquations(problem, stated, first)
+    normal = normal.less(NoiseBias(normal, stated, more))
     solution = found.solution._replace(x=stated, at=stated, normal=normal, residual=normal.residual)
     linear = linearise(solution, found.calibration, replicas=True)
-    screened = screen(replace(found, solution=solution), linear, lambda share: None)
+    screened = screen(replace(found, solution=solution), linear, screening)
     passed = [one for one in screened.scored if not (one.refused or one.candidate.release)]
-    more = _add(replace(found, rounds=(*found.rounds[:-1], screened)), passed, lambda share: None)
-    closes = more is not None and share_explained(found, more) >= found.numbers.number("accept.closure")
-    return more if closes else None
+    added = _add(replace(found, rounds=(*found.rounds[:-1], screened)), passed, adding)
+    return added if added is not None and share_explained(found, added) >= n("accept.closure") else None
 
 
 def _pruned(found: Search) -> Search:

@@ -60,7 +60,8 @@ def _passes(name: str, command: list[str]) -> bool:
 
 
 def _run(command: list[str], **options: Any) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([sys.executable, *command], cwd=ROOT, check=False, **options)
+    one_thread = {"OPENBLAS_NUM_THREADS": "1"}  # there is a worker on every core: more threads would only wait
+    return subprocess.run([sys.executable, *command], cwd=ROOT, check=False, env=os.environ | one_thread, **options)
 
 
 if __name__ == "__main__":

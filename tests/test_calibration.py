@@ -206,6 +206,16 @@ def test_columns_of_independent_noise_stay_as_they_are():
     assert np.array_equal(factor, np.tril(factor))
 
 
+def test_columns_of_different_groups_are_not_mixed():
+    """What the model of friction leaves in a force must not reach a flow, though the same sensor's noise is in both."""
+    rng, edges, f = np.random.default_rng(2), np.array([0.0, 0.01, 10.0]), np.linspace(0.1, 9.9, 400)
+    force, other = rng.standard_normal((2, 400, 1)) + 1j * rng.standard_normal((2, 400, 1))
+    noise = [[np.hstack([force, force + 0.5 * other, force + other])]]
+    factor = make_whitener(noise, [f], edges, np.array([0, 1, 1])).factor[0, 1]
+    assert factor[1, 0] == factor[2, 0] == 0.0
+    assert abs(factor[2, 1]) > 0.5  # within a group they are
+
+
 def test_noise_of_too_few_samples_is_refused():
     noise = [[np.ones((2, 7), complex)] * 3]  # the first band counts with the second
     with pytest.raises(RecordError, match=r"6 samples of the noise between 1 and 2 Hz"):

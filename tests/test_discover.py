@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import joblib
 import numpy as np
@@ -18,6 +19,7 @@ from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
+from lhpost6_pin.discovery.balances import lowers_squares
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
@@ -29,6 +31,7 @@ from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, les
 from lhpost6_pin.discovery.screening import _by_rank, score_pairs
 from lhpost6_pin.discovery.search import _fit_jointly, _pruned, without_effect
 from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
+from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.effects.effect import Effect
@@ -404,6 +407,31 @@ def test_a_free_function_takes_the_place_of_names_it_beats_and_is_the_form_of_th
     assert told([free(200.0, "H1")], []) == (0.0, set())  # the form of what was found there
     assert told([free(100.0, "H2")], []) == (0.0, set())  # and what that leaves elsewhere
     assert told([free(200.0, "H2")], []) == (200.0, set())
+
+
+def test_a_small_effect_is_not_blamed_for_the_form_of_a_large_one_beside_it(ready):
+    numbers = discovery_numbers()[0]
+    column = int(np.flatnonzero(ready.rows("wrench", 0))[0])
+    residual = [np.ones((len(f), sum(ready.widths)), complex) for f in ready.frequency]
+    for r in residual:
+        r[:, column] = 4.0  # sixteen times noise
+    noise = sum(len(r) for r in residual)
+    search = SimpleNamespace(numbers=numbers, problem=ready, residual=residual, added=())
+
+    def added(family: str, share: float) -> AddedEffect:
+        fall = np.zeros(sum(ready.widths))
+        fall[column] = share * noise
+        return AddedEffect(candidate(family, "platen.x"), 1e3, 0, 10, (), fall, 10.0)
+
+    small, large = added("stray_spring", 30.0), added("added_mass", 1000.0)
+    assert leaves_much(small, [small], search)
+    assert not leaves_much(small, [small, large], search) and not leaves_much(large, [small, large], search)
+
+
+def test_an_effect_must_lower_some_column_of_held_out_tests_by_a_share_of_what_was_there_first():
+    first, before = np.array([1000.0, 100.0]), np.array([400.0, 100.0])
+    assert lowers_squares(first, before, np.array([390.0, 95.0]), 0.03)
+    assert not lowers_squares(first, before, np.array([380.0, 98.0]), 0.03)
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):

@@ -15,9 +15,11 @@ from lhpost6_pin.data.importing import find_tests, guess_map, load_raw, make_imp
 from lhpost6_pin.data.measured_sensors import save_sensors
 from lhpost6_pin.data.sensors import SensorSet, load_sensors
 from lhpost6_pin.discovery import discover
+from lhpost6_pin.discovery.localise import gap_map
 from lhpost6_pin.identification.calibration import calibrate, calibration_numbers
 from lhpost6_pin.identification.calibration.calibration_summary import convergence_summary, friction_summary
-from lhpost6_pin.identification.calibration.friction_forms import compare_friction, effect_of_form
+from lhpost6_pin.identification.calibration.fit import misfit
+from lhpost6_pin.identification.calibration.friction_forms import compare_friction, effect_of_form, own_suffices
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.laws import backlash, backlash_instead, bouc_wen
@@ -131,13 +133,16 @@ def test_backlash_is_preferred_where_there_is_one_with_its_gap(loose):
     assert found.best.machine.platen.mass[0] == pytest.approx(MASS, rel=0.2)
     assert found.best.machine.actuators[0].seal_friction == pytest.approx(SLIDING, rel=0.05)
     assert found.best.explained.min() > 0.99 > found.own.explained.min()  # scatter of 2 % leaves a thousandth
+    assert not own_suffices(prepare_problem(*_given(loose), numbers), found.own.machine, numbers)
 
 
 @pytest.mark.long
 def test_presliding_without_a_gap_is_no_backlash(tight):
     numbers = calibration_numbers()
-    found = compare_friction(prepare_problem(*_given(tight), numbers), numbers)
+    problem = prepare_problem(*_given(tight), numbers)
+    found = compare_friction(problem, numbers)
     assert found is not None and found.best.name != "backlash"
+    assert own_suffices(problem, found.own.machine, numbers)  # scatter is no reason to call a force unexplained
     coulomb = next(form for form in found.forms if form.name == "coulomb")
     assert coulomb.typical > 3.0 * found.own.typical  # 1.5 mm of elastic slip in strokes of 12 mm
 
@@ -147,6 +152,18 @@ def test_forms_are_not_compared_where_that_says_nothing(loose):
     numbers = calibration_numbers()
     two = prepare_problem(machine, campaign.records[:2], sensors, numbers)
     assert compare_friction(two, numbers) is None
+
+
+def test_only_the_axis_that_moves_is_compared(tight):
+    """Five more columns of zeros would lower the mean square of a force residual by six."""
+    problem = prepare_problem(*_given(tight), calibration_numbers())
+    (column,) = np.flatnonzero(problem.rows("wrench"))
+    residual = problem.whitened(np.zeros(len(problem.names)))
+    assert column == 0 and not problem.rows("wrench", 1, 5).any()
+    own = [np.mean(np.abs(r[:, 0]) ** 2) for r in residual]
+    assert np.allclose(misfit(problem, residual)[:, 0], own, rtol=1e-12)
+    axes = {spot.label for row in gap_map(problem, residual) for spot in row if spot.kind == "wrench"}
+    assert axes == {"x"}
 
 
 def _given(case: tuple[Machine, Campaign, SensorSet]) -> tuple[Machine, list, SensorSet]:

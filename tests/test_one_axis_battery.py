@@ -12,7 +12,9 @@ from battery.simulate import RATE
 from scipy.integrate import cumulative_simpson
 
 from lhpost6_pin.data.campaign import load_campaign
+from lhpost6_pin.data.measured_sensors import find_sensors
 from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.discovery import discover
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
@@ -263,6 +265,21 @@ def test_a_test_that_would_cavitate_is_made_smaller():
     assert tamed.references["TRI"] is wild["TRI"]
     for run in runs.values():
         assert run.y[:, (PA, PB)].min() > one_axis_cases.numbers()["limit"]["least_pressure"]
+
+
+def test_overlap_is_found_though_a_refit_without_it_ends_far_off(tmp_path):
+    """About that refit no small addition of overlap helps, and nothing was named; about the stated numbers it does."""
+    case = one_axis_cases.draw_case("null", np.random.SeedSequence(1).spawn(1)[0], "brief")
+    one_axis_files.write_cases([replace(case, table=case.table._replace(overlap=0.02))], tmp_path)
+    home = tmp_path / case.id
+    machine = load_machine(home / "machine.toml")
+    campaign = load_campaign(home, machine)
+    sensors = find_sensors(machine, campaign.records, home / "sensors.toml")
+    found = discover(machine, campaign, sensors, phases=(1,), propose=False)
+    assert found.search.rounds[0].misfit > 100.0
+    (overlap,) = found.verdict.effects
+    assert overlap.family == "valve_deadband"
+    assert overlap.parameters["overlap"].value == pytest.approx(0.02, rel=0.1)
 
 
 def test_scores_tell_what_was_found_from_what_was_named_wrongly():

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration.fit import Solution
@@ -18,11 +17,12 @@ from ..identification.calibration.measured_wrench import measured_bins
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
 from ..identification.residuals import kinds_shown
-from ..mechanics.plant import make_plant
+from .acceptance import squares_by_column
 from .search import without_effect
 from .search_state import Search
 
-__all__ = ["Balance", "HeldOut", "evaluate_balances", "gain_on", "residual_at", "unproven_effects"]
+__all__ = ["Balance", "HeldOut", "evaluate_balances", "gain_on", "lowers_squares", "residual_at"]
+__all__ += ["unproven_effects"]
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,7 @@ def residual_at(held: Problem, solution: Solution | None = None) -> HeldOut:
 
 def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance, ...]:
     """Balances of the held-out tests by three models."""
-    found, axes = [], make_plant(held.machine).axes
-    forces = axes[axes < 3]
+    found, forces = [], held.rows("wrench", 0, 1, 2)
     for t, test in enumerate(held.tests):
         for kind in held.kinds:
             rows = held.rows(kind)
@@ -65,23 +64,26 @@ def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance,
                 continue
             error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
             share = explained = None
-            if kind == "wrench" and (left := _left(held, three, t, rows, forces)) is not None:
+            if kind == "wrench" and (left := _left(held, three, t, forces)) is not None:
                 share, explained = _three(np.sqrt(left)), _three(1.0 - left)
             found.append(Balance(kind, test.name, _three(np.array(error)), share, explained))
     return tuple(found)
 
 
-def _left(held: Problem, three: Sequence[HeldOut], t: int, rows: Mask, forces: NDArray[np.int64]) -> Array | None:
-    """Squares of a test's residual force over those of the measured one, by three models; None where that is zero."""
+def _left(held: Problem, three: Sequence[HeldOut], t: int, forces: Mask) -> Array | None:
+    """Squares of a test's residual force over those of the measured one, by three models; None where that is zero.
+
+    forces are the columns (c,) of the residual along free axes.
+    """
     f, base = held.frequency[t], three[0].base
-    size = _squares(measured_bins(held, base.plant, base.tests[t], t), f, forces)
+    size = _squares(measured_bins(held, base.plant, base.tests[t], t), f, forces[:6])
     if size == 0.0:
         return None
-    plain = [held.bins(one.base.residuals[t], one.base.tests[t])[0][:, rows] for one in three]
+    plain = [held.bins(one.base.residuals[t], one.base.tests[t])[0] for one in three]
     return np.array([_squares(bins, f, forces) / size for bins in plain])
 
 
-def _squares(bins: Complex, f: Array, columns: NDArray[np.int64]) -> float:
+def _squares(bins: Complex, f: Array, columns: Mask) -> float:
     """Sum of squares of some columns of bins (m, c) above zero frequency."""
     return float(np.sum(np.abs(bins[f > 0.0][:, columns]) ** 2))
 
@@ -107,14 +109,21 @@ def gain_on(held: Problem, before: HeldOut, after: HeldOut, rows: Mask) -> tuple
     return gain, expected
 
 
+def lowers_squares(first: Array, before: Array, after: Array, share: float) -> bool:
+    """Whether squares by column (c,) fall in one of them by at least a share of the `first` ones."""
+    return bool(np.any(before - after >= share * first))
+
+
 def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, float]:
     """Effects that do not close the gap on held-out tests, by name, with their gain of log-likelihood there.
 
     `after` is the residual of the search's solution there. Each effect is compared with everything else refitted
-    without it, in the residuals that its family shows in. One that the held-out tests do not excite is none of them:
-    its expected gain is within chance.
+    without it, in the residuals that its family shows in: it must gain there, and lower the squares in some column by
+    a share of those before any effect. One that the held-out tests do not excite is none of them: its expected gain is
+    within chance.
     """
     n, unproven = found.numbers.number, {}
+    original = residual_at(held, found.refit)
     for one in found.added:
         if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
             continue  # a sensor's error
@@ -122,6 +131,9 @@ def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, 
         kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
         rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
         gain, expected = gain_on(held, before, after, rows)
-        if expected > n("accept.chance") and gain < max(n("accept.chance"), n("accept.held_out") * expected):
+        three = (squares_by_column(one.whitened)[rows] for one in (original, before, after))
+        lower = lowers_squares(*three, n("accept.of_first"))
+        least = max(n("accept.chance"), n("accept.held_out") * expected)
+        if expected > n("accept.chance") and (not lower or gain < least):
             unproven[one.candidate.name] = gain
     return unproven

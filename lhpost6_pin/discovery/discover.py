@@ -36,6 +36,7 @@ from .residual_function import ResidualFunction, fit_residual_functions, with_re
 from .search import refit, search, without_effect
 from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
+from .unexplained import forces_explained
 from .verdict import Verdict, judge
 
 __all__ = ["Discovery", "discover", "discovery_numbers"]
@@ -120,7 +121,7 @@ def discover(
     found, linear = search(
         begun.search, lambda one: checkpoint.write(begun._replace(search=one)), between(report, 0.4, 0.75)
     )
-    misfit = found.misfit("wrench")
+    misfit = 0.0 if forces_explained(found) else found.misfit("wrench")
     beside = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
     replacing: tuple[ResidualFunction, ...] = ()
     forces = any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added)

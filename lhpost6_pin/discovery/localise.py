@@ -10,7 +10,6 @@ from ..core.arrays import Complex
 from ..core.names import AXES
 from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
-from ..machine.machine import Machine
 
 __all__ = ["Spot", "gap_map", "worst_spots"]
 
@@ -44,7 +43,7 @@ def gap_map(problem: Problem, residual: Sequence[Complex]) -> list[list[Spot]]:
     found = []
     for kind in RESIDUALS:
         columns = np.flatnonzero(problem.rows(kind))
-        for label, column in zip(_labels(problem.machine, kind), columns.tolist(), strict=False):
+        for label, column in zip(_labels(problem, kind), columns.tolist(), strict=False):
             spots = []
             for k, band in enumerate(bands):
                 own = squares[group == k, column]
@@ -62,8 +61,14 @@ def worst_spots(problem: Problem, residual: Sequence[Complex]) -> list[Spot]:
     return [spot for spot in spots if spot.excess >= least][:_MOST] or spots[:1]
 
 
-def _labels(machine: Machine, kind: str) -> Sequence[str]:
-    """Names of the columns of a kind of residuals."""
+def _labels(problem: Problem, kind: str) -> Sequence[str]:
+    """Names of the columns of a kind of residuals that are compared."""
+    machine = problem.machine
     chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
-    named = {"wrench": AXES, "flow": chambers, "gas": machine.strut_names, "supply": ("pressure",)}
+    named = {
+        "wrench": [AXES[i] for i in problem.axes],
+        "flow": chambers,
+        "gas": machine.strut_names,
+        "supply": ("pressure",),
+    }
     return named.get(kind, machine.actuator_names)

@@ -21,7 +21,7 @@ from .candidates import Candidate, list_candidates, list_releases
 from .scores import Block, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
 
-__all__ = ["CandidatePair", "screen", "score_pairs"]
+__all__ = ["CandidatePair", "found_there", "screen", "score_pairs"]
 
 
 BATCH = 8
@@ -33,14 +33,12 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     problem, numbers, base, background = found.problem, found.numbers, linear.base, linear.background
     taken = {a.candidate.name for a in found.added}
     groups = [g for g in list_candidates(base.plant.machine, base.tests[0].channels) if not taken & {c.name for c in g}]
-    residual = found.solution.normal.residual
-    misfit = float(sum(np.sum(np.abs(r) ** 2) for r in residual) / sum(r.size for r in residual))
     weigh, look = Reweighting(found, background), numbers.number("accept.look")
 
     def judged(candidate: Candidate, one: Score, explained: Sequence[Array]) -> Scored:
         less = weigh.lowered(explained, one) if explained else Lowered(one.gain, 0.0, 0.0, 0.0)
         why = refusal([candidate.family], one, less, numbers)
-        if not why and less.gain < numbers.number("accept.again") * _found_there(found, candidate):
+        if not why and less.gain < numbers.number("accept.again") * found_there(found, candidate):
             why = "may be due to the form of an effect added there"
         return Scored(candidate, one, less.gain, less.share, why)
 
@@ -82,7 +80,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
         for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
             scored += some
             progress((done + 1) / len(batches))
-    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), misfit)
+    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), found.power)
 
 
 def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
@@ -100,7 +98,7 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
     return sorted(found, key=rank)
 
 
-def _found_there(found: Search, candidate: Candidate) -> float:
+def found_there(found: Search, candidate: Candidate) -> float:
     """Largest gain of an effect added on the same components that shows in the same residuals or is often confused."""
     one, gain = candidate.family, 0.0
     for added in found.added:

@@ -18,7 +18,7 @@ from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained, squares_by_column
 from .candidates import Candidate
-from .screening import score_pairs, screen
+from .screening import found_there, score_pairs, screen
 from .search_state import (
     AddedEffect,
     FittedCandidate,
@@ -172,15 +172,19 @@ def _leading(found: Search) -> Scored | None:
 def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | None:
     """The search with a leading candidate, if its joint fit explains enough of the residual beyond noise.
 
-    Or gains far more than its threshold: held-out tests then decide (`balances.unproven_effects`).
+    Or gains far more than its threshold: held-out tests then decide (`balances.unproven_effects`). Not so of a family
+    confusable with another form of friction, of which a large residual has always some to gain.
     """
     n = found.numbers.number
     more = _best_of(found, [one, *_in_its_place(found, one)], progress)
     if more is None:
         return None
-    far = n("accept.lead") * gate(one.candidate.family, found.numbers)
-    closes = share_explained(found, more) >= n("accept.closure") or found.objective - more.objective >= far
-    return more if closes else None
+    best = more.added[-1]
+    if best.gain < n("accept.again") * found_there(found, best.candidate):
+        return None
+    far = n("accept.lead") * gate(best.candidate.family, found.numbers)
+    closes = share_explained(found, more) >= n("accept.closure")
+    return more if closes or (best.gain >= far and not best.candidate.family.confusable) else None
 
 
 def _in_its_place(found: Search, one: Scored) -> list[Scored]:

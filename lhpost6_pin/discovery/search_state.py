@@ -118,7 +118,8 @@ class Search:
     @property
     def power(self) -> float:
         """Mean square of the residual, each test with equal weight."""
-        return float(np.mean([np.mean(np.abs(r) ** 2) for r in self.residual]))
+        columns = self.problem.compared
+        return float(np.mean([np.mean(np.abs(r[:, columns]) ** 2) for r in self.residual]))
 
     @property
     def objective(self) -> float:

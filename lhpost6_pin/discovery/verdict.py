@@ -11,17 +11,18 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2, norm
 
-from ..core.arrays import Array, Complex, Mask
+from ..core.arrays import Array
 from ..identification.calibration import FreeParameter
 from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.scale import Scale, ratios
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.parameters import Parameters
-from .acceptance import form_share, squares_by_column
+from .acceptance import form_share
 from .localise import Spot, worst_spots
 from .residual_function import ResidualFunction
 from .search_state import AddedEffect, Search
 from .sensor_findings import SensorFault
+from .unexplained import leaves_much, more_than_noise
 
 __all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
@@ -121,11 +122,11 @@ def judge(
     differs |= {_amplitude(one) for one in found.added if one.candidate.name in rescaled}
     changed = {name: estimate for name, estimate in estimates.items() if name in differs}
     function, rejected = reject_effects(kept, beside, replacing, numbers)
-    rejected |= {one.candidate.name for one in kept if not one.from_lengths and _leaves_much(one, found)}
+    rejected |= {one.candidate.name for one in kept if not one.from_lengths and leaves_much(one, kept, found)}
     bounded = _at_bounds(found)
     at_bound = {one.candidate.name for one in kept if _amplitude(one) in bounded} - rejected
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
-    unexplained = function is not None or bool(rejected) or drifting or _more_than_noise(found)
+    unexplained = function is not None or bool(rejected) or drifting or more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
     effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | at_bound])
     hidden, testable = _untestable(found)
@@ -252,47 +253,6 @@ def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:
             )
         merged[key] = one
     return tuple(merged.values())
-
-
-def _more_than_noise(found: Search) -> bool:
-    """Whether the residual exceeds noise by more than errors in the form of the effects found explain."""
-    limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
-    for kind in found.problem.kinds:
-        families = [one.candidate.family for one in found.added if kind in one.candidate.family.shows_in]
-        share = max((form_share(f, found.numbers) for f in families), default=found.numbers.number("verdict.rest"))
-        rows = found.problem.rows(kind) & ~_impacted(found)
-        if not rows.any():
-            continue
-        first, last = ([r[:, rows] for r in tests] for tests in (found.refit.normal.residual, found.residual))
-        misfit = float(np.mean([np.mean(np.abs(r) ** 2) for r in last]))
-        if misfit > limit and _excess(last, doubt) > share * _excess(first, doubt):
-            return True
-    return False
-
-
-def _impacted(found: Search) -> Mask:
-    """Columns (c,) of actuators with play identified from lengths: impacts are faster than the sampling rate."""
-    names, columns = found.problem.machine.actuator_names, np.zeros(sum(found.problem.widths), bool)
-    for one in found.added:
-        for name in one.candidate.components if one.from_lengths else ():
-            columns |= found.problem.rows_of_actuator(names.index(name))
-    return columns
-
-
-def _excess(residual: Sequence[Complex], doubt: float) -> float:
-    """Squares of whitened residuals beyond `doubt` times noise; at least a tenth of noise."""
-    count = sum(r.size for r in residual)
-    return max(sum(float(np.sum(np.abs(r) ** 2)) for r in residual) - doubt * count, 0.1 * count)
-
-
-def _leaves_much(added: AddedEffect, found: Search) -> bool:
-    """Whether an effect leaves much of the residual unexplained in the columns where it explains most."""
-    limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
-    share = form_share(added.candidate.family, found.numbers)
-    where = (added.fall > 0.1 * added.fall.max()) & ~_impacted(found)
-    left = squares_by_column(found.residual)[where]
-    noise = float(sum(len(r) for r in found.residual) * left.size)
-    return bool(left.sum() > limit * noise and left.sum() - doubt * noise > share * added.fall[where].sum())
 
 
 def reject_effects(

@@ -182,6 +182,8 @@ def _family(family: Family, machine: Machine) -> str:
         facts.append(("reported as", f"[{family.named}](#{family.named})"))
     if family.search == "background":
         facts.append(("in a search", "always refitted, never reported: another form of a law of the report"))
+    if family.search == "compared":
+        facts.append(("in a search", "compared with the machine's own friction by held-out error, before it"))
     if family.search == "unnamed":
         facts.append(("in a search", "never a candidate: the form of an unexplained residual"))
     if family.confusable:

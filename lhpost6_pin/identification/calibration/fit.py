@@ -193,8 +193,9 @@ def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
     out = np.full((len(whitened), len(RESIDUALS)), np.nan)
     for t, bins in enumerate(whitened):
         for k, kind in enumerate(RESIDUALS):
-            if problem.widths[k]:
-                out[t, k] = np.mean(np.abs(bins[:, problem.rows(kind)]) ** 2)
+            rows = problem.rows(kind)
+            if rows.any():
+                out[t, k] = np.mean(np.abs(bins[:, rows]) ** 2)
     return out
 
 

@@ -219,7 +219,7 @@ class _Force:
     def __init__(self, problem: Problem, machine: Machine) -> None:
         self.problem, self.plant = problem, make_plant(machine)
         axes = self.plant.axes[self.plant.axes < 3]
-        self.columns = np.flatnonzero(problem.rows("wrench"))[axes]
+        self.columns = np.flatnonzero(problem.rows("wrench", 0, 1, 2))
         self.paths: list[Path] = [follow(self.plant, test) for test in problem.tests]
         self.size = []
         for t, test in enumerate(problem.tests):

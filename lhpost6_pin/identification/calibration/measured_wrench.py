@@ -20,4 +20,4 @@ def measured_bins(problem: Problem, plant: Plant, test: MeasuredTest, t: int) ->
         return np.zeros((len(problem.frequency[t]), 6), np.complex128)
     wrench = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)
     none = np.zeros((len(wrench), 0))
-    return problem.bins(Residuals(wrench, none, none, none, none, none), test)[0][:, problem.rows("wrench")]
+    return problem.bins(Residuals(wrench, none, none, none, none, none), test)[0][:, :6]

@@ -75,6 +75,7 @@ class Problem:
         test, of which a share `preload` of the force is unknown. Raises RecordError if they are too short together.
         """
         plant = make_plant(machine)
+        self.axes = plant.axes  # free twist components of the platen
         tests = tuple(made_fine(plant, test) for test in tests)
 
         def weighed(some: Sequence[MeasuredTest]) -> tuple[MeasuredTest, ...]:
@@ -109,7 +110,9 @@ class Problem:
             draws = len(found)
             found += [self.bins(_less(one, base), test)[0] * np.sqrt(draws) for one in more]
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
-        self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands))
+        # where all friction acts along one axis or two, what its form leaves there is no noise of other kinds
+        kinds_of = None if machine.motion == "free" else np.repeat(np.arange(len(self.widths)), self.widths)
+        self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands), kinds_of)
 
     def _set(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
         """Set the machine and its free parameters; returns itself."""
@@ -185,12 +188,21 @@ class Problem:
         return found
 
     def rows(self, kind: str, *places: int) -> Mask:
-        """Mask of the stacked residuals' columns of a kind, all or those at some places."""
+        """Mask of the stacked residuals' columns of a kind, all or those at some places.
+
+        Of the wrench only along free axes: the others are zero.
+        """
         at = RESIDUALS.index(kind)
         first, width = sum(self.widths[:at]), self.widths[at]
+        own = set(self.axes.tolist() if kind == "wrench" else range(width))
         mask = np.zeros(sum(self.widths), bool)
-        mask[[first + p for p in (places or range(width)) if p < width]] = True
+        mask[[first + p for p in own.intersection(places or own) if p < width]] = True
         return mask
+
+    @property
+    def compared(self) -> Mask:
+        """Mask of the stacked residuals' columns that are not zero by the machine's guides."""
+        return np.asarray(np.any([self.rows(kind) for kind in RESIDUALS], axis=0))
 
     def whitened(self, x: Array) -> list[Complex]:
         """Whitened bins (m, c) of every test with the unknowns at x."""
@@ -281,7 +293,7 @@ class Problem:
         weighed = wrench.reshape(n, -1) if weight is None else wrench.reshape(n, -1) * weight[:, None]
         bins, f = spectrum_of(weighed, self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
         out = np.zeros((len(f), sum(self.widths), count), np.complex128)
-        out[:, self.rows("wrench")] = bins.reshape(len(f), axes, count)
+        out[:, :axes] = bins.reshape(len(f), axes, count)  # of all kinds of residuals the wrench is first
         return self.whitener.apply(test, out, f)
 
     def rows_of_actuator(self, place: int) -> Mask:

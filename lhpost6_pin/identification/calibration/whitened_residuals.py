@@ -117,11 +117,17 @@ def negative_log_likelihood(means: Array, counts: NDArray[np.intp]) -> Array:
     return np.asarray(counts @ np.minimum(means, 1.0) + (BELIEF + counts) @ np.log(more))
 
 
-def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array], edges: Array) -> Whitener:
+def make_whitener(
+    noise: Sequence[Sequence[Complex]],
+    frequency: Sequence[Array],
+    edges: Array,
+    groups: NDArray[np.int64] | None = None,
+) -> Whitener:
     """Whitener from realisations of every test's noise, bins (m, k) at its frequencies (m,).
 
     Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. Correlations are
-    pooled over all tests, and those of means with the first band: one test has too few bins in a band.
+    pooled over all tests, and those of means with the first band: one test has too few bins in a band. Columns of
+    different `groups` (k,) count as uncorrelated.
 
     Raises RecordError if all together still have too few.
     """
@@ -144,7 +150,10 @@ def make_whitener(noise: Sequence[Sequence[Complex]], frequency: Sequence[Array]
         if len(rows) <= CERTAIN:  # too few for correlations
             what = f"{len(rows)} samples of the noise between {edges[b]:g} and {edges[b + 1]:g} Hz"
             raise RecordError(f"the tests are too short together: they give {what}; add tests, or longer ones")
-        factors[:, b] = _uncorrelated(rows.T @ rows.conj() / len(rows), len(rows)) @ factors[:, b]  # of E[x x^H]
+        matrix = rows.T @ rows.conj() / len(rows)  # E[x x^H]
+        if groups is not None:
+            matrix = np.where(groups[:, None] == groups, matrix, 0.0)
+        factors[:, b] = _uncorrelated(matrix, len(rows)) @ factors[:, b]
     return Whitener(edges, factors)
 
 

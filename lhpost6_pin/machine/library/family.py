@@ -48,7 +48,9 @@ class Family:
     grouping: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
     named: str  # the family that it is a form of; usually itself
     background_without: str  # channel without which it is refitted in every search and never named; empty: none
-    search: str  # "named"; "background": refitted in every search and never named; "unnamed": never a candidate
+    # "named"; "compared": with the machine's own friction, by held-out error, before a search; "background": refitted
+    # in every search and never named; "unnamed": never a candidate
+    search: str
     confusable: bool  # whether another form of the report's own laws may pass for it
     law: str  # whose parameters are the family's numbers and the component's; empty where `make` composes it
     parameters: Mapping[str, str | float]  # of the law: another name in the family or the component, or a constant

@@ -1,0 +1,70 @@
+"""Whether the effects found leave residual unexplained: more than noise, and than what errors in their form explain."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..core.arrays import Complex, Mask
+from ..identification.calibration.friction_forms import own_suffices
+from .acceptance import form_share, squares_by_column
+from .search_state import AddedEffect, Search, fitted_machine
+
+__all__ = ["forces_explained", "leaves_much", "more_than_noise"]
+
+
+def more_than_noise(found: Search) -> bool:
+    """Whether the residual exceeds noise by more than errors in the form of the effects found explain."""
+    limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
+    for kind in found.problem.kinds:
+        families = [one.candidate.family for one in found.added if kind in one.candidate.family.shows_in]
+        share = max((form_share(f, found.numbers) for f in families), default=found.numbers.number("verdict.rest"))
+        rows = found.problem.rows(kind) & ~_impacted(found)
+        if not rows.any() or (kind == "wrench" and forces_explained(found)):
+            continue
+        first, last = ([r[:, rows] for r in tests] for tests in (found.refit.normal.residual, found.residual))
+        misfit = float(np.mean([np.mean(np.abs(r) ** 2) for r in last]))
+        if misfit > limit and _excess(last, doubt) > share * _excess(first, doubt):
+            return True
+    return False
+
+
+def _impacted(found: Search) -> Mask:
+    """Columns (c,) of actuators with play identified from lengths: impacts are faster than the sampling rate."""
+    names, columns = found.problem.machine.actuator_names, np.zeros(sum(found.problem.widths), bool)
+    for one in found.added:
+        for name in one.candidate.components if one.from_lengths else ():
+            columns |= found.problem.rows_of_actuator(names.index(name))
+    return columns
+
+
+def _excess(residual: Sequence[Complex], doubt: float) -> float:
+    """Squares of whitened residuals beyond `doubt` times noise; at least a tenth of noise."""
+    count = sum(r.size for r in residual)
+    return max(sum(float(np.sum(np.abs(r) ** 2)) for r in residual) - doubt * count, 0.1 * count)
+
+
+def forces_explained(found: Search) -> bool:
+    """Whether a machine on guides explains its measured forces but for what friction varies by from stroke to stroke.
+
+    All friction acts along one axis or two there, and no law has exactly its form: noise is no measure of that.
+    """
+    problem = found.problem
+    if problem.machine.motion == "free" or not problem.rows("wrench").any():
+        return False
+    return own_suffices(problem, fitted_machine(found.solution), found.calibration)
+
+
+def leaves_much(added: AddedEffect, kept: Sequence[AddedEffect], found: Search) -> bool:
+    """Whether an effect leaves much of the residual unexplained in the columns where it explains most.
+
+    Compared with what all effects `kept` explain there.
+    """
+    limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
+    share = form_share(added.candidate.family, found.numbers)
+    where = (added.fall > 0.1 * added.fall.max()) & ~_impacted(found)
+    if forces_explained(found):
+        where &= ~found.problem.rows("wrench")
+    fall = sum(np.maximum(one.fall, 0.0)[where].sum() for one in kept)
+    left = squares_by_column(found.residual)[where]
+    noise = float(sum(len(r) for r in found.residual) * left.size)
+    return bool(left.sum() > limit * noise and left.sum() - doubt * noise > share * fall)

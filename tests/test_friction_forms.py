@@ -16,6 +16,7 @@ from lhpost6_pin.data.measured_sensors import save_sensors
 from lhpost6_pin.data.sensors import SensorSet, load_sensors
 from lhpost6_pin.discovery import discover
 from lhpost6_pin.discovery.localise import gap_map
+from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.identification.calibration import calibrate, calibration_numbers
 from lhpost6_pin.identification.calibration.calibration_summary import convergence_summary, friction_summary
 from lhpost6_pin.identification.calibration.fit import misfit
@@ -204,7 +205,8 @@ def test_discover_names_the_backlash_and_nothing_else(loose):
 def test_discover_names_nothing_where_the_joint_is_tight(tight):
     machine, campaign, sensors = tight
     found = discover(machine, campaign, sensors, hold_out=["middle"], phases=(1,), propose=False)
-    assert not found.verdict.effects
+    assert not found.verdict.effects and found.verdict.word != "unexplained"
+    assert "times sensor noise, but within 5 % of the forces" in summary(found)  # its scatter, 2 %, is no sensor noise
 
 
 # ------------------------------------------------------------------------------------------------ what was in the way

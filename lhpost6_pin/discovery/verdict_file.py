@@ -5,6 +5,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import __version__
 from ..core.files import write_whole
 from ..core.jsonable import as_json
@@ -13,6 +15,7 @@ from ..identification.calibration.scale import scale_summary
 from ..machine.library import find_family
 from .discover import Discovery
 from .held_out import FLOOR
+from .unexplained import forces_explained
 from .verdict import Estimate
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
@@ -155,6 +158,8 @@ def summary(found: Discovery) -> str:
         text += f" Not identified: {names}, which lowers the residual of the tests searched, but not of those held out."
     if (worse := _worse(found)) is not None:
         text += f" {worse}"
+    if (scatter := _scatter(found)) is not None:
+        text += f" {scatter}"
     if verdict.bounded:
         text += f" At the bound of their ranges, and no estimates: {', '.join(verdict.bounded)}."
     if verdict.scale is not None:
@@ -173,6 +178,18 @@ def _worse(found: Discovery) -> str | None:
         return None
     each = ", ".join(f"{one.kind} of {one.test} {one.error[0]:.2f} to {one.error[1]:.2f}" for one in worse)
     return f"The refit without effects is worse than the machine as delivered on held-out tests ({each})."
+
+
+def _scatter(found: Discovery) -> str | None:
+    """That forces exceed sensor noise, but are explained well enough for friction; None where they do not."""
+    n, misfit = found.numbers.number, found.search.misfit("wrench")
+    if not (misfit > n("verdict.unexplained") and forces_explained(found.search)):
+        return None
+    share = np.sqrt(found.search.calibration.number("friction.enough"))
+    return (
+        f"The residual of forces is {np.sqrt(misfit):.3g} times sensor noise, but within {100.0 * share:g} % of the "
+        "forces, as friction varies from stroke to stroke."
+    )
 
 
 def _unexplained_summary(found: Discovery, effects: str) -> str:

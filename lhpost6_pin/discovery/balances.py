@@ -131,8 +131,8 @@ def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, 
         kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
         rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
         gain, expected = gain_on(held, before, after, rows)
-        three = (squares_by_column(one.whitened)[rows] for one in (original, before, after))
-        lower = lowers_squares(*three, n("accept.of_first"))
+        first, old, new = (squares_by_column(one.whitened)[rows] for one in (original, before, after))
+        lower = lowers_squares(first, old, new, n("accept.of_first"))
         least = max(n("accept.chance"), n("accept.held_out") * expected)
         if expected > n("accept.chance") and (not lower or gain < least):
             unproven[one.candidate.name] = gain

@@ -12,6 +12,7 @@ from lhpost6_pin.discovery.balances import gain_on
 from lhpost6_pin.discovery.candidates import list_candidates, with_background
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
 from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
+from lhpost6_pin.identification.decompose.record import decompose_test
 from lhpost6_pin.identification.friction_march import made_fine
 from lhpost6_pin.identification.prepare import MeasuredTest, chamber_pressures
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow, oil_balance
@@ -81,6 +82,12 @@ def test_the_base_shear_of_measured_floors_is_in_the_balance(test, tmp_path):
     np.testing.assert_allclose(change[:, 0], 210.0 * acceleration[:, 0], rtol=1e-9)
     assert "RF.mass" in {p.name for p in machine_parameters(machine)}
     assert machine.labels["floor"] == ("RF",)
+    floored = replace(floored, record=test.record.assign_coords(time=test.dt * np.arange(test.samples)))
+    forces, _ = decompose_test(plant, floored)
+    shear = forces.ledger.wrench[:, forces.ledger.effect("base_shear"), 0]
+    np.testing.assert_allclose(shear, -210.0 * acceleration[:, 0], rtol=1e-9)
+    without, _ = decompose_test(plant, replace(floored, channels=test.channels))
+    np.testing.assert_allclose(forces.residual[:, 0] - without.residual[:, 0], -shear, rtol=1e-6)
 
 
 # ------------------------------------------------------------------------------------------- friction at rest

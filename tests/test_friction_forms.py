@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 from lhpost6_pin.data.campaign import Campaign
 from lhpost6_pin.data.campaign_check import check_campaign
@@ -19,7 +20,7 @@ from lhpost6_pin.discovery.localise import gap_map
 from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.identification.calibration import calibrate, calibration_numbers
 from lhpost6_pin.identification.calibration.calibration_summary import convergence_summary, friction_summary
-from lhpost6_pin.identification.calibration.fit import misfit
+from lhpost6_pin.identification.calibration.fit import misfit, solve
 from lhpost6_pin.identification.calibration.friction_forms import compare_friction, effect_of_form, own_suffices
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
@@ -28,12 +29,14 @@ from lhpost6_pin.machine.draft.asked import read_answers
 from lhpost6_pin.machine.draft.draft import draft_machine
 from lhpost6_pin.machine.library import scaled_families
 from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.show.new_machine import draft_text
 from lhpost6_pin.show.report.friction_section import friction_table
 from lhpost6_pin.show.results import calibration_entries
 
 RATE = 512.0
 MASS, SLIDING, ELASTIC, GAP = 600.0, 1.0e4, 1.5e-3, 2.0e-3  # kg, N, m, m
 MOTIONS = {"slow": (0.5, 0.025), "middle": (0.5, 0.0125), "fast": (1.0, 0.02), "short": (2.0, 0.0125)}  # Hz, m
+SPECIMEN = (1.0, 2.0 * 0.03 * 2.0 * np.pi * 2.3, (2.0 * np.pi * 2.3) ** 2)  # of one floor: 2.3 Hz, 3 % of critical
 KNOWN = {
     "mass": "300 kg +- 200 %",
     "area": "20 cm2 +- 30 %",
@@ -56,30 +59,35 @@ def slider(x: np.ndarray, sliding: float, elastic: float, gap: float) -> np.ndar
     return force
 
 
-def write_rig(folder: Path, gap: float, elastic: float = ELASTIC, seed: int = 3) -> Path:
-    """One CSV file a test: time, displacement and force as a laboratory has them, in inches and kips."""
+def write_rig(folder: Path, gap: float, elastic: float = ELASTIC, seed: int = 3, floor: float = 0.0) -> Path:
+    """One CSV file a test: time, displacement and force as a laboratory has them, in inches and kips.
+
+    And of a specimen of one `floor` [kg], if there is one, its acceleration.
+    """
     rng = np.random.default_rng(seed)
     folder.mkdir()
     for name, (frequency, amplitude) in MOTIONS.items():
         t = np.arange(0.0, 3.5 if name == "short" else 7.0, 1.0 / RATE)
         rise = np.minimum(1.0, t * frequency)
         x = amplitude * rise * np.sin(2.0 * np.pi * frequency * t)
-        force = MASS * np.gradient(np.gradient(x, t), t) + slider(x, SLIDING, elastic, gap)
+        platen = np.gradient(np.gradient(x, t), t)
+        moved = lsim((SPECIMEN[1:], SPECIMEN), platen, t)[1] if floor else np.zeros(len(t))
+        force = MASS * platen + floor * moved + slider(x, SLIDING, elastic, gap)
         force *= 1.0 + 0.02 * np.repeat(rng.standard_normal(len(t) // 128 + 1), 128)[: len(t)]  # friction scatters
         x = x + 2e-6 * rng.standard_normal(len(t))
         force = force + 10.0 * rng.standard_normal(len(t))
-        columns = np.stack([t, x / 0.0254, force / 4448.2216], axis=1)
-        np.savetxt(
-            folder / f"{name}.csv", columns, "%.9g", ",", header="time (s),displacement (in),force (kip)", comments=""
-        )
+        columns, header = [t, x / 0.0254, force / 4448.2216], "time (s),displacement (in),force (kip)"
+        if floor:
+            columns, header = [*columns, moved + 0.01 * rng.standard_normal(len(t))], f"{header},Acc RF (m/s2)"
+        np.savetxt(folder / f"{name}.csv", np.stack(columns, axis=1), "%.9g", ",", header=header, comments="")
     return folder
 
 
-def rig(tmp: Path, gap: float, elastic: float = ELASTIC) -> tuple[Machine, Campaign, SensorSet]:
+def rig(tmp: Path, gap: float, elastic: float = ELASTIC, floor: float = 0.0) -> tuple[Machine, Campaign, SensorSet]:
     """A rig's machine of wide priors, its tests by a guessed map, and its sensors as they show their noise."""
     machine = draft_machine("rig", read_answers(KNOWN), motion="x", cylinder="double-rod")
     records = []
-    for test in find_tests([write_rig(tmp / f"gap_{gap:g}", gap, elastic)]):
+    for test in find_tests([write_rig(tmp / f"gap_{gap:g}", gap, elastic, floor=floor)]):
         raws = load_raw(test.file)
         channels, remarks = guess_map(raws, machine.labels, machine.axis_names)
         assert not remarks
@@ -207,6 +215,45 @@ def test_discover_names_nothing_where_the_joint_is_tight(tight):
     found = discover(machine, campaign, sensors, hold_out=["middle"], phases=(1,), propose=False)
     assert not found.verdict.effects and found.verdict.word != "unexplained"
     assert "times sensor noise, but within 5 % of the forces" in summary(found)  # its scatter, 2 %, is no sensor noise
+
+
+# ------------------------------------------------------------------------------------------- floors of a specimen
+FLOOR = """
+[floor.RF]
+along = "x"
+mass = { value = 200.0, unit = "kg", evidence = "assumed", source = "guessed", rel_sd = 0.5 }
+point = { value = [0.0, 0.0, 2.0], unit = "m", evidence = "drawn", source = "drawing" }
+"""
+
+
+@pytest.fixture(scope="module")
+def floored(tmp_path_factory) -> tuple[Machine, Campaign, SensorSet]:
+    """A floor of 300 kg whose acceleration is measured, on a machine that does not state it."""
+    return rig(tmp_path_factory.mktemp("floored"), 0.0, floor=300.0)
+
+
+def test_floors_that_the_machine_does_not_state_are_left_out_with_a_warning(floored, caplog):
+    machine, campaign, sensors = floored
+    assert all("floor_acceleration" in record for record in campaign.records)
+    problem = prepare_problem(machine, list(campaign.records), sensors, calibration_numbers())
+    assert not any("floor_acceleration" in test.channels for test in problem.tests)
+    assert "add [floor.RF] with along, mass and point" in caplog.text
+
+
+@pytest.mark.long
+def test_a_floor_above_guides_has_its_mass_fitted_and_no_moment_that_guides_take(floored, tmp_path):
+    """Its overturning moment, which guides take, was compared with none, and drove its mass to its bound."""
+    drafted, campaign, sensors = floored
+    (tmp_path / "rig.toml").write_text(draft_text(drafted) + FLOOR, encoding="utf-8")
+    machine, numbers = load_machine(tmp_path / "rig.toml"), calibration_numbers()
+    problem = prepare_problem(machine, list(campaign.records), sensors, numbers)
+    whitened = problem.whitened(np.zeros(len(problem.prior)))
+    assert not any(bins[:, ~problem.compared].any() for bins in whitened)
+    found = solve(problem, numbers, np.zeros(len(problem.prior)), lambda share: None)
+    mass = {p.name: p.at(x) for p, x in zip(problem.parameters, found.x, strict=False) if p.name.endswith("mass")}
+    assert mass["RF.mass"] == pytest.approx(
+        300.0, rel=0.05
+    )  # forces vary by 2 %, and the floor's is a quarter of them in one test
 
 
 # ------------------------------------------------------------------------------------------------ what was in the way

@@ -67,7 +67,7 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
             break
         found = more
         keep(found)
-    if len(found.added) > 1 and (fewer := _pruned(found)) is not found:
+    if (fewer := _pruned(found)) is not found:
         found, linear = fewer, linearise(fewer.solution, found.calibration)
     progress(1.0)
     return found, linear
@@ -94,8 +94,11 @@ def _screened_as_stated(found: Search, progress: Progress) -> Search | None:
 
 
 def _pruned(found: Search) -> Search:
-    """The search without effects that have become superfluous since others were added."""
-    for one in found.added[:-1]:
+    """The search without superfluous effects.
+
+    Others added since explain the same, or one only led the fit to parameters that do as well without it.
+    """
+    for one in found.added:
         less = without_effect(found, one.candidate)
         if less.objective - found.objective + one.from_lengths < gate(one.candidate.family, found.numbers):
             return _pruned(_refined(less, lambda share: None))

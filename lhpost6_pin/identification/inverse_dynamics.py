@@ -25,7 +25,7 @@ from ..effects.registry import LAWS, actuator_rows, law_of
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import PlatenMotion, kinematic_jacobian, plant_motion
-from ..mechanics.required_wrench import required_wrench
+from ..mechanics.required_wrench import floor_wrench, required_wrench, wrenches_at_c
 from ..mechanics.schemes import pose_stage
 from ..mechanics.workspace import make_workspace
 from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
@@ -100,14 +100,17 @@ def inverse_dynamics(
     actuator_force: ArrayLike,
     strut_pressure: ArrayLike | None = None,
     *,
+    floor_acceleration: ArrayLike | None = None,
     path: Array | None = None,
     model_step: bool = False,
 ) -> Decomposition:
     """Forces behind a motion of C and Euler angles, friction states starting at rest.
 
     time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
-    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). model_step: the
-    samples are steps of a semi-implicit run, whose forces see the last step's velocity (`schemes.staggered_stage`).
+    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). floor_acceleration
+    (n, n_floors) [m/s2] are those measured on a specimen's floors: their base shear is the effect `base_shear` of the
+    ledger. model_step: the samples are steps of a semi-implicit run, whose forces see the last step's velocity
+    (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
     if plant.model.nv != plant.axes.size:
@@ -132,8 +135,13 @@ def inverse_dynamics(
     wrench = leg_wrenches(plant, moved.q, force)
     seen = moved._replace(v=v)
     ports = ports_along(plant, seen)
-    loaded = with_loads(plant, ports, required_wrench(plant, seen, ports.turn), z, measured[0])
+    required = required_wrench(plant, seen, ports.turn)
+    floors = None if floor_acceleration is None else floor_wrench(plant, np.asarray(floor_acceleration, float))
+    loaded = with_loads(plant, ports, required if floors is None else required + floors, z, measured[0])
     ledger = _without_oil(force_ledger(states._replace(z=loaded)), plant)
+    if floors is not None:
+        shear = -wrenches_at_c(plant, ports.turn, floors)[:, None]
+        ledger = replace(ledger, effects=(*ledger.effects, "base_shear"), wrench=np.hstack([ledger.wrench, shear]))
     return Decomposition(states, ledger, tuple(names), force, wrench, plant.spools)
 
 

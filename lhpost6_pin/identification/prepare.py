@@ -11,6 +11,7 @@ groups of channels are removed beforehand, and from which tests they are estimat
                   calibrated                                                                  (calibrate and discover)
 """
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -33,6 +34,9 @@ from ..mechanics.pose import PlatenMotion
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
 __all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
 __all__ += ["prepare_test", "source_of"]
+
+
+log = logging.getLogger(__name__)
 
 
 class Policy(NamedTuple):
@@ -141,9 +145,20 @@ def source_of(record: xr.Dataset) -> str:
 
 
 def align_records(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> list[xr.Dataset]:
-    """Records of a campaign with the channels that a policy uses, its delays removed."""
+    """Records of a campaign with the channels that a policy uses, its delays removed.
+
+    Accelerations of floors are left out with a warning where the machine states none: without masses they are no force.
+    """
     if not policy.lengths:
         records = [r.drop_vars("actuator_displacement", errors="ignore") for r in records]
+    if not plant.machine.floors and any("floor_acceleration" in r for r in records):
+        names = [f"[floor.{name}]" for name in next(r for r in records if "floor" in r.coords)["floor"].values]
+        log.warning(
+            "floor_acceleration is not used, since %s states no floors, and their base shear is missing in the balance "
+            "of forces; add %s with along, mass and point (documentation: your own machine)",
+            plant.machine.name, ", ".join(names),
+        )  # fmt: skip
+        records = [r.drop_vars(("floor_acceleration", "floor"), errors="ignore") for r in records]
     delays = find_delays(plant, records, policy)
     return [align_record(r, delays) for r in records]
 

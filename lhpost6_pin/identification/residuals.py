@@ -26,7 +26,7 @@ from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import plant_motion
-from ..mechanics.required_wrench import require_alike, required_wrench
+from ..mechanics.required_wrench import floor_wrench, require_alike, required_wrench
 from .friction_march import march_finely
 from .inverse_dynamics import with_loads
 from .prepare import MeasuredTest, actuator_forces, chamber_pressures, oil_forces
@@ -129,10 +129,11 @@ def evaluate_residuals(
     force, oil = actuator_forces(machine, measured), oil_forces(machine, measured)
     wrench = gas = by_cell = servo = np.zeros((test.samples, 0))
     if "wrench" in only and force is not None:
-        z = with_loads(plant, path.ports, path.required, path.z, force)
-        wrench = wrench_residual(plant, path.ports, path.required, z, force)
+        required = path.required
         if "floor_acceleration" in measured:
-            wrench += _floor_wrench(plant, measured["floor_acceleration"])
+            required = required + floor_wrench(plant, measured["floor_acceleration"])
+        z = with_loads(plant, path.ports, required, path.z, force)
+        wrench = wrench_residual(plant, path.ports, required, z, force)
     if "gas" in only and "strut_pressure" in measured:
         length = path.ports.s[:, plant.spools : plant.legs.size]
         gas = np.log(measured["strut_pressure"] / strut_pressures(machine, length) / gas_ratio(plant, path.z))
@@ -157,19 +158,6 @@ def _spools(plant: Plant, test: MeasuredTest) -> Array | None:
     """Spool positions (n, n_actuators): measured, else those that the valves' commands give; None without either."""
     spool, command = test.channels.get("spool_position"), test.channels.get("valve_command")
     return due_spools(plant, command, test.dt) if spool is None and command is not None else spool
-
-
-def _floor_wrench(plant: Plant, acceleration: Array) -> Array:
-    """Wrench (n, 6) at C [N, N m] that moves a specimen's floors: masses times `acceleration` (n, n_floors) [m/s2].
-
-    Axes of {c}: the platen turns by little.
-    """
-    out = np.zeros((len(acceleration), 6))
-    for k, floor in enumerate(plant.machine.floors):
-        along = np.eye(3)["xyz".index(floor.along)]
-        moved = np.concatenate([along, np.cross(floor.point, along)])
-        out += floor.mass * acceleration[:, k, None] * np.where(np.isin(range(6), plant.axes), moved, 0.0)
-    return out
 
 
 class OilBalance(NamedTuple):

@@ -16,7 +16,7 @@ from .plant import Plant
 from .pose import PlantMotion
 from .spatial import act_force, cross, to_body
 
-__all__ = ["refuse_joints", "require_alike", "required_wrench", "rigid_wrenches", "wrenches_at_c"]
+__all__ = ["floor_wrench", "refuse_joints", "require_alike", "required_wrench", "rigid_wrenches", "wrenches_at_c"]
 
 
 def refuse_joints(plant: Plant) -> None:
@@ -77,6 +77,20 @@ def required_wrench(plant: Plant, motion: PlantMotion, turn: Array) -> Array:
     required = np.zeros_like(inertia)
     required[:, plant.axes] = (inertia - weight)[:, plant.axes]
     return required
+
+
+def floor_wrench(plant: Plant, acceleration: Array) -> Array:
+    """Wrench (n, 6) [N, N m] at B in platen axes that moves a specimen's floors, on the free axes.
+
+    Their masses times their absolute `acceleration` (n, n_floors) [m/s2]; the platen turns by little. Its negative is
+    the specimen's base shear and overturning moment.
+    """
+    out = np.zeros((len(acceleration), 6))
+    for k, floor in enumerate(plant.machine.floors):
+        along = np.eye(3)["xyz".index(floor.along)]
+        moved = np.concatenate([along, np.cross(plant.body[0]["rho_c"] + floor.point, along)])
+        out[:, plant.axes] += floor.mass * acceleration[:, k, None] * moved[plant.axes]
+    return out
 
 
 def wrenches_at_c(plant: Plant, turn: Array, wrench: Array) -> Array:

@@ -124,6 +124,8 @@ def solve(
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps, a rejected step shortened to a quarter.
 
+    Steps are half as long after each that does not lower the objective.
+
     The correction for noise in the derivatives is evaluated in the second step, in a `frugal` search in the first.
     Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
     already evaluated. A frugal search evaluates derivatives by nearly linear unknowns only at `start`, all others while
@@ -141,7 +143,7 @@ def solve(
     bias: NoiseBias | None = None
     normal: NormalEquations | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
-    least, converged, replicas = np.inf, False, len(problem.again)
+    least, damped, converged, replicas = np.inf, 1.0, False, len(problem.again)
     parts = split(progress, rounds + replicas)
     for done in range(1, rounds + 1):
         part = parts[0 if done == 1 else done - 1 + replicas]
@@ -164,14 +166,16 @@ def solve(
             step, normal = 0.25 * step, held
             x = at + step
             continue
+        damped *= 0.5 if value > least else 1.0  # else steps may go to and fro where the objective is flat
         least, held, at = value, normal, x
         posterior = normal.posterior(problem.prior)
         step = bounded_step(normal, posterior, x, problem, numbers)
         slope = normal.whole[1] + x / problem.prior**2
         gain = -float(slope @ step + 0.5 * step @ posterior @ step)
-        x = x + step
         sd = np.sqrt(np.diag(np.linalg.inv(posterior)) + floor**2)
         still = np.max(np.abs(step) / sd) < numbers.number("fit.converged")
+        step = damped * step
+        x = x + step
         if done > 1 and (still or (frugal and gain < numbers.number("fit.still"))):
             converged = True
             break

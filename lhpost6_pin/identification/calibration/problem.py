@@ -273,10 +273,11 @@ class Problem:
         return make_plant(with_parameters(self.machine, self.parameters, x[: len(self.parameters)]))
 
     def bins(self, residuals: Residuals, test: MeasuredTest) -> tuple[Complex, Array]:
-        """Bins (m, c) of a test's stacked residuals, zero for those that have no columns here."""
+        """Bins (m, c) of a test's stacked residuals, zero for those that have no columns here, or that guides take."""
         c = self.comparison
-        if test.weight is not None:
-            residuals = residuals._replace(wrench=residuals.wrench * test.weight[:, None])
+        free = np.isin(range(residuals.wrench.shape[1]), self.axes)
+        weight = free if test.weight is None else test.weight[:, None] * free
+        residuals = residuals._replace(wrench=residuals.wrench * weight)
         bins, f = spectrum_of(residuals.stacked(), test.dt, c.bands[0], c.bands[-1], c.edge)
         given = np.repeat([part.shape[1] > 0 for part in residuals], self.widths)
         if given.all():
@@ -287,13 +288,14 @@ class Problem:
 
     def of_wrench(self, test: int, wrench: Array) -> Complex:
         """Whitened bins (m, c, k) of changes of a test's wrench residual (n, 6, k)."""
-        n, axes, count = wrench.shape
+        n, _, count = wrench.shape
         c = self.comparison
         weight = self.tests[test].weight
-        weighed = wrench.reshape(n, -1) if weight is None else wrench.reshape(n, -1) * weight[:, None]
+        free = wrench[:, self.axes].reshape(n, -1)
+        weighed = free if weight is None else free * weight[:, None]
         bins, f = spectrum_of(weighed, self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
         out = np.zeros((len(f), sum(self.widths), count), np.complex128)
-        out[:, :axes] = bins.reshape(len(f), axes, count)  # of all kinds of residuals the wrench is first
+        out[:, self.rows("wrench")] = bins.reshape(len(f), -1, count)
         return self.whitener.apply(test, out, f)
 
     def rows_of_actuator(self, place: int) -> Mask:

@@ -163,7 +163,10 @@ def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tup
         step = ", at the model's steps; forces use the velocity of the step." if at_steps else "."
         notes.append(f"Simulated without noise: the platen's motion is the record's own{step}")
     time = record["time"].values
-    found = inverse_dynamics(plant, time, test.motion, force, struts, path=test.path, model_step=at_steps)
+    floors = test.channels.get("floor_acceleration") if plant.machine.floors else None
+    found = inverse_dynamics(
+        *(plant, time, test.motion, force, struts), floor_acceleration=floors, path=test.path, model_step=at_steps
+    )
     return found, tuple(notes)
 
 

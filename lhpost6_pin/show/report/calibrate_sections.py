@@ -1,5 +1,6 @@
 """Sections of a calibration report: parameters, sensors, residuals, information per test, correlation."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -218,6 +219,8 @@ def _judged(calibration: Calibration, misfit: float) -> str:
 
 def _plain(value: float) -> str:
     """A number in the unit of the machine file, with as many digits as a calibration can give."""
+    if not math.isfinite(value):
+        return "none"
     mantissa, _, power = f"{value:.4e}".partition("e")
     plain = f"{float(f'{value:.5g}'):,.10g}" if -4 <= int(power) < 8 else f"{float(mantissa):g}e{int(power)}"
     return plain.replace("-", "−")

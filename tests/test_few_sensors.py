@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.files import models_folder
@@ -13,12 +14,13 @@ from lhpost6_pin.discovery.candidates import list_candidates, with_background
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
 from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
 from lhpost6_pin.identification.decompose.record import decompose_test
-from lhpost6_pin.identification.friction_march import made_fine
+from lhpost6_pin.identification.friction_march import made_fine, refined, thinned
 from lhpost6_pin.identification.prepare import MeasuredTest, chamber_pressures
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow, oil_balance
 from lhpost6_pin.machine.library import families, scaled_families
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.port_path import PortPath
 from lhpost6_pin.mechanics.pose import PlatenMotion
 
 
@@ -125,6 +127,29 @@ def test_a_fine_march_is_the_march_of_a_record_sampled_as_finely(table):
     inside = slice(280, -4)
     error, without = (np.sqrt(np.mean((z - smooth)[inside] ** 2)) for z in (found, rough))
     assert error < 0.02 and without > 3.0 * error  # cubic interpolation of 3 Hz at 256 Hz: micrometres of 2 mm
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_a_refined_path_is_the_cubic_hermite_spline_through_its_samples(count):
+    """SciPy's spline of coordinate and of slip; both to rounding: coordinates of order one, 40 samples summed."""
+    rng, dt = np.random.default_rng(3), 1 / 256
+    s, rate, slip = rng.normal(size=(3, 40, 2))
+    slip[0] = 0.0
+    fine = refined(PortPath(s, rate, slip, np.zeros((40, 2, 6)), np.zeros((40, 3, 3))), dt, count)
+    t, at = np.arange(40) * dt, np.arange(39 * count + 1) * dt / count
+    spline, gone = CubicHermiteSpline(t, s, rate), CubicHermiteSpline(t, np.cumsum(slip, axis=0), rate)
+    np.testing.assert_allclose(fine.s, spline(at), atol=1e-13)
+    np.testing.assert_allclose(fine.rate, spline(at, 1), atol=1e-10)
+    np.testing.assert_allclose(np.cumsum(fine.slip, axis=0), gone(at), atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_thinned_states_are_means_over_an_interval_about_each_sample(count):
+    z = np.random.default_rng(4).normal(size=(9 * count + 1, 3))
+    width = 2 * (count // 2) + 1
+    padded = np.pad(z, ((count // 2, count // 2), (0, 0)), "edge")
+    wanted = np.lib.stride_tricks.sliding_window_view(padded, width, axis=0).mean(axis=-1)[::count]
+    np.testing.assert_allclose(thinned(z, count), wanted, atol=1e-14)
 
 
 def rocking_motion(dt: float, samples: int) -> PlatenMotion:

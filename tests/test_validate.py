@@ -16,7 +16,8 @@ from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.data.signals import Band, align, resample_band_limited
-from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, metrics, validate
+from lhpost6_pin.discovery.held_out import normalised_error
+from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, Phase, metrics, validate
 from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
 from lhpost6_pin.identification.validation.prepare_tests import validation_numbers
 from lhpost6_pin.identification.validation.spectra import find_peak, find_valves
@@ -253,6 +254,20 @@ def test_a_column_moves_if_it_stands_out_of_the_noise_and_of_the_others(scale, m
     assert rows[1].error_to_noise == pytest.approx(0.1 * scale * np.sqrt(0.5) / 1e-4, rel=1e-2)
     loud = agree([replace(pair, sensor_noise=np.full(2, 0.1))], 1 / 512, numbers)  # rms 0.71
     assert not loud[0].moves
+
+
+def test_a_held_out_error_is_over_one_noise_whichever_model_is_wrong():
+    """Two models with one error, the noise predicted with one five times as large: no model gains by its own noise."""
+    t = np.arange(4096) / 512
+    x = np.sin(2 * np.pi * t)[:, None]
+    phases = []
+    for noise in (1e-2, 5e-2):
+        pair = ComparedQuantity("wrench", ("x",), x, 1.1 * x, np.full(1, 1e-4), np.full(1, noise))
+        phases.append(Phase(1, "SINE", t, (pair,), agree([pair], 1 / 512, validation_numbers())))
+    quiet, noisy = phases
+    assert normalised_error(noisy, quiet) == normalised_error(quiet, quiet) == pytest.approx(7.07, rel=1e-2)
+    assert normalised_error(quiet, noisy) == pytest.approx(normalised_error(quiet, quiet) / 5.0)
+    assert np.isnan(normalised_error(None, quiet)) and np.isnan(normalised_error(quiet, replace(quiet, reason="none")))
 
 
 def test_a_preload_makes_no_error_look_small_and_an_offset_none_large():

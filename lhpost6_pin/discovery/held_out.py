@@ -2,7 +2,8 @@
 
 Three models: as delivered; refitted, with parameters and sensor errors but no effect; after, with the effects. The gap
 of a phase of a test is the RMS, over all columns that move, of the model's error in standard deviations of the sensor
-noise, so that noise alone gives one (the floor); closure = (refitted - after) / (refitted - floor).
+noise, so that noise alone gives one (the floor); closure = (refitted - after) / (refitted - floor). The noise that
+reaches a balance depends on the model's numbers; all three errors are over that of the model with the effects.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from ..identification.validation import PHASES, Phase, validate
 from ..machine.machine import Machine
 from .search_state import Search, fitted_machine
 
-__all__ = ["FLOOR", "Gap", "Proof", "prove"]
+__all__ = ["FLOOR", "Gap", "Proof", "normalised_error", "prove"]
 
 FLOOR = 1.0
 """Gap due to noise alone."""
@@ -78,16 +79,18 @@ def prove(
     gaps = []
     for test in done[0].tests:
         for number in phases:
-            sizes = [_size(v.phase(test, number)) for v in done]
+            three = [v.phase(test, number) for v in done]
+            sizes = [normalised_error(phase, three[-1]) for phase in three]
             if np.all(np.isfinite(sizes)):
                 gaps.append(Gap(PHASES[number], test, *sizes))
     return Proof(tuple(gaps))
 
 
-def _size(phase: Phase | None) -> float:
-    """RMS of the errors of a phase in deviations of noise; nan where it could not be compared."""
-    if phase is None or phase.reason:
+def normalised_error(phase: Phase | None, noisy: Phase | None) -> float:
+    """RMS of the errors of a phase over the noise of the same phase by one model; nan where not compared."""
+    if phase is None or noisy is None or phase.reason or noisy.reason:
         return float("nan")
-    found = [a.error_to_noise for a in phase.agreement if a.quantity in _COMPARED[phase.number] and a.moves]
-    found = [x for x in found if np.isfinite(x)]
+    noise = {(a.quantity, a.column): a.noise for a in noisy.agreement if a.moves and a.noise > 0.0}
+    compared = [a for a in phase.agreement if a.quantity in _COMPARED[phase.number] and (a.quantity, a.column) in noise]
+    found = [a.error_aligned / noise[a.quantity, a.column] for a in compared if np.isfinite(a.error_aligned)]
     return float(np.sqrt(np.mean(np.square(found)))) if found else float("nan")

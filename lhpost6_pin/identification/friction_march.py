@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.compiled import compiled
 from ..effects.registry import law_of, states_of
 from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
@@ -20,7 +21,7 @@ from ..mechanics.port_path import PortPath
 from .inverse_dynamics import march_states
 from .prepare import MeasuredTest
 
-__all__ = ["least_yield", "made_fine", "march_finely"]
+__all__ = ["least_yield", "made_fine", "march_finely", "refined", "thinned"]
 
 SHAKEN = 0.1
 """Noise of a displacement over a friction's yield slip from which it shakes presliding: 0.05 on the LHPOST6."""
@@ -42,10 +43,10 @@ def march_finely(
     steps = [test.substeps if law_of(row).friction_memory else 1 for row in rows]
     for count in sorted(set(steps)):
         some = [row for row, own in zip(rows, steps, strict=True) if own == count]
-        way = path if count == 1 else _refined(path, test.dt, count)
+        way = path if count == 1 else refined(path, test.dt, count)
         marched = march_states(plant, way, test.dt / count, start, rows=np.array(some, plant.rows.dtype))
         if count > 1:
-            marched = _thinned(marched, count)
+            marched = thinned(marched, count)
         for row in some:
             yield row, marched[:, states_of(row)]
 
@@ -93,23 +94,51 @@ def _sliding(plant: Plant, test: MeasuredTest, least: float) -> Array | None:
     return np.asarray(1.0 - np.minimum(np.convolve(unknown, kernel, "same"), 1.0))
 
 
-def _refined(path: PortPath, dt: float, count: int) -> PortPath:
-    """The path at `count` times as many steps; columns and rotations, which no state needs, are left out."""
-    from scipy.interpolate import CubicHermiteSpline
+def refined(path: PortPath, dt: float, count: int) -> PortPath:
+    """The path (n samples, dt [s] apart) at `count` times as many steps, by cubic Hermite interpolation.
 
-    n = len(path.s)
-    t, fine = np.arange(n) * dt, np.arange((n - 1) * count + 1) * (dt / count)
-    gone = CubicHermiteSpline(t, np.cumsum(path.slip, axis=0), path.rate)
-    at = CubicHermiteSpline(t, path.s, path.rate)
-    slip = np.diff(gone(fine), axis=0, prepend=0.0)
-    slip[0] = 0.0
-    return PortPath(at(fine), at(fine, 1), slip, path.column[:0], path.turn[:0])
+    Columns and rotations, which no state needs, are left out.
+    """
+    m = (len(path.s) - 1) * count + 1
+    at, rate, slip = (np.zeros((m, path.s.shape[1])) for _ in range(3))
+    fine = PortPath(at, rate, slip, path.column[:0], path.turn[:0])
+    _refine(path, fine, dt, count)
+    return fine
 
 
-def _thinned(z: Array, count: int) -> Array:
+@compiled
+def _refine(path, fine, dt, count):
+    basis, rates = np.zeros((count + 1, 3)), np.zeros((count + 1, 3))
+    for j in range(count + 1):
+        u = j / count
+        basis[j] = u * u * (3.0 - 2.0 * u), u * (1.0 - u) ** 2 * dt, u * u * (u - 1.0) * dt
+        rates[j] = 6.0 * u * (1.0 - u) / dt, (1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
+    fine.s[0], fine.rate[0] = path.s[0], path.rate[0]
+    for i in range(path.s.shape[0] - 1):
+        for j in range(1, count + 1):
+            k = i * count + j
+            for p in range(path.s.shape[1]):
+                first, last = path.rate[i, p], path.rate[i + 1, p]
+                gone = path.s[i + 1, p] - path.s[i, p]
+                fine.s[k, p] = path.s[i, p] + basis[j, 0] * gone + basis[j, 1] * first + basis[j, 2] * last
+                fine.rate[k, p] = rates[j, 0] * gone + rates[j, 1] * first + rates[j, 2] * last
+                b = basis[j] - basis[j - 1]
+                fine.slip[k, p] = b[0] * path.slip[i + 1, p] + b[1] * first + b[2] * last
+
+
+def thinned(z: Array, count: int) -> Array:
     """States (n, k) of samples by those of every substep: the mean over one interval about each."""
+    out = np.zeros(((len(z) - 1) // count + 1, z.shape[1]))
+    _average(np.ascontiguousarray(z), count, out)
+    return out
+
+
+@compiled
+def _average(z, count, out):
     half = count // 2
-    padded = np.concatenate([np.repeat(z[:1], half, axis=0), z, np.repeat(z[-1:], half, axis=0)])
-    total = np.cumsum(np.concatenate([np.zeros((1, z.shape[1])), padded]), axis=0)
-    width = 2 * half + 1
-    return ((total[width:] - total[:-width]) / width)[::count]
+    for i in range(out.shape[0]):
+        for k in range(z.shape[1]):
+            total = 0.0
+            for j in range(i * count - half, i * count + half + 1):
+                total += z[min(max(j, 0), z.shape[0] - 1), k]
+            out[i, k] = total / (2 * half + 1)

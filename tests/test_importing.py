@@ -765,6 +765,8 @@ def test_kinds_of_channels_that_a_layout_has_are_matched_by_their_words():
         assert {name: channels.channels[name].column for name in wanted} == wanted
         line = '"valve_command[A1]" = { column = "Voltage command (V)", unit = "1" }  # add gain = 1 / full command'
         assert any(remark.startswith(line) for remark in remarks)
+        assert "floor_acceleration is not used without masses: add [floor.1F], [floor.RF]" in remarks[-1]
+        assert not any("masses" in r for r in guess_map(raws, {**ONE, "floor": ("1F", "RF")}, ("x",)).remarks)
         floors = make_imported_record(raws, channels, ONE, load_machine("uniaxial"))["floor_acceleration"]
         assert floors["floor"].values.tolist() == ["1F", "RF"]
         np.testing.assert_allclose(floors.sel(floor="RF"), 1e-3 * raws[0].values[:, 6], rtol=1e-12)

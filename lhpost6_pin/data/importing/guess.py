@@ -67,6 +67,7 @@ def guess_map(
     become remarks with the channels that they could be. A valve's command in volts needs its full one, by actuator [V].
     """
     words = [words_of(without_unit(name)) for raw in raws for name in raw.names]
+    stated = set(labels.get("floor", ()))
     labels = with_labels(labels, [f"{_FLOORS}[{floor}]" for w in words if (floor := floor_in(w))])
     machine = _Machine(labels, tuple(moves), channels_of(labels), full_commands)
     found: dict[str, Source] = {}
@@ -101,6 +102,7 @@ def guess_map(
     remarks += [f"{source_line(_PLACEHOLDER, source)}  # {why}{_possible(source, free)}" for source, why in unknown]
     if unknown:
         remarks.append(f"{_PLACEHOLDER} is one of: {_short(free)}")
+    remarks += _without_masses(found, stated)
     facts = {key: value for raw in reversed(raws) for key, value in raw.facts.items()}
     ordered = {name: found[name] for name in machine.known if name in found}
     return Guess(ChannelMap("guessed map", _test(facts), ordered), tuple(remarks))
@@ -112,6 +114,14 @@ def other_columns(first: Sequence[RawTest], other: Sequence[RawTest]) -> str:
     more, less = [n for n in theirs if n not in ours], [n for n in ours if n not in theirs]
     parts = [f"{word} {shown(names)}" for word, names in (("has also", more), ("lacks", less)) if names]
     return f"{other[0].source}: {'; '.join(parts)}" if parts else ""
+
+
+def _without_masses(found: Mapping[str, Source], stated: set[str]) -> list[str]:
+    """A remark on floors whose accelerations are measured, and which the machine's file does not state."""
+    floors = [name.rpartition("[")[2].rstrip("]") for name in found if name.startswith(_FLOORS)]
+    new = [f"[floor.{name}]" for name in floors if name not in stated]
+    what = f"add {', '.join(new)} with their masses to the machine's file"
+    return [f"{_FLOORS} is not used without masses: {what}"] if new else []
 
 
 def _is_still(label: str | None, machine: _Machine) -> bool:

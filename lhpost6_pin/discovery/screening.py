@@ -80,7 +80,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
         for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
             scored += some
             progress((done + 1) / len(batches))
-    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))), found.power)
+    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))))
 
 
 def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:

@@ -77,7 +77,6 @@ class Round:
     """One screening of the library; candidates by falling gain."""
 
     scored: tuple[Scored, ...]
-    misfit: float  # mean square of the whitened residuals before it
 
     @property
     def best(self) -> dict[str, Scored]:

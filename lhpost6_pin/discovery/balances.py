@@ -118,9 +118,10 @@ def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, 
     """Effects that do not close the gap on held-out tests, by name, with their gain of log-likelihood there.
 
     `after` is the residual of the search's solution there. Each effect is compared with everything else refitted
-    without it, in the residuals that its family shows in: it must gain there, and lower the squares in some column by
-    a share of those before any effect. One that the held-out tests do not excite is none of them: its expected gain is
-    within chance.
+    without it, in the residuals that its family shows in: it must gain there, by a share of what is expected of it and by
+    more than the standard deviation of that by noise, sqrt(2 expected); and lower the squares in some column by a share
+    of those before any effect. One that the held-out tests do not excite is none of them: its expected gain is within
+    chance.
     """
     n, unproven = found.numbers.number, {}
     original = residual_at(held, found.refit)
@@ -133,7 +134,7 @@ def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, 
         gain, expected = gain_on(held, before, after, rows)
         first, old, new = (squares_by_column(one.whitened)[rows] for one in (original, before, after))
         lower = lowers_squares(first, old, new, n("accept.of_first"))
-        least = max(n("accept.chance"), n("accept.held_out") * expected)
+        least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
         if expected > n("accept.chance") and (not lower or gain < least):
             unproven[one.candidate.name] = gain
     return unproven

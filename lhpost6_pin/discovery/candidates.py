@@ -98,14 +98,14 @@ def with_background(
     """The machine with the library's effects of the background, at zero, one of each for a kind; and their parameters.
 
     spread is the standard deviation of an amplitude in typical ones; channels are those measured. What the machine has
-    already is not added again.
+    already is not added again. That an amplitude is zero, its lowest value, is an estimate: there is no such effect.
     """
     parameters: list[FreeParameter] = []
     lacking = {family.name for family in families().values() if family.background_without not in {"", *channels}}
     for one in _of_background(machine, lacking):
         absent = tuple(0.0 for _ in one.amplitudes)
         machine = one.on(machine, absent)
-        parameters += one.parameters(absent, spread)
+        parameters += (replace(p, natural=True) for p in one.parameters(absent, spread))
     return machine, tuple(parameters)
 
 

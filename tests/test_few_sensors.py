@@ -233,3 +233,16 @@ def test_only_an_effect_that_is_there_gains_on_held_out_tests_what_its_change_pr
     assert expected > 100.0
     assert (gain > 0.3 * expected) == closes
     assert closes or gain < 0.0
+
+
+def test_the_gain_of_a_true_effect_scatters_by_the_root_of_twice_what_is_expected():
+    """By noise alone, over 300 draws: their mean within 4 sd / sqrt(300) = 2, their deviation within 4 / sqrt(600)."""
+    rng = np.random.default_rng(5)
+    gains = []
+    for _ in range(300):
+        noise, own = (rng.standard_normal((400, 1, 2)) @ np.array([1.0, 1.0j]) / np.sqrt(2.0) for _ in range(2))
+        change = 0.3 * own / np.sqrt(np.mean(np.abs(own) ** 2))
+        gains.append(gain_on(Held, Left(noise + change), Left(noise), np.array([True]))[0])
+    expected = 0.09 * 400
+    assert np.mean(gains) == pytest.approx(expected, abs=2.0)
+    assert np.std(gains) == pytest.approx(np.sqrt(2.0 * expected), rel=0.16)

@@ -118,10 +118,9 @@ def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, 
     """Effects that do not close the gap on held-out tests, by name, with their gain of log-likelihood there.
 
     `after` is the residual of the search's solution there. Each effect is compared with everything else refitted
-    without it, in the residuals that its family shows in: it must gain there, by a share of what is expected of it and by
-    more than the standard deviation of that by noise, sqrt(2 expected); and lower the squares in some column by a share
-    of those before any effect. One that the held-out tests do not excite is none of them: its expected gain is within
-    chance.
+    without it, in the residuals that its family shows in. It must gain there a share of what is expected of it, and more
+    than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a share of those before any
+    effect. One that the held-out tests do not excite is none of them: its expected gain is within chance.
     """
     n, unproven = found.numbers.number, {}
     original = residual_at(held, found.refit)

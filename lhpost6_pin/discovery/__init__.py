@@ -1,7 +1,8 @@
 """Discovery: identification of effects that a model lacks, validated on held-out tests."""
 
 from .discover import Discovery, discover
-from .verdict import EffectFinding, Estimate, Verdict
+from .estimates import Estimate
+from .verdict import EffectFinding, Verdict
 from .verdict_file import save_verdict, verdict_entries
 
 __all__ = ["Discovery", "Estimate", "EffectFinding", "Verdict", "discover", "save_verdict", "verdict_entries"]

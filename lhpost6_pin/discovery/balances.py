@@ -16,13 +16,8 @@ from ..identification.calibration.fit import Solution
 from ..identification.calibration.measured_wrench import measured_bins
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
-from ..identification.residuals import kinds_shown
-from .acceptance import squares_by_column
-from .search import without_effect
-from .search_state import Search
 
-__all__ = ["Balance", "HeldOut", "evaluate_balances", "gain_on", "lowers_squares", "residual_at"]
-__all__ += ["unproven_effects"]
+__all__ = ["Balance", "HeldOut", "evaluate_balances", "gain_on", "residual_at"]
 
 
 @dataclass(frozen=True)
@@ -107,33 +102,3 @@ def gain_on(held: Problem, before: HeldOut, after: HeldOut, rows: Mask) -> tuple
         gain += float(np.sum(negative_log_likelihood(means, counts) - negative_log_likelihood(then, counts)))
         expected += float(np.sum(counts @ (change / np.maximum(means, 1.0))))
     return gain, expected
-
-
-def lowers_squares(first: Array, before: Array, after: Array, share: float) -> bool:
-    """Whether squares by column (c,) fall in one of them by at least a share of the `first` ones."""
-    return bool(np.any(before - after >= share * first))
-
-
-def unproven_effects(found: Search, held: Problem, after: HeldOut) -> dict[str, float]:
-    """Effects that do not close the gap on held-out tests, by name, with their gain of log-likelihood there.
-
-    `after` is the residual of the search's solution there. Each effect is compared with everything else refitted
-    without it, in the residuals that its family shows in. It must gain there a share of what is expected of it, and more
-    than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a share of those before any
-    effect. One that the held-out tests do not excite is none of them: its expected gain is within chance.
-    """
-    n, unproven = found.numbers.number, {}
-    original = residual_at(held, found.refit)
-    for one in found.added:
-        if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
-            continue  # a sensor's error
-        before = residual_at(held, without_effect(found, one.candidate).solution)
-        kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
-        rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
-        gain, expected = gain_on(held, before, after, rows)
-        first, old, new = (squares_by_column(one.whitened)[rows] for one in (original, before, after))
-        lower = lowers_squares(first, old, new, n("accept.of_first"))
-        least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
-        if expected > n("accept.chance") and (not lower or gain < least):
-            unproven[one.candidate.name] = gain
-    return unproven

@@ -25,7 +25,7 @@ from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.plant import make_plant
-from .balances import Balance, evaluate_balances, residual_at, unproven_effects
+from .balances import Balance, evaluate_balances, residual_at
 from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
 from .friction_form import with_friction_form
@@ -33,11 +33,12 @@ from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
-from .search import refit, search, without_effect
+from .search import refit, search
 from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
 from .unexplained import forces_explained
 from .verdict import Verdict, judge
+from .withdrawal import withdraw_effects
 
 __all__ = ["Discovery", "discover", "discovery_numbers"]
 
@@ -121,6 +122,9 @@ def discover(
     found, linear = search(
         begun.search, lambda one: checkpoint.write(begun._replace(search=one)), between(report, 0.4, 0.75)
     )
+    found, withdrawn = withdraw_effects(found, begun.held_problem)
+    if withdrawn:
+        linear = linearise(found.solution, calibration)
     misfit = 0.0 if forces_explained(found) else found.misfit("wrench")
     beside = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
     replacing: tuple[ResidualFunction, ...] = ()
@@ -131,19 +135,15 @@ def discover(
     out, part = [records[i] for i in held], between(report, 0.8, 0.95)
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
     balances: tuple[Balance, ...] = ()
-    unproven: dict[str, float] = {}
     if (held_problem := begun.held_problem) is not None:
         three = [residual_at(held_problem, one) for one in (None, found.refit, found.solution)]
-        balances, unproven = evaluate_balances(held_problem, three), unproven_effects(found, held_problem, three[-1])
-    verdict = judge(found, beside, replacing, faults, unproven)
+        balances = evaluate_balances(held_problem, three)
+    verdict = judge(found, beside, replacing, faults, withdrawn)
     ambiguous = propose and verdict.word == "ambiguous"
     tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()
     checkpoint.remove()
     report(1.0)
     function = verdict.residual_function
-    for one in found.added:
-        if one.candidate.name in verdict.dropped:
-            found = without_effect(found, one.candidate)
     final = found.refit if any(function is one for one in replacing) else found.solution
     fitted = fitted_machine(final)
     return Discovery(

@@ -175,7 +175,7 @@ def _leading(found: Search) -> Scored | None:
 def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | None:
     """The search with a leading candidate, if its joint fit explains enough of the residual beyond noise.
 
-    Or gains far more than its threshold: held-out tests then decide (`balances.unproven_effects`). Not so of a family
+    Or gains far more than its threshold: held-out tests then decide (`withdrawal`). Not so of a family
     confusable with another form of friction, of which a large residual has always some to gain.
     """
     n = found.numbers.number

@@ -11,35 +11,22 @@ from typing import Literal
 import numpy as np
 from scipy.stats import chi2, norm
 
-from ..core.arrays import Array
-from ..identification.calibration import FreeParameter
-from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.scale import Scale, ratios
-from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.parameters import Parameters
 from .acceptance import form_share
+from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of
 from .localise import Spot, worst_spots
 from .residual_function import ResidualFunction
 from .search_state import AddedEffect, Search
 from .sensor_findings import SensorFault
 from .unexplained import leaves_much, more_than_noise
+from .withdrawal import Withdrawn
 
-__all__ = ["Estimate", "EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
+__all__ = ["EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
 Functions = Sequence[ResidualFunction]
 MASS = "added_mass"  # family of masses beyond their priors
-AT_BOUND = 1e-3  # of an unknown's prior deviation: nearer to a bound it counts as at it
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number with its interval."""
-
-    value: float
-    unit: str
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -77,11 +64,10 @@ class Verdict:
     untestable: tuple[str, ...]  # families that this campaign could not show, at typical size
     nearest: tuple[str, ...] = ()  # families nearest to the effect that was not identified
     where: tuple[Spot, ...] = ()  # where most of the unexplained residual is, by falling share
-    unproven: tuple[tuple[str, float], ...] = ()  # families rejected on held-out tests, with the gain there
+    withdrawn: tuple[Withdrawn, ...] = ()  # effects that were added and are no findings
     bounded: tuple[str, ...] = ()  # unknowns at a bound, which are no estimates
     scale: Scale | None = None  # that nothing measured fixes
     ratios: Mapping[str, Estimate] = field(default_factory=dict)  # to that scale, of what was estimated
-    dropped: frozenset[str] = frozenset()  # effects by name that are at a bound, or unproven: no part of the model
 
 
 def judge(
@@ -89,46 +75,40 @@ def judge(
     beside: Functions,
     replacing: Functions,
     faults: Sequence[SensorFault],
-    unproven: Mapping[str, float],
+    withdrawn: tuple[Withdrawn, ...],
 ) -> Verdict:
     """The verdict on a search.
 
     beside are residual functions fitted in addition to the effects, replacing those fitted in their place, both by
-    falling gain; faults are of sensors whose records were corrected before; `unproven` are the effects by name that do
-    not close the gap on held-out tests, with their gain there.
+    falling gain; faults are of sensors whose records were corrected before; `withdrawn` effects are in the search no
+    more.
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
     own = tuple(f"{one.candidate.name}." for one in found.added)
-    sd = _deviations(found, own)
-    reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
-    estimates = _estimates(found, reach * sd)
+    sd, estimates = deviations(found), estimates_of(found)
     released = tuple(
         SensorFinding(u.name, one.candidate.family.named, estimates[u.name], float(np.sqrt(3.0) * u.sd))
         for u in problem.unknowns
         for one in found.added
         if one.candidate.release == u.name
     )
+    reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     rescaled = _rescaled(found)
     kept = [one for one in found.added if one.candidate.name not in {s.name for s in released} | rescaled]
-    failed = tuple(
-        (one.candidate.family.named, unproven[one.candidate.name]) for one in kept if one.candidate.name in unproven
-    )
-    kept = [one for one in kept if one.candidate.name not in unproven]
     sure = np.abs(x) > calibration.number("report.deviations") * sd
     material = np.abs(x) > calibration.number("report.material") * problem.stated
     differs = {p.name for i, p in enumerate(problem.parameters) if sure[i] and material[i]}
     differs -= {name for name in differs if name.startswith(own) or name in problem.free}
-    differs |= {_amplitude(one) for one in found.added if one.candidate.name in rescaled}
+    differs |= {amplitude_of(one) for one in found.added if one.candidate.name in rescaled}
     changed = {name: estimate for name, estimate in estimates.items() if name in differs}
     function, rejected = reject_effects(kept, beside, replacing, numbers)
     rejected |= {one.candidate.name for one in kept if not one.from_lengths and leaves_much(one, kept, found)}
-    bounded = _at_bounds(found)
-    at_bound = {one.candidate.name for one in kept if _amplitude(one) in bounded} - rejected
+    bounded = at_bounds(found)
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
-    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | at_bound])
+    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected])
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
     word: Word = "not_testable" if blind else "parameters_only" if changed else "none"
@@ -139,14 +119,12 @@ def judge(
     elif sensors:
         word = "sensor"
     spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
-    dropped = frozenset({*unproven, *at_bound})
-    told = changed | {n: e for n, e in estimates.items() if n.startswith(own) and not n.startswith(tuple(dropped))}
+    told = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(own)}
     scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in told.items() if n not in bounded))
     return Verdict(
-        *(word, effects, changed, sensors, function, hidden, nearest, spots, failed, bounded),
+        *(word, effects, changed, sensors, function, hidden, nearest, spots, withdrawn, bounded),
         scale=problem.scale,
         ratios={name: Estimate(*ratio) for name, ratio in scaled.items()},
-        dropped=dropped,
     )
 
 
@@ -158,48 +136,6 @@ def _rescaled(found: Search) -> set[str]:
     scale = found.problem.scale
     names = {one.candidate.name for one in found.added if one.candidate.family.named == MASS}
     return names if scale is not None and scale.unit else set()
-
-
-def _amplitude(one: AddedEffect) -> str:
-    """Name of the unknown in proportion to which an effect vanishes."""
-    return one.candidate.release or f"{one.candidate.name}.{one.candidate.amplitudes[0].name}"
-
-
-def _at_bounds(found: Search) -> tuple[str, ...]:
-    """Unknowns at a bound: not estimates."""
-    x, problem = found.solution.x, found.problem
-    low, high = bounds_of(problem, found.calibration)
-    natural = np.zeros(len(x), bool)
-    natural[: len(problem.parameters)] = [p.natural for p in problem.parameters]
-    near = AT_BOUND * problem.prior
-    ends = (x <= low + near) & ~(natural & (low == problem.lowest)) | (x >= high - near)
-    return tuple(name for name, end in zip(problem.names, ends, strict=True) if end)
-
-
-def _deviations(found: Search, own: tuple[str, ...]) -> Array:
-    """Standard deviations (p,) of the unknowns with their floors; the priors of effects' `own` parameters are flat."""
-    problem = found.problem
-    floor = found.calibration.number("fit.floor") * problem.stated
-    by_lengths = tuple(f"{a.candidate.name}." for a in found.added if a.from_lengths)
-    for i, parameter in enumerate(problem.parameters):
-        if parameter.name.startswith(by_lengths):
-            floor[i] = found.numbers.number("lengths.form") * (parameter.value if parameter.form == "shift" else 1.0)
-        elif parameter.name.startswith(own):
-            floor[i] = 0.0
-    covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
-    return np.asarray(np.sqrt(np.diag(covariance) + floor**2))
-
-
-def _estimates(found: Search, reach: Array) -> dict[str, Estimate]:
-    """All unknowns by name, in their units, with intervals of half width `reach` (p,)."""
-    every: list[FreeParameter | SensorUnknown] = [*found.problem.parameters, *found.problem.unknowns]
-    out = {}
-    for one, x, half in zip(every, found.solution.x.tolist(), reach.tolist(), strict=True):
-        values = [x, x - half, x + half]
-        if isinstance(one, FreeParameter):
-            values = [one.at(value) for value in values]
-        out[one.name] = Estimate(values[0], one.unit, *sorted(values[1:]))
-    return out
 
 
 def _untestable(found: Search) -> tuple[tuple[str, ...], int]:

@@ -14,12 +14,20 @@ from ..data.campaign import skipped_summary
 from ..identification.calibration.scale import scale_summary
 from ..machine.library import find_family
 from .discover import Discovery
+from .estimates import Estimate
 from .held_out import FLOOR
 from .unexplained import forces_explained
-from .verdict import Estimate
+from .withdrawal import Why
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
 
+
+_WITHDRAWN: dict[Why, str] = {
+    "at_bound": "of which a number is at the bound of its range",
+    "zero": "whose size cannot be told from zero",
+    "held_out": "which lowers the residual of the tests searched, but not of those held out",
+}
+"""Why an effect that was added is no finding."""
 
 WORSE = 1.05
 """Normalised RMS error on a held-out test over that before, from which it counts as worse."""
@@ -64,7 +72,8 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "unexplained": None if verdict.word != "unexplained" else _unexplained(found),
         "not_testable": list(verdict.untestable),
         "at_bound": list(verdict.bounded),
-        "rejected_on_held_out": {family: round(gain, 2) for family, gain in verdict.unproven},
+        "withdrawn": [{"family": w.family, "why": w.why, "numbers": list(w.numbers)} for w in verdict.withdrawn],
+        "rejected_on_held_out": {w.family: round(w.gain, 2) for w in verdict.withdrawn if w.why == "held_out"},
         "held_out_balances": [asdict(one) for one in found.balances],
         "next_test": [
             {"test": n.test, "tells": list(n.families), "margin": _rounded(n.margin, 1), "told": n.informative}
@@ -153,9 +162,9 @@ def summary(found: Discovery) -> str:
             "named": f"{effects}.",
             "ambiguous": f"{effects}; the campaign does not discriminate between {rivals}.",
         }[verdict.word]
-    if verdict.unproven:
-        names = " and ".join(title_of(family) for family, _ in verdict.unproven)
-        text += f" Not identified: {names}, which lowers the residual of the tests searched, but not of those held out."
+    for why, reason in _WITHDRAWN.items():
+        if names := [title_of(one.family) for one in verdict.withdrawn if one.why == why]:
+            text += f" Not identified: {' and '.join(names)}, {reason}."
     if (worse := _worse(found)) is not None:
         text += f" {worse}"
     if (scatter := _scatter(found)) is not None:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from ...discovery import Discovery, save_verdict
 from ...discovery.balances import Balance
+from ...discovery.estimates import Estimate
 from ...discovery.held_out import Proof
-from ...discovery.verdict import EffectFinding, Estimate, SensorFinding, Word
+from ...discovery.verdict import EffectFinding, SensorFinding, Word
 from ...discovery.verdict_file import advice, summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml

@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import ANY
 
 import joblib
 import numpy as np
@@ -23,7 +24,7 @@ from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.estimates import amplitude_of, deviations
+from lhpost6_pin.discovery.estimates import amplitude_of
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
@@ -34,7 +35,7 @@ from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Lin
 from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
-from lhpost6_pin.discovery.withdrawal import lowers_squares, withdraw_effects
+from lhpost6_pin.discovery.withdrawal import Withdrawn, lowers_squares, withdraw_effects
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table
@@ -436,20 +437,28 @@ def test_an_effect_must_lower_some_column_of_held_out_tests_by_a_share_of_what_w
     assert not lowers_squares(first, before, np.array([380.0, 98.0]), 0.03)
 
 
-@pytest.mark.parametrize("why", ["at_bound", "zero"])
-def test_an_effect_at_a_bound_or_not_to_be_told_from_zero_is_withdrawn(found, why):
-    """The effect found stays; with its amplitude moved to its upper bound, or near zero, it is no finding."""
+def test_an_effect_at_a_bound_is_withdrawn(found):
+    """The effect found stays; with its amplitude moved to its upper bound, it is no finding."""
     search, problem = found.search, found.search.problem
     assert withdraw_effects(search, None) == (search, ())
     (effect,) = search.added
-    place, x = problem.names.index(amplitude_of(effect)), search.solution.x.copy()
-    zero = -problem.parameters[place].value + 0.1 * deviations(search)[place]
-    x[place] = zero if why == "zero" else bounds_of(problem, search.calibration)[1][place]
-    moved = replace(search, solution=search.solution._replace(x=x))
-    less, (gone,) = withdraw_effects(moved, None)
-    assert (gone.family, gone.why) == ("stribeck_friction", why)
-    assert gone.numbers == ((problem.names[place],) if why == "at_bound" else ())
-    assert not less.added
+    x = search.solution.x.copy()
+    place = problem.names.index(amplitude_of(effect))
+    x[place] = bounds_of(problem, search.calibration)[1][place]
+    less, gone = withdraw_effects(replace(search, solution=search.solution._replace(x=x)), None)
+    assert gone == (Withdrawn("stribeck_friction", "at_bound", (problem.names[place],), ANY),)
+    assert not less.added and problem.names[place] not in less.problem.names
+
+
+def test_an_effect_whose_size_cannot_be_told_from_zero_is_withdrawn(found):
+    """A superfluous one of either sign beside the effect found, which stays."""
+    search = found.search
+    helper = scored("asymmetric_friction", ("V1",), 50.0)
+    both = _fit_jointly(search, helper, lambda share: None)
+    both = replace(both, added=(*both.added, replace(search.added[0], candidate=helper.candidate)))
+    less, gone = withdraw_effects(both, None)
+    assert gone == (Withdrawn("asymmetric_friction", "zero", (), ANY),)
+    assert less.added == search.added
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):

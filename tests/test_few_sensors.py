@@ -1,6 +1,9 @@
 """Tables with few sensors: what replaces chamber pressures, spools and specimens, and what may not explain itself."""
 
+from contextlib import ExitStack
 from dataclasses import replace
+from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -9,8 +12,11 @@ from scipy.interpolate import CubicHermiteSpline
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.channels import LAYOUT, residuals_of
+from lhpost6_pin.discovery import withdrawal
 from lhpost6_pin.discovery.balances import gain_on
 from lhpost6_pin.discovery.candidates import list_candidates, with_background
+from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.estimates import Estimate
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
 from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
 from lhpost6_pin.identification.decompose.record import decompose_test
@@ -246,3 +252,20 @@ def test_the_gain_of_a_true_effect_scatters_by_the_root_of_twice_what_is_expecte
     expected = 0.09 * 400
     assert np.mean(gains) == pytest.approx(expected, abs=2.0)
     assert np.std(gains) == pytest.approx(np.sqrt(2.0 * expected), rel=0.16)
+
+
+@pytest.mark.parametrize(("amplitude", "gone"), [(0.05, True), (0.2, False)])
+def test_a_small_effect_that_friction_of_another_form_may_be_is_withdrawn_on_guides(table, amplitude, gone):
+    """A null of the one-axis battery had backlash of a twentieth of its friction named, beside presliding of Dahl's."""
+    family = scaled_families(table)["backlash"]
+    candidate = SimpleNamespace(family=family, components=("A1",), release="", name="backlash_A1", amplitudes=[])
+    one = SimpleNamespace(candidate=candidate, gain=123.0)
+    value = amplitude * table.actuators[0].seal_friction
+    found = SimpleNamespace(added=[one], solution=None, numbers=discovery_numbers()[0])
+    own = {"at_bounds": (), "amplitude_of": "friction", "fitted_machine": table}
+    own["estimates_of"] = {"friction": Estimate(value, "N", 0.9 * value, 1.1 * value)}
+    with ExitStack() as patched:
+        for name, result in own.items():
+            patched.enter_context(mock.patch.object(withdrawal, name, return_value=result))
+        weakest = withdrawal._by_estimate(found)
+    assert (weakest and weakest[1].why) == ("own_form" if gone else None)

@@ -25,6 +25,7 @@ __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "
 _WITHDRAWN: dict[Why, str] = {
     "at_bound": "of which a number is at the bound of its range",
     "zero": "whose size cannot be told from zero",
+    "own_form": "which is no more than what the form of friction may be off by",
     "held_out": "which lowers the residual of the tests searched, but not of those held out",
 }
 """Why an effect that was added is no finding."""

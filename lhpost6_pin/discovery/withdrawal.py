@@ -1,7 +1,7 @@
 """Effects that a search has added and that are no findings, withdrawn one by one with everything else refitted.
 
-An effect is withdrawn that has a number at its bound, that cannot be told from zero, or that does not close the gap on
-tests that were not searched.
+An effect is withdrawn that has a number at its bound, that cannot be told from zero, that is no more than what the form
+of friction may be off by, or that does not close the gap on tests that were not searched.
 """
 
 from typing import Literal, NamedTuple
@@ -15,18 +15,18 @@ from .acceptance import squares_by_column
 from .balances import gain_on, residual_at
 from .estimates import amplitude_of, at_bounds, estimates_of, owns
 from .search import without_effect
-from .search_state import AddedEffect, Search
+from .search_state import AddedEffect, Search, fitted_machine
 
 __all__ = ["Why", "Withdrawn", "lowers_squares", "withdraw_effects"]
 
-Why = Literal["at_bound", "zero", "held_out"]
+Why = Literal["at_bound", "zero", "own_form", "held_out"]
 
 
 class Withdrawn(NamedTuple):
     """An effect that was added and is no finding."""
 
     family: str
-    why: Why  # a number at its bound; zero within its interval; gain on held-out tests
+    why: Why  # a number at its bound; zero within its interval; too small beside friction; gain on held-out tests
     numbers: tuple[str, ...] = ()  # those at their bounds
     gain: float = float("nan")  # of log-likelihood on the held-out tests
 
@@ -42,7 +42,7 @@ def withdraw_effects(found: Search, held: Problem | None) -> tuple[Search, tuple
 
 
 def _by_estimate(found: Search) -> tuple[AddedEffect, Withdrawn] | None:
-    """The effect of least gain with a number at its bound, or with zero in the interval of its amplitude."""
+    """The effect of least gain that its own numbers reject."""
     bounded, estimates = at_bounds(found), estimates_of(found)
     for one in sorted(found.added, key=lambda one: one.gain):
         family, amplitude = one.candidate.family.named, estimates[amplitude_of(one)]
@@ -50,7 +50,18 @@ def _by_estimate(found: Search) -> tuple[AddedEffect, Withdrawn] | None:
             return one, Withdrawn(family, "at_bound", at_bound)
         if not one.candidate.release and amplitude.low <= 0.0 <= amplitude.high:
             return one, Withdrawn(family, "zero")
+        if one.candidate.family.confusable and amplitude.unit == "N" and abs(amplitude.value) < _form_error(found, one):
+            return one, Withdrawn(family, "own_form")
     return None
+
+
+def _form_error(found: Search, one: AddedEffect) -> float:
+    """Force [N] by which the form of friction may be off on the components of an effect, of a platen on guides."""
+    machine = fitted_machine(found.solution)
+    if machine.motion == "free":
+        return 0.0
+    friction = [actuator.seal_friction for actuator in machine.actuators if actuator.name in one.candidate.components]
+    return found.numbers.number("verdict.own_form") * min(friction, default=0.0)
 
 
 def _by_held_out(found: Search, held: Problem | None) -> tuple[AddedEffect, Withdrawn] | None:

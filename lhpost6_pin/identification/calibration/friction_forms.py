@@ -4,7 +4,7 @@ Each form is the machine with other friction: of the library in place of its own
 of the model that friction is confused with (mass, viscous force), are fitted to the measured forces by plain least
 squares, every test with equal weight: on real tables the error of any law of friction is far above sensor noise, and
 weighing by noise would fit what is left between strokes. Errors are over the measured force, over the compared band
-without the mean; each test is predicted by a fit to the others, to first order from the fit to all.
+without an offset of the force; each test is predicted by a fit to the others, to first order from the fit to all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,8 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import Plant, make_plant
 from ..friction_march import least_yield
-from ..residuals import Path, evaluate_residuals, follow
+from ..prepare import MeasuredTest
+from ..residuals import Path, Residuals, evaluate_residuals, follow
 from .effect_parameters import effect_parameters
 from .free_parameters import FreeParameter, with_parameters
 from .measured_wrench import measured_bins
@@ -29,6 +30,7 @@ from .problem import Problem
 __all__ = ["FormError", "FrictionForms", "compare_friction", "effect_of_form", "own_suffices"]
 
 FEWEST = 3  # tests, of which one is held out
+NEGLIGIBLE = 1e-3  # amplitude of a constant force above zero frequency over that at zero: leakage of the spectrum
 OWN = "bouc_wen"
 _CONFUSED = ("seal_friction", "viscous")
 _HYSTERESIS = ("seal_yield", "seal_shape")
@@ -221,14 +223,29 @@ class _Force:
         axes = self.plant.axes[self.plant.axes < 3]
         self.columns = np.flatnonzero(problem.rows("wrench", 0, 1, 2))
         self.paths: list[Path] = [follow(self.plant, test) for test in problem.tests]
-        self.size = []
+        self.offset: list[Complex] = []
+        self.size: list[float] = []
         for t, test in enumerate(problem.tests):
+            self.offset.append(self._offset(test, t))
             measured = measured_bins(problem, self.plant, test, t)[:, axes]
             self.size.append(float(np.sum(np.abs(self._moving(measured, t)) ** 2)) or 1.0)
 
+    def _offset(self, test: MeasuredTest, t: int) -> Complex:
+        """Bins (m, k) above zero frequency of a constant force along each free axis, of unit norm; zero if negligible.
+
+        It has some where samples without a known slip weigh nothing.
+        """
+        none = np.zeros((test.samples, 0))
+        constant = Residuals(np.ones((test.samples, 6)), none, none, none, none, none)
+        every = self.problem.bins(constant, test)[0][:, self.columns]
+        bins = every[self.problem.frequency[t] > 0.0]
+        norm, whole = np.linalg.norm(bins, axis=0), np.linalg.norm(every, axis=0)
+        return np.where(norm > NEGLIGIBLE * whole, bins / np.maximum(norm, 1e-300), 0.0)
+
     def _moving(self, bins: Complex, t: int) -> Complex:
-        """Bins above zero frequency."""
-        return bins[self.problem.frequency[t] > 0.0]
+        """Bins above zero frequency, without what an offset of the force would explain: no form of friction is that."""
+        moving, offset = bins[self.problem.frequency[t] > 0.0], self.offset[t]
+        return np.asarray(moving - offset * np.sum(offset.conj() * moving, axis=0).real)
 
     def residual(self, plant: Plant, t: int) -> Array:
         """Real rows of a test's force residual, their squares adding up to its share of the measured ones."""

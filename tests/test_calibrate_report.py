@@ -15,9 +15,16 @@ from lhpost6_pin.identification.calibration.calibration_summary import (
     contradiction_summary,
     correlation_summary,
     cut_strokes,
+    delay_summary,
 )
 from lhpost6_pin.identification.calibration.override import save_override
-from lhpost6_pin.identification.calibration.result import changed_parameters, contradictions, out_of_range, verdict_on
+from lhpost6_pin.identification.calibration.result import (
+    RemovedDelay,
+    changed_parameters,
+    contradictions,
+    out_of_range,
+    verdict_on,
+)
 from lhpost6_pin.identification.calibration.sensor_errors import SensorUnknown
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
@@ -73,6 +80,17 @@ def found() -> Calibration:
 def page_of(calibration: Calibration, folder: Path) -> str:
     path = write_calibrate_report(calibration, folder / "page.html", command="lhpost6 calibrate march")
     return Reader(path).words.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_a_delay_beyond_its_stated_range_that_was_removed_first_is_not_passed_over(found, tmp_path, capsys):
+    late = RemovedDelay("platen_acceleration", 9e-3, 5e-6, 2e-3)
+    known = RemovedDelay("actuator_force", 1e-3, 5e-6, 2e-3)
+    told = replace(found, delays=(known, late))
+    words = "Delays beyond their stated ranges, removed before the fit: platen_acceleration 9 ms (stated: at most 2 ms)"
+    assert delay_summary(told) == f"{words}." and delay_summary(replace(found, delays=(known,))) == ""
+    print_calibration(told)
+    assert words in " ".join(capsys.readouterr().out.split()) and words in page_of(told, tmp_path)
+    assert calibration_entries(told)["delays_removed"]["platen_acceleration"]["stated"] == 2e-3
 
 
 # ---------------------------------------------------------------------------------------- verdicts

@@ -144,8 +144,10 @@ def source_of(record: xr.Dataset) -> str:
     return str(record.encoding.get("source", "the record"))
 
 
-def align_records(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> list[xr.Dataset]:
-    """Records of a campaign with the channels that a policy uses, its delays removed.
+def align_records(
+    plant: Plant, records: Sequence[xr.Dataset], policy: Policy
+) -> tuple[list[xr.Dataset], dict[str, Delay]]:
+    """Records of a campaign with the channels that a policy uses, and the delays removed, by group of channels.
 
     Accelerations of floors are left out with a warning where the machine states none: without masses they are no force.
     """
@@ -160,7 +162,7 @@ def align_records(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -
         )  # fmt: skip
         records = [r.drop_vars(("floor_acceleration", "floor"), errors="ignore") for r in records]
     delays = find_delays(plant, records, policy)
-    return [align_record(r, delays) for r in records]
+    return [align_record(r, delays) for r in records], delays
 
 
 def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> dict[str, Delay]:

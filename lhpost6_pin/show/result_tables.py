@@ -8,6 +8,7 @@ from ..identification.calibration.calibration_summary import (
     convergence_summary,
     correlation_summary,
     cut_strokes,
+    delay_summary,
     friction_summary,
     range_summary,
 )
@@ -70,6 +71,7 @@ def print_calibration(calibration: Calibration) -> None:
         parameter_table(calibration),
         off,
         f"{len(off.rows)} of {len(calibration.unknowns)} sensor errors are significant, {range_summary(calibration)}",
+        delay_summary(calibration),
         misfit_table(calibration),
         *cut_strokes(calibration),
         correlation_summary(calibration),

@@ -221,6 +221,7 @@ def calibration_entries(found: Calibration) -> Entries:
     return {
         **_picked(found, "campaign", "converged", "rounds"),
         "skipped": dict(found.skipped),
+        "delays_removed": {late.group: late._asdict() for late in found.delays},
         "scale": None
         if found.scale is None
         else {"fixed_by": found.scale.name, "why": scale_summary(found.scale), "ratios": found.ratios()},

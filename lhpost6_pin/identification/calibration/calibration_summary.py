@@ -6,7 +6,7 @@ from .free_parameters import parameter_changes
 from .result import Calibration, contradictions, out_of_range
 
 __all__ = ["chance", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
-__all__ += ["friction_summary", "lacking", "range_summary"]
+__all__ += ["delay_summary", "friction_summary", "lacking", "range_summary"]
 
 
 def cut_strokes(calibration: Calibration) -> list[str]:
@@ -27,6 +27,13 @@ def range_summary(calibration: Calibration) -> str:
     if not wrong:
         return "all within their stated ranges"
     return f"beyond their stated ranges: {', '.join(calibration.names[i] for i in wrong)}"
+
+
+def delay_summary(calibration: Calibration) -> str:
+    """Delays beyond their stated ranges that were removed before the fit; empty if there are none."""
+    late = [d for d in calibration.delays if abs(d.delay) > d.stated + calibration.limit * d.deviation]
+    each = [f"{d.group} {1e3 * d.delay:.3g} ms (stated: at most {1e3 * d.stated:.3g} ms)" for d in late]
+    return f"Delays beyond their stated ranges, removed before the fit: {', '.join(each)}." if late else ""
 
 
 def lacking(calibration: Calibration) -> bool:

@@ -45,7 +45,7 @@ def prepare_problem(
     machine = machine.as_tested(records[0].attrs, "the first test")
     plant = make_plant(machine)
     policy = policy_of(numbers)
-    records = align_records(plant, records, policy)
+    records, delays = align_records(plant, records, policy)
     rng = np.random.default_rng(seed)
 
     def drawn(policy: Policy) -> list[MeasuredTest]:
@@ -56,7 +56,7 @@ def prepare_problem(
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
     return Problem(
         *(machine, tests, noisy, sensors, comparison),
-        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload,
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=delays,
     )  # fmt: skip
 
 

@@ -3,16 +3,18 @@
 Unknowns x (p,) are the machine's parameters, then the sensors' errors; zero at the nominal machine and perfect sensors.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from itertools import cycle
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
 
 from ...core.arrays import Array, Complex, Mask
+from ...data.alignment import Delay
 from ...data.sensors import SensorSet
 from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
@@ -66,15 +68,16 @@ class Problem:
         kinds: tuple[str, ...] = KINDS,
         others: Sequence[Machine] = (),
         preload: float = 0.0,
+        delays: Mapping[str, Delay] = MappingProxyType({}),
     ) -> None:
         """Prepare the problem; all tests have the same channels.
 
-        noisy are draws of the tests in order, any number of times, each with more noise; the whitener is made from
-        them. `again` are further draws of all tests, for the correction of derivatives. Noise also includes the
-        differences of residuals between equally plausible machines (`others`), and friction's state at the start of a
-        test, of which a share `preload` of the force is unknown. Raises RecordError if they are too short together.
+        noisy are draws of the tests in order, any number of times, each with more noise, from which the whitener is
+        made; `again` are further ones, for the correction of derivatives. Noise also includes differences of residuals
+        between equally plausible machines (`others`), and friction's state at the start of a test, of which a share
+        `preload` is unknown. `delays` were removed from the tests. Raises RecordError if they are too short together.
         """
-        plant = make_plant(machine)
+        self.delays, plant = delays, make_plant(machine)
         self.axes = plant.axes  # free twist components of the platen
         tests = tuple(made_fine(plant, test) for test in tests)
 

@@ -16,7 +16,16 @@ from .friction_forms import FrictionForms
 from .scale import Ratio, Scale, ratios
 from .sensor_errors import SensorUnknown
 
-__all__ = ["Calibration", "Contradiction", "Subset", "Verdict", "beyond", "calibration_numbers", "changed_parameters"]
+__all__ = [
+    "Calibration",
+    "Contradiction",
+    "RemovedDelay",
+    "Subset",
+    "Verdict",
+    "beyond",
+    "calibration_numbers",
+    "changed_parameters",
+]
 __all__ += ["contradictions", "far", "out_of_range", "stated_range", "verdict_on"]
 
 Verdict = Literal["at its bound", "changed", "unchanged", "not informed"]
@@ -29,6 +38,15 @@ class Subset(NamedTuple):
     estimate: Array  # (p,)
     sd: Array  # (p,) predicted deviations
     part: bool = True  # of all together; simulation is not
+
+
+class RemovedDelay(NamedTuple):
+    """Delay of a group of channels that was removed before the fit."""
+
+    group: str
+    delay: float  # [s]
+    deviation: float  # [s]
+    stated: float  # largest delay that the sensors' file allows [s]
 
 
 @dataclass(frozen=True)
@@ -52,6 +70,7 @@ class Calibration:
     numbers: Parameters = field(repr=False)
     curves: Curves = field(default_factory=Curves, repr=False)  # as delivered, and calibrated
     skipped: tuple[SkippedTest, ...] = ()  # tests that were not used
+    delays: tuple[RemovedDelay, ...] = ()  # that redundant channels show, removed first
     scale: Scale | None = None  # that nothing measured fixes
     friction: FrictionForms | None = None  # forms compared on held-out tests; None where that does not apply
 

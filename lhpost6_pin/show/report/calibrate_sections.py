@@ -10,6 +10,7 @@ from ...identification.calibration.calibration_summary import (
     contradiction_summary,
     correlation_summary,
     cut_strokes,
+    delay_summary,
     range_summary,
 )
 from ...identification.calibration.result import beyond, contradictions, far, stated_range, verdict_on
@@ -114,7 +115,7 @@ def sensor_blocks(calibration: Calibration) -> list[Block]:
         "measured(t) = (1 + gain) true(t − delay) + offset. Delays are against the motion of the platen. Calibrated "
         "parameters are corrected for these errors, which the override file does not contain. "
         f"{len(off.rows)} of {len(calibration.unknowns)} errors are significant (beyond {calibration.limit:g} "
-        f"predicted deviations), {range_summary(calibration)}."
+        f"predicted deviations), {range_summary(calibration)}. {delay_summary(calibration)}"
     )
     rest = [details(f"The other {len(others.rows)}", others)] if others.rows else []
     return [how, *([off] if off.rows else []), *rest]

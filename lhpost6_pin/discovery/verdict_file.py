@@ -163,8 +163,10 @@ def summary(found: Discovery) -> str:
             "named": f"{effects}.",
             "ambiguous": f"{effects}; the campaign does not discriminate between {rivals}.",
         }[verdict.word]
+    identified = {one.family for one in verdict.effects}
     for why, reason in _WITHDRAWN.items():
-        if names := [title_of(one.family) for one in verdict.withdrawn if one.why == why]:
+        gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
+        if names := [title_of(family) for family in gone if family not in identified]:
             text += f" Not identified: {' and '.join(names)}, {reason}."
     if (worse := _worse(found)) is not None:
         text += f" {worse}"

@@ -60,7 +60,7 @@ class _Channels(NamedTuple):
 def observable(machine: Machine, present: Collection[str]) -> tuple[Observable, ...]:
     """What the channels `present` in every test can tell."""
     have = _Channels(machine, present)
-    rules = (_mass, _friction, _valve, _leakage, _lag, _oil, _specimen, _supply, _struts, _accelerometer)
+    rules = (_mass, _friction, _direction, _valve, _leakage, _lag, _oil, _specimen, _supply, _struts, _accelerometer)
     return tuple(found for rule in rules if (found := rule(have)))
 
 
@@ -84,6 +84,15 @@ def _mass(c: _Channels) -> Observable:
 
 def _friction(c: _Channels) -> Observable:
     return _by_force("friction law", c, "force against velocity, at all speeds of the tests")
+
+
+def _direction(c: _Channels) -> Observable | None:
+    """On guides: legs of a platform push against each other, which tells an offset from friction."""
+    if c.machine.motion == "free" or not (c.motion and (c.force or c.pressures)):
+        return None
+    sensor = "actuator_force" if c.force else "a pressure"
+    why = f"only beyond the offset of {sensor} that the sensors file allows: both shift the force alike"
+    return Observable("friction by direction", "ratio", why)
 
 
 def _valve(c: _Channels) -> Observable:

@@ -281,10 +281,9 @@ def test_scales_are_told_by_a_force_and_ratios_by_pressures():
     single = TABLE.with_params({f"{TABLE.actuators[0].kind}.area_b": 0.7 * TABLE.actuators[0].area_a})
     assert told({*bare, "actuator_force"}, single)["leakage"] == "no"
     assert told({"spool_command", "spool_position"})["valve delay and lag"] == "yes"
-    assert (
-        cell["friction by direction"] == few["friction by direction"] == "ratio"
-    )  # an offset of the force is that, too
-    assert "friction by direction" not in told(bare) and "friction by direction" not in told({*bare, "actuator_force"}, load_machine())
+    name = "friction by direction"  # which an offset of the force is, too
+    assert cell[name] == few[name] == "ratio" and name not in told(bare)
+    assert name not in told({*bare, "actuator_force"}, load_machine())
     assert "gas of the struts" not in told(bare) and "gas of the struts" in {
         one.quantity for one in observable(load_machine(), bare)
     }

@@ -1,9 +1,9 @@
-"""All checks of the project: lint, format, types, tests, a blind battery. Exit code 0 only if all pass.
+"""All checks of the project: lint, format, types, tests, two batteries of sealed cases. Exit code 0 only if all pass.
 
     python scripts/checks.py [--fast | --slow]
 
---fast leaves out the battery and all tests marked `long`: under two minutes, between two edits. --slow runs the long
-studies that the ordinary run leaves out. The battery is of seven brief cases, made anew.
+--fast leaves out the batteries and all tests marked `long`: under two minutes, between two edits. --slow runs the long
+studies that the ordinary run leaves out. The batteries are of a few brief cases, made anew.
 """
 
 import os
@@ -18,6 +18,9 @@ ROOT = Path(__file__).parent.parent
 TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
 BATTERY = ["scripts/blind_battery.py", "--cases", "7", "--brief", "--seed", "901", "--check"]
 """One that lacks nothing, a wrong sensor, two with one effect, one each with two and three, and one without a name."""
+
+ONE_AXIS = ["scripts/one_axis_battery.py", "--cases", "4", "--brief", "--seed", "7", "--check"]
+"""Two that lack nothing, one with each effect."""
 
 COMPILE = """
 import sys
@@ -46,7 +49,8 @@ def main() -> int:
         _run(["-c", COMPILE, *commands], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         checks = {"tests": [*TESTS, *chosen]}
         if not fast and not slow:
-            checks["battery"] = [*BATTERY, "--jobs", str(os.cpu_count() or 1), "--out", folder]
+            for name, battery in (("battery", BATTERY), ("one-axis battery", ONE_AXIS)):
+                checks[name] = [*battery, "--jobs", str(os.cpu_count() or 1), "--out", f"{folder}/{name}"]
         failed += [name for name, command in checks.items() if not _passes(name, command)]
         print(f"== types: -m mypy\n{types.result().stdout}", end="", flush=True)
         failed += ["types"] * (types.result().returncode != 0)

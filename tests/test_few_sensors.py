@@ -269,3 +269,20 @@ def test_a_small_effect_that_friction_of_another_form_may_be_is_withdrawn_on_gui
             patched.enter_context(mock.patch.object(withdrawal, name, return_value=result))
         weakest = withdrawal._by_estimate(found)
     assert (weakest and weakest[1].why) == ("own_form" if gone else None)
+
+
+def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_need_not_excite_it(table):
+    """A null of the one-axis battery had backlash of tiny size named, which its held-out test did not confirm."""
+    candidate = SimpleNamespace(family=families()["backlash"], release="", name="backlash_A1")
+    one, left = SimpleNamespace(candidate=candidate, gain=80.0), SimpleNamespace(whitened=[np.ones((9, 1))])
+    kinds = SimpleNamespace(tests=[SimpleNamespace(channels=LAYOUT)], kinds=("wrench", "flow"), rows=lambda _: [True])
+    given = {"residual_at": left, "without_effect": SimpleNamespace(solution=None), "gain_on": (2.0, 6.0)}
+    for machine, gone in ((table, True), (load_machine(), False)):
+        problem = SimpleNamespace(machine=machine, unknowns=())
+        numbers = discovery_numbers()[0]
+        found = SimpleNamespace(added=[one], problem=problem, numbers=numbers, refit=None, solution=None)
+        with ExitStack() as patched:
+            for name, result in given.items():
+                patched.enter_context(mock.patch.object(withdrawal, name, return_value=result))
+            weakest = withdrawal._by_held_out(found, kinds)
+        assert (weakest and weakest[1].why) == ("held_out" if gone else None)

@@ -69,11 +69,12 @@ def _by_held_out(found: Search, held: Problem | None) -> tuple[AddedEffect, With
 
     Each effect is compared with everything else refitted without it, in the residuals that its family shows in. It must
     gain there a share of what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the
-    squares in some column by a share of those before any effect. One that the held-out tests do not excite is none of
-    them: its expected gain is within chance.
+    squares in some column by a share of those before any effect. One that the held-out tests do not excite, with an
+    expected gain within chance, stays, but not on a table with one actuator, which every test excites.
     """
     if held is None or not found.added:
         return None
+    single = len(found.problem.machine.actuators) == 1
     n, original, after = found.numbers.number, residual_at(held, found.refit), residual_at(held, found.solution)
     for one in sorted(found.added, key=lambda one: one.gain):
         if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
@@ -85,7 +86,7 @@ def _by_held_out(found: Search, held: Problem | None) -> tuple[AddedEffect, With
         first, old, new = (squares_by_column(part.whitened)[rows] for part in (original, before, after))
         lower = lowers_squares(first, old, new, n("accept.of_first"))
         least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
-        if expected > n("accept.chance") and (not lower or gain < least):
+        if (single or expected > n("accept.chance")) and (not lower or gain < least):
             return one, Withdrawn(one.candidate.family.named, "held_out", gain=gain)
     return None
 

@@ -17,17 +17,15 @@ import json
 import sys
 import tomllib
 from contextlib import nullcontext
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
 from battery.generate import draw_cases, seal, unseal, write_case
 from battery.reach import measured_label
-from battery.reporting import answers, report, search, wrong
+from battery.reporting import answers, publish, report, search, wrong
 from battery.scoring import score
 from joblib import Parallel, delayed, parallel_config
 
-from lhpost6_pin import __version__
 from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.data.sensors import load_sensors
@@ -75,13 +73,11 @@ def baseline_rows(folder: Path, names: list[str], pairs: list[tuple[dict, dict]]
     return rows
 
 
-def described(asked: argparse.Namespace) -> str:
-    """What was run: the command, the version, the day."""
+def command_of(asked: argparse.Namespace) -> str:
+    """The command that was run."""
     length = f" --{asked.campaign}" if asked.campaign != "full" else ""
     length += " --baselines" if asked.baselines else ""
-    command = f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{length}"
-    today = datetime.now(UTC).date().isoformat()
-    return f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."
+    return f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{length}"
 
 
 def main() -> None:
@@ -121,8 +117,7 @@ def main() -> None:
         beside.write_text(text, encoding="utf-8")
     print(text)
     if asked.publish:
-        with write_whole(RESULTS) as beside:
-            beside.write_text(f"# What the blind battery last said\n\n{described(asked)}\n\n{text}", encoding="utf-8")
+        publish(text, RESULTS, "Scores of the blind battery", command_of(asked))
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

@@ -1,7 +1,7 @@
 """A battery of one-axis tables with few sensors: sealed cases of another simulator, searched, unsealed and scored.
 
     python scripts/one_axis_battery.py [--cases 100] [--seed 1] [--brief] [--only null] [--jobs 2] [--out FOLDER]
-                                       [--check]
+                                       [--check] [--publish]
 
 Half of the cases lack nothing, the others hide friction that falls with speed or a spool off its null. Each has a table
 of its own size, a random set of sensors, a machine file whose numbers are wrong within their stated deviations, and a
@@ -9,7 +9,8 @@ sensors file whose noise is wrong by a factor of 0.5 to 2 (`scripts/battery/one_
 any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not searched again, so that
 an interrupted battery goes on where it stopped; delete a case's verdict.json to search it anew. --brief takes shorter
 campaigns, --only cases of one sort. --check exits with 1 where a campaign that lacks nothing got a name, too few a
-right one, or a case got no verdict: `scripts/checks.py` runs it.
+right one, or a case got no verdict: `scripts/checks.py` runs it. --publish writes the scores to
+scripts/battery/one_axis_results.md, too.
 """
 
 import argparse
@@ -20,7 +21,7 @@ from pathlib import Path
 
 from battery.one_axis_cases import Case, draw_cases, numbers
 from battery.one_axis_files import write_cases
-from battery.reporting import answers, report, search, wrong
+from battery.reporting import answers, publish, report, search, wrong
 from battery.scoring import Answer, Label, Share, families
 from battery.sealing import seal, unseal
 from joblib import Parallel, delayed
@@ -29,6 +30,9 @@ from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.data.measured_sensors import find_sensors
 from lhpost6_pin.machine.machine import load_machine
+
+RESULTS = Path(__file__).parent / "battery" / "one_axis_results.md"
+"""The latest published scores."""
 
 TOGETHER = 10
 """Cases simulated side by side: more would gain little, and need more memory."""
@@ -89,7 +93,8 @@ def main() -> None:
     parser.add_argument("--only", choices=list(numbers()["mix"]))
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--out", type=Path, default=Path("out") / "one_axis_battery")
-    parser.add_argument("--check", action="store_true")
+    for option in ("check", "publish"):
+        parser.add_argument(f"--{option}", action="store_true")
     asked = parser.parse_args()
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
@@ -108,6 +113,11 @@ def main() -> None:
     with write_whole(folder / "scores.md") as beside:
         beside.write_text(text, encoding="utf-8")
     print(text)
+    if asked.publish:
+        length = " --brief" if asked.campaign == "brief" else ""
+        only = f" --only {asked.only}" if asked.only else ""
+        command = f"python scripts/one_axis_battery.py --cases {asked.cases} --seed {asked.seed}{length}{only}"
+        publish(text, RESULTS, "Scores of the one-axis battery", command)
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

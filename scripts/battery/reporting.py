@@ -5,11 +5,14 @@ import time
 import tomllib
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 from joblib import parallel_config
 
+from lhpost6_pin import __version__
 from lhpost6_pin.core.errors import LhpostError
+from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import discover, save_verdict
@@ -17,7 +20,7 @@ from lhpost6_pin.machine.machine import Machine
 
 from .scoring import Answer, Label, Share, families, named_what_is_there, reach, score, strength_curve
 
-__all__ = ["answers", "report", "search", "wrong"]
+__all__ = ["answers", "publish", "report", "search", "wrong"]
 
 Rows = Callable[[list[str], list[tuple[Label, Answer]]], list[str]]
 """Further rows of the table of scores from the names of cases and their labels with verdicts."""
@@ -96,3 +99,11 @@ def wrong(labels: Mapping[str, Label], answered: Mapping[str, tuple[Label, Answe
     if false.hits:
         return f"names on campaigns that lack nothing: {false.text}"
     return f"too few right names: {first.text}" if first.hits < least * first.of else ""
+
+
+def publish(text: str, path: Path, title: str, command: str) -> None:
+    """Write scores to a page of the documentation's, with the command that gave them, the version and the day."""
+    today = datetime.now(UTC).date().isoformat()
+    how = f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."
+    with write_whole(path) as beside:
+        beside.write_text(f"# {title}\n\n{how}\n\n{text}", encoding="utf-8")

@@ -61,9 +61,9 @@ def _examples() -> str:
     return "\n\n".join(parts)
 
 
-def _battery() -> str:
-    """The published scores, without their title."""
-    text = (ROOT / "scripts" / "battery" / "results.md").read_text(encoding="utf-8")
+def _battery(name: str) -> str:
+    """Published scores of a battery, without their title."""
+    text = (ROOT / "scripts" / "battery" / f"{name}.md").read_text(encoding="utf-8")
     return text.partition("\n")[2].strip()
 
 

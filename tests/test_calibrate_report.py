@@ -105,6 +105,13 @@ def test_a_parameter_is_changed_beyond_three_deviations_and_not_informed_near_it
     assert changed_parameters(found) == [0, 4]
 
 
+def test_a_lowest_value_that_is_an_estimate_like_any_other_is_no_bound(found):
+    straight = replace(found.parameters[1], lowest=-0.1, natural=True)  # such as a valve whose curve is straight
+    told = replace(found, parameters=(found.parameters[0], straight, *found.parameters[2:]))
+    at = [replace(told, estimate=np.where(np.arange(7) == 1, x, found.estimate)) for x in (-0.1, 1e3)]
+    assert [verdict_on(one, 1) == "at its bound" for one in at] == [False, True]
+
+
 def test_a_parameter_is_at_its_bound_where_no_machine_could_be_built_beyond(found):
     leakage = replace(found.parameters[1], lowest=-0.1, highest=0.2)
     for x, verdict in ((-0.1, "at its bound"), (-0.09, "unchanged"), (0.2, "at its bound")):

@@ -149,14 +149,16 @@ def beyond(calibration: Calibration) -> Mask:
 def verdict_on(calibration: Calibration, i: int) -> Verdict:
     """The verdict on unknown i; the first that holds.
 
-    At its bound: at the limit set by its prior or by what can be built. Changed: `beyond`. Unchanged: identifiable and
-    not beyond.
+    At its bound: at the limit set by its prior or by what can be built, but for a lowest value that is an estimate like
+    any other. Changed: `beyond`. Unchanged: identifiable and not beyond.
     """
     count, prior, x = len(calibration.parameters), calibration.prior[i], calibration.estimate[i]
     reach = calibration.numbers.number("fit.reach" if i < count else "fit.sensor_reach") * prior
     low, high = -reach, reach
     if i < count:
-        low, high = max(low, calibration.parameters[i].lowest), min(high, calibration.parameters[i].highest)
+        one = calibration.parameters[i]
+        low = -np.inf if one.natural and one.lowest > low else max(low, one.lowest)
+        high = min(high, one.highest)
     if not low + 1e-6 * prior < x < high - 1e-6 * prior:
         return "at its bound"
     if beyond(calibration)[i]:

@@ -33,7 +33,7 @@ from lhpost6_pin.discovery.screening import _by_rank, score_pairs
 from lhpost6_pin.discovery.search import _fit_jointly, _pruned, without_effect
 from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
 from lhpost6_pin.discovery.unexplained import leaves_much
-from lhpost6_pin.discovery.verdict import reject_effects
+from lhpost6_pin.discovery.verdict import judge, reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.discovery.withdrawal import Withdrawn, lowers_squares, withdraw_effects
 from lhpost6_pin.effects.effect import Effect
@@ -437,28 +437,19 @@ def test_an_effect_must_lower_some_column_of_held_out_tests_by_a_share_of_what_w
     assert not lowers_squares(first, before, np.array([380.0, 98.0]), 0.03)
 
 
-def test_an_effect_at_a_bound_is_withdrawn(found):
-    """The effect found stays; with its amplitude moved to its upper bound, it is no finding."""
+def test_an_effect_at_a_bound_is_no_finding(found):
+    """The effect found is one; with its size moved to its upper bound, it is none, though it is judged in place."""
     search, problem = found.search, found.search.problem
     assert withdraw_effects(search, None) == (search, ())
     (effect,) = search.added
-    x = search.solution.x.copy()
-    place = problem.names.index(amplitude_of(effect))
+    x, size = search.solution.x.copy(), amplitude_of(effect)
+    place = problem.names.index(size)
     x[place] = bounds_of(problem, search.calibration)[1][place]
-    less, gone = withdraw_effects(replace(search, solution=search.solution._replace(x=x)), None)
-    assert gone == (Withdrawn("stribeck_friction", "at_bound", (problem.names[place],), ANY),)
-    assert not less.added and problem.names[place] not in less.problem.names
-
-
-def test_an_effect_whose_size_cannot_be_told_from_zero_is_withdrawn(found):
-    """A superfluous one of either sign beside the effect found, which stays."""
-    search = found.search
-    helper = scored("asymmetric_friction", ("V1",), 50.0)
-    both = _fit_jointly(search, helper, lambda share: None)
-    both = replace(both, added=(*both.added, replace(search.added[0], candidate=helper.candidate)))
-    less, gone = withdraw_effects(both, None)
-    assert gone == (Withdrawn("asymmetric_friction", "zero", (), ANY),)
-    assert less.added == search.added
+    moved = replace(search, solution=search.solution._replace(x=x))
+    less, gone = withdraw_effects(moved, None)
+    assert less is moved and gone == (Withdrawn(effect.candidate.name, "stribeck_friction", "at_bound", (size,), ANY),)
+    verdict = judge(less, (), (), (), gone)
+    assert not verdict.effects and verdict.withdrawn == gone
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):

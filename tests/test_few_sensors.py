@@ -1,5 +1,6 @@
 """Tables with few sensors: what replaces chamber pressures, spools and specimens, and what may not explain itself."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from lhpost6_pin.discovery.balances import gain_on
 from lhpost6_pin.discovery.candidates import list_candidates, with_background
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import Estimate
+from lhpost6_pin.discovery.withdrawal import Withdrawn
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
 from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
 from lhpost6_pin.identification.decompose.record import decompose_test
@@ -254,35 +256,49 @@ def test_the_gain_of_a_true_effect_scatters_by_the_root_of_twice_what_is_expecte
     assert np.std(gains) == pytest.approx(np.sqrt(2.0 * expected), rel=0.16)
 
 
-@pytest.mark.parametrize(("amplitude", "gone"), [(0.05, True), (0.2, False)])
-def test_a_small_effect_that_friction_of_another_form_may_be_is_withdrawn_on_guides(table, amplitude, gone):
-    """A null of the one-axis battery had backlash of a twentieth of its friction named, beside presliding of Dahl's."""
-    family = scaled_families(table)["backlash"]
-    candidate = SimpleNamespace(family=family, components=("A1",), release="", name="backlash_A1", amplitudes=[])
-    one = SimpleNamespace(candidate=candidate, gain=123.0)
-    value = amplitude * table.actuators[0].seal_friction
-    found = SimpleNamespace(added=[one], solution=None, numbers=discovery_numbers()[0])
-    own = {"at_bounds": (), "amplitude_of": "friction", "fitted_machine": table}
-    own["estimates_of"] = {"friction": Estimate(value, "N", 0.9 * value, 1.1 * value)}
+BACKLASH = SimpleNamespace(family=families()["backlash"], components=("A1",), release="", name="backlash_A1")
+ADDED = SimpleNamespace(candidate=BACKLASH, gain=80.0)
+SIZE = "backlash_A1.friction"
+
+
+def why_withdrawn(judged: Callable[..., Withdrawn | None], *args: object, **given: object) -> str | None:
+    """Why an effect is no finding, where what is computed of the search is `given` by name."""
     with ExitStack() as patched:
-        for name, result in own.items():
+        for name, result in given.items():
             patched.enter_context(mock.patch.object(withdrawal, name, return_value=result))
-        weakest = withdrawal._by_estimate(found)
-    assert (weakest and weakest[1].why) == ("own_form" if gone else None)
+        found = judged(*args)
+    return found and found.why
+
+
+@pytest.mark.parametrize(
+    ("share", "half", "bounds", "why"),
+    [
+        (0.2, 0.02, (), None),
+        (0.05, 0.01, (), "own_form"),  # a null of the one-axis battery: a twentieth, beside presliding of Dahl's form
+        (0.2, 0.3, (), "zero"),  # small_table t5 had local viscous friction of 430 N s/m within 430 of zero named
+        (0.2, 0.02, (SIZE,), "at_bound"),
+        (0.2, 0.02, ("backlash_A1.gap",), "at_bound"),
+        (0.2, 0.02, ("drive.seal_shape",), None),
+    ],
+)
+def test_an_effect_on_guides_that_its_own_numbers_reject_is_no_finding(table, share, half, bounds, why):
+    friction = table.actuators[0].seal_friction
+    given = {"at_bounds": bounds, "amplitude_of": SIZE, "fitted_machine": table}
+    value, low, high = (friction * f for f in (share, share - half, share + half))
+    given["estimates_of"] = {SIZE: Estimate(value, "N", low, high)}
+    for machine in (table, load_machine()):
+        found = SimpleNamespace(problem=SimpleNamespace(machine=machine), solution=None, numbers=discovery_numbers()[0])
+        free = None if SIZE not in bounds else "at_bound"  # on legs the size alone
+        wanted = why if machine is table else free
+        assert why_withdrawn(withdrawal._by_estimate, found, ADDED, **given) == wanted
 
 
 def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_need_not_excite_it(table):
     """A null of the one-axis battery had backlash of tiny size named, which its held-out test did not confirm."""
-    candidate = SimpleNamespace(family=families()["backlash"], release="", name="backlash_A1")
-    one, left = SimpleNamespace(candidate=candidate, gain=80.0), SimpleNamespace(whitened=[np.ones((9, 1))])
-    kinds = SimpleNamespace(tests=[SimpleNamespace(channels=LAYOUT)], kinds=("wrench", "flow"), rows=lambda _: [True])
+    held = SimpleNamespace(tests=[SimpleNamespace(channels=LAYOUT)], kinds=("wrench", "flow"), rows=lambda _: [True])
+    left = SimpleNamespace(whitened=[np.ones((9, 1))])
     given = {"residual_at": left, "without_effect": SimpleNamespace(solution=None), "gain_on": (2.0, 6.0)}
-    for machine, gone in ((table, True), (load_machine(), False)):
+    for machine, wanted in ((table, "held_out"), (load_machine(), None)):
         problem = SimpleNamespace(machine=machine, unknowns=())
-        numbers = discovery_numbers()[0]
-        found = SimpleNamespace(added=[one], problem=problem, numbers=numbers, refit=None, solution=None)
-        with ExitStack() as patched:
-            for name, result in given.items():
-                patched.enter_context(mock.patch.object(withdrawal, name, return_value=result))
-            weakest = withdrawal._by_held_out(found, kinds)
-        assert (weakest and weakest[1].why) == ("held_out" if gone else None)
+        found = SimpleNamespace(problem=problem, numbers=discovery_numbers()[0], refit=None, solution=None)
+        assert why_withdrawn(withdrawal._by_held_out, found, ADDED, held, **given) == wanted

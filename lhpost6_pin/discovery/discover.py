@@ -33,7 +33,7 @@ from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
-from .search import refit, search
+from .search import refit, search, without_effect
 from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
 from .unexplained import forces_explained
@@ -123,7 +123,7 @@ def discover(
         begun.search, lambda one: checkpoint.write(begun._replace(search=one)), between(report, 0.4, 0.75)
     )
     found, withdrawn = withdraw_effects(found, begun.held_problem)
-    if withdrawn:
+    if withdrawn and machine.motion != "free":
         linear = linearise(found.solution, calibration)
     misfit = 0.0 if forces_explained(found) else found.misfit("wrench")
     beside = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
@@ -144,6 +144,9 @@ def discover(
     checkpoint.remove()
     report(1.0)
     function = verdict.residual_function
+    for one in found.added:
+        if one.candidate.name in {gone.name for gone in withdrawn}:
+            found = without_effect(found, one.candidate)
     final = found.refit if any(function is one for one in replacing) else found.solution
     fitted = fitted_machine(final)
     return Discovery(

@@ -80,8 +80,8 @@ def judge(
     """The verdict on a search.
 
     beside are residual functions fitted in addition to the effects, replacing those fitted in their place, both by
-    falling gain; faults are of sensors whose records were corrected before; `withdrawn` effects are in the search no
-    more.
+    falling gain; faults are of sensors whose records were corrected before; `withdrawn` effects are no findings, though
+    they may be in the search.
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
     own = tuple(f"{one.candidate.name}." for one in found.added)
@@ -96,6 +96,8 @@ def judge(
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     rescaled = _rescaled(found)
     kept = [one for one in found.added if one.candidate.name not in {s.name for s in released} | rescaled]
+    gone = {one.name for one in withdrawn}
+    kept = [one for one in kept if one.candidate.name not in {w.name for w in withdrawn if w.why == "held_out"}]
     sure = np.abs(x) > calibration.number("report.deviations") * sd
     material = np.abs(x) > calibration.number("report.material") * problem.stated
     differs = {p.name for i, p in enumerate(problem.parameters) if sure[i] and material[i]}
@@ -108,7 +110,7 @@ def judge(
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
-    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected])
+    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone])
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
     word: Word = "not_testable" if blind else "parameters_only" if changed else "none"
@@ -119,7 +121,8 @@ def judge(
     elif sensors:
         word = "sensor"
     spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
-    told = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(own)}
+    kept_own = tuple(f"{one.candidate.name}." for one in found.added if one.candidate.name not in gone)
+    told = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(kept_own)}
     scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in told.items() if n not in bounded))
     return Verdict(
         *(word, effects, changed, sensors, function, hidden, nearest, spots, withdrawn, bounded),

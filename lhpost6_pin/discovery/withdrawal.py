@@ -1,9 +1,12 @@
-"""Effects that a search has added and that are no findings, withdrawn one by one with everything else refitted.
+"""Effects that a search has added and that are no findings.
 
-An effect is withdrawn that has a number at its bound, that cannot be told from zero, that is no more than what the form
-of friction may be off by, or that does not close the gap on tests that were not searched.
+An effect is none whose size is at its bound, or that does not close the gap on tests that were not searched. On guides,
+where few sensors leave much to be confused, it is none either with any of its numbers at a bound, if it cannot be told
+from zero, or if it is no more than what the form of friction may be off by; there effects are removed one by one, with
+everything else refitted. A platform on legs is judged with all effects in place.
 """
 
+from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -25,6 +28,7 @@ Why = Literal["at_bound", "zero", "own_form", "held_out"]
 class Withdrawn(NamedTuple):
     """An effect that was added and is no finding."""
 
+    name: str  # of the effect
     family: str
     why: Why  # a number at its bound; zero within its interval; too small beside friction; gain on held-out tests
     numbers: tuple[str, ...] = ()  # those at their bounds
@@ -32,62 +36,73 @@ class Withdrawn(NamedTuple):
 
 
 def withdraw_effects(found: Search, held: Problem | None) -> tuple[Search, tuple[Withdrawn, ...]]:
-    """The search without its effects that are no findings, and why each is none; `held` are the held-out tests."""
+    """Effects that are no findings, and the search, on guides without them; `held` are the held-out tests."""
+    if found.problem.machine.motion == "free":
+        return found, tuple(_doubtful(found, held))
     gone: list[Withdrawn] = []
-    while (weakest := _by_estimate(found) or _by_held_out(found, held)) is not None:
-        one, why = weakest
-        gone.append(why)
+    while (first := next(_doubtful(found, held), None)) is not None:
+        gone.append(first)
+        (one,) = (one for one in found.added if one.candidate.name == first.name)
         found = without_effect(found, one.candidate)
     return found, tuple(gone)
 
 
-def _by_estimate(found: Search) -> tuple[AddedEffect, Withdrawn] | None:
-    """The effect of least gain that its own numbers reject."""
-    bounded, estimates = at_bounds(found), estimates_of(found)
-    for one in sorted(found.added, key=lambda one: one.gain):
-        family, amplitude = one.candidate.family.named, estimates[amplitude_of(one)]
-        if at_bound := tuple(name for name in bounded if owns(one, name)):
-            return one, Withdrawn(family, "at_bound", at_bound)
-        if not one.candidate.release and amplitude.low <= 0.0 <= amplitude.high:
-            return one, Withdrawn(family, "zero")
-        if one.candidate.family.confusable and amplitude.unit == "N" and abs(amplitude.value) < _form_error(found, one):
-            return one, Withdrawn(family, "own_form")
+def _doubtful(found: Search, held: Problem | None) -> Iterator[Withdrawn]:
+    """Effects that are no findings, once each: by their own numbers, then by held-out tests, by rising gain."""
+    by_gain, seen = sorted(found.added, key=lambda one: one.gain), set()
+    for one in by_gain:
+        if (why := _by_estimate(found, one)) is not None:
+            seen.add(one.candidate.name)
+            yield why
+    for one in by_gain:
+        if one.candidate.name in seen or held is None:
+            continue
+        if (why := _by_held_out(found, one, held)) is not None:
+            yield why
+
+
+def _by_estimate(found: Search, one: AddedEffect) -> Withdrawn | None:
+    """Why an effect's own numbers reject it, if they do."""
+    name, family, size = one.candidate.name, one.candidate.family, amplitude_of(one)
+    guided = found.problem.machine.motion != "free"
+    if at_bound := tuple(other for other in at_bounds(found) if other == size or (guided and owns(one, other))):
+        return Withdrawn(name, family.named, "at_bound", at_bound)
+    amplitude = estimates_of(found)[size]
+    if guided and not one.candidate.release and amplitude.low <= 0.0 <= amplitude.high:
+        return Withdrawn(name, family.named, "zero")
+    if guided and family.confusable and amplitude.unit == "N" and abs(amplitude.value) < _form_error(found, one):
+        return Withdrawn(name, family.named, "own_form")
     return None
 
 
 def _form_error(found: Search, one: AddedEffect) -> float:
-    """Force [N] by which the form of friction may be off on the components of an effect, of a platen on guides."""
+    """Force [N] by which the form of friction may be off on the components of an effect."""
     machine = fitted_machine(found.solution)
-    if machine.motion == "free":
-        return 0.0
     friction = [actuator.seal_friction for actuator in machine.actuators if actuator.name in one.candidate.components]
     return found.numbers.number("verdict.own_form") * min(friction, default=0.0)
 
 
-def _by_held_out(found: Search, held: Problem | None) -> tuple[AddedEffect, Withdrawn] | None:
-    """The effect of least gain that does not close the gap on held-out tests.
+def _by_held_out(found: Search, one: AddedEffect, held: Problem) -> Withdrawn | None:
+    """Whether held-out tests reject an effect: it does not close the gap there.
 
-    Each effect is compared with everything else refitted without it, in the residuals that its family shows in. It must
-    gain there a share of what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the
+    It is compared with everything else refitted without it, in the residuals that its family shows in. It must gain
+    there a share of what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the
     squares in some column by a share of those before any effect. One that the held-out tests do not excite, with an
     expected gain within chance, stays, but not on a table with one actuator, which every test excites.
     """
-    if held is None or not found.added:
-        return None
-    single = len(found.problem.machine.actuators) == 1
-    n, original, after = found.numbers.number, residual_at(held, found.refit), residual_at(held, found.solution)
-    for one in sorted(found.added, key=lambda one: one.gain):
-        if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
-            continue  # a sensor's error
-        before = residual_at(held, without_effect(found, one.candidate).solution)
-        kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
-        rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
-        gain, expected = gain_on(held, before, after, rows)
-        first, old, new = (squares_by_column(part.whitened)[rows] for part in (original, before, after))
-        lower = lowers_squares(first, old, new, n("accept.of_first"))
-        least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
-        if (single or expected > n("accept.chance")) and (not lower or gain < least):
-            return one, Withdrawn(one.candidate.family.named, "held_out", gain=gain)
+    if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
+        return None  # a sensor's error
+    n, single = found.numbers.number, len(found.problem.machine.actuators) == 1
+    without = without_effect(found, one.candidate).solution
+    original, before, after = (residual_at(held, at) for at in (found.refit, without, found.solution))
+    kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
+    rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
+    gain, expected = gain_on(held, before, after, rows)
+    first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
+    lower = lowers_squares(first, old, new, n("accept.of_first"))
+    least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
+    if (single or expected > n("accept.chance")) and (not lower or gain < least):
+        return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)
     return None
 
 

@@ -16,7 +16,7 @@ from .layout import line_on, log_ticks, stacked_layout
 from .page import Block, Figure, Markup, Table, shaded, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
 
-__all__ = ["gain_figure", "gap_figure", "residual_function_figure", "map_blocks"]
+__all__ = ["gain_figure", "gap_figure", "held_out_errors", "residual_function_figure", "map_blocks"]
 
 
 SHOWN = 10  # families in a figure
@@ -85,23 +85,27 @@ def gain_figure(one: Round, number: int, least: float, confusable: float) -> Fig
     return Figure(f"gains-{number}", f"Round {number}: candidate effects", words, traces, layout, layout["height"])
 
 
+def held_out_errors(found: Discovery) -> dict[str, tuple[float, float, float]]:
+    """Errors on held-out tests over noise by phase or balance and test: as delivered, refitted, with the effects."""
+    gaps = found.proof.gaps if found.proof else ()
+    by_phase = {f"{gap.phase}, {gap.test}": (gap.delivered, gap.refitted, gap.after) for gap in gaps}
+    return by_phase | {f"{_KINDS[one.kind].lower()}, {one.test}": one.error for one in found.balances}
+
+
 def gap_figure(found: Discovery) -> Figure:
-    """Return the gap of every phase of every held-out test: delivered, refitted, after."""
-    assert found.proof is not None
-    gaps = found.proof.gaps
-    names = [f"{gap.phase}, {gap.test}" for gap in gaps]
-    series = (
-        ("as delivered", "delivered", GREY),
-        ("refitted", "refitted", VERMILLION),
-        ("with the effects", "after", BLUE),
-    )
+    """Return the errors of every phase and balance of every held-out test: delivered, refitted, with the effects."""
+    errors = held_out_errors(found)
+    series = zip(("as delivered", "refitted", "with the effects"), (GREY, VERMILLION, BLUE), strict=True)
     traces = [
-        _bar(words, color, [getattr(gap, key) for gap in gaps], range(len(gaps)), "%{x:.3g} × noise")
-        for words, key, color in series
+        _bar(words, color, [three[k] for three in errors.values()], range(len(errors)), "%{x:.3g} × noise")
+        for k, (words, color) in enumerate(series)
     ]
-    most = max(max(gap.delivered, gap.refitted, gap.after) for gap in gaps)
-    layout = _bars(names, "Normalised RMS error (1: sensor noise)", 74, FLOOR, most) | {"barmode": "group"}
-    words = "Root mean square error of all moving channels over sensor noise; the dashed line is noise alone."
+    most = max(max(three) for three in errors.values())
+    layout = _bars(list(errors), "Normalised RMS error (1: sensor noise)", 74, FLOOR, most) | {"barmode": "group"}
+    words = (
+        "Root mean square error over noise: of all moving channels in a phase, over that of the sensors; and of each "
+        "balance, over that of the sensors and of what the form of friction leaves open. The dashed line is noise alone."
+    )
     return Figure("gap", "Normalised RMS error on held-out tests", words, traces, layout, layout["height"])
 
 

@@ -14,7 +14,7 @@ from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .control_blocks import load_of, numbers_used
 from .curve_plots import curve_blocks
-from .discover_plots import gain_figure, gap_figure, map_blocks, residual_function_figure
+from .discover_plots import gain_figure, gap_figure, held_out_errors, map_blocks, residual_function_figure
 from .page import Block, Headline, Level, Page, Section, Table, bullet_list, details, number, save_page
 
 __all__ = ["discovery_tables", "save_discovery", "verdict_sentence", "write_discover_report"]
@@ -147,12 +147,12 @@ def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
     shown = [Headline(_VERDICTS[verdict.word][0], "Verdict"), Headline(named, "Effects")]
-    if found.proof and found.proof.gaps:
-        widest = max(found.proof.gaps, key=lambda gap: gap.refitted)
+    if errors := held_out_errors(found):
+        widest, (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
         shown.append(
             Headline(
-                f"{number(widest.refitted)} → {number(widest.after)}",
-                f"Largest normalised RMS error: {widest.phase}, {widest.test}",
+                f"{number(refitted)} → {number(after)}",
+                f"Largest normalised RMS error: {widest}",
                 "refitted → with the effects; 1 is sensor noise",
             )
         )

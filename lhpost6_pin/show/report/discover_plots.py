@@ -103,8 +103,8 @@ def gap_figure(found: Discovery) -> Figure:
     most = max(max(three) for three in errors.values())
     layout = _bars(list(errors), "Normalised RMS error (1: sensor noise)", 74, FLOOR, most) | {"barmode": "group"}
     words = (
-        "Root mean square error over noise: of all moving channels in a phase, over that of the sensors; of each balance, "
-        "over that of the sensors and of what the form of friction leaves open. The dashed line is noise alone."
+        "Root mean square error over noise: of all moving channels in a phase, over that of the sensors; of each "
+        "balance, over that of the sensors and of what the form of friction leaves open. Dashed: noise alone."
     )
     return Figure("gap", "Normalised RMS error on held-out tests", words, traces, layout, layout["height"])
 

@@ -283,14 +283,14 @@ def why_withdrawn(judged: Callable[..., Withdrawn | None], *args: object, **give
 )
 def test_an_effect_on_guides_that_its_own_numbers_reject_is_no_finding(table, share, half, bounds, why):
     friction = table.actuators[0].seal_friction
-    given = {"at_bounds": bounds, "amplitude_of": SIZE, "fitted_machine": table}
+    given = {"amplitude_of": SIZE, "fitted_machine": table}
     value, low, high = (friction * f for f in (share, share - half, share + half))
-    given["estimates_of"] = {SIZE: Estimate(value, "N", low, high)}
+    estimates = {SIZE: Estimate(value, "N", low, high)}
     for machine in (table, load_machine()):
         found = SimpleNamespace(problem=SimpleNamespace(machine=machine), solution=None, numbers=discovery_numbers()[0])
         free = None if SIZE not in bounds else "at_bound"  # on legs the size alone
         wanted = why if machine is table else free
-        assert why_withdrawn(withdrawal._by_estimate, found, ADDED, **given) == wanted
+        assert why_withdrawn(withdrawal._by_estimate, found, ADDED, bounds, estimates, **given) == wanted
 
 
 def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_need_not_excite_it(table):
@@ -301,4 +301,4 @@ def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_
     for machine, wanted in ((table, "held_out"), (load_machine(), None)):
         problem = SimpleNamespace(machine=machine, unknowns=())
         found = SimpleNamespace(problem=problem, numbers=discovery_numbers()[0], refit=None, solution=None)
-        assert why_withdrawn(withdrawal._by_held_out, found, ADDED, held, **given) == wanted
+        assert why_withdrawn(withdrawal._by_held_out, found, ADDED, held, left, left, **given) == wanted

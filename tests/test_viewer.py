@@ -345,6 +345,7 @@ def test_a_browser_that_comes_late_gets_what_was_drawn_and_what_is_drawn_later()
         window.send(Command("/a", 3))
         late = await browser.read_message()
         browser.close()
+        assert await browser.read_message() is None  # the socket is closed: the loop may end
         return [umsgpack.unpackb(message)["value"] for message in (*early, late)]
 
     window = LoopbackWindow("")

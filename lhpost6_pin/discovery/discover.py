@@ -122,9 +122,9 @@ def discover(
     found, linear = search(
         begun.search, lambda one: checkpoint.write(begun._replace(search=one)), between(report, 0.4, 0.75)
     )
-    found, withdrawn = withdraw_effects(found, begun.held_problem)
-    if withdrawn and machine.motion != "free":
-        linear = linearise(found.solution, calibration)
+    kept, withdrawn = withdraw_effects(found, begun.held_problem)
+    if kept is not found:
+        found, linear = kept, linearise(kept.solution, calibration)
     misfit = 0.0 if forces_explained(found) else found.misfit("wrench")
     beside = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
     replacing: tuple[ResidualFunction, ...] = ()

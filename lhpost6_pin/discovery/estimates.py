@@ -10,9 +10,10 @@ from ..core.arrays import Array
 from ..identification.calibration import FreeParameter
 from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
+from ..machine.parameters import Parameters
 from .search_state import AddedEffect, Search
 
-__all__ = ["Estimate", "amplitude_of", "at_bounds", "deviations", "estimates_of", "owns"]
+__all__ = ["Estimate", "amplitude_of", "at_bounds", "deviations", "estimates_of", "interval_reach", "owns"]
 
 AT_BOUND = 1e-3
 """Of an unknown's prior deviation: nearer to a bound it counts as at it."""
@@ -62,10 +63,15 @@ def deviations(found: Search) -> Array:
     return np.asarray(np.sqrt(np.diag(covariance) + floor**2))
 
 
-def estimates_of(found: Search) -> dict[str, Estimate]:
-    """All unknowns by name, in their units, with the intervals of `verdict.probability`."""
+def interval_reach(numbers: Parameters) -> float:
+    """Half width of the intervals of `verdict.probability`, in standard deviations."""
+    return float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
+
+
+def estimates_of(found: Search, sd: Array) -> dict[str, Estimate]:
+    """All unknowns by name, in their units, with intervals by their standard deviations (p,), `deviations`."""
     every: Sequence[FreeParameter | SensorUnknown] = [*found.problem.parameters, *found.problem.unknowns]
-    reach = float(norm.ppf(0.5 + 0.5 * found.numbers.number("verdict.probability"))) * deviations(found)
+    reach = interval_reach(found.numbers) * sd
     out = {}
     for one, x, half in zip(every, found.solution.x.tolist(), reach.tolist(), strict=True):
         values = [x, x - half, x + half]

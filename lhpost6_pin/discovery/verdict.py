@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from ..identification.calibration.scale import Scale, ratios
 from ..machine.parameters import Parameters
 from .acceptance import form_share
-from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of
+from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of, interval_reach, owns
 from .localise import Spot, worst_spots
 from .residual_function import ResidualFunction
 from .search_state import AddedEffect, Search
@@ -85,19 +85,20 @@ def judge(
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
     own = tuple(f"{one.candidate.name}." for one in found.added)
-    sd, estimates = deviations(found), estimates_of(found)
+    sd = deviations(found)
+    estimates = estimates_of(found, sd)
     released = tuple(
         SensorFinding(u.name, one.candidate.family.named, estimates[u.name], float(np.sqrt(3.0) * u.sd))
         for u in problem.unknowns
         for one in found.added
         if one.candidate.release == u.name
     )
-    reach = float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
-    sensors = (*(_of_fault(f, reach) for f in faults), *released)
+    sensors = (*(_of_fault(f, interval_reach(numbers)) for f in faults), *released)
     rescaled = _rescaled(found)
-    kept = [one for one in found.added if one.candidate.name not in {s.name for s in released} | rescaled]
     gone = {one.name for one in withdrawn}
-    kept = [one for one in kept if one.candidate.name not in {w.name for w in withdrawn if w.why == "held_out"}]
+    unproven = {one.name for one in withdrawn if one.why == "held_out"}
+    others = {s.name for s in released} | rescaled | unproven
+    kept = [one for one in found.added if one.candidate.name not in others]
     sure = np.abs(x) > calibration.number("report.deviations") * sd
     material = np.abs(x) > calibration.number("report.material") * problem.stated
     differs = {p.name for i, p in enumerate(problem.parameters) if sure[i] and material[i]}
@@ -155,11 +156,7 @@ def _untestable(found: Search) -> tuple[tuple[str, ...], int]:
 
 def _of_added(added: AddedEffect, estimates: Mapping[str, Estimate]) -> EffectFinding:
     candidate = added.candidate
-    own = {
-        name.removeprefix(f"{candidate.name}."): value
-        for name, value in estimates.items()
-        if name == candidate.release or name.startswith(f"{candidate.name}.")
-    }
+    own = {name.removeprefix(f"{candidate.name}."): value for name, value in estimates.items() if owns(added, name)}
     return EffectFinding(
         family=candidate.family.named,
         components=candidate.components,

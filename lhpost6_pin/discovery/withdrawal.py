@@ -6,7 +6,7 @@ from zero, or if it is no more than what the form of friction may be off by; the
 everything else refitted. A platform on legs is judged with all effects in place.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,8 +15,8 @@ from ..core.arrays import Array
 from ..identification.calibration.problem import Problem
 from ..identification.residuals import kinds_shown
 from .acceptance import squares_by_column
-from .balances import gain_on, residual_at
-from .estimates import amplitude_of, at_bounds, estimates_of, owns
+from .balances import HeldOut, gain_on, residual_at
+from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of, owns
 from .search import without_effect
 from .search_state import AddedEffect, Search, fitted_machine
 
@@ -49,25 +49,30 @@ def withdraw_effects(found: Search, held: Problem | None) -> tuple[Search, tuple
 
 def _doubtful(found: Search, held: Problem | None) -> Iterator[Withdrawn]:
     """Effects that are no findings, once each: by their own numbers, then by held-out tests, by rising gain."""
-    by_gain, seen = sorted(found.added, key=lambda one: one.gain), set()
-    for one in by_gain:
-        if (why := _by_estimate(found, one)) is not None:
-            seen.add(one.candidate.name)
+    remaining = []
+    bounded, estimates = at_bounds(found), estimates_of(found, deviations(found))
+    for one in sorted(found.added, key=lambda one: one.gain):
+        if (why := _by_estimate(found, one, bounded, estimates)) is not None:
             yield why
-    for one in by_gain:
-        if one.candidate.name in seen or held is None:
-            continue
-        if (why := _by_held_out(found, one, held)) is not None:
+        else:
+            remaining.append(one)
+    if held is None or not remaining:
+        return
+    original, after = (residual_at(held, at) for at in (found.refit, found.solution))
+    for one in remaining:
+        if (why := _by_held_out(found, one, held, original, after)) is not None:
             yield why
 
 
-def _by_estimate(found: Search, one: AddedEffect) -> Withdrawn | None:
-    """Why an effect's own numbers reject it, if they do."""
+def _by_estimate(
+    found: Search, one: AddedEffect, bounded: Sequence[str], estimates: Mapping[str, Estimate]
+) -> Withdrawn | None:
+    """Why an effect's own numbers reject it, if they do; `bounded` are the unknowns at a bound."""
     name, family, size = one.candidate.name, one.candidate.family, amplitude_of(one)
     guided = found.problem.machine.motion != "free"
-    if at_bound := tuple(other for other in at_bounds(found) if other == size or (guided and owns(one, other))):
+    if at_bound := tuple(other for other in bounded if other == size or (guided and owns(one, other))):
         return Withdrawn(name, family.named, "at_bound", at_bound)
-    amplitude = estimates_of(found)[size]
+    amplitude = estimates[size]
     if guided and not one.candidate.release and amplitude.low <= 0.0 <= amplitude.high:
         return Withdrawn(name, family.named, "zero")
     if guided and family.confusable and amplitude.unit == "N" and abs(amplitude.value) < _form_error(found, one):
@@ -82,19 +87,19 @@ def _form_error(found: Search, one: AddedEffect) -> float:
     return found.numbers.number("verdict.own_form") * min(friction, default=0.0)
 
 
-def _by_held_out(found: Search, one: AddedEffect, held: Problem) -> Withdrawn | None:
+def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldOut, after: HeldOut) -> Withdrawn | None:
     """Whether held-out tests reject an effect: it does not close the gap there.
 
-    It is compared with everything else refitted without it, in the residuals that its family shows in. It must gain
-    there a share of what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the
-    squares in some column by a share of those before any effect. One that the held-out tests do not excite, with an
-    expected gain within chance, stays, but not on a table with one actuator, which every test excites.
+    original is their residual before any effect, `after` that of the search's solution. The effect is compared with
+    everything else refitted without it, in the residuals that its family shows in. It must gain there a share of what
+    is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a
+    share of those before any effect. One that the held-out tests do not excite, with an expected gain within chance,
+    stays, but not on a table with one actuator, which every test excites.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
     n, single = found.numbers.number, len(found.problem.machine.actuators) == 1
-    without = without_effect(found, one.candidate).solution
-    original, before, after = (residual_at(held, at) for at in (found.refit, without, found.solution))
+    before = residual_at(held, without_effect(found, one.candidate).solution)
     kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
     rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
     gain, expected = gain_on(held, before, after, rows)

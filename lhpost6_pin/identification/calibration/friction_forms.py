@@ -21,10 +21,10 @@ from ...machine.parameters import Parameters
 from ...mechanics.plant import Plant, make_plant
 from ..friction_march import least_yield
 from ..prepare import MeasuredTest
-from ..residuals import Path, Residuals, evaluate_residuals, follow
+from ..residuals import Path, evaluate_residuals, follow
 from .effect_parameters import effect_parameters
 from .free_parameters import FreeParameter, with_parameters
-from .measured_wrench import measured_bins
+from .measured_wrench import measured_bins, wrench_bins
 from .problem import Problem
 
 __all__ = ["FormError", "FrictionForms", "compare_friction", "effect_of_form", "own_suffices"]
@@ -235,9 +235,7 @@ class _Force:
 
         It has some where samples without a known slip weigh nothing.
         """
-        none = np.zeros((test.samples, 0))
-        constant = Residuals(np.ones((test.samples, 6)), none, none, none, none, none)
-        every = self.problem.bins(constant, test)[0][:, self.columns]
+        every = wrench_bins(self.problem, np.ones((test.samples, 6)), test)[:, self.columns]
         bins = every[self.problem.frequency[t] > 0.0]
         norm, whole = np.linalg.norm(bins, axis=0), np.linalg.norm(every, axis=0)
         return np.where(norm > NEGLIGIBLE * whole, bins / np.maximum(norm, 1e-300), 0.0)

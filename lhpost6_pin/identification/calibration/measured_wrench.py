@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core.arrays import Complex
+from ...core.arrays import Array, Complex
 from ...mechanics.plant import Plant
 from ...mechanics.pose import plant_motion
 from ..inverse_dynamics import leg_wrenches
@@ -10,7 +10,13 @@ from ..prepare import MeasuredTest, actuator_forces
 from ..residuals import Residuals
 from .problem import Problem
 
-__all__ = ["measured_bins"]
+__all__ = ["measured_bins", "wrench_bins"]
+
+
+def wrench_bins(problem: Problem, wrench: Array, test: MeasuredTest) -> Complex:
+    """Bins (m, 6) of a wrench (n, 6) at C along a problem's test, as its residual would have them."""
+    none = np.zeros((len(wrench), 0))
+    return problem.bins(Residuals(wrench, none, none, none, none, none), test)[0][:, :6]
 
 
 def measured_bins(problem: Problem, plant: Plant, test: MeasuredTest, t: int) -> Complex:
@@ -19,5 +25,4 @@ def measured_bins(problem: Problem, plant: Plant, test: MeasuredTest, t: int) ->
     if force is None or not problem.rows("wrench").any():
         return np.zeros((len(problem.frequency[t]), 6), np.complex128)
     wrench = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)
-    none = np.zeros((len(wrench), 0))
-    return problem.bins(Residuals(wrench, none, none, none, none, none), test)[0][:, :6]
+    return wrench_bins(problem, wrench, test)

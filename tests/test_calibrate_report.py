@@ -19,13 +19,12 @@ from lhpost6_pin.identification.calibration.calibration_summary import (
 )
 from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.result import (
-    RemovedDelay,
     changed_parameters,
     contradictions,
     out_of_range,
     verdict_on,
 )
-from lhpost6_pin.identification.calibration.sensor_errors import SensorUnknown
+from lhpost6_pin.identification.calibration.sensor_errors import RemovedDelay, SensorUnknown
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report import write_calibrate_report

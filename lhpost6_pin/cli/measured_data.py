@@ -24,6 +24,7 @@ def check(
     sensors_out: Annotated[
         Path | None, typer.Option(help="Sensors file (TOML) to write, with noise as rests of these records show it.")
     ] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Replace that file if there is one.")] = False,
     json: opt.Json = False,
 ) -> None:
     """Check records: layout, values, signs, noise at rest, agreement of redundant sensors; what sensors can tell."""
@@ -35,8 +36,8 @@ def check(
     from ..show.tables import print_findings
 
     table = machine.load()
-    if sensors_out is not None and sensors_out.exists():
-        raise ParameterError(f"{sensors_out}: exists and may have been edited; remove it, or name another")
+    if sensors_out is not None and sensors_out.exists() and not replace:
+        raise ParameterError(f"{sensors_out}: exists and may have been edited; --replace writes it anew")
     files = sorted(file.glob("*.nc")) or [file]
     found = {str(path): check_record(path, table) for path in files}
     wrong = {path for path, findings in found.items() if any(f.severity == "error" for f in findings)}

@@ -83,9 +83,16 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         _odd_rates(sound),
         _inconsistent_motion(sound),
         _inconsistent_forces(sound, machine),
+        _floors_without_mass(sound, machine),
     )
     errors += turned_signs(sound, machine) if machine is not None and not errors else []
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + contents
+
+
+def _floors_without_mass(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:
+    if machine is not None and not machine.floors and "floor_acceleration" in dataset:
+        where = f"[floor.NAME] of {machine.name}'s file"
+        yield "floor_acceleration", None, "is not used: the masses of these floors are not stated", f"add {where}"
 
 
 # -------------------------------------------------------------------------------------------- contents

@@ -133,7 +133,9 @@ def _oil(c: _Channels) -> Observable:
 def _specimen(c: _Channels) -> Observable:
     name = "specimen"
     if c.any("floor_acceleration"):
-        return Observable(name, "yes", "base shear: floor masses, which must be stated, times floor_acceleration")
+        if not c.machine.floors:
+            return Observable(name, "no", "needs the floors' masses, [floor.NAME] of the machine's file")
+        return Observable(name, "yes", "base shear: floor masses times floor_acceleration")
     if c.motion and (c.force or c.pressures):
         return Observable(name, "ratio", "its base shear as what the bare table lacks; no floor_acceleration")
     return Observable(name, "no", "needs floor_acceleration, or forces on the table")

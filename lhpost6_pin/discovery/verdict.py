@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..identification.calibration.scale import Scale, ratios
+from ..identification.calibration.sensor_errors import RemovedDelay
 from ..machine.parameters import Parameters
 from .acceptance import form_share
 from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of, interval_reach, owns
@@ -44,7 +45,7 @@ class EffectFinding:
 
 @dataclass(frozen=True)
 class SensorFinding:
-    """A sensor that is off beyond its stated range."""
+    """A sensor that is off beyond the range of the sensors' file."""
 
     name: str
     family: str
@@ -93,7 +94,11 @@ def judge(
         for one in found.added
         if one.candidate.release == u.name
     )
-    sensors = (*(_of_fault(f, interval_reach(numbers)) for f in faults), *released)
+    reach = interval_reach(numbers)
+    sensors = (*(_of_fault(f, reach) for f in faults), *released)
+    known = {one.name for one in sensors}
+    late = (_of_delay(d, reach) for d in problem.delays if d.beyond(calibration.number("report.deviations")))
+    removed = tuple(one for one in late if one.name not in known)  # before the fit: no part of the verdict's word
     rescaled = _rescaled(found)
     gone = {one.name for one in withdrawn}
     unproven = {one.name for one in withdrawn if one.why == "held_out"}
@@ -126,7 +131,7 @@ def judge(
     told = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(kept_own)}
     scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in told.items() if n not in bounded))
     return Verdict(
-        *(word, effects, changed, sensors, function, hidden, nearest, spots, withdrawn, bounded),
+        *(word, effects, changed, (*sensors, *removed), function, hidden, nearest, spots, withdrawn, bounded),
         scale=problem.scale,
         ratios={name: Estimate(*ratio) for name, ratio in scaled.items()},
     )
@@ -171,6 +176,12 @@ def _of_added(added: AddedEffect, estimates: Mapping[str, Estimate]) -> EffectFi
 def _of_fault(fault: SensorFault, reach: float) -> SensorFinding:
     low, high = (fault.value + side * reach * fault.deviation for side in (-1.0, 1.0))
     return SensorFinding(fault.name, fault.family, Estimate(fault.value, fault.unit, low, high), fault.stated)
+
+
+def _of_delay(late: RemovedDelay, reach: float) -> SensorFinding:
+    half = reach * late.deviation
+    found = Estimate(late.delay, "s", late.delay - half, late.delay + half)
+    return SensorFinding(f"delay {late.group}", "channel_delay", found, late.stated)
 
 
 def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:

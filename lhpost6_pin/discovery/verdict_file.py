@@ -1,6 +1,7 @@
 """The verdict of a search: in a sentence or two, and as a file, verdict.json."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from .discover import Discovery
 from .estimates import Estimate
 from .held_out import FLOOR
 from .unexplained import forces_explained
+from .verdict import SensorFinding
 from .withdrawal import Why
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
@@ -158,11 +160,13 @@ def summary(found: Discovery) -> str:
             "campaign: it needs more excitation, or sensors that tell of them (lhpost6 check).",
             "parameters_only": f"no missing effect; {len(verdict.changed)} parameters differ: "
             f"{', '.join(verdict.changed)}.",
-            "sensor": "no missing effect; sensors beyond their stated ranges: "
-            f"{', '.join(s.name for s in verdict.sensors)}.",
+            "sensor": f"no missing effect; {_beyond(verdict.sensors)}.",
             "named": f"{effects}.",
             "ambiguous": f"{effects}; the campaign does not discriminate between {rivals}.",
         }[verdict.word]
+    if verdict.sensors and verdict.word != "sensor":
+        said = _beyond(verdict.sensors)
+        text += f" {said[0].upper()}{said[1:]}."
     identified = {one.family for one in verdict.effects}
     for why, reason in _WITHDRAWN.items():
         gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
@@ -181,6 +185,18 @@ def summary(found: Discovery) -> str:
     if verdict.effects and found.proof is None:
         return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
     return text
+
+
+def _beyond(sensors: Sequence[SensorFinding]) -> str:
+    """Sensors beyond their ranges, with values and ranges."""
+    each = []
+    for one in sensors:
+        value, stated, unit = one.estimate.value, one.stated, one.estimate.unit
+        if unit == "s":
+            value, stated, unit = 1e3 * value, 1e3 * stated, "ms"
+        size = f"{value:.3g}{'' if unit == '1' else f' {unit}'}"
+        each.append(one.name if one.name.startswith("sign ") else f"{one.name} {size} (at most {stated:.3g})")
+    return f"sensors beyond the ranges of the sensors file: {', '.join(each)}"
 
 
 def _worse(found: Discovery) -> str | None:

@@ -105,13 +105,14 @@ class Strut:
 class Floor:
     """A floor of a specimen whose acceleration is measured: its mass times that is its share of the base shear.
 
-    `along` is the platen axis, x, y or z, of its accelerometer; point is where its mass is, in platen axes from C.
+    `along` is the platen axis, x, y or z, of its accelerometer; point is where its mass is, in platen axes from C. On
+    guides, which take the overturning moment, it may be left out.
     """
 
     name: str
     along: str
     mass: float = quantity_field("kg", bound="positive")
-    point: Vec3 = quantity_field("m", length=3)
+    point: Vec3 | None = quantity_field("m", length=3, optional=True)
 
 
 @dataclass(frozen=True)

@@ -249,6 +249,8 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str],
             continue
         if section not in known:
             said = instead_of(section, sorted(known))
+            if f"{section}.mass" in parameters:
+                said = f'a floor of a specimen, [floor.{section}], needs along, such as "x", beside its mass'
             raise ParameterError(f"{parameters.origin}: {path} is in no known section; {said}")
         if key not in known[section]:
             said = instead_of(key, sorted(known[section]))
@@ -280,6 +282,9 @@ def _check_machine(machine: Machine) -> None:
         still = [AXES[k] for k in machine.axes if not getattr(machine.limits, quantity)[k]]
         if still:
             raise ParameterError(f"{origin}: limits.{quantity} is 0 in {', '.join(still)}, where the platen can move")
+    for floor in machine.floors if machine.motion == "free" else ():
+        if floor.point is None:
+            raise ParameterError(f"{origin}: {floor.name}.point is missing: where the mass of this floor is, from C")
     for component in machine.components:
         if component.platen_point == component.base_point:
             raise ParameterError(f"{origin}: {component.name}: platen_point and base_point coincide")

@@ -88,7 +88,7 @@ def floor_wrench(plant: Plant, acceleration: Array) -> Array:
     out = np.zeros((len(acceleration), 6))
     for k, floor in enumerate(plant.machine.floors):
         along = np.eye(3)["xyz".index(floor.along)]
-        moved = np.concatenate([along, np.cross(plant.body[0]["rho_c"] + floor.point, along)])
+        moved = np.concatenate([along, np.cross(plant.body[0]["rho_c"] + (floor.point or (0.0, 0.0, 0.0)), along)])
         out[:, plant.axes] += floor.mass * acceleration[:, k, None] * moved[plant.axes]
     return out
 

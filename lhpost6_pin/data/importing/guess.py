@@ -120,8 +120,10 @@ def _without_masses(found: Mapping[str, Source], stated: set[str]) -> list[str]:
     """A remark on floors whose accelerations are measured, and which the machine's file does not state."""
     floors = [name.rpartition("[")[2].rstrip("]") for name in found if name.startswith(_FLOORS)]
     new = [f"[floor.{name}]" for name in floors if name not in stated]
-    what = f"add {', '.join(new)} with their masses to the machine's file"
-    return [f"{_FLOORS} is not used without masses: {what}"] if new else []
+    mass = 'mass = { value = 100.0, unit = "kg", evidence = "measured", source = "weighed", rel_sd = 0.1 }'
+    what = f'add {", ".join(new)} to the machine\'s file, each with lines as along = "x" and {mass}'
+    more = "; where no guides take the overturning moment, with point, too: its place from C"
+    return [f"{_FLOORS} is not used without masses: {what}{more}"] if new else []
 
 
 def _is_still(label: str | None, machine: _Machine) -> bool:

@@ -29,7 +29,7 @@ from .friction_forms import compare_friction
 from .normal_equations import NoiseBias, NormalEquations, bounded_step, positive
 from .prepare import prepare_problem
 from .problem import OperatingPoint, Problem
-from .result import Calibration, RemovedDelay, Subset, calibration_numbers
+from .result import Calibration, Subset, calibration_numbers
 from .simulated_residuals import by_simulation
 from .whitened_residuals import mean_squares, negative_log_likelihood
 
@@ -74,10 +74,7 @@ def calibrate(
         machine=problem.machine,
         campaign=campaign,
         skipped=tuple(skipped),
-        delays=tuple(
-            RemovedDelay(group, late.delay, late.standard_error, sensors.delay_range.get(group, 0.0))
-            for group, late in problem.delays.items()
-        ),
+        delays=problem.delays,
         scale=problem.scale,
         tests=tuple(str(r.attrs.get("test", i)) for i, r in enumerate(records)),
         parameters=problem.parameters,

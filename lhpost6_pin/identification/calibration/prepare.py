@@ -15,6 +15,7 @@ from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
 from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
+from .sensor_errors import RemovedDelay
 from .usable_tests import too_short
 
 __all__ = ["policy_of", "prepare_problem"]
@@ -46,6 +47,10 @@ def prepare_problem(
     plant = make_plant(machine)
     policy = policy_of(numbers)
     records, delays = align_records(plant, records, policy)
+    removed = tuple(
+        RemovedDelay(group, late.delay, late.standard_error, sensors.delay_range.get(group, 0.0))
+        for group, late in delays.items()
+    )
     rng = np.random.default_rng(seed)
 
     def drawn(policy: Policy) -> list[MeasuredTest]:
@@ -56,7 +61,7 @@ def prepare_problem(
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
     return Problem(
         *(machine, tests, noisy, sensors, comparison),
-        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=delays,
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed,
     )  # fmt: skip
 
 

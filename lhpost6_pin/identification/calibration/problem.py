@@ -3,18 +3,16 @@
 Unknowns x (p,) are the machine's parameters, then the sensors' errors; zero at the nominal machine and perfect sensors.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from itertools import cycle
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
 
 from ...core.arrays import Array, Complex, Mask
-from ...data.alignment import Delay
 from ...data.sensors import SensorSet
 from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
@@ -25,7 +23,7 @@ from ..prepare import MeasuredTest
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .scale import find_scale, without_held
-from .sensor_errors import SensorUnknown, corrected, sensor_unknowns
+from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
 
 __all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
@@ -68,7 +66,7 @@ class Problem:
         kinds: tuple[str, ...] = KINDS,
         others: Sequence[Machine] = (),
         preload: float = 0.0,
-        delays: Mapping[str, Delay] = MappingProxyType({}),
+        delays: tuple[RemovedDelay, ...] = (),
     ) -> None:
         """Prepare the problem; all tests have the same channels.
 

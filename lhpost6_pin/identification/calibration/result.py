@@ -14,12 +14,11 @@ from .curves import Curves
 from .free_parameters import FreeParameter, with_parameters
 from .friction_forms import FrictionForms
 from .scale import Ratio, Scale, ratios
-from .sensor_errors import SensorUnknown
+from .sensor_errors import RemovedDelay, SensorUnknown
 
 __all__ = [
     "Calibration",
     "Contradiction",
-    "RemovedDelay",
     "Subset",
     "Verdict",
     "beyond",
@@ -38,15 +37,6 @@ class Subset(NamedTuple):
     estimate: Array  # (p,)
     sd: Array  # (p,) predicted deviations
     part: bool = True  # of all together; simulation is not
-
-
-class RemovedDelay(NamedTuple):
-    """Delay of a group of channels that was removed before the fit."""
-
-    group: str
-    delay: float  # [s]
-    deviation: float  # [s]
-    stated: float  # largest delay that the sensors' file allows [s]
 
 
 @dataclass(frozen=True)

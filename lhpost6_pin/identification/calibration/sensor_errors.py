@@ -14,6 +14,7 @@ of the motion, to first order. Skews between them have been removed; other delay
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -29,7 +30,7 @@ from ...mechanics.pose import PlatenMotion
 from ..prepare import MeasuredTest
 from .scale import measures_alone
 
-__all__ = ["SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
+__all__ = ["RemovedDelay", "SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,19 @@ class SensorUnknown:
     lowest: float = -np.inf
     highest: float = np.inf
     step: float | None = None  # for derivatives; None: the comparison's share of sd
+
+
+class RemovedDelay(NamedTuple):
+    """Delay of a group of channels that redundant channels show, removed before the fit."""
+
+    group: str
+    delay: float  # [s]
+    deviation: float  # standard [s]
+    stated: float  # largest delay that the sensors' file allows [s]
+
+    def beyond(self, reach: float) -> bool:
+        """Whether it is beyond the stated one by more than `reach` standard deviations."""
+        return abs(self.delay) > self.stated + reach * self.deviation
 
 
 def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:

@@ -22,7 +22,7 @@ __all__ = ["discovery_tables", "save_discovery", "verdict_sentence", "write_disc
 _VERDICTS: dict[Word, tuple[str, Level]] = {
     "none": ("no missing effect", "good"),
     "parameters_only": ("parameters differ", "good"),
-    "sensor": ("sensor fault", "attention"),
+    "sensor": ("sensor beyond its range", "attention"),
     "named": ("effect identified", "good"),
     "ambiguous": ("effects not distinguished", "attention"),
     "unexplained": ("unexplained residual", "bad"),
@@ -45,7 +45,7 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
     held = f"; {', '.join(found.held_out)} held out" if found.held_out else ""
     page = Page(
         kind="Discovery",
-        title=f"Effects missing from {found.machine.name}, by {found.campaign}",
+        title=f"Search for missing effects: {found.machine.name}, by {found.campaign}",
         purpose=f"Identify effects missing from the model of {load_of(found.machine)}, from {tests}{held}.",
         verdict=verdict_sentence(found),
         level=_VERDICTS[found.verdict.word][1],
@@ -107,7 +107,7 @@ def _balance_table(balances: Sequence[Balance]) -> Table:
 
 def _sensor_table(sensors: Sequence[SensorFinding]) -> Table:
     rows = [(s.name, f"{s.estimate.value:.4g} {s.estimate.unit}", f"{s.stated:.3g}", s.family) for s in sensors]
-    return Table("Sensors outside their stated range", ("Error", "Value", "Stated", "Family"), rows)
+    return Table("Sensors beyond the ranges of the sensors file", ("Error", "Value", "At most", "Family"), rows)
 
 
 def _effect_table(one: EffectFinding) -> Table:
@@ -146,7 +146,13 @@ def _acted_on(found: Discovery) -> set[str]:
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
-    shown = [Headline(_VERDICTS[verdict.word][0], "Verdict"), Headline(named, "Effects")]
+    shown = [Headline(_VERDICTS[verdict.word][0], "Verdict")]
+    if verdict.word == "sensor":
+        first = verdict.sensors[0]
+        size = f"{first.estimate.value:.4g} {first.estimate.unit}"
+        shown.append(Headline(first.name, "Sensor", f"{size}; sensors file: at most {first.stated:.3g}"))
+    else:
+        shown.append(Headline(named, "Effects"))
     if errors := held_out_errors(found):
         widest, (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
         shown.append(
@@ -240,8 +246,10 @@ def _considered(found: Discovery) -> list[Block]:
 def _parameter_blocks(found: Discovery) -> list[Block]:
     changed, sensors = found.verdict.changed, found.verdict.sensors
     return [
-        _estimates("Recalibrated parameters", "Parameter", changed) if changed else "No parameter differs.",
-        _sensor_table(sensors) if sensors else "All sensors are within their stated ranges.",
+        _estimates("Recalibrated parameters", "Parameter", changed, found.verdict.bounded)
+        if changed
+        else "No parameter differs.",
+        _sensor_table(sensors) if sensors else "All sensors are within the ranges of the sensors file.",
     ]
 
 

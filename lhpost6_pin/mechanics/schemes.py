@@ -8,8 +8,9 @@
 An engine brings two things: integrate(q, dq), and the forward dynamics a = f(q, v, tau), ABA.
 
 tables are those of the plant (`tables`), ws its `workspace`: motion (6, nv) and port (4, n_ports), whose rows are named
-below, JB (2, n_ports, 6) the ports' J and B, frame (8, 3) as in `ports`, force (n_rows, 3) the ledger. A
-stage returns 0, or the number (from 1) of a leg out of its stroke, or -1 if not finite.
+below, JB (2, n_ports, 6) the ports' J and B, frame (8, 3) as in `ports`, force (n_rows, 3) the ledger, external (6,)
+a wrench on the platen from outside. A stage returns 0, or the number (from 1) of a leg out of its stroke, or -1 if not
+finite.
 """
 
 import math
@@ -82,18 +83,18 @@ def leg_out_of_stroke(legs, s):
 @compiled_inline
 def forces_stage(tables, ws, z):
     """Forces at the pose and ports in place, for V_SEEN and states z; fills port[SD], port[FORCE], force, TAU."""
-    motion, port, frame, axes = ws.motion, ws.port, ws.frame, tables.axes
+    motion, port, frame, external, axes = ws.motion, ws.port, ws.frame, ws.external, tables.axes
     set_twist(motion[V_SEEN], axes, frame)
     port_rates(ws.JB[0], frame, port[SD])
     apply_forces(tables.rows, port[S], port[SD], z, ws.force, port[FORCE])
     wrench_on_platen(frame, tables.body, ws.JB[1], port[FORCE])
     if axes.size == 6:
         for k in range(3):
-            motion[TAU, k] = frame[6, k]
-            motion[TAU, 3 + k] = frame[7, k]
+            motion[TAU, k] = frame[6, k] + external[k]
+            motion[TAU, 3 + k] = frame[7, k] + external[3 + k]
     else:
         for k in range(axes.size):
-            motion[TAU, k] = frame[6, axes[k]]
+            motion[TAU, k] = frame[6, axes[k]] + external[axes[k]]
     for k in range(axes.size, motion.shape[1]):  # specimen joints
         motion[TAU, k] = -tables.damping[k] * motion[V_SEEN, k]
 

@@ -25,6 +25,7 @@ class Workspace(NamedTuple):
     JB: Array  # (2, n_ports, 6)
     frame: Array  # (8, 3)
     force: Array  # (n_rows, 3)
+    external: Array  # (6,) wrench on the platen from outside, at B in platen axes, linear first [N, N m]
 
 
 _HEAD = 6
@@ -35,7 +36,7 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
     """Arrays sized for a plant, holding a copy of the start state."""
     states, n, rows = len(plant.states), len(plant.ports), plant.rows.size
     nq, nv = plant.model.nq, plant.model.nv
-    shapes = [(nq,), (states,), (states,), (6, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS))]
+    shapes = [(nq,), (states,), (states,), (6, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS)), (6,)]
     ends = np.cumsum([_HEAD, *(int(np.prod(shape)) for shape in shapes)])
     buffer = np.zeros(ends[-1])
     buffer[:_HEAD] = nq, states, nv, n, rows, 0
@@ -57,6 +58,7 @@ def unpack_workspace(buffer):
     JB = port + 4 * n
     frame = JB + 12 * n
     force = frame + 24
+    external = force + 3 * rows
     return Workspace(
         buffer,
         buffer[_HEAD:z],
@@ -66,5 +68,6 @@ def unpack_workspace(buffer):
         buffer[port:JB].reshape((4, n)),
         buffer[JB:frame].reshape((2, n, 6)),
         buffer[frame:force].reshape((8, 3)),
-        buffer[force : force + 3 * rows].reshape((rows, 3)),
+        buffer[force:external].reshape((rows, 3)),
+        buffer[external : external + 6],
     )

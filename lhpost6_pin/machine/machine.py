@@ -12,6 +12,7 @@ from typing import Any
 
 from ..core.errors import ParameterError, RecordError, UnknownNameError, instead_of
 from ..core.names import AXES
+from ..core.user_code import is_python
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
@@ -21,6 +22,7 @@ from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
 from .structure import MOTIONS, Structure
+from .user_specimen import UserSpecimen, load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -33,7 +35,7 @@ class Machine(Structure):
     """
 
     own_effects: tuple[Effect, ...] = ()
-    specimen: Specimen | None = None
+    specimen: Specimen | UserSpecimen | None = None
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -117,7 +119,7 @@ class Machine(Structure):
 
     def with_specimen(
         self,
-        urdf: str | Path,
+        urdf: Any,
         position: Vec3 = (0.0, 0.0, 0.0),
         rpy: Vec3 = (0.0, 0.0, 0.0),
         *,
@@ -125,9 +127,15 @@ class Machine(Structure):
     ) -> "Machine":
         """Return a copy with the specimen of a URDF (a path, or a shipped name: ``pendulum``) bolted to the platen.
 
+        ``FILE.py:NAME``, or an object in Python, is a specimen of your own (`mechanics.coupled`).
+
         position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
         locked joints make it one rigid body; free ones join the same Pinocchio model.
         """
+        if is_python(str(urdf)) or not isinstance(urdf, str | Path):
+            return replace(
+                self, specimen=load_user_specimen(str(urdf) if isinstance(urdf, str | Path) else urdf, position, rpy)
+            )
         return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
 
 
@@ -147,7 +155,7 @@ def load_machine(
 def build_machine(
     parameters: Parameters,
     added_effects: tuple[Effect, ...] = (),
-    specimen: Specimen | None = None,
+    specimen: Specimen | UserSpecimen | None = None,
     size: tuple[int, ...] | None = None,
 ) -> Machine:
     """Give typed objects to a flat mapping of quantities; raises ParameterError."""

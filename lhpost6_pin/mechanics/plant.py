@@ -15,6 +15,7 @@ from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from .coupled import CoupledSpecimen, base_at_rest, base_placement, coupled_specimen, rigid_wrench, start_coupled
 from .forward_dynamics import inertia_table
 from .ports import body_table, leg_table
 from .rigid_body import free_axes, make_model
@@ -46,6 +47,7 @@ class Plant:
     supply: Supply  # supply and return pressure [Pa], and how flow changes them
     delays: Array  # (n_actuators,) valve delay [s]
     lags: Array  # (n_actuators,) time constant [s] with which a spool follows its delayed command
+    coupled: CoupledSpecimen | None = None  # specimen that exchanges motion and wrench with the platen
 
     @cached_property
     def tables(self) -> Tables:
@@ -69,6 +71,16 @@ class Plant:
     def command_path(self) -> Array:
         """Delays of valves (n_actuators,) [s], with lags behind if any, as `valve_delay.delayed_spools` takes them."""
         return np.concatenate([self.delays, self.lags]) if self.lags.any() else self.delays
+
+    @cached_property
+    def rest_external(self) -> Array:
+        """Wrench (6,) at B in platen axes of a coupled specimen at rest, less that of what is rigidly attached."""
+        if self.coupled is None:
+            return np.zeros(6)
+        base, gravity = base_at_rest(self.machine), self.machine.platen.gravity
+        _, wrench = start_coupled(self.coupled, base, gravity)
+        rest = wrench - rigid_wrench(self.coupled.inertia, base, gravity)
+        return np.array(base_placement(self.machine).act(rest).vector)
 
     @property
     def articulated(self) -> bool:
@@ -100,9 +112,10 @@ def make_plant(machine: Machine) -> Plant:
     states = state_names(effects)
     oil = machine.hydraulics
     delays, lags = command_path(effects, {a.name: a.valve_delay for a in machine.actuators})
+    coupled = coupled_specimen(machine)
     return Plant(
         machine=machine,
-        model=make_model(machine),
+        model=make_model(machine, coupled),
         axes=free_axes(machine),
         legs=leg_table(machine),
         body=body_table(machine),
@@ -112,4 +125,5 @@ def make_plant(machine: Machine) -> Plant:
         supply=supply_of(effects, states, oil.supply_pressure, oil.return_pressure),
         delays=np.array(delays),
         lags=np.array(lags),
+        coupled=coupled,
     )

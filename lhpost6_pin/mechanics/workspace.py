@@ -43,6 +43,7 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
     views = (buffer[a:b].reshape(shape) for a, b, shape in zip(ends[:-1], ends[1:], shapes, strict=True))
     ws = Workspace(buffer, *views)
     ws.q[:], ws.motion[V], ws.z[:] = start
+    ws.external[:] = plant.rest_external
     return ws
 
 

@@ -43,13 +43,13 @@ def load_bodies(machine: Machine) -> Bodies:
 
 
 def load_specimen_bodies(machine: Machine) -> Bodies | None:
-    """Read the specimen's URDF with Pinocchio; None without one.
+    """Read the specimen's URDF with Pinocchio; None without one, as for a specimen in Python.
 
     A body is drawn by its boxes, cylinders and spheres; one without any of these as the uniform box that has its mass
     and inertia.
     """
     specimen = machine.specimen
-    if specimen is None:
+    if specimen is None or isinstance(specimen, UserSpecimen):
         return None
     model = pin.buildModelFromUrdf(str(specimen.urdf))
     try:

@@ -13,6 +13,7 @@ from ...effects.effect import Effect
 from ...machine.machine import Machine, build_machine
 from ...machine.parameters import EffectEntry, Parameters, Quantity
 from ...machine.specimen import Specimen
+from ...machine.user_specimen import UserSpecimen
 
 __all__ = ["MACHINE_FILE", "load_machine_file", "save_machine_file"]
 
@@ -33,6 +34,11 @@ def save_machine_file(machine: Machine, folder: Path) -> list[Path]:
         "own_effects": [asdict(effect) for effect in machine.own_effects],
     }
     files = [folder / MACHINE_FILE]
+    if isinstance(machine.specimen, UserSpecimen):
+        raise ParameterError(
+            f"{machine.specimen.source}: an FMU carries numbers, not a specimen in Python; export the table without it "
+            "and couple it through the inputs interface_wrench_*"
+        )
     if machine.specimen is not None:
         urdf = machine.specimen.urdf
         if not urdf.is_file():

@@ -142,7 +142,7 @@ def monolithic(plant: Plant, start: State, spool: Array, dt: float) -> tuple[Arr
     out = [(q, v)]
     for held in spool:
         total, dq = [0.0, 0.0, 0.0, 0.0], np.zeros_like(v)
-        a, dz, dx, moved = np.zeros_like(v), np.zeros_like(z), np.zeros_like(x), np.zeros_like(v)
+        a, dz, dx = np.zeros_like(v), np.zeros_like(z), np.zeros_like(x)
         for reach, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
             # the twist of the next stage moves the pose: the body's own rate suffices at steps of 1e-5 s
             qs = pin.integrate(model, q, reach * dt * dq)

@@ -92,7 +92,7 @@ class SpecimenOptions(MachineOptions):
     specimen: Annotated[
         str | None,
         typer.Option(
-            help="Specimen bolted to the platen: shipped name, or a URDF file.",
+            help="Specimen on the platen: shipped name, URDF file, or Python, FILE.py:NAME (a class, or an OpenSees model).",
             autocompletion=completing(lambda: shipped("specimens", ".urdf")),
         ),
     ] = None

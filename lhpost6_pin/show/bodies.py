@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from ..core.arrays import Array
 from ..machine.machine import Machine
+from ..machine.user_specimen import UserSpecimen
 from ..mechanics.pose import rotation
 from .urdf import legs, urdf_text
 

@@ -48,7 +48,8 @@ from ..mechanics.schemes import TAU, A, V
 from ..mechanics.workspace import Workspace
 from .engine_pinocchio import make_stepper
 
-__all__ = ["Continued", "Coupling", "CouplingOptions", "CouplingResult", "Stability", "make_coupling", "stability_of"]
+__all__ = ["Continued", "Coupling", "CouplingOptions", "CouplingResult", "Stability", "WithOutside"]
+__all__ += ["make_coupling", "stability_of"]
 
 _LEAD = dict(zip(SCHEMES, (1.0, 0.0, 0.5), strict=True))
 """Instant within a model step, in steps, at which a scheme sees the wrench."""
@@ -87,6 +88,15 @@ class CouplingResult(NamedTuple):
         """Energy that the coupling created, over the largest that passed the interface [1]."""
         return (self.work_platen - self.work_specimen) / max(self.energy, np.finfo(float).tiny)
 
+    @property
+    def summary(self) -> str:
+        """Energy and stability of the exchange in one sentence."""
+        return (
+            f"coupled specimen: at most {self.energy / 1e3:.4g} kJ passed its base; the exchange created "
+            f"{self.energy_error:.2g} of it and damps its errors to {self.stability.growth:.2g} per exchange (below 1: "
+            "stable)"
+        )
+
     def every(self, step: int, rows: int) -> "CouplingResult":
         """With every `step`-th sample, `rows` in all."""
         return self._replace(wrench=self.wrench[::step][:rows], acceleration=self.acceleration[::step][:rows])
@@ -106,6 +116,10 @@ class Continued:
         if self.order and dt > 0.0:
             self.slope = (value - self.value) / dt
         self.value, self._interval = value, dt
+
+    def hold(self) -> None:
+        """Keep the last value taken."""
+        self.slope = np.zeros(6)
 
     def at(self, t: float) -> Array:
         """Value t [s] after the last taken."""
@@ -247,6 +261,27 @@ class Coupling:
         self._exchanges += 1
         self._t = 0.0
         self._moved, self._swept = np.zeros(6), np.zeros(6)
+
+
+class WithOutside:
+    """A `Stepper` of a plant, coupled or not, that adds a wrench (6,) from outside at B in platen axes."""
+
+    def __init__(self, plant: Plant, scheme: str, dt: float, coupled: Coupling | None) -> None:
+        """`coupled`: that of the plant's specimen, if it has one."""
+        self._coupled, self._dt, self._lead = coupled, dt, _LEAD[scheme] * dt
+        self._plain = make_stepper(plant, scheme, dt)
+
+    def __call__(self, ws: Workspace, window: Array, outside: Continued | None) -> int:
+        """Advance over the model steps of a sample; returns the stage status."""
+        if self._coupled is not None:
+            return self._coupled.advance(ws, window, outside)
+        if outside is None:
+            return self._plain(ws, window)
+        for i in range(len(window)):
+            ws.external[:] = outside.at(i * self._dt + self._lead)
+            if status := self._plain(ws, window[i : i + 1]):
+                return status
+        return 0
 
 
 def make_coupling(

@@ -14,6 +14,7 @@ from ..effects.actuator import rod_travels
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
+from .ledger import WRENCH_AXES
 from .simulate import Run
 
 __all__ = ["record_of_run"]
@@ -65,6 +66,10 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         about["joint_units"] = " ".join(joint.unit for joint in joints)
         labels["specimen_joint"] = tuple(joint.name for joint in joints)
         channels["specimen_joint_position"] = (("time", "specimen_joint"), specimen_positions(plant, run.q), about)
+    if run.coupling is not None:
+        about = {"units": "N, N m", "long_name": "wrench of the specimen on the platen at its base, axes of the base"}
+        labels["wrench"] = WRENCH_AXES
+        channels["interface_wrench"] = (("time", "wrench"), run.coupling.wrench, about)
     valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
     facts: dict[str, Any] = {
         "kind": "simulated",
@@ -76,6 +81,10 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         "spool_values_clipped": run.clipped,
         "trouble": run.trouble or "none",
     }
+    if run.coupling is not None:
+        facts["interface_energy"] = run.coupling.energy
+        facts["interface_energy_error"] = run.coupling.energy_error
+        facts["interface_growth"] = run.coupling.stability.growth
     if valves:
         facts["valves_per_horizontal_actuator"] = int(valves[0])
     return make_record(run.time, channels, labels, {**facts, **attrs})

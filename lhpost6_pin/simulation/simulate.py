@@ -90,8 +90,8 @@ def simulate(
 
     `watch` is called 32 times per second of the run, first at its start. `coupling`: how a coupled specimen is.
 
-    Raises UnknownNameError or SimulationError for an invalid scheme, engine, rate, loop or exchange. A run that stops early does
-    not raise: see `Run.trouble`.
+    Raises UnknownNameError or SimulationError for an invalid scheme, engine, rate, loop or exchange. A run that stops
+    early does not raise: see `Run.trouble`.
     """
     options: dict[str, Any] = {"scheme": scheme, "steps_per_second": steps_per_second, "engine": engine}
     steps = check_run(plant, loop, samples=samples, record_every=record_every, **options)
@@ -149,7 +149,7 @@ def simulate_many(jobs: Sequence[tuple[Plant, Loop]], *, samples: int, threads: 
 
 
 def fastest_engine(plant: Plant) -> str:
-    """Fastest engine for a compiled controller on a plant: the fused one, unless a specimen has free joints or is coupled."""
+    """Fastest engine for a compiled controller: the fused one, but with free joints or a coupled specimen."""
     return "pinocchio" if plant.articulated or plant.coupled else "fused"
 
 

@@ -92,7 +92,7 @@ class SpecimenOptions(MachineOptions):
     specimen: Annotated[
         str | None,
         typer.Option(
-            help="Specimen on the platen: shipped name, URDF file, or Python, FILE.py:NAME (a class, or an OpenSees model).",
+            help="Specimen on the platen: shipped name, URDF file, or FILE.py:NAME, a class or an OpenSees model.",
             autocompletion=completing(lambda: shipped("specimens", ".urdf")),
         ),
     ] = None

@@ -16,10 +16,10 @@ The model moves relative to its base. At each exchange the inertial forces of th
 
 R the motion of a degree of freedom with the base, a the acceleration of the base (linear and angular), g gravity in
 axes of the base. That is exact for all six components of a base that moves without limit, but for what the relative
-motion u adds to it: Coriolis force, and inertia of the turning base at r + u in place of r. All fixed degrees of freedom
-move with the base; their masses ride on it. The wrench is the rate of momentum, -R^T M (u'' + R (a - g) + ...), of all
-masses: no damping force is lost, and levers are those of the undeformed model. Loads other than gravity and masses
-shared between fixed and free degrees of freedom are not taken.
+motion u adds to it: Coriolis force, and inertia of the turning base at r + u in place of r. All fixed degrees of
+freedom move with the base; their masses ride on it. The wrench is the rate of momentum of all masses,
+-R^T M (u'' + R (a - g) + omega x (omega x r)): no damping force is lost, and levers are those of the undeformed model.
+Loads other than gravity and masses shared between fixed and free degrees of freedom are not taken.
 
 OpenSees holds one model at a time in a process. Time integration: Newmark, constant average acceleration, one step per
 exchange; its relative error of a period is (omega dt)^2 / 12.
@@ -44,7 +44,7 @@ BASE = 1
 _PATTERN = 900_001
 _GRAVITY_STEPS = 10
 _TOLERANCE = 1e-12
-"""Displacement increment [m] at which an equilibrium iteration ends: rounding of forces of 1e7 N at 1e9 N/m is 1e-18."""
+"""Displacement increment [m] at which an equilibrium iteration ends."""
 _ITERATIONS = 50
 _DENSE = 100
 """Degrees of freedom up to which products with a full mass matrix are the faster."""
@@ -56,8 +56,8 @@ def import_opensees() -> Any:
         import openseespy.opensees as ops
     except (ImportError, RuntimeError) as error:
         raise SimulationError(
-            "an OpenSees model needs openseespy: pip install 'lhpost6-pin[opensees]'; on Debian and Ubuntu its libraries "
-            f"too: apt-get install libblas3 liblapack3 ({error})"
+            "an OpenSees model needs openseespy: pip install 'lhpost6-pin[opensees]'; on Debian and Ubuntu its "
+            f"libraries too: apt-get install libblas3 liblapack3 ({error})"
         ) from error
     return ops
 

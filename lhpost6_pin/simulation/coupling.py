@@ -109,21 +109,22 @@ class Continued:
         """Constant before the first `take`."""
         if order not in (0, 1):
             raise SimulationError(f"order {order} of a continued wrench; 0: held, 1: linear")
-        self.order, self.value, self.slope, self._interval = order, np.array(start, float), np.zeros(6), 0.0
+        self.order, self.value, self.slope = order, np.array(start, float), np.zeros(6)
+        self._interval = self._age = 0.0
 
     def take(self, value: Array, dt: float) -> None:
         """Take the value dt [s] after the last."""
         if self.order and dt > 0.0:
             self.slope = (value - self.value) / dt
-        self.value, self._interval = value, dt
+        self.value, self._interval, self._age = value, dt, 0.0
 
-    def hold(self) -> None:
-        """Keep the last value taken."""
-        self.slope = np.zeros(6)
+    def later(self, dt: float) -> None:
+        """Let dt [s] pass without a new value."""
+        self._age += dt
 
     def at(self, t: float) -> Array:
-        """Value t [s] after the last taken."""
-        return np.asarray(self.value + min(t, self._interval) * self.slope)
+        """Value at a time [s] from now."""
+        return np.asarray(self.value + min(self._age + t, self._interval) * self.slope)
 
 
 def stability_of(plant: Plant, dt: float, options: CouplingOptions) -> tuple[Stability, Array]:

@@ -112,8 +112,8 @@ class RunningPlant:
         """Apply the command (n_actuators,) of this sample, -1..1, and advance to the next.
 
         wrench: on the platen at C in its axes, at the start of the sample, of what is not part of the plant; without it
-        the last one goes on unchanged, at first none. Mount the rigid part of a heavy specimen and give the rest here
-        (`simulation.coupling`).
+        the last one is continued over one interval and then kept; at first there is none. Mount the rigid part of a
+        heavy specimen and give the rest here (`simulation.coupling`).
 
         Raises SimulationError for a command or wrench that is not finite, if an actuator or strut leaves its stroke,
         and if the run diverges.
@@ -142,7 +142,9 @@ class RunningPlant:
             at_b = np.array(self._base.act(given).vector)
             if self._outside is None:
                 self._outside, self._since = Continued(at_b, self._order), 0
+                self._ws.external[:] += at_b
+                self._evaluate(self._ws, self._window[0])  # the acceleration at the start of the sample
             self._outside.take(at_b, self._since / SAMPLE_RATE)
             self._since = 0
         elif self._outside is not None:
-            self._outside.hold()
+            self._outside.later(1.0 / SAMPLE_RATE)

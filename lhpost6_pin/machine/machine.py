@@ -117,18 +117,19 @@ class Machine(Structure):
 
     def with_specimen(
         self,
-        urdf: str | Path,
+        name_or_path: str | Path,
         position: Vec3 = (0.0, 0.0, 0.0),
         rpy: Vec3 = (0.0, 0.0, 0.0),
         *,
         locked: bool = False,
     ) -> "Machine":
-        """Return a copy with the specimen of a URDF (a path, or a shipped name: ``pendulum``) bolted to the platen.
+        """Return a copy with a specimen bolted to the platen: a shipped name (``pendulum``), or a file.
 
-        position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
-        locked joints make it one rigid body; free ones join the same Pinocchio model.
+        A file is a URDF, or states a rigid body with modes or matrices (.toml, .npz, .mat; `specimen_file`).
+        position [m] and rpy [rad] place its root or base in the platen's top-face frame (axes of the platen, origin C).
+        locked: one rigid body. Free joints join the Pinocchio model; modes run in both engines.
         """
-        return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
+        return replace(self, specimen=Specimen(find_specimen(name_or_path), position, rpy, locked))
 
 
 def load_machine(

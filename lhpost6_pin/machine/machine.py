@@ -22,7 +22,7 @@ from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
 from .structure import MOTIONS, Structure
-from .user_specimen import UserSpecimen, load_user_specimen
+from .user_specimen import load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -35,7 +35,7 @@ class Machine(Structure):
     """
 
     own_effects: tuple[Effect, ...] = ()
-    specimen: Specimen | UserSpecimen | None = None
+    specimen: Specimen | None = None
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -119,24 +119,24 @@ class Machine(Structure):
 
     def with_specimen(
         self,
-        urdf: Any,
+        name_or_path: Any,
         position: Vec3 = (0.0, 0.0, 0.0),
         rpy: Vec3 = (0.0, 0.0, 0.0),
         *,
         locked: bool = False,
     ) -> "Machine":
-        """Return a copy with the specimen of a URDF (a path, or a shipped name: ``pendulum``) bolted to the platen.
+        """Return a copy with a specimen bolted to the platen: a shipped name (``pendulum``), or a file.
 
+        A file is a URDF, or states a rigid body with modes or matrices (.toml, .npz, .mat; `specimen_file`).
         ``FILE.py:NAME``, or an object in Python, is a specimen of your own (`mechanics.coupled`).
-
-        position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
-        locked joints make it one rigid body; free ones join the same Pinocchio model.
+        position [m] and rpy [rad] place its root or base in the platen's top-face frame (axes of the platen, origin C).
+        locked: one rigid body. Free joints join the Pinocchio model; modes run in both engines.
         """
-        if is_python(str(urdf)) or not isinstance(urdf, str | Path):
-            return replace(
-                self, specimen=load_user_specimen(str(urdf) if isinstance(urdf, str | Path) else urdf, position, rpy)
-            )
-        return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
+        named = isinstance(name_or_path, str | Path)
+        if not named or is_python(str(name_or_path)):
+            source = str(name_or_path) if named else name_or_path
+            return replace(self, specimen=load_user_specimen(source, position, rpy))
+        return replace(self, specimen=Specimen(find_specimen(name_or_path), position, rpy, locked))
 
 
 def load_machine(
@@ -155,7 +155,7 @@ def load_machine(
 def build_machine(
     parameters: Parameters,
     added_effects: tuple[Effect, ...] = (),
-    specimen: Specimen | UserSpecimen | None = None,
+    specimen: Specimen | None = None,
     size: tuple[int, ...] | None = None,
 ) -> Machine:
     """Give typed objects to a flat mapping of quantities; raises ParameterError."""

@@ -17,8 +17,11 @@ from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
 from .coupled import CoupledSpecimen, base_at_rest, base_placement, coupled_specimen, rigid_wrench, start_coupled
 from .forward_dynamics import inertia_table
+from .joint_springs import spring_table
+from .modes import modal_states, modal_tables
 from .ports import body_table, leg_table
 from .rigid_body import free_axes, make_model
+from .specimen_mount import modal_participation
 from .tables import Tables, pack_tables
 
 __all__ = ["Plant", "State", "make_plant"]
@@ -45,6 +48,9 @@ class Plant:
     ports: tuple[str, ...]  # those that its arrays hold; platen's and swivels' only where an effect acts on them
     states: tuple[str, ...]
     supply: Supply  # supply and return pressure [Pa], and how flow changes them
+    springs: NDArray[np.void]  # joint_springs.SPRING of a specimen's joints
+    modes: NDArray[np.void]  # modes.MODE of a specimen; their states are the last of `states`
+    coupling: Array  # (n_modes * n_modes,) damping between modes [1/s], or empty
     delays: Array  # (n_actuators,) valve delay [s]
     lags: Array  # (n_actuators,) time constant [s] with which a spool follows its delayed command
     coupled: CoupledSpecimen | None = None  # specimen that exchanges motion and wrench with the platen
@@ -52,9 +58,9 @@ class Plant:
     @cached_property
     def tables(self) -> Tables:
         """All tables as compiled code reads them."""
-        inertia = inertia_table(self.model, self.machine, self.axes)
+        inertia = inertia_table(self.model, self.machine, self.axes, self.modes)
         damping, actuators = np.array(self.model.damping), actuator_rows(self.rows)
-        rest = damping, actuators, self.command_path, inertia, self.supply
+        rest = damping, actuators, self.command_path, inertia, self.springs, self.modes, self.coupling, self.supply
         return pack_tables(self.axes, self.legs, self.body, self.rows, *rest)
 
     @cached_property
@@ -87,6 +93,11 @@ class Plant:
         """Whether a specimen on the platen moves on joints of its own."""
         return bool(self.model.nv > self.axes.size)
 
+    @property
+    def flexible(self) -> bool:
+        """Whether a specimen on the platen moves at all, on joints, in modes, or by itself."""
+        return self.articulated or self.modes.size > 0 or self.coupled is not None
+
     def zero_state(self) -> State:
         """State in the control zero-position at rest with all hidden states zero (no pressure)."""
         q = pin.neutral(self.model)
@@ -111,18 +122,23 @@ def make_plant(machine: Machine) -> Plant:
             ports = ports[:end]  # no effect acts on the others: nothing to evaluate there
     states = state_names(effects)
     oil = machine.hydraulics
+    coupled, specimen = coupled_specimen(machine), machine.specimen
+    model = make_model(machine, coupled)
+    modes, coupling = modal_tables(specimen.modes if specimen else None, modal_participation(machine))
     delays, lags = command_path(effects, {a.name: a.valve_delay for a in machine.actuators})
-    coupled = coupled_specimen(machine)
     return Plant(
         machine=machine,
-        model=make_model(machine, coupled),
+        model=model,
         axes=free_axes(machine),
         legs=leg_table(machine),
         body=body_table(machine),
         rows=rows,
         ports=ports,
-        states=states,
+        states=(*states, *modal_states(modes.size)),
         supply=supply_of(effects, states, oil.supply_pressure, oil.return_pressure),
+        springs=spring_table(model, specimen),
+        modes=modes,
+        coupling=coupling,
         delays=np.array(delays),
         lags=np.array(lags),
         coupled=coupled,

@@ -28,8 +28,9 @@ def refuse_joints(plant: Plant) -> None:
         )
     if plant.articulated:
         raise SimulationError(
-            "the fused engine takes a platen with a rigid specimen at most; take the engine pinocchio for free joints "
-            "(--engine pinocchio), or lock them (--locked)"
+            "the fused engine takes no free joints: its compiled algebra is that of one rigid body, and joints need "
+            "the articulated-body algorithm of Pinocchio; take that engine (--engine pinocchio), lock the joints "
+            "(--locked), or describe the specimen by modes or matrices (.toml, .npz, .mat), which run on both"
         )
 
 

@@ -41,7 +41,7 @@ from ..mechanics.coupled import (
     start_coupled,
     step_coupled,
 )
-from ..mechanics.derivatives import evaluate
+from ..mechanics.derivatives import Forward, evaluate, forward_dynamics
 from ..mechanics.interface import apparent_mass, base_motion, mass_at_b
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import TAU, A, V
@@ -181,11 +181,10 @@ class Coupling:
         axes = plant.axes
         table = apparent_mass(plant)[np.ix_(axes, axes)]
         share = np.linalg.solve(table + self._added[np.ix_(axes, axes)], table)
-        if not self._added.any():
-            self._forward = pin.aba
-        else:
-            self._forward = lambda *state: share @ pin.aba(*state)
-        self._data = plant.model.createData()
+        accelerate = forward_dynamics(plant)
+        self._forward: Forward = accelerate
+        if self._added.any():
+            self._forward = lambda q, v, tau: share @ accelerate(q, v, tau)
         self._step = make_stepper(plant, scheme, dt, self._forward)
         self._placement = base_placement(plant.machine)
         assert plant.coupled is not None
@@ -203,7 +202,7 @@ class Coupling:
         """As `evaluate_derivatives`, with the interface mass."""
         status = evaluate(self._plant, ws, spool)
         if status == 0:
-            ws.motion[A] = self._forward(self._plant.model, self._data, ws.q, ws.motion[V], ws.motion[TAU])
+            ws.motion[A] = self._forward(ws.q, ws.motion[V], ws.motion[TAU])
         return status
 
     def advance(self, ws: Workspace, window: Array, outside: Continued | None = None) -> int:

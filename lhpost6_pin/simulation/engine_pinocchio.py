@@ -11,25 +11,25 @@ import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from ..mechanics.derivatives import rates_at
+from ..mechanics.derivatives import Forward, forward_dynamics, rates_at
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, staggered_stage
 from ..mechanics.tables import unpack_tables
 from ..mechanics.workspace import Workspace, unpack_workspace
 
-__all__ = ["Forward", "Stepper", "make_stepper"]
+__all__ = ["Stepper", "make_stepper"]
 
 Stepper = Callable[[Workspace, Array], int]
 """Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
 
 
-Forward = Callable[[Any, Any, Array, Array, Array], Array]
-"""Forward dynamics a = f(model, data, q, v, tau), as pin.aba."""
+def make_stepper(plant: Plant, scheme: str, dt: float, forward: Forward | None = None) -> Stepper:
+    """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand.
 
-
-def make_stepper(plant: Plant, scheme: str, dt: float, forward: Forward = pin.aba) -> Stepper:
-    """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand."""
-    return {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}[scheme](plant, dt, forward)
+    forward: accelerations of q, v and torque, in place of the plant's `forward_dynamics`.
+    """
+    kinds = {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}
+    return kinds[scheme](plant, dt, forward or forward_dynamics(plant))
 
 
 @compiled
@@ -38,9 +38,8 @@ def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
 
-def _semi_implicit(plant: Plant, dt: float, forward: Forward) -> Stepper:
-    model, data, packed = plant.model, plant.model.createData(), plant.tables.packed
-    integrate = pin.integrate
+def _semi_implicit(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+    model, packed, integrate = plant.model, plant.tables.packed, pin.integrate
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, buffer = ws.motion, ws.buffer
@@ -52,15 +51,15 @@ def _semi_implicit(plant: Plant, dt: float, forward: Forward) -> Stepper:
             status = _staggered(q, dt, packed, buffer, held)
             if status:
                 break
-            kick(motion, forward(model, data, q, v_seen, tau), dt)
+            kick(motion, accelerate(q, v_seen, tau), dt)
         ws.q[:] = q
         return status
 
     return advance
 
 
-def _euler(plant: Plant, dt: float, forward: Forward) -> Stepper:
-    model, data = plant.model, plant.model.createData()
+def _euler(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+    model = plant.model
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, z = ws.motion, ws.z
@@ -69,7 +68,7 @@ def _euler(plant: Plant, dt: float, forward: Forward) -> Stepper:
             status = rates_at(plant, ws, ws.q, ws.z, held)
             if status:
                 return status
-            motion[A] = forward(model, data, ws.q, motion[V], motion[TAU])
+            motion[A] = accelerate(ws.q, motion[V], motion[TAU])
             ws.q[:] = pin.integrate(model, ws.q, dt * motion[V])
             motion[V] += dt * motion[A]
             z += dt * ws.zd
@@ -91,8 +90,8 @@ def _local_rate(model: Any, n_platen: int, q0: Array, q: Array, moved: Array, v:
     return out
 
 
-def _rk4(plant: Plant, dt: float, forward: Forward) -> Stepper:
-    model, data, n_platen = plant.model, plant.model.createData(), plant.axes.size
+def _rk4(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+    model, n_platen = plant.model, plant.axes.size
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, q0 = ws.motion, ws.q
@@ -108,7 +107,7 @@ def _rk4(plant: Plant, dt: float, forward: Forward) -> Stepper:
                 if status:
                     return status
                 step = _local_rate(model, n_platen, q0, q, reach * dt * step, v)
-                dv, dz = forward(model, data, q, v, motion[TAU]), ws.zd
+                dv, dz = accelerate(q, v, motion[TAU]), ws.zd
                 if reach == 0.0:
                     motion[A] = dv
                 for total, rate in zip(sums, (step, dv, dz), strict=True):

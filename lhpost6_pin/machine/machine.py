@@ -134,6 +134,8 @@ class Machine(Structure):
         """
         named = isinstance(name_or_path, str | Path)
         if not named or is_python(str(name_or_path)):
+            if locked:
+                raise ParameterError(f"{name_or_path}: a specimen in Python has no joints or modes to lock (--locked)")
             source = str(name_or_path) if named else name_or_path
             return replace(self, specimen=load_user_specimen(source, position, rpy))
         return replace(self, specimen=Specimen(find_specimen(name_or_path), position, rpy, locked))

@@ -17,6 +17,7 @@ from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.interfaces.fmi import export_fmu
 from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file, save_machine_file
 from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.mechanics.interface import motion_numbers, wrench_of
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.simulation.running import RunningPlant
@@ -114,6 +115,7 @@ def measured(table: RunningPlant) -> dict[str, np.ndarray]:
         )
         for side in "ab"
     }
+    interface = np.split(motion_numbers(table.interface_motion()), 3)
     return pressures | {
         "actuator_displacement": sensors.displacement,
         "actuator_force": sensors.force,
@@ -121,6 +123,7 @@ def measured(table: RunningPlant) -> dict[str, np.ndarray]:
         "platen_displacement": platen.displacement[0],
         "platen_velocity": platen.velocity[0],
         "spool_position": table.spool,
+        **dict(zip(("interface_pose", "interface_velocity", "interface_acceleration"), interface, strict=True)),
     }
 
 
@@ -158,7 +161,8 @@ def test_the_model_description_is_valid_and_says_what_the_fmu_can(made):
     units = {v.name: v.unit for v in about.modelVariables if v.type == "Real"}
     assert units["actuator_force_V6"] == "N" and units["platen_acceleration_yaw"] == "rad/s2"
     assert [n for n in units if n.startswith("platen_velocity_")] == [f"platen_velocity_{axis}" for axis in AXES]
-    assert len(about.outputs) == 10 * 4 + 4 + 18 + 1
+    assert len(about.outputs) == 10 * 4 + 4 + 18 + 18 + 1
+    assert units["interface_wrench_mx"] == "N.m" and units["interface_acceleration_pitch"] == "rad/s2"
     assert all(unknown.dependencies == [] for unknown in about.outputs)  # no direct feedthrough
 
 
@@ -193,6 +197,23 @@ def test_the_fmu_is_the_plant_to_the_last_bit(instance, plant, rest, samples):
             table.advance(command)
     assert table.time == 1.0 and np.abs(table.sensors().displacement).max() > 1e-3
     assert_same(instance, table)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_a_wrench_acts_as_on_the_plant_to_the_last_bit(folder, plant, rest, order):
+    """Steps of two samples: the wrench is taken at their start, held, or continued as `RunningPlant` does."""
+    one = Instance(folder, wrench_order=order)
+    table = RunningPlant(plant, rest, wrench_order=order)
+    inputs = [one.numbers[f"interface_wrench_{name}"] for name in ("fx", "fy", "fz", "mx", "my", "mz")]
+    for k in range(0, 200, 2):
+        push = np.array([1e5, 2e4, -1e5, 1e4, 0.0, 3e4]) * np.sin(0.05 * k)
+        one.fmu.setReal(inputs, list(push))
+        one.step(k * STEP, 2 * STEP)
+        table.advance(rest.spool, wrench_of(push))
+        table.advance(rest.spool)
+    assert np.abs(table.sensors().displacement).max() > 1e-4
+    assert_same(one, table)
+    one.fmu.freeInstance()
 
 
 def test_fmpys_own_loop_drives_it_within_a_nanometre(made, plant, rest):

@@ -20,6 +20,7 @@ from lhpost6_pin.interfaces.link.protocol import (
     encode,
     find_mode,
     is_newer,
+    refusal,
 )
 
 U32, U64 = st.integers(0, 2**32 - 1), st.integers(0, 2**64 - 1)
@@ -31,7 +32,7 @@ EXAMPLES = [
     Datagram(Kind.HELLO, 7),
     Datagram(Kind.WELCOME, 7, LinkMode.FREE, actuators=3, valves=4, welcome=ABOUT),
     Datagram(Kind.COMMAND, 7, actuators=2, valves=3, sequence=1, numbers=np.array([0.5, -0.25, 1e-300])),
-    Datagram(Kind.SENSORS, 7, LinkMode.REAL_TIME, PlantState.HOLD, 1, 1, 9, 8, 5, 6, np.arange(8.0)),
+    Datagram(Kind.SENSORS, 7, LinkMode.REAL_TIME, PlantState.HOLD, 1, 1, 9, 8, 5, 6, np.arange(26.0)),
     Datagram(Kind.BYE, 7),
     Datagram(Kind.STATUS, 7, counts=tuple(range(12))),
 ]
@@ -46,7 +47,7 @@ def same(a: Datagram, b: Datagram) -> bool:
 def test_a_command_written_by_hand_from_the_layout_is_a_frame():
     datagram = bytearray(48 + 2 * 8)
     datagram[0:4] = b"LHP6"
-    datagram[4], datagram[5], datagram[8], datagram[9] = 1, 3, 2, 2
+    datagram[4], datagram[5], datagram[8], datagram[9] = 2, 3, 2, 2
     for offset, form, value in ((12, "<I", 77), (16, "<I", 1), (24, "<Q", 10**18), (48, "<d", 0.5), (56, "<d", -0.25)):
         struct.pack_into(form, datagram, offset, value)
     frame = decode(bytes(datagram))
@@ -61,7 +62,7 @@ def test_sensors_and_welcome_are_laid_out_as_the_table_says():
     sensors = encode(EXAMPLES[3])
     assert sensors[6] == 1 and sensors[7] == 2
     assert struct.unpack_from("<IIQQ", sensors, 16) == (9, 8, 5, 6)
-    assert struct.unpack_from("<8d", sensors, 48) == tuple(range(8))
+    assert struct.unpack_from("<26d", sensors, 48) == tuple(range(26))
     welcome = encode(EXAMPLES[1])
     assert struct.unpack_from("<d32s", welcome, 48) == (2048.0, b"lhpost6".ljust(32, b"\0"))
     assert struct.unpack_from("<15sB15sB", welcome, 88) == (b"H1".ljust(15, b"\0"), 2, b"V1".ljust(15, b"\0"), 1)
@@ -72,8 +73,33 @@ def test_commands_and_sensors_come_back_to_the_last_bit(head, numbers):
     command = Datagram(Kind.COMMAND, **head, valves=len(numbers), numbers=np.array(numbers, float))
     assert same(decode(encode(command)), command)
     n = len(numbers) // 2
-    sensors = Datagram(Kind.SENSORS, **head, actuators=n, numbers=np.array([*range(6), *numbers[: 2 * n]], float))
+    sensors = Datagram(Kind.SENSORS, **head, actuators=n, numbers=np.array([*range(24), *numbers[: 2 * n]], float))
     assert same(decode(encode(sensors)), sensors)
+
+
+def test_a_command_with_a_wrench_sets_its_flag_and_has_six_numbers_more():
+    values = np.array([0.5, -0.25, *range(1, 7)], float)
+    datagram = encode(Datagram(Kind.COMMAND, 7, actuators=2, valves=2, sequence=1, numbers=values))
+    assert datagram[10] == 3 and len(datagram) == 48 + 8 * 8
+    assert struct.unpack_from("<6d", datagram, 64) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    found = decode(datagram)
+    assert np.array_equal(found.wrench, values[2:]) and np.array_equal(found.numbers, values)
+    assert decode(encode(EXAMPLES[2])).wrench is None and EXAMPLES[3].wrench is None
+    with pytest.raises(LinkError, match="command frame of 2 actuators"):
+        encode(Datagram(Kind.COMMAND, 7, actuators=2, valves=2, numbers=values[:7]))
+
+
+def test_a_client_of_version_1_is_told_in_frames_of_its_own_which_version_is_needed():
+    """Decoded by the layout of version 1: a machine without actuators whose name is the message."""
+    welcome, sensors = refusal(77)
+    for datagram, kind in ((welcome, 2), (sensors, 4)):
+        assert (datagram[4], datagram[5], datagram[8], datagram[9]) == (1, kind, 0, 0)
+        assert struct.unpack_from("<I", datagram, 12) == (77,)
+        blank = bytearray(datagram)
+        blank[40:44] = bytes(4)
+        assert struct.unpack_from("<I", datagram, 40) == (zlib.crc32(blank),)
+    assert len(welcome) == 48 + 40 and len(sensors) == 48 + 48
+    assert struct.unpack_from("<d32s", welcome, 48)[1].rstrip(b"\0") == b"needs protocol version 2"
 
 
 def test_names_too_long_for_their_place_are_cut_to_whole_characters():
@@ -118,7 +144,9 @@ def test_a_frame_comes_back_cut_short_is_short_and_too_long_or_with_a_changed_bi
             decode(bytes(changed))
 
 
-@pytest.mark.parametrize("offset, value, word", [(0, 65, "begins"), (4, 2, "version 2"), (5, 7, "kind 7"), (5, 0, "0")])
+@pytest.mark.parametrize(
+    "offset, value, word", [(0, 65, "begins"), (4, 1, "version 1; version 2 is needed"), (5, 7, "kind 7"), (5, 0, "0")]
+)
 def test_what_is_wrong_with_a_header_is_said(offset, value, word):
     datagram = bytearray(encode(EXAMPLES[0]))
     datagram[offset] = value

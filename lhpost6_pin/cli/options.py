@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..core.errors import MotionError, ParameterError
-from ..core.files import shipped
+from ..core.files import shipped, shipped_specimens
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from .completion import complete_motion, completing
 
@@ -92,14 +92,17 @@ class SpecimenOptions(MachineOptions):
     specimen: Annotated[
         str | None,
         typer.Option(
-            help="Specimen bolted to the platen: shipped name, or a URDF file.",
-            autocompletion=completing(lambda: shipped("specimens", ".urdf")),
+            help="Specimen on the platen: shipped name; a URDF; a rigid body with modes or matrices in .toml, .npz or "
+            ".mat; or FILE.py:NAME, a class or an OpenSees model.",
+            autocompletion=completing(shipped_specimens),
         ),
     ] = None
     specimen_at: Annotated[
         str | None, typer.Option(help=r"Place of its root from C: x,y,z \[m], or with roll,pitch,yaw \[rad].")
     ] = None
-    locked: Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints: one rigid body.")] = False
+    locked: Annotated[bool, typer.Option("--locked", help="Lock the specimen's joints or modes: one rigid body.")] = (
+        False
+    )
 
     def load(self, valves: int = 0) -> "Machine":
         """Machine with its open valves and its specimen, if any; warnings about the specimen are logged."""

@@ -168,6 +168,7 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
     beyond = joints_beyond(done.plant, done.time, done.q)
     for warning in beyond:
         log.warning("%s", warning)
+    exchanged = [done.coupling.summary] if done.coupling else []
     if against is None:
         from ..show.report import write_run_report
 
@@ -176,7 +177,7 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
             record,
             files[1],
             limits=report_limits(done.plant),
-            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond],
+            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *exchanged],
             command=repeating_command(),
             machine_table=machine_rows(done.plant.machine),
         )

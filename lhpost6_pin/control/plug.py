@@ -10,24 +10,25 @@
 `lhpost6 run MOTION --controller mine.py:Mine` runs it in place of the 469D; so does `PluggedLoop` in Python.
 """
 
-import importlib.util
-import sys
-import traceback
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
-from ..core.errors import ControllerError, LhpostError
+from ..core.errors import ControllerError
+from ..core.user_code import call_user, is_python, load_attribute, make_attribute
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant
 from .loop import Feedback
 
 __all__ = ["Feedback", "UserController", "Wanted", "checked_command", "is_plugged", "load_plugged"]
 __all__ += ["start_plugged"]
+
+
+is_plugged = is_python
+"""Whether the name of a controller is a class or function in a Python file rather than settings."""
 
 
 class Wanted(NamedTuple):
@@ -48,39 +49,13 @@ class UserController(Protocol):
         """Spool commands (n_actuators,), -1..1, of one sample; called once a sample, in order."""
 
 
-def is_plugged(name: str) -> bool:
-    """Whether the name of a controller is a class or function in a Python file rather than settings."""
-    return ".py:" in name or name.endswith(".py")
-
-
 def load_plugged(name: str) -> UserController:
     """Controller from ``file.py:Name``, a class without arguments or a function that returns one.
 
     Raises ControllerError naming the file and what is wrong with it.
     """
-    file, colon, attribute = name.rpartition(":")
-    if not colon:
-        raise ControllerError(f"{name}: which class or function in it? write --controller {name}:NAME")
-    path = Path(file)
-    if not path.is_file():
-        raise ControllerError(f"{path}: no such file; write --controller FILE.py:NAME")
-    spec = importlib.util.spec_from_file_location(f"lhpost6_plugged_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise ControllerError(f"{path} cannot be imported as Python")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses and pickle look up modules there
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # whatever a user's file raises
-        del sys.modules[spec.name]
-        raise ControllerError(f"{path} cannot be imported: {type(error).__name__}: {error}") from error
-    if not hasattr(module, attribute):
-        names = [n for n, v in vars(module).items() if callable(v) and getattr(v, "__module__", "") == module.__name__]
-        raise ControllerError(f"{path} has no {attribute!r}; it has {', '.join(names) or 'no class or function'}")
-    try:
-        controller = getattr(module, attribute)()
-    except (Exception, SystemExit) as error:  # likewise
-        raise ControllerError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
+    made = load_attribute(name, "--controller", ControllerError)
+    controller: UserController = make_attribute(name, made, ControllerError)
     for method in ("init", "step"):
         if not callable(getattr(controller, method, None)):
             raise ControllerError(f"{name} has no {method}(); a controller has init(plant, rest) and step(...)")
@@ -99,27 +74,15 @@ def start_plugged(
     views = [values.view() for values in motion]
     for values in views:
         values.flags.writeable = False
-    memory = _call(controller, "init", "", plant, rest)
+    memory = call_user(controller, "init", "", ControllerError, plant, rest)
 
     def command(sample: int, sensors: Feedback) -> Array:
         wanted = Wanted(*(values[sample] for values in views))
-        given = _call(controller, "step", f" at sample {sample}", memory, wanted, sensors)
+        when = f" at sample {sample}"
+        given = call_user(controller, "step", when, ControllerError, memory, wanted, sensors)
         return checked_command(controller, given, sample, plant.spools)
 
     return command
-
-
-def _call(controller: UserController, method: str, when: str, *arguments: Any) -> Any:
-    """Result of a user's method; an exception becomes a ControllerError with the line of the file that raised it."""
-    try:
-        return getattr(controller, method)(*arguments)
-    except LhpostError:
-        raise
-    except (Exception, SystemExit) as error:  # whatever a user's code raises
-        lines = [f for f in traceback.extract_tb(error.__traceback__) if f.filename != __file__]
-        where = f" ({lines[-1].filename}, line {lines[-1].lineno})" if lines else ""
-        what = f"{type(error).__name__}: {error}{where}"
-        raise ControllerError(f"{type(controller).__name__}.{method} failed{when}: {what}") from error
 
 
 def checked_command(controller: UserController, command: ArrayLike, sample: int, spools: int) -> Array:

@@ -11,7 +11,12 @@ from typing import Any
 
 from .errors import UnknownNameError
 
-__all__ = ["find_shipped", "models_folder", "read_toml", "reason_of", "refuse_folder", "shipped", "write_whole"]
+__all__ = ["find_shipped", "models_folder", "read_toml", "reason_of", "refuse_folder", "shipped"]
+__all__ += ["shipped_specimens", "write_whole"]
+
+
+_SPECIMENS = (".urdf", ".toml", ".npz", ".mat")
+"""Files of specimens; of several with one name the first counts."""
 
 
 def models_folder() -> Path:
@@ -24,6 +29,11 @@ def models_folder() -> Path:
 def shipped(folder: str = "", suffix: str = ".toml") -> dict[str, Path]:
     """Files in a folder of the shipped data, by name."""
     return {path.stem: path for path in sorted((models_folder() / folder).glob(f"*{suffix}"))}
+
+
+def shipped_specimens() -> dict[str, Path]:
+    """Shipped specimens by name; a TOML beside a URDF states its joints and is no specimen of its own."""
+    return {name: path for suffix in reversed(_SPECIMENS) for name, path in shipped("specimens", suffix).items()}
 
 
 def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") -> Path:

@@ -113,10 +113,10 @@ def inverse_dynamics(
     (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
-    if plant.model.nv != plant.axes.size:
+    if plant.flexible:
         raise SimulationError(
-            "inverse dynamics takes a platen with a rigid specimen at most: the motion of its joints is not measured; "
-            "lock them (--locked)"
+            "inverse dynamics takes a platen with a rigid specimen at most: the motion of its joints or modes is not "
+            "measured; lock them (--locked)"
         )
     t = np.asarray(time, float)
     dt = float(t[-1] - t[0]) / (len(t) - 1)

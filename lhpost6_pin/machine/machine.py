@@ -12,6 +12,7 @@ from typing import Any
 
 from ..core.errors import ParameterError, RecordError, UnknownNameError, instead_of
 from ..core.names import AXES
+from ..core.user_code import is_python
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
@@ -21,6 +22,7 @@ from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
 from .structure import MOTIONS, Structure
+from .user_specimen import load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -117,18 +119,26 @@ class Machine(Structure):
 
     def with_specimen(
         self,
-        urdf: str | Path,
+        name_or_path: Any,
         position: Vec3 = (0.0, 0.0, 0.0),
         rpy: Vec3 = (0.0, 0.0, 0.0),
         *,
         locked: bool = False,
     ) -> "Machine":
-        """Return a copy with the specimen of a URDF (a path, or a shipped name: ``pendulum``) bolted to the platen.
+        """Return a copy with a specimen bolted to the platen: a shipped name (``pendulum``), or a file.
 
-        position [m] and rpy [rad] place the URDF's root in the platen's top-face frame (axes of the platen, origin C).
-        locked joints make it one rigid body; free ones join the same Pinocchio model.
+        A file is a URDF, or states a rigid body with modes or matrices (.toml, .npz, .mat; `specimen_file`).
+        ``FILE.py:NAME``, or an object in Python, is a specimen of your own (`mechanics.coupled`).
+        position [m] and rpy [rad] place its root or base in the platen's top-face frame (axes of the platen, origin C).
+        locked: one rigid body. Free joints join the Pinocchio model; modes run in both engines.
         """
-        return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
+        named = isinstance(name_or_path, str | Path)
+        if not named or is_python(str(name_or_path)):
+            if locked:
+                raise ParameterError(f"{name_or_path}: a specimen in Python has no joints or modes to lock (--locked)")
+            source = str(name_or_path) if named else name_or_path
+            return replace(self, specimen=load_user_specimen(source, position, rpy))
+        return replace(self, specimen=Specimen(find_specimen(name_or_path), position, rpy, locked))
 
 
 def load_machine(

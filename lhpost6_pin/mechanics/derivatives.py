@@ -1,22 +1,47 @@
 """Forces, rates and accelerations of a plant at one state."""
 
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
 from .plant import Plant
+from .rigid_body import platen_inertia
 from .schemes import TAU, V_SEEN, A, V, rates_stage
 from .tables import unpack_tables
 from .workspace import Workspace, unpack_workspace
 
-__all__ = ["evaluate", "rates_at", "evaluate_derivatives"]
+__all__ = ["Forward", "evaluate", "evaluate_derivatives", "forward_dynamics", "rates_at"]
+
+
+Forward = Callable[[Array, Array, Array], Array]
+"""Accelerations (nv,) of q, v and torque."""
+
+
+def forward_dynamics(plant: Plant) -> Forward:
+    """Accelerations (nv,) of q, v and torque, by pin.aba; with modes of a specimen on the mass that they reduce.
+
+    aba divides the torque by the mass M of platen and specimen as a rigid body; modes leave M - sum G G^T (`modes`),
+    both constant in platen axes: its acceleration is (M - sum G G^T)^-1 M times that of aba.
+    """
+    aba = partial(pin.aba, plant.model, plant.model.createData())
+    if not plant.modes.size:
+        return aba
+    _, full = platen_inertia(plant.model, plant.machine)
+    block = np.ix_(plant.axes, plant.axes)
+    taken = plant.modes["participation"].T @ plant.modes["participation"]
+    ratio = np.linalg.solve((full - taken)[block], full[block])
+    return lambda q, v, tau: ratio @ aba(q, v, tau)
 
 
 def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
     """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
     status = evaluate(plant, ws, spool)
     if status == 0:
-        ws.motion[A] = pin.aba(plant.model, plant.model.createData(), ws.q, ws.motion[V], ws.motion[TAU])
+        ws.motion[A] = forward_dynamics(plant)(ws.q, ws.motion[V], ws.motion[TAU])
     return status
 
 

@@ -14,15 +14,18 @@ from ..effects.supply import steady_supply, supply_pressures
 from ..laws.hydraulic import Hydraulic, leak_flows, valve_flows
 from ..laws.orifice import spool_for_opening
 from ..laws.supply import varies
+from .modes import rest_of_modes
 from .plant import Plant, State
 from .schemes import TAU, forces_stage, pose_stage
 from .workspace import make_workspace
 
-__all__ = ["Equilibrium", "find_equilibrium", "rest_pressures", "unloaded_speeds"]
+__all__ = ["Equilibrium", "find_equilibrium", "rest_pressures", "specimen_at_rest", "unloaded_speeds"]
 
 Pressures = tuple[float, ...]
 """Supply and return pressure [Pa], perhaps with what follows in `laws.supply.Supply`."""
 
+_SPRING_TURNS, _SPRING_MISS = 50, 1e-12
+"""Newton's iterations for the rest of springs, and their last step [m or rad]."""
 _SUPPLY_TURNS = 8
 """Rounds of pressures at rest and flow drawn: leaks lower the supply by a thousandth of its pressure."""
 
@@ -43,9 +46,8 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     Ten actuators hold six degrees of freedom: of all solutions of Eq. 4-30 this is the one of least norm.
     Raises SimulationError if the actuators cannot hold the platen, or not within supply and return pressure.
     """
-    start = plant.zero_state()
+    start = specimen_at_rest(plant)
     ws = make_workspace(plant, start)
-    ws.z[:] = 0.0
     pose_stage(ws.q, plant.tables, ws)
     forces_stage(plant.tables, ws, ws.z)
     free = plant.axes.size
@@ -67,6 +69,39 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
         _fill(plant, force, supply_pressures(plant.supply, z), z, spool)
     wrench = pin.SE3(np.eye(3), -plant.body[0]["rho_c"]).act(pin.Force(ws.JB[1][: plant.spools].T @ force))
     return Equilibrium(State(start.q, start.v, z), spool, force, pin.SE3.Identity(), wrench)
+
+
+def specimen_at_rest(plant: Plant) -> State:
+    """The zero state with the specimen at rest under its weight; raises SimulationError for one that falls over."""
+    start = plant.zero_state()
+    if plant.modes.size:
+        start.z[-2 * plant.modes.size :] = rest_of_modes(plant.modes, plant.model.gravity.linear)
+    return State(_rest_of_springs(plant, start.q), start.v, start.z)
+
+
+def _rest_of_springs(plant: Plant, q: Array) -> Array:
+    """Configuration at which the springs in a specimen's joints carry its weight; other joints stay.
+
+    Raises SimulationError if there is none nearby: the specimen falls over.
+    """
+    springs, model = plant.springs[plant.springs["stiffness"] > 0.0], plant.model
+    if not springs.size:
+        return q
+    data, at, v = model.createData(), springs["v"], np.zeros(model.nv)
+    for _ in range(_SPRING_TURNS):
+        table = [np.arctan2(q[s["q"] + 1], q[s["q"]]) if s["turns"] else q[s["q"]] for s in springs]
+        miss = springs["stiffness"] * (springs["rest"] - table) - pin.computeGeneralizedGravity(model, data, q)[at]
+        rate = np.diag(springs["stiffness"]) + pin.computeGeneralizedGravityDerivatives(model, data, q)[np.ix_(at, at)]
+        if np.linalg.eigvalsh(0.5 * (rate + rate.T))[0] <= 0.0:
+            break
+        v[at] = np.linalg.solve(rate, miss)
+        q = pin.integrate(model, q, v)
+        if np.abs(v).max() < _SPRING_MISS:
+            return np.asarray(q)
+    raise SimulationError(
+        f"specimen {plant.machine.specimen.name if plant.machine.specimen else ''} has no stable rest: its weight "
+        "overcomes the springs in its joints; make them stiffer"
+    )
 
 
 def _fill(plant: Plant, force: Array, supply: Pressures, z: Array, spool: Array) -> None:

@@ -14,14 +14,15 @@ __all__ = ["INERTIA", "inertia_table", "platen_acceleration"]
 INERTIA = np.dtype(
     [
         ("plain", np.float64, (6, 6)),  # spatial inertia of the platen body at B, linear first
-        ("inverse", np.float64, (6, 6)),  # of plain plus directional mass, on the free axes, zero elsewhere
+        # of plain plus directional mass, less what modes of a specimen take, on the free axes, zero elsewhere
+        ("inverse", np.float64, (6, 6)),
         ("gravity", np.float64),  # [m/s2]
     ]
 )
 
 
-def inertia_table(model: Any, machine: Machine, axes: NDArray[np.int64]) -> NDArray[np.void]:
-    """Table (one row) of the rigid body; all zero for an articulated specimen."""
+def inertia_table(model: Any, machine: Machine, axes: NDArray[np.int64], modes: NDArray[np.void]) -> NDArray[np.void]:
+    """Table (one row) of the rigid body; all zero for an articulated specimen. modes (`modes.MODE`) reduce its mass."""
     table = np.zeros(1, INERTIA)
     if model.nv > axes.size:
         return table
@@ -29,7 +30,7 @@ def inertia_table(model: Any, machine: Machine, axes: NDArray[np.int64]) -> NDAr
     table["plain"] = plain
     block = np.ix_(axes, axes)
     inverse = np.zeros((6, 6))
-    inverse[block] = np.linalg.inv(full[block])
+    inverse[block] = np.linalg.inv((full - modes["participation"].T @ modes["participation"])[block])
     table["inverse"] = inverse
     table["gravity"] = machine.platen.gravity
     return table

@@ -18,6 +18,7 @@ __all__ = ["SPOOL_STEP", "LinearPlant", "OilColumnMode", "linearize", "oil_colum
 
 # Finite-difference steps: small against every scale of the machine, large against rounding.
 _POSE_STEP, _VELOCITY_STEP, _PRESSURE_STEP, SPOOL_STEP = 1e-6, 1e-6, 1e2, 1e-6
+_MODE_STEP = 1e-2  # of modal states, in which the plant is linear
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
     size = np.concatenate(
         [np.full(nv, _POSE_STEP), np.full(nv, _VELOCITY_STEP), np.where(pressure, _PRESSURE_STEP, _POSE_STEP)]
     )
+    if plant.modes.size:
+        size[-2 * plant.modes.size :] = _MODE_STEP
 
     def rates(x: Array, u: Array) -> Array:
         ws.q[:] = pin.integrate(plant.model, state.q, x[:nv])

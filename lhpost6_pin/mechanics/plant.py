@@ -15,9 +15,13 @@ from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from .coupled import CoupledSpecimen, base_at_rest, base_placement, coupled_specimen, rigid_wrench, start_coupled
 from .forward_dynamics import inertia_table
+from .joint_springs import spring_table
+from .modes import modal_states, modal_tables
 from .ports import body_table, leg_table
 from .rigid_body import free_axes, make_model
+from .specimen_mount import modal_participation
 from .tables import Tables, pack_tables
 
 __all__ = ["Plant", "State", "make_plant"]
@@ -44,15 +48,19 @@ class Plant:
     ports: tuple[str, ...]  # those that its arrays hold; platen's and swivels' only where an effect acts on them
     states: tuple[str, ...]
     supply: Supply  # supply and return pressure [Pa], and how flow changes them
+    springs: NDArray[np.void]  # joint_springs.SPRING of a specimen's joints
+    modes: NDArray[np.void]  # modes.MODE of a specimen; their states are the last of `states`
+    coupling: Array  # (n_modes * n_modes,) damping between modes [1/s], or empty
     delays: Array  # (n_actuators,) valve delay [s]
     lags: Array  # (n_actuators,) time constant [s] with which a spool follows its delayed command
+    coupled: CoupledSpecimen | None = None  # specimen that exchanges motion and wrench with the platen
 
     @cached_property
     def tables(self) -> Tables:
         """All tables as compiled code reads them."""
-        inertia = inertia_table(self.model, self.machine, self.axes)
+        inertia = inertia_table(self.model, self.machine, self.axes, self.modes)
         damping, actuators = np.array(self.model.damping), actuator_rows(self.rows)
-        rest = damping, actuators, self.command_path, inertia, self.supply
+        rest = damping, actuators, self.command_path, inertia, self.springs, self.modes, self.coupling, self.supply
         return pack_tables(self.axes, self.legs, self.body, self.rows, *rest)
 
     @cached_property
@@ -70,10 +78,25 @@ class Plant:
         """Delays of valves (n_actuators,) [s], with lags behind if any, as `valve_delay.delayed_spools` takes them."""
         return np.concatenate([self.delays, self.lags]) if self.lags.any() else self.delays
 
+    @cached_property
+    def rest_external(self) -> Array:
+        """Wrench (6,) at B in platen axes of a coupled specimen at rest, less that of what is rigidly attached."""
+        if self.coupled is None:
+            return np.zeros(6)
+        base, gravity = base_at_rest(self.machine), self.machine.platen.gravity
+        _, wrench = start_coupled(self.coupled, base, gravity)
+        rest = wrench - rigid_wrench(self.coupled.inertia, base, gravity)
+        return np.array(base_placement(self.machine).act(rest).vector)
+
     @property
     def articulated(self) -> bool:
         """Whether a specimen on the platen moves on joints of its own."""
         return bool(self.model.nv > self.axes.size)
+
+    @property
+    def flexible(self) -> bool:
+        """Whether a specimen on the platen moves at all, on joints, in modes, or by itself."""
+        return self.articulated or self.modes.size > 0 or self.coupled is not None
 
     def zero_state(self) -> State:
         """State in the control zero-position at rest with all hidden states zero (no pressure)."""
@@ -99,17 +122,24 @@ def make_plant(machine: Machine) -> Plant:
             ports = ports[:end]  # no effect acts on the others: nothing to evaluate there
     states = state_names(effects)
     oil = machine.hydraulics
+    coupled, specimen = coupled_specimen(machine), machine.specimen
+    model = make_model(machine, coupled)
+    modes, coupling = modal_tables(specimen.modes if specimen else None, modal_participation(machine))
     delays, lags = command_path(effects, {a.name: a.valve_delay for a in machine.actuators})
     return Plant(
         machine=machine,
-        model=make_model(machine),
+        model=model,
         axes=free_axes(machine),
         legs=leg_table(machine),
         body=body_table(machine),
         rows=rows,
         ports=ports,
-        states=states,
+        states=(*states, *modal_states(modes.size)),
         supply=supply_of(effects, states, oil.supply_pressure, oil.return_pressure),
+        springs=spring_table(model, specimen),
+        modes=modes,
+        coupling=coupling,
         delays=np.array(delays),
         lags=np.array(lags),
+        coupled=coupled,
     )

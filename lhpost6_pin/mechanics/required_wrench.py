@@ -20,11 +20,17 @@ __all__ = ["floor_wrench", "refuse_joints", "require_alike", "required_wrench", 
 
 
 def refuse_joints(plant: Plant) -> None:
-    """Raise SimulationError for a specimen with free joints."""
+    """Raise SimulationError for a specimen with free joints, or a coupled one."""
+    if plant.coupled is not None:
+        raise SimulationError(
+            "a specimen in Python or OpenSees is not part of the plant's compiled equations: take the engine pinocchio "
+            "(--engine pinocchio); forces are not decomposed with it"
+        )
     if plant.articulated:
         raise SimulationError(
-            "the fused engine takes a platen with a rigid specimen at most; take the engine pinocchio for free joints "
-            "(--engine pinocchio), or lock them (--locked)"
+            "the fused engine takes no free joints: its compiled algebra is that of one rigid body, and joints need "
+            "the articulated-body algorithm of Pinocchio; take that engine (--engine pinocchio), lock the joints "
+            "(--locked), or describe the specimen by modes or matrices (.toml, .npz, .mat), which run on both"
         )
 
 

@@ -17,6 +17,8 @@ from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..effects.modifiers import added_inertias
 from ..machine.machine import Machine
+from ..machine.user_specimen import UserSpecimen
+from .coupled import CoupledSpecimen, base_at_rest, coupled_specimen
 from .specimen_mount import mount_specimen
 
 __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
@@ -27,12 +29,12 @@ def free_axes(machine: Machine) -> NDArray[np.int64]:
     return np.array(machine.axes, np.int64)
 
 
-def make_model(machine: Machine) -> Any:
+def make_model(machine: Machine, coupled: CoupledSpecimen | None = None) -> Any:
     """Build the pin.Model of platen and specimen; the platen is joint 1, its frame {b} at B.
 
     q starts with the position of B in {s} and a quaternion (x, y, z, w), or with the displacements along guides; v with
-    the twist of B in platen axes, linear first, on the free axes. Specimen joints follow. Raises ParameterError for an
-    unreadable URDF.
+    the twist of B in platen axes, linear first, on the free axes. Specimen joints follow. Of a coupled specimen the
+    rigidly attached part belongs to the platen. Raises ParameterError for an unreadable URDF.
     """
     platen = machine.platen
     model = pin.Model()
@@ -51,7 +53,11 @@ def make_model(machine: Machine) -> Any:
     model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
     armature = np.zeros(6)
     armature[:3] = platen.directional_mass
-    if machine.specimen is not None:
+    if isinstance(machine.specimen, UserSpecimen):
+        coupled = coupled or coupled_specimen(machine)
+        assert coupled is not None
+        model.appendBodyToJoint(index, coupled.inertia, top * base_at_rest(machine).pose)
+    elif machine.specimen is not None:
         model = mount_specimen(model, machine.specimen)
     extra = np.zeros(model.nv)
     axes = free_axes(machine)

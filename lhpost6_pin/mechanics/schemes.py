@@ -7,9 +7,10 @@
 
 An engine brings two things: integrate(q, dq), and the forward dynamics a = f(q, v, tau), ABA.
 
-tables are those of the plant (`tables`), ws its `workspace`: motion (6, nv) and port (4, n_ports), whose rows are named
-below, JB (2, n_ports, 6) the ports' J and B, frame (8, 3) as in `ports`, force (n_rows, 3) the ledger. A
-stage returns 0, or the number (from 1) of a leg out of its stroke, or -1 if not finite.
+tables are those of the plant (`tables`), ws its `workspace`: motion (7, nv) and port (4, n_ports), whose rows are named
+below, JB (2, n_ports, 6) the ports' J and B, frame (8, 3) as in `ports`, force (n_rows, 3) the ledger, external (6,)
+a wrench on the platen from outside, modal the scratch of
+`modes`. A stage returns 0, or the number (from 1) of a leg out of its stroke, or -1 if not finite.
 """
 
 import math
@@ -20,13 +21,15 @@ from ..core.compiled import compiled, compiled_inline
 from ..core.errors import SimulationError, UnknownNameError
 from ..core.names import SAMPLE_RATE, SCHEMES
 from ..effects.evaluate import advance_states, apply_forces, state_rates, wrench_on_platen
+from .modes import add_modal_wrench, advance_modes, modal_rates
 from .ports import evaluate_ports, platen_pose
 
-__all__ = ["DS", "FORCE", "SD", "A", "DQ", "S", "TAU", "V", "V_MID", "V_SEEN"]
+__all__ = ["DS", "FORCE", "SD", "A", "DQ", "S", "SPRING", "TAU", "V", "V_MID", "V_SEEN"]
 __all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "staggered_stage", "steps_a_sample"]
 
-V, A, V_MID, V_SEEN, DQ, TAU = range(6)
-"""Rows of `motion`: velocity, acceleration, velocity at mid-step and as forces see it, step of the pose, torque."""
+V, A, V_MID, V_SEEN, DQ, TAU, SPRING = range(7)
+"""Rows of `motion`: velocity, acceleration, velocity at mid-step and as forces see it, step of the pose, torque, and
+that of springs in a specimen's joints at the pose."""
 S, SD, DS, FORCE = range(4)
 """Rows of `port`: coordinate, rate, increment over the step, force."""
 
@@ -82,26 +85,32 @@ def leg_out_of_stroke(legs, s):
 @compiled_inline
 def forces_stage(tables, ws, z):
     """Forces at the pose and ports in place, for V_SEEN and states z; fills port[SD], port[FORCE], force, TAU."""
-    motion, port, frame, axes = ws.motion, ws.port, ws.frame, tables.axes
+    motion, port, frame, external, axes = ws.motion, ws.port, ws.frame, ws.external, tables.axes
     set_twist(motion[V_SEEN], axes, frame)
     port_rates(ws.JB[0], frame, port[SD])
     apply_forces(tables.rows, port[S], port[SD], z, ws.force, port[FORCE])
     wrench_on_platen(frame, tables.body, ws.JB[1], port[FORCE])
+    if tables.modes.size > 0:
+        add_modal_wrench(tables.modes, tables.coupling, tables.inertia[0].gravity, frame, z, ws.modal)
     if axes.size == 6:
         for k in range(3):
-            motion[TAU, k] = frame[6, k]
-            motion[TAU, 3 + k] = frame[7, k]
+            motion[TAU, k] = frame[6, k] + external[k]
+            motion[TAU, 3 + k] = frame[7, k] + external[3 + k]
     else:
         for k in range(axes.size):
-            motion[TAU, k] = frame[6, axes[k]]
+            motion[TAU, k] = frame[6, axes[k]] + external[axes[k]]
     for k in range(axes.size, motion.shape[1]):  # specimen joints
-        motion[TAU, k] = -tables.damping[k] * motion[V_SEEN, k]
+        motion[TAU, k] = motion[SPRING, k] - tables.damping[k] * motion[V_SEEN, k]
 
 
 @compiled_inline
 def pose_stage(q, tables, ws):
-    """Ports at the pose q; returns the stage's status."""
+    """Ports and springs at the pose q; returns the stage's status."""
     platen_pose(q, tables.axes, tables.body, ws.frame)
+    for i in range(tables.springs.size):
+        spring = tables.springs[i]
+        at = q[spring.q] if spring.turns == 0 else math.atan2(q[spring.q + 1], q[spring.q])
+        ws.motion[SPRING, spring.v] = spring.stiffness * (spring.rest - at)
     evaluate_ports(ws.frame, tables.legs, tables.body, ws.port[S], ws.JB[0], ws.JB[1])
     return leg_out_of_stroke(tables.legs, ws.port[S])
 
@@ -146,6 +155,8 @@ def staggered_stage(q, dt, tables, ws, spool):
     for i in range(start.size):
         port[DS, i] = 0.5 * dt * (port[DS, i] + port[SD, i])
     advance_states(tables.rows, start, port[DS], dt, spool, tables.supply, ws.z)
+    if tables.modes.size > 0:
+        advance_modes(tables.modes, tables.coupling, tables.inertia[0].gravity, frame, dt, ws.z, ws.modal)
     for k in range(motion.shape[1]):
         motion[V_SEEN, k] = motion[V_MID, k] + 0.5 * dt * motion[A, k]
     forces_stage(tables, ws, ws.z)
@@ -160,6 +171,8 @@ def rates_stage(q, z, tables, ws, spool):
         return status
     forces_stage(tables, ws, z)
     state_rates(tables.rows, ws.port[S], ws.port[SD], spool, tables.supply, z, ws.zd)
+    if tables.modes.size > 0:
+        modal_rates(tables.modes, tables.coupling, tables.inertia[0].gravity, ws.frame, z, ws.modal, ws.zd)
     return 0
 
 

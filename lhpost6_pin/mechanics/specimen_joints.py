@@ -88,5 +88,6 @@ def joints_beyond(plant: Plant, time: Array, q: Array) -> list[str]:
 
 
 def _mass(plant: Plant) -> float:
-    """Mass of the specimen [kg]: what the model has beyond the bare table's."""
-    return float(sum(i.mass for i in plant.model.inertias)) - plant.machine.platen.isotropic_mass
+    """Mass of the specimen [kg]: what the model has beyond the bare table's, and the weight of a coupled one."""
+    own = float(sum(i.mass for i in plant.model.inertias)) - plant.machine.platen.isotropic_mass
+    return own - float(plant.rest_external[2]) / plant.machine.platen.gravity

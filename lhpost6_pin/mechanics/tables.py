@@ -14,6 +14,8 @@ from ..core.compiled import compiled_views
 from ..effects.registry import ROW
 from ..laws.supply import Supply
 from .forward_dynamics import INERTIA
+from .joint_springs import SPRING
+from .modes import MODE
 from .ports import BODY, LEG
 
 __all__ = ["Tables", "pack_tables", "unpack_tables"]
@@ -31,6 +33,9 @@ class Tables(NamedTuple):
     actuators: NDArray[np.int64]  # (n_actuators,) their rows
     delays: Array  # command path of the valves (`valve_delay.delayed_spools`)
     inertia: NDArray[np.void]  # forward_dynamics.INERTIA, one row
+    springs: NDArray[np.void]  # joint_springs.SPRING, those of a specimen's joints
+    modes: NDArray[np.void]  # modes.MODE, those of a specimen
+    coupling: Array  # (n_modes * n_modes,) damping between modes [1/s], or empty
     supply: Supply
 
 
@@ -56,7 +61,7 @@ def pack_tables(
 def unpack_tables(packed):
     """Tables from `Tables.packed`."""
     at = packed[: _PARTS + 1].view(np.int64)
-    values = packed[at[8] : at[9]]
+    values = packed[at[11] : at[12]]
     supply = Supply(values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8])
     return Tables(
         packed,
@@ -68,5 +73,8 @@ def unpack_tables(packed):
         packed[at[5] : at[6]].view(np.int64),
         packed[at[6] : at[7]],
         packed[at[7] : at[8]].view(INERTIA),
+        packed[at[8] : at[9]].view(SPRING),
+        packed[at[9] : at[10]].view(MODE),
+        packed[at[10] : at[11]],
         supply,
     )

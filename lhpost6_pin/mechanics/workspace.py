@@ -20,28 +20,32 @@ class Workspace(NamedTuple):
     q: Array  # (nq,)
     z: Array  # (n_states,)
     zd: Array  # (n_states,)
-    motion: Array  # (6, nv)
+    motion: Array  # (7, nv)
     port: Array  # (4, n_ports)
     JB: Array  # (2, n_ports, 6)
     frame: Array  # (8, 3)
     force: Array  # (n_rows, 3)
+    external: Array  # (6,) wrench on the platen from outside, at B in platen axes, linear first [N, N m]
+    modal: Array  # (3, n_modes) scratch of `modes`
 
 
 _HEAD = 6
-"""Numbers at the start of a buffer: its sizes nq, n_states, nv, n_ports, n_rows, and one to spare."""
+"""Numbers at the start of a buffer: its sizes nq, n_states, nv, n_ports, n_rows, n_modes."""
 
 
 def make_workspace(plant: Plant, start: State) -> Workspace:
     """Arrays sized for a plant, holding a copy of the start state."""
     states, n, rows = len(plant.states), len(plant.ports), plant.rows.size
-    nq, nv = plant.model.nq, plant.model.nv
-    shapes = [(nq,), (states,), (states,), (6, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS))]
+    nq, nv, modes = plant.model.nq, plant.model.nv, plant.modes.size
+    shapes = [(nq,), (states,), (states,), (7, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS)), (6,)]
+    shapes.append((3, modes))
     ends = np.cumsum([_HEAD, *(int(np.prod(shape)) for shape in shapes)])
     buffer = np.zeros(ends[-1])
-    buffer[:_HEAD] = nq, states, nv, n, rows, 0
+    buffer[:_HEAD] = nq, states, nv, n, rows, modes
     views = (buffer[a:b].reshape(shape) for a, b, shape in zip(ends[:-1], ends[1:], shapes, strict=True))
     ws = Workspace(buffer, *views)
     ws.q[:], ws.motion[V], ws.z[:] = start
+    ws.external[:] = plant.rest_external
     return ws
 
 
@@ -49,22 +53,26 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
 def unpack_workspace(buffer):
     """Workspace from its buffer."""
     nq, states, nv = int(buffer[0]), int(buffer[1]), int(buffer[2])
-    n, rows = int(buffer[3]), int(buffer[4])
+    n, rows, modes = int(buffer[3]), int(buffer[4]), int(buffer[5])
     z = _HEAD + nq
     zd = z + states
     motion = zd + states
-    port = motion + 6 * nv
+    port = motion + 7 * nv
     JB = port + 4 * n
     frame = JB + 12 * n
     force = frame + 24
+    external = force + 3 * rows
+    modal = external + 6
     return Workspace(
         buffer,
         buffer[_HEAD:z],
         buffer[z:zd],
         buffer[zd:motion],
-        buffer[motion:port].reshape((6, nv)),
+        buffer[motion:port].reshape((7, nv)),
         buffer[port:JB].reshape((4, n)),
         buffer[JB:frame].reshape((2, n, 6)),
         buffer[frame:force].reshape((8, 3)),
-        buffer[force : force + 3 * rows].reshape((rows, 3)),
+        buffer[force:external].reshape((rows, 3)),
+        buffer[external:modal],
+        buffer[modal : modal + 3 * modes].reshape((3, modes)),
     )

@@ -12,6 +12,8 @@ import pinocchio as pin
 
 from ..core.arrays import Array
 from ..machine.machine import Machine
+from ..machine.specimen_forms import SpecimenContents
+from ..machine.user_specimen import UserSpecimen
 from ..mechanics.pose import rotation
 from .urdf import legs, urdf_text
 
@@ -43,19 +45,22 @@ def load_bodies(machine: Machine) -> Bodies:
 
 
 def load_specimen_bodies(machine: Machine) -> Bodies | None:
-    """Read the specimen's URDF with Pinocchio; None without one.
+    """Read the specimen's URDF with Pinocchio, or draw the floors of any other form; None without, or for Python.
 
     A body is drawn by its boxes, cylinders and spheres; one without any of these as the uniform box that has its mass
-    and inertia.
+    and inertia. A specimen of modes is a slab at each of its points on a mast, or the box of its mass.
     """
     specimen = machine.specimen
-    if specimen is None:
+    if specimen is None or isinstance(specimen, UserSpecimen):
         return None
-    model = pin.buildModelFromUrdf(str(specimen.urdf))
-    try:
-        shapes = _shapes(model, specimen.urdf.read_text(encoding="utf-8"))
-    except (ValueError, RuntimeError):  # a mesh that cannot be read
-        shapes = []
+    if specimen.contents is None:
+        model = pin.buildModelFromUrdf(str(specimen.file))
+        try:
+            shapes = _shapes(model, specimen.file.read_text(encoding="utf-8"))
+        except (ValueError, RuntimeError):  # a mesh that cannot be read
+            shapes = []
+    else:
+        model, shapes = pin.Model(), _floors(specimen.contents)
     drawn = {shape.parentJoint for shape in shapes}
     for joint, inertia in enumerate(model.inertias):
         if joint not in drawn and inertia.mass > 0.0:
@@ -69,6 +74,22 @@ def _shapes(model: Any, text: str) -> list[Any]:
     """Boxes, cylinders and spheres of a URDF's visuals."""
     objects = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL).geometryObjects
     return [one for one in objects if hasattr(one.geometry, "halfSide") or hasattr(one.geometry, "radius")]
+
+
+def _floors(contents: SpecimenContents) -> list[Any]:
+    """Slab at every place of a specimen's points, and a mast; the uniform box of its mass without points."""
+    body = contents.body
+    whole = _uniform_box(0, pin.Inertia(body.mass, np.array(body.centre), body.inertia))
+    places = list(dict.fromkeys(point.at for point in contents.points))
+    if not places:
+        return [whole]
+    edges = 2.0 * whole.geometry.halfSide
+    x, y = (float(np.abs(whole.placement.rotation[k]) @ edges) for k in range(2))
+    top = max(max(place[2] for place in places), 0.1)
+    thick, mast = 0.05 * top, 0.1 * min(x, y)
+    boxes = [(np.array(place), pin.coal.Box(x, y, thick)) for place in places]
+    boxes.append((np.array([*np.mean(places, axis=0)[:2], 0.5 * top]), pin.coal.Box(mast, mast, top)))
+    return [pin.GeometryObject(f"floor_{k}", 0, pin.SE3(np.eye(3), at), box) for k, (at, box) in enumerate(boxes)]
 
 
 def _uniform_box(joint: int, inertia: Any) -> Any:

@@ -98,6 +98,9 @@ def run_entries(run: Run, summary: "RunSummary | None") -> Entries:
         "spool_values_clipped": run.clipped,
         "trouble": run.trouble,
     }
+    if run.coupling is not None:
+        stability = _picked(run.coupling.stability, "spectral_radius", "growth")
+        entries["interface"] = _picked(run.coupling, "energy", "energy_error") | stability
     if summary is None:
         return entries
     names = ("axis", "quantity", "peak_target", "peak_achieved", "rrmse", "delay", "rrmse_aligned")

@@ -263,3 +263,5 @@ def print_run(run: "Run", summary: "RunSummary | None") -> None:
         print_blocks(Text(summary.verdict, style="bold"), *(table for table in tables if table.rows))
     seconds = run.time[-1] + 1 / run.rate
     print_blocks(f"{seconds:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")
+    if run.coupling is not None:
+        print_blocks(run.coupling.summary)

@@ -4,10 +4,11 @@
     audit.power[:, audit.entry("created.thrust_direction")]   # [W]
 
 Energy, per effect:  inflow = change of stored + dissipated + delivered
-and for the platen:  delivered + created = change of kinetic + gravity (+ dissipated in a specimen's joints)
+and for the platen:  delivered + created = change of kinetic + gravity (+ stored and dissipated in a specimen)
 
 inflow      oil through the valves' orifices, h(P) Q per chamber
-stored      compressed oil, nitrogen (laws with a potential); kinetic energy and weight
+stored      compressed oil, nitrogen (laws with a potential); kinetic energy and weight; springs in a specimen's
+            joints, and what its modes hold beyond the specimen as a rigid body
 dissipated  leakage between chambers, and all work of laws without a potential: seals, pads, viscous
 delivered   force times port rate, to the platen
 created     three terms of the report's equations that do not conserve energy; zero in a machine with normal thrust,
@@ -33,6 +34,7 @@ from ..effects.supply import supply_pressures
 from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
 from .ledger import history_of, number_of
 from .simulate import Run
+from .specimen_response import modes_of_run, spring_energy, twists_of_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -133,6 +135,14 @@ def energy_audit(run: Run) -> Audit:
     if plant.articulated:
         joints = slice(plant.axes.size, None)
         add("dissipated.specimen_joints", run.v[:, joints] ** 2 @ plant.model.damping[joints])
+    if plant.springs.size:
+        power, energy = spring_energy(run)
+        add("stored.specimen_joints", power, energy - energy[0])
+    if plant.modes.size:
+        modes = modes_of_run(run)
+        rate = -modes.dissipation - np.einsum("ij,ij->i", modes.reaction, twists_of_run(run)[0])
+        add("stored.specimen_modes", rate, modes.energy - modes.energy[0])
+        add("dissipated.specimen_modes", modes.dissipation)
     for i, name in enumerate(CREATED):
         add(f"created.{name}", created[:, i])
     return Audit(run.time, tuple(found), *(np.stack(values, axis=1) for values in zip(*found.values(), strict=True)))

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from ..mechanics.derivatives import rates_at
+from ..mechanics.derivatives import Forward, forward_dynamics, rates_at
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, staggered_stage
 from ..mechanics.tables import unpack_tables
@@ -23,9 +23,13 @@ Stepper = Callable[[Workspace, Array], int]
 """Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
 
 
-def make_stepper(plant: Plant, scheme: str, dt: float) -> Stepper:
-    """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand."""
-    return {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}[scheme](plant, dt)
+def make_stepper(plant: Plant, scheme: str, dt: float, forward: Forward | None = None) -> Stepper:
+    """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand.
+
+    forward: accelerations of q, v and torque, in place of the plant's `forward_dynamics`.
+    """
+    kinds = {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}
+    return kinds[scheme](plant, dt, forward or forward_dynamics(plant))
 
 
 @compiled
@@ -34,9 +38,8 @@ def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
 
-def _semi_implicit(plant: Plant, dt: float) -> Stepper:
-    model, data, packed = plant.model, plant.model.createData(), plant.tables.packed
-    aba, integrate = pin.aba, pin.integrate
+def _semi_implicit(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+    model, packed, integrate = plant.model, plant.tables.packed, pin.integrate
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, buffer = ws.motion, ws.buffer
@@ -48,15 +51,15 @@ def _semi_implicit(plant: Plant, dt: float) -> Stepper:
             status = _staggered(q, dt, packed, buffer, held)
             if status:
                 break
-            kick(motion, aba(model, data, q, v_seen, tau), dt)
+            kick(motion, accelerate(q, v_seen, tau), dt)
         ws.q[:] = q
         return status
 
     return advance
 
 
-def _euler(plant: Plant, dt: float) -> Stepper:
-    model, data = plant.model, plant.model.createData()
+def _euler(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+    model = plant.model
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, z = ws.motion, ws.z
@@ -65,7 +68,7 @@ def _euler(plant: Plant, dt: float) -> Stepper:
             status = rates_at(plant, ws, ws.q, ws.z, held)
             if status:
                 return status
-            motion[A] = pin.aba(model, data, ws.q, motion[V], motion[TAU])
+            motion[A] = accelerate(ws.q, motion[V], motion[TAU])
             ws.q[:] = pin.integrate(model, ws.q, dt * motion[V])
             motion[V] += dt * motion[A]
             z += dt * ws.zd
@@ -87,8 +90,8 @@ def _local_rate(model: Any, n_platen: int, q0: Array, q: Array, moved: Array, v:
     return out
 
 
-def _rk4(plant: Plant, dt: float) -> Stepper:
-    model, data, n_platen = plant.model, plant.model.createData(), plant.axes.size
+def _rk4(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+    model, n_platen = plant.model, plant.axes.size
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, q0 = ws.motion, ws.q
@@ -104,7 +107,7 @@ def _rk4(plant: Plant, dt: float) -> Stepper:
                 if status:
                     return status
                 step = _local_rate(model, n_platen, q0, q, reach * dt * step, v)
-                dv, dz = pin.aba(model, data, q, v, motion[TAU]), ws.zd
+                dv, dz = accelerate(q, v, motion[TAU]), ws.zd
                 if reach == 0.0:
                     motion[A] = dv
                 for total, rate in zip(sums, (step, dv, dz), strict=True):

@@ -26,6 +26,7 @@ from ..mechanics.spatial import act_force
 from ..mechanics.tables import Tables
 from ..mechanics.workspace import Workspace, make_workspace
 from .simulate import Run
+from .specimen_response import modes_of_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,7 +56,7 @@ class Ledger:
     time: Array  # (n,) [s]
     rows: tuple[str, ...]  # (k,) "effect.port"
     force: Array  # (n, k) on the port [N], or [N m] on a rotation
-    effects: tuple[str, ...]  # (m,) effects in the machine's order, gravity, and the guides of a guided platen
+    effects: tuple[str, ...]  # (m,) effects in the machine's order, gravity, modes of a specimen, guides of a platen
     wrench: Array  # (n, m, 6) on the platen at C in {c}: fx fy fz mx my mz [N, N m]
     inertia: Array  # (n, 6) rate of momentum of platen and specimen, same point and axes [N, N m]
 
@@ -107,6 +108,10 @@ def force_ledger(run: "Run | States") -> Ledger:
     names = [e.name for e in effects]
     wrench = np.concatenate([by_effect, gravity[:, None]], axis=1)
     names.append("gravity")
+    if plant.modes.size:
+        reaction = modes_of_run(run).reaction
+        wrench = np.concatenate([wrench, wrenches_at_c(plant, turn, reaction)[:, None]], axis=1)
+        names.append("specimen_modes")
     if plant.axes.size != 6:
         guides = inertia - wrench.sum(axis=1)
         guides[:, plant.axes] = 0.0

@@ -10,6 +10,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError, UnknownNameError
 from ..core.names import ENGINES
 from ..mechanics.equilibrium import Equilibrium
+from ..mechanics.modes import fastest_mode
 from ..mechanics.plant import Plant, State
 from ..mechanics.required_wrench import refuse_joints
 from ..mechanics.schemes import steps_a_sample
@@ -66,7 +67,15 @@ def check_options(plant: Plant, *, scheme: str, steps_per_second: int, engine: s
                 "the fused engine runs compiled controllers; take the engine pinocchio for your own "
                 "(--engine pinocchio)"
             )
-    return steps_a_sample(scheme, steps_per_second)
+    steps = steps_a_sample(scheme, steps_per_second)
+    fastest = fastest_mode(plant.modes, plant.tables.inertia["inverse"][0])
+    if fastest > steps_per_second:
+        file = plant.machine.specimen.file.name if plant.machine.specimen else ""
+        raise SimulationError(
+            f"modes of {file} reach {fastest / (2.0 * np.pi):.0f} Hz on the platen, too fast for {steps_per_second} "
+            f"steps a second: take {fastest:.0f} or more (--rate), or leave its stiff modes rigid by highest_frequency"
+        )
+    return steps
 
 
 def check_run(plant: Plant, loop: Loop, *, samples: int, record_every: int, **options: Any) -> int:

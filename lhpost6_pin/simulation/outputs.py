@@ -14,16 +14,26 @@ from ..effects.actuator import rod_travels
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
+from .ledger import WRENCH_AXES
 from .simulate import Run
+from .specimen_response import point_response
 
 __all__ = ["record_of_run"]
+
+_OF_POINTS = {
+    "displacement": ("m", "displacement of the specimen's points relative to its base"),
+    "velocity": ("m/s", "velocity of the specimen's points relative to its base"),
+    "acceleration": ("m/s2", "absolute acceleration of the specimen's points"),
+}
+"""Channels of a specimen's points: unit of translations, and name."""
 
 
 def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | None = None) -> xr.Dataset:
     """Record of a simulated test.
 
     attrs: further global attributes (`test`, `title`, ...). reference: target at the run's samples, if any; its
-    velocity and acceleration are extra variables, as are hidden states and the joints of an articulated specimen.
+    velocity and acceleration are extra variables, as are hidden states, the joints of an articulated specimen and the
+    points of a modal one.
     """
     plant, machine = run.plant, run.plant.machine
     motion = platen_motion(plant, run.q, run.v, run.a)
@@ -59,12 +69,24 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
             channels[f"reference_{name}"] = (like.dims, values, about)
     channels |= {name: channels[c.same_as] for name, c in LAYOUT.items() if c.same_as in channels}
     channels |= _hidden_states(run)
+    if response := point_response(run):
+        points = machine.specimen.contents.points if machine.specimen and machine.specimen.contents else ()
+        labels["specimen_point"] = tuple(point.name for point in points)
+        turning = [point.direction.startswith("r") for point in points]
+        for name, (unit, long_name) in _OF_POINTS.items():
+            units = " ".join(unit.replace("m", "rad") if turns else unit for turns in turning)
+            about = {"units": unit if not any(turning) else units, "long_name": long_name, "point_units": units}
+            channels[f"specimen_{name}"] = (("time", "specimen_point"), response[name], about)
     if plant.articulated:
         joints = specimen_joints(plant)
         about = {"units": "m or rad", "long_name": "position of the specimen's joints"}
         about["joint_units"] = " ".join(joint.unit for joint in joints)
         labels["specimen_joint"] = tuple(joint.name for joint in joints)
         channels["specimen_joint_position"] = (("time", "specimen_joint"), specimen_positions(plant, run.q), about)
+    if run.coupling is not None:
+        about = {"units": "N, N m", "long_name": "wrench of the specimen on the platen at its base, axes of the base"}
+        labels["wrench"] = WRENCH_AXES
+        channels["interface_wrench"] = (("time", "wrench"), run.coupling.wrench, about)
     valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
     facts: dict[str, Any] = {
         "kind": "simulated",
@@ -76,6 +98,10 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         "spool_values_clipped": run.clipped,
         "trouble": run.trouble or "none",
     }
+    if run.coupling is not None:
+        facts["interface_energy"] = run.coupling.energy
+        facts["interface_energy_error"] = run.coupling.energy_error
+        facts["interface_growth"] = run.coupling.stability.growth
     if valves:
         facts["valves_per_horizontal_actuator"] = int(valves[0])
     return make_record(run.time, channels, labels, {**facts, **attrs})
@@ -92,7 +118,7 @@ def _hidden_states(run: Run) -> dict[str, Any]:
     columns: dict[str, list[int]] = {}
     names = run.plant.states
     for i, name in enumerate(names):
-        if "pressure" not in name:
+        if "pressure" not in name and not name.startswith("specimen."):
             columns.setdefault(name.split(".")[0], []).append(i)
     found: dict[str, Any] = {}
     for effect, own in columns.items():

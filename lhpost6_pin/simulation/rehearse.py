@@ -18,7 +18,7 @@ from ..core.progress import Progress
 from ..data.records import require
 from ..data.signals import resample_band_limited
 from ..machine.machine import Machine
-from ..mechanics.equilibrium import Equilibrium, find_equilibrium
+from ..mechanics.equilibrium import Equilibrium, find_equilibrium, specimen_at_rest
 from ..mechanics.plant import Plant, State, make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import Target
@@ -151,7 +151,7 @@ def _usable(run: Run) -> Run:
 
 def _start(plant: Plant, record: xr.Dataset) -> State:
     """Zero pose at rest with the chamber pressures of the record's first sample."""
-    zero = plant.zero_state()
+    zero = specimen_at_rest(plant)
     z = zero.z.copy()
     for name, row in zip(plant.machine.actuator_names, plant.rows[plant.tables.actuators], strict=True):
         z[row["state"]] = float(record["chamber_pressure_a"].sel(actuator=name)[0])

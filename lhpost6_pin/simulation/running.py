@@ -7,20 +7,25 @@
 The compiled stages and their order are those of `simulate` with the Pinocchio engine: results are equal bit by bit.
 """
 
+from functools import partial
+
 import numpy as np
+import pinocchio as pin
 
 from ..control.loop import sense_packed
 from ..control.plug import Feedback
 from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE, SCHEMES
+from ..mechanics.coupled import BaseMotion, checked_wrench
 from ..mechanics.derivatives import evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium
+from ..mechanics.interface import base_motion, top_placement
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import V, steps_a_sample
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import make_workspace
-from .engine_pinocchio import make_stepper
+from .coupling import Continued, CouplingOptions, CouplingResult, WithOutside, make_coupling
 from .simulate import diagnosis
 from .snapshot import Snapshot, take_snapshot
 
@@ -40,17 +45,26 @@ class RunningPlant:
         *,
         scheme: str = SCHEMES[0],
         steps_per_second: int = 4 * SAMPLE_RATE,
+        coupling: CouplingOptions | None = None,
+        wrench_order: int = 1,
     ) -> None:
-        """Start at rest; raises as `schemes.steps_a_sample` does."""
+        """Start at rest; raises as `schemes.steps_a_sample` and, with a coupled specimen, `coupling.Coupling` do.
+
+        wrench_order: a wrench from outside is held over a sample (0), or continued linearly from its last two (1).
+        """
         steps = steps_a_sample(scheme, steps_per_second)
         self.plant, self.scheme, self.steps_per_second = plant, scheme, steps_per_second
         self.sample = self.clipped = 0
-        self._advance = make_stepper(plant, scheme, 1.0 / steps_per_second)
+        self._coupled = make_coupling(plant, scheme, steps_per_second, coupling)
+        self._evaluate = self._coupled.evaluate if self._coupled else partial(evaluate_derivatives, plant)
+        self._advance = WithOutside(plant, scheme, 1.0 / steps_per_second, self._coupled)
+        self._outside: Continued | None = None
+        self._order, self._base, self._since = wrench_order, top_placement(plant), 0
         self._ws = make_workspace(plant, rest.state)
         self._window = np.zeros((steps, plant.spools))
         self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))
         self._path = plant.command_path
-        evaluate_derivatives(plant, self._ws, np.ascontiguousarray(rest.spool))
+        self._evaluate(self._ws, np.ascontiguousarray(rest.spool))
 
     @property
     def time(self) -> float:
@@ -71,20 +85,38 @@ class RunningPlant:
         """Feedback at the next sample, in new arrays."""
         ws, plant = self._ws, self.plant
         if self.scheme != SCHEMES[0]:  # the other schemes leave the ports of their last stage
-            evaluate_derivatives(plant, ws, self._window[0])
+            self._evaluate(ws, self._window[0])
         found = Feedback(np.empty(plant.spools), np.empty(6), np.empty(plant.spools))
         sense_packed(plant.tables.packed, ws.buffer, *found)
         return found
+
+    def interface_motion(self) -> BaseMotion:
+        """Motion of the platen at C, axes of the platen, at the next sample: what a specimen in another program needs.
+
+        Its acceleration is that of the last model step, as the accelerations of `sensors` are.
+        """
+        if self.scheme != SCHEMES[0]:
+            self._evaluate(self._ws, self._window[0])
+        return base_motion(self.plant, self._ws, self._base)
+
+    @property
+    def coupling(self) -> CouplingResult | None:
+        """What a coupled specimen exchanged so far."""
+        return self._coupled.result() if self._coupled else None
 
     def snapshot(self) -> Snapshot:
         """Snapshot of the plant at the next sample."""
         return take_snapshot(self.plant, self._ws, self.time)
 
-    def advance(self, command: Array) -> None:
+    def advance(self, command: Array, wrench: pin.Force | None = None) -> None:
         """Apply the command (n_actuators,) of this sample, -1..1, and advance to the next.
 
-        Raises SimulationError for a command that is not finite, if an actuator or strut leaves its stroke, and if the
-        run diverges.
+        wrench: on the platen at C in its axes, at the start of the sample, of what is not part of the plant; without it
+        the last one is continued over one interval and then kept; at first there is none. Mount the rigid part of a
+        heavy specimen and give the rest here (`simulation.coupling`).
+
+        Raises SimulationError for a command or wrench that is not finite, if an actuator or strut leaves its stroke,
+        and if the run diverges.
         """
         command = np.asarray(command, float)
         if command.shape != (self.plant.spools,) or not np.isfinite(command).all():
@@ -96,7 +128,23 @@ class RunningPlant:
             self._history[:] = self._window[:] = self._history[-1]
         first = self.sample - len(self._history) + 1
         delayed_spools(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
-        status = self._advance(self._ws, self._window)
+        self._take(wrench)
+        status = self._advance(self._ws, self._window, self._outside)
         self.sample += 1
         if status:
             raise SimulationError(diagnosis(self.plant, status, self.time, self.scheme, self.steps_per_second))
+
+    def _take(self, wrench: pin.Force | None) -> None:
+        """Take a wrench from outside at the start of a sample."""
+        self._since += 1
+        if wrench is not None:
+            given = checked_wrench(self, wrench, f"at sample {self.sample}")
+            at_b = np.array(self._base.act(given).vector)
+            if self._outside is None:
+                self._outside, self._since = Continued(at_b, self._order), 0
+                self._ws.external[:] += at_b
+                self._evaluate(self._ws, self._window[0])  # the acceleration at the start of the sample
+            self._outside.take(at_b, self._since / SAMPLE_RATE)
+            self._since = 0
+        elif self._outside is not None:
+            self._outside.later(1.0 / SAMPLE_RATE)

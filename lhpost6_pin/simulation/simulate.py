@@ -11,6 +11,7 @@ or if it diverges; its results so far are kept, and `Run.trouble` states time, c
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import A, V
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import Workspace, make_workspace
+from .coupling import Coupling, CouplingOptions, CouplingResult, make_coupling
 from .engine_fused import Log, Signals, Span, run_fused
 from .engine_pinocchio import make_stepper
 from .loops import ClosedLoop, Loop, OpenLoop, PluggedLoop, check_closed_loop, check_options, check_run
@@ -58,6 +60,7 @@ class Run:
     engine: str
     clipped: int
     trouble: str | None
+    coupling: CouplingResult | None = None  # of a coupled specimen
 
     @property
     def state(self) -> State:
@@ -81,13 +84,14 @@ def simulate(
     record_every: int = 1,
     progress: Progress | None = None,
     watch: Watch | None = None,
+    coupling: CouplingOptions | None = None,
 ) -> Run:
     """Run `samples` controller samples and return the motion, every `record_every`-th sample.
 
-    `watch` is called 32 times per second of the run, first at its start.
+    `watch` is called 32 times per second of the run, first at its start. `coupling`: how a coupled specimen is.
 
-    Raises UnknownNameError or SimulationError for an invalid scheme, engine, rate or loop. A run that stops early does
-    not raise: see `Run.trouble`.
+    Raises UnknownNameError or SimulationError for an invalid scheme, engine, rate, loop or exchange. A run that stops
+    early does not raise: see `Run.trouble`.
     """
     options: dict[str, Any] = {"scheme": scheme, "steps_per_second": steps_per_second, "engine": engine}
     steps = check_run(plant, loop, samples=samples, record_every=record_every, **options)
@@ -100,11 +104,13 @@ def simulate(
     log_ = Log(*(np.zeros((-(-samples // record_every), width)) for width in widths))
     closed = not isinstance(loop, OpenLoop)
     command = np.tile(spool[0], (samples, 1)) if closed else np.zeros((samples, plant.spools))
-    status, done = evaluate_derivatives(plant, ws, np.ascontiguousarray(spool[0])), 0
+    coupled = make_coupling(plant, scheme, steps_per_second, coupling)
+    evaluated = coupled.evaluate if coupled else partial(evaluate_derivatives, plant)
+    status, done = evaluated(ws, np.ascontiguousarray(spool[0])), 0
     if status == 0:
         compiled = isinstance(loop, ClosedLoop)
         span = Span(SCHEMES.index(scheme), 0, samples, steps, 1.0 / steps_per_second, compiled, record_every)
-        job = _Job(plant, loop, ws, log_, span, spool, command, progress, watch)
+        job = _Job(plant, loop, ws, log_, span, spool, command, progress, watch, coupled)
         status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
     kept = -(-done // record_every)
@@ -114,7 +120,10 @@ def simulate(
     if clipped:
         log.warning("%d spool values beyond full stroke were clipped to it: the motion needs more flow", clipped)
     motion = {name: values[:kept] for name, values in log_._asdict().items()}
-    if scheme != SCHEMES[0]:  # the accelerations logged belong to the start of the last step
+    exchanged = coupled.result().every(record_every, kept) if coupled else None
+    if exchanged:
+        motion["a"] = exchanged.acceleration
+    elif scheme != SCHEMES[0]:  # the accelerations logged belong to the start of the last step
         motion["a"] = _accelerations(plant, motion["q"], motion["v"], motion["z"])
     return Run(
         plant=plant,
@@ -125,6 +134,7 @@ def simulate(
         **options,
         clipped=clipped,
         trouble=trouble,
+        coupling=exchanged,
     )
 
 
@@ -139,8 +149,8 @@ def simulate_many(jobs: Sequence[tuple[Plant, Loop]], *, samples: int, threads: 
 
 
 def fastest_engine(plant: Plant) -> str:
-    """Fastest engine for a compiled controller on a plant: the fused one, unless a specimen's joints are free."""
-    return "pinocchio" if plant.articulated else "fused"
+    """Fastest engine for a compiled controller: the fused one, but with free joints or a coupled specimen."""
+    return "pinocchio" if plant.articulated or plant.coupled else "fused"
 
 
 def _clip(spool: Array) -> tuple[Array, int]:
@@ -160,6 +170,7 @@ class _Job(NamedTuple):
     command: Array  # (samples, n_actuators), closed loop
     progress: Progress | None
     watch: Watch | None
+    coupled: Coupling | None
 
     def look(self, sample: int) -> None:
         """Call the watch, if a snapshot is due."""
@@ -175,14 +186,16 @@ class _Job(NamedTuple):
 def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     """Run all samples step by step; returns (status, samples done, commands clipped)."""
     plant, ws, span = job.plant, job.ws, job.span
-    advance = make_stepper(plant, SCHEMES[span.scheme], span.dt)
+    coupled = job.coupled
+    advance = coupled.advance if coupled else make_stepper(plant, SCHEMES[span.scheme], span.dt)
+    evaluated = coupled.evaluate if coupled else partial(evaluate_derivatives, plant)
     closed = not isinstance(job.loop, OpenLoop)
     window = job.spool if closed else np.zeros((span.steps, plant.spools))
     spools = _spools_from(job)
     clipped = 0
     for sample in range(span.last):
         if span.scheme != 0 and closed:
-            evaluate_derivatives(plant, ws, window[0])  # the other schemes leave the ports of their last stage
+            evaluated(ws, window[0])  # the other schemes leave the ports of their last stage
         clipped += spools(sample, window)
         if sample % span.every == 0:
             row = ws.q, ws.motion[V], ws.motion[A], ws.z, window.sum(axis=0) / span.steps

@@ -109,5 +109,5 @@ def identify_axes(
         target = noise(axis)
         return [identify(controller, rest, target, (axis,), segment) for controller in controllers]
 
-    threads = 1 if plant.articulated else -1  # the engine of free joints holds the interpreter
+    threads = 1 if fastest_engine(plant) == "pinocchio" else -1  # that engine holds the interpreter
     return list(Parallel(n_jobs=threads, prefer="threads")(delayed(one)(AXES[k]) for k in plant.axes))

@@ -75,8 +75,10 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
     """Raise the errors that `calibrate` lists, naming the test."""
     if not records:
         raise RecordError("the campaign has no records")
-    if make_plant(machine).articulated:
-        raise SimulationError("calibration takes a platen with a rigid specimen at most; lock its joints (--locked)")
+    if make_plant(machine).flexible:
+        raise SimulationError(
+            "calibration takes a platen with a rigid specimen at most; lock its joints or modes (--locked)"
+        )
     names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
     for test, record in zip(names, records, strict=True):
         if faults := layout_faults(record, machine.labels):

@@ -38,10 +38,11 @@ The libraries under binaries/ contain CPPFMU (https://github.com/viproma/cppfmu)
 def export_fmu(machine: Machine, path: Path | str) -> None:
     """Write the plant of a machine as an FMU (FMI 2.0, co-simulation) that holds every number of the machine.
 
-    Inputs are one spool command per actuator (``spool_command_H1``, ...); outputs are displacement, force, spool
-    position and chamber pressures of each actuator, displacement, velocity and acceleration of the platen, and a
-    status. Steps are whole multiples of 1/2048 s. The FMU holds no Python: where it runs, a Python of this platform
-    with lhpost6_pin must be found by the program that imports it.
+    Inputs are one spool command per actuator (``spool_command_H1``, ...) and the wrench of a specimen outside
+    (``interface_wrench_fx``, ...); outputs are displacement, force, spool position and chamber pressures of each
+    actuator, displacement, velocity and acceleration of the platen, pose, velocity and acceleration of the interface in
+    axes of the platen (``interface_pose_x``, ...), and a status. Steps are whole multiples of 1/2048 s. The FMU holds
+    no Python: where it runs, a Python of this platform with lhpost6_pin must be found by the program that imports it.
 
     Raises SimulationError without pythonfmu or for a path that does not end in .fmu, and whatever is wrong with the
     machine.

@@ -25,8 +25,10 @@ from lhpost6_pin.data.channels import LAYOUT, MOTION, channel_unit
 from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.interface import motion_numbers, wrench_of
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.simulation.ledger import WRENCH_AXES
 from lhpost6_pin.simulation.running import RunningPlant
 
 __all__ = ["ShakeTable"]
@@ -42,15 +44,25 @@ _UNITS: dict[str, dict[str, int]] = {
     "rad/s": {"rad": 1, "s": -1},
     "rad/s2": {"rad": 1, "s": -2},
     "N": {"kg": 1, "m": 1, "s": -2},
+    "N.m": {"kg": 1, "m": 2, "s": -2},
     "Pa": {"kg": 1, "m": -1, "s": -2},
 }
 """Units of the variables by their exponents of SI base units."""
 
 _ACTUATORS = ("actuator_displacement", "actuator_force", "spool_position", "chamber_pressure_a", "chamber_pressure_b")
 
+_WRENCH = {name: "N.m" if name.startswith("m") else "N" for name in WRENCH_AXES}
+_INTERFACE = (
+    ("pose", ("m", "rad"), "position of C in {s}, Euler angles"),
+    ("velocity", ("m/s", "rad/s"), "velocity of C, angular velocity, axes of the platen"),
+    ("acceleration", ("m/s2", "rad/s2"), "acceleration of C less gravity, angular acceleration, axes of the platen"),
+)
+"""Motion of the interface: name, units of its first and last three components, description."""
+
 _ABOUT = """{title}
 Inputs are normalised spool commands, -1..1, held over a step; outputs are the sensors at the end of it, spool \
 positions means over its last sample. \
+The interface_wrench is that of a specimen outside on the platen, at C in axes of the platen, at the start of a step. \
 Steps are whole multiples of 1/{rate} s. No output depends directly on an input. \
 Needs a 64-bit Python with lhpost6-pin {version} at run time."""
 
@@ -75,12 +87,14 @@ class ShakeTable(Fmi2Slave):
         self.scheme = SCHEMES[0]
         self.steps_per_second = 4 * SAMPLE_RATE
         self.override = ""
+        self.wrench_order = 1
         self.status = 0
         self.trouble = ""
         self._start_time = 0.0
         self._commands: dict[int, float] = {}  # by actuator, where the master has set them
+        self._wrench: dict[int, float] = {}  # by component, likewise
         self._running = False
-        self._settings: tuple[str, int, str] | None = None
+        self._settings: tuple[str, int, str, int] | None = None
         self._table: RunningPlant | None = None
         self._rest = np.full(len(self._machine.actuators), np.nan)
         self._values = np.full(len(_outputs(self._machine)), np.nan)
@@ -112,9 +126,10 @@ class ShakeTable(Fmi2Slave):
             return False
         command = self._rest.copy()
         command[list(self._commands)] = list(self._commands.values())
+        wrench = [self._wrench.get(k, 0.0) for k in range(len(_WRENCH))] if self._wrench else None
         try:
-            for _ in range(samples):
-                self._table.advance(command)
+            for k in range(samples):
+                self._table.advance(command, wrench_of(wrench) if wrench and not k else None)
         except SimulationError as error:
             self._stop(str(error))
             return False
@@ -168,6 +183,17 @@ class ShakeTable(Fmi2Slave):
                 getter=partial(self._command, i),
                 setter=partial(self._commands.__setitem__, i),
             )
+        about = "wrench of the interface over a step: 0 held, 1 continued linearly from the last two"
+        self.register_variable(Integer("wrench_order", description=about, **fixed))
+        for i, (name, unit) in enumerate(_WRENCH.items()):
+            self._real(
+                f"interface_wrench_{name}",
+                unit,
+                f"{name} of a specimen outside on the platen, at C in axes of the platen",
+                Fmi2Causality.input,
+                getter=partial(self._wrench_now, i),
+                setter=partial(self._wrench.__setitem__, i),
+            )
         for i, (name, unit, about) in enumerate(_outputs(machine)):
             self._real(
                 name,
@@ -191,14 +217,15 @@ class ShakeTable(Fmi2Slave):
 
     def _build(self) -> None:
         """Build the plant at rest, if its parameters are not those that it was built with; they are fixed in a run."""
-        settings = (self.scheme, self.steps_per_second, self.override)
+        settings = (self.scheme, self.steps_per_second, self.override, self.wrench_order)
         if self._running or settings == self._settings:
             return
         self._settings, self.status, self.trouble = settings, 0, ""
         try:
             plant = make_plant(_changed(self._machine, self.override))
             rest = find_equilibrium(plant)
-            self._table = RunningPlant(plant, rest, scheme=self.scheme, steps_per_second=self.steps_per_second)
+            steps, order = self.steps_per_second, self.wrench_order
+            self._table = RunningPlant(plant, rest, scheme=self.scheme, steps_per_second=steps, wrench_order=order)
         except Exception as error:  # any: see the top of this file
             self._stop(str(error))
         else:
@@ -211,6 +238,9 @@ class ShakeTable(Fmi2Slave):
     def _command(self, actuator: int) -> float:
         self._build()
         return self._commands.get(actuator, float(self._rest[actuator]))
+
+    def _wrench_now(self, component: int) -> float:
+        return self._wrench.get(component, 0.0)
 
     def _stop(self, reason: str) -> None:
         self.status, self.trouble = 1, reason
@@ -230,6 +260,10 @@ def _outputs(machine: Machine) -> list[tuple[str, str, str]]:
         (f"{name}_{label}", channel_unit(f"{name}[{label}]"), f"{LAYOUT[name].long_name}, {label}")
         for name in (*_ACTUATORS, *MOTION)
         for label in labels[LAYOUT[name].dims[1]]
+    ] + [
+        (f"interface_{name}_{axis}", units[k // 3], f"interface: {about}")
+        for name, units, about in _INTERFACE
+        for k, axis in enumerate(AXES)
     ]
 
 
@@ -249,6 +283,7 @@ def _measure(table: RunningPlant) -> np.ndarray:
             platen.displacement[0],
             platen.velocity[0],
             sensors.acceleration,
+            motion_numbers(table.interface_motion()),
         ]
     )
 

@@ -13,6 +13,7 @@ from ...effects.effect import Effect
 from ...machine.machine import Machine, build_machine
 from ...machine.parameters import EffectEntry, Parameters, Quantity
 from ...machine.specimen import Specimen
+from ...machine.user_specimen import UserSpecimen
 
 __all__ = ["MACHINE_FILE", "load_machine_file", "save_machine_file"]
 
@@ -20,7 +21,7 @@ MACHINE_FILE = "machine.json"
 
 
 def save_machine_file(machine: Machine, folder: Path) -> list[Path]:
-    """Write a machine, and its specimen's URDF if it carries one, into a folder; returns the files.
+    """Write a machine, and its specimen's files if it carries one, into a folder; returns the files.
 
     Numbers are written so that they read back to the last bit.
     """
@@ -33,12 +34,17 @@ def save_machine_file(machine: Machine, folder: Path) -> list[Path]:
         "own_effects": [asdict(effect) for effect in machine.own_effects],
     }
     files = [folder / MACHINE_FILE]
+    if isinstance(machine.specimen, UserSpecimen):
+        raise ParameterError(
+            f"{machine.specimen.source}: an FMU carries numbers, not a specimen in Python; export the table without it "
+            "and couple it through the inputs interface_wrench_*"
+        )
     if machine.specimen is not None:
-        urdf = machine.specimen.urdf
-        if not urdf.is_file():
-            raise ParameterError(f"{urdf}: no such URDF file")
-        known["specimen"] = {**asdict(machine.specimen), "urdf": urdf.name}
-        files.append(Path(shutil.copy2(urdf, folder)))
+        file = machine.specimen.file
+        if not file.is_file():
+            raise ParameterError(f"{file}: no such {'URDF' if file.suffix == '.urdf' else 'specimen'} file")
+        known["specimen"] = {**asdict(machine.specimen), "file": file.name}
+        files += [Path(shutil.copy2(each, folder)) for each in machine.specimen.files]
     files[0].write_text(json.dumps(known, indent=1), encoding="utf-8")
     return files
 
@@ -52,7 +58,9 @@ def load_machine_file(folder: Path) -> tuple[Machine, str]:
     }
     specimen = None
     if entry := known.get("specimen"):
-        specimen = Specimen(**{**entry, "urdf": folder / entry["urdf"]})
+        entry = dict(entry)
+        name = entry.pop("urdf", None) or entry.pop("file")  # FMUs of older versions carry a URDF
+        specimen = Specimen(folder / name, **entry)
     machine = build_machine(
         Parameters(_quantities(known["quantities"]), known["words"], known["origin"], effects),
         added_effects=tuple(Effect(**entry) for entry in known["own_effects"]),

@@ -18,13 +18,16 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...control.plug import Feedback
 from ...control.valves import valve_names
 from ...core.arrays import Array
 from ...core.errors import LinkError
+from ...mechanics.coupled import BaseMotion
+from ...mechanics.interface import motion_of_numbers, wrench_of
 from .clock import SECOND, Histogram, now
-from .protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
+from .protocol import COUNTS, MOTION, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
 from .server import HOST, PORT
 
 __all__ = ["LinkClient", "Reading"]
@@ -41,6 +44,7 @@ class Reading(NamedTuple):
     sensors: Feedback
     acknowledged: int  # sequence of the newest command that acted
     stamp: int  # the server's clock [ns]
+    motion: BaseMotion  # of the interface, at C in axes of the platen
 
 
 class LinkClient:
@@ -92,9 +96,13 @@ class LinkClient:
         """Give the plant back and close."""
         self.close()
 
-    def send(self, command: Array) -> None:
-        """Send a command, per actuator (n_actuators,) or per servovalve (n_valves,), -1..1, without waiting."""
-        self._put(self._command(command))
+    def send(self, command: Array, wrench: ArrayLike | None = None) -> None:
+        """Send a command, per actuator (n_actuators,) or per servovalve (n_valves,), -1..1, without waiting.
+
+        wrench: on the platen at C in its axes at the sample of the newest reading, a `pin.Force` or (6,), force first;
+        of what stands on the platen and is not part of the server's plant.
+        """
+        self._put(self._command(command, wrench))
 
     def newest(self) -> Reading | None:
         """The newest sensors that have come since the last look, or None; does not wait."""
@@ -103,13 +111,13 @@ class LinkClient:
             fresh = self._take(frame) or fresh
         return fresh
 
-    def exchange(self, command: Array) -> Reading:
-        """Send a command and return the next sensors.
+    def exchange(self, command: Array, wrench: ArrayLike | None = None) -> Reading:
+        """Send a command, with a wrench as `send` takes it, and return the next sensors.
 
         In lock-step those of the very next sample; a command is sent again until they come. In real time and free
         running the newest of those that come. Raises LinkError if none do.
         """
-        frame = self._command(command)
+        frame = self._command(command, wrench)
         if self.mode == LinkMode.LOCK_STEP:
             self._request(frame, lambda f: self._take(f) is not None and f.acknowledged == frame.sequence)
             return self.reading
@@ -133,7 +141,7 @@ class LinkClient:
             self._sock.close()
         return dict(zip(COUNTS, status.counts, strict=True))
 
-    def _command(self, command: Array) -> Datagram:
+    def _command(self, command: Array, wrench: ArrayLike | None) -> Datagram:
         values = np.asarray(command, float)
         if values.shape == self.counts.shape:
             values = np.repeat(values, self.counts)
@@ -142,6 +150,8 @@ class LinkClient:
                 f"a command of shape {values.shape}; {self.machine} has {len(self.actuators)} actuators and "
                 f"{len(self.valves)} servovalves"
             )
+        if wrench is not None:
+            values = np.concatenate([values, wrench_of(wrench).vector])
         self._sequence = (self._sequence + 1) % (1 << 32)
         return Datagram(
             Kind.COMMAND,
@@ -174,7 +184,7 @@ class LinkClient:
     def _silence(self) -> str:
         return (
             f"{self._where} did not answer within {self._timeout * self._tries:g} s; start the plant there with "
-            "`lhpost6 serve`, or wait until another client has left it"
+            "`lhpost6 serve` of this version, or wait until another client has left it"
         )
 
     def _put(self, frame: Datagram) -> None:
@@ -216,5 +226,6 @@ class LinkClient:
     def _read(self, frame: Datagram) -> Reading:
         assert frame.numbers is not None
         n = len(self.actuators)
-        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n :])
-        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp)
+        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : 6 + 2 * n])
+        motion = motion_of_numbers(frame.numbers[-MOTION:])
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion)

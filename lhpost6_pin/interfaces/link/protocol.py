@@ -1,19 +1,19 @@
 """The link's datagrams, byte by byte, for controllers in any language over UDP.
 
 All numbers are little endian, without padding; float64 is IEEE 754 binary64. One frame is one datagram. A frame is a
-header of 48 bytes and a payload whose length follows from `kind`, `actuators` and `valves`.
+header of 48 bytes and a payload whose length follows from `kind`, `actuators`, `valves` and `flags`.
 
 Header
 
     offset  type     field         meaning
     0       char[4]  magic         "LHP6"
-    4       uint8    version       1
+    4       uint8    version       2
     5       uint8    kind          1 hello, 2 welcome, 3 command, 4 sensors, 5 bye, 6 status
     6       uint8    mode          0 lock-step, 1 real time, 2 free running; a client sends 0
     7       uint8    state         0 waiting for the first command, 1 running, 2 safe hold, 3 tripped; a client sends 0
     8       uint8    actuators     n, number of actuators; 0 in hello and bye
     9       uint8    valves        m, number of servovalves; 0 in hello and bye
-    10      uint16   flags         bit 0: crc is filled in; the others are 0
+    10      uint16   flags         bit 0: crc is filled in; bit 1: a command carries a wrench; the others are 0
     12      uint32   session       any number that the client chose for its hello; the same in every frame that follows
     16      uint32   sequence      command: 1, 2, 3 ...; sensors: sample of the plant, 0 at rest; others: 0
     20      uint32   acknowledged  sensors: sequence of the newest command that acted; command: sample it answers to
@@ -30,10 +30,20 @@ Payload
                  char[32]         machine, UTF-8, filled up with zeros
                  n x 16 bytes     per actuator: char[15] name, UTF-8, filled up with zeros; uint8 number of its valves
     command      m x float64      spool commands [1], -1..1, in the order of the actuators and of their valves
+                 6 x float64      with bit 1 of flags: wrench on the platen, force [N] and moment [N m]
     sensors      6 x float64      acceleration of the platen: of C in {s} [m/s2], of the Euler angles [rad/s2]
                  n x float64      actuator displacements from the zero-position [m]
                  n x float64      actuator forces [N]
+                 6 x float64      pose of the interface: position of C in {s} [m], Euler angles [rad]
+                 6 x float64      its twist: velocity [m/s], angular velocity [rad/s]
+                 6 x float64      its acceleration [m/s2], angular acceleration [rad/s2]
     status       12 x uint64      the server's counts, in the order of `COUNTS`
+
+The interface is at C, the centre of the platen's top, in axes of the platen: wrench, twist and acceleration (that of
+the point, less gravity) have their components along these. The wrench is that of what stands on the platen and is not
+part of the server's plant, weight included, at the sample of the last sensors. It is continued linearly over the
+sample; without a new one it is kept. Mount the rigid part of a heavy specimen at the server (`lhpost6 serve
+--specimen`) and send the rest, w - w_rigid: `simulation.coupling` states the criterion of stability.
 
 An actuator with one valve has one command; one with two has two, A and B, side by side. Sequence numbers and samples
 go on at 0 after 4294967295. Nothing but finite numbers may be sent.
@@ -53,6 +63,9 @@ In lock-step the plant moves one sample for each new command; the same command a
 a client without an answer sends it again. In real time and free running the plant moves by itself from the first
 command on, takes the newest command at each sample and sends sensors after each. A hello with another session number
 puts the plant at rest again, also a tripped one.
+
+Version 1 had neither wrench nor interface motion. A hello of version 1 is answered by a welcome of version 1 to a
+machine without actuators whose name is the version that is needed.
 """
 
 import math
@@ -66,11 +79,24 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import LinkError, UnknownNameError
 
-__all__ = ["COUNTS", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError", "Welcome"]
-__all__ += ["decode", "encode", "find_mode", "is_newer"]
+__all__ = [
+    "COUNTS",
+    "MOTION",
+    "VERSION",
+    "VersionError",
+    "Datagram",
+    "Kind",
+    "LinkMode",
+    "PlantState",
+    "ShortDatagramError",
+    "Welcome",
+]
+__all__ += ["decode", "encode", "find_mode", "is_newer", "refusal"]
 
 
-MAGIC, VERSION = b"LHP6", 1
+MAGIC, VERSION = b"LHP6", 2
+MOTION = 18
+"""Numbers of the motion of the interface: pose, twist, acceleration."""
 COUNTS = {
     "received": "datagrams received",
     "late": "commands older than one before",
@@ -91,7 +117,8 @@ _HEADER = struct.Struct("<4s6BH3I2Q2I")
 _WELCOME = struct.Struct("<d32s")
 _ACTUATOR = struct.Struct("<15sB")
 _CRC = struct.Struct("<I")
-_CRC_AT, _HAS_CRC, _WRAP = 40, 1, 1 << 32
+_CRC_AT, _HAS_CRC, _HAS_WRENCH, _WRAP = 40, 1, 2, 1 << 32
+_WRENCH = 6
 
 
 class Kind(IntEnum):
@@ -121,6 +148,18 @@ class ShortDatagramError(LinkError):
     """A datagram ends before its frame does."""
 
 
+class VersionError(LinkError):
+    """A frame of another version of the protocol.
+
+    Attributes: version; kind, as a number; session.
+    """
+
+    def __init__(self, version: int, kind: int, session: int) -> None:
+        """What its header says."""
+        super().__init__(f"a frame of version {version}; version {VERSION} is needed: update lhpost6-pin")
+        self.version, self.kind, self.session = version, kind, session
+
+
 class Welcome(NamedTuple):
     """Content of a welcome: samples a second [Hz], machine, actuator names, valves of each actuator."""
 
@@ -143,9 +182,15 @@ class Datagram(NamedTuple):
     acknowledged: int = 0
     stamp: int = 0
     echo: int = 0
-    numbers: Array | None = None  # command (m,), or sensors (6 + 2 n,)
+    numbers: Array | None = None  # command (m,) or, with a wrench, (m + 6,); or sensors (6 + 2 n + 18,)
     welcome: Welcome | None = None
     counts: tuple[int, ...] = ()
+
+    @property
+    def wrench(self) -> Array | None:
+        """Wrench (6,) of a command, if it carries one."""
+        beyond = () if self.numbers is None else self.numbers[self.valves :]
+        return np.asarray(beyond) if self.kind == Kind.COMMAND and len(beyond) else None
 
 
 def find_mode(label: str) -> LinkMode:
@@ -171,19 +216,31 @@ def encode(frame: Datagram) -> bytes:
         payload += b"".join(_ACTUATOR.pack(_cut(n, 15), v) for n, v in zip(names, valves, strict=True))
     else:
         payload = struct.pack(f"<{len(frame.counts)}Q", *frame.counts)
-    size = _payload_size(frame.kind, frame.actuators, frame.valves)
+    flags = _HAS_CRC if frame.wrench is None else _HAS_CRC | _HAS_WRENCH
+    size = _payload_size(frame.kind, frame.actuators, frame.valves, flags)
     if len(payload) != size:
         counts = f"{frame.actuators} actuators and {frame.valves} valves"
         raise LinkError(f"a {frame.kind.name.lower()} frame of {counts} takes {size} bytes, not {len(payload)}")
-    head = (frame.kind, frame.mode, frame.state, frame.actuators, frame.valves, _HAS_CRC, frame.session)
+    return _packed(VERSION, frame, flags, payload)
+
+
+def refusal(session: int) -> list[bytes]:
+    """Welcome and sensors of version 1 that name the version that is needed, in answer to a hello of version 1."""
+    needed = _WELCOME.pack(1.0, _cut(f"needs protocol version {VERSION}", 32))
+    welcome, sensors = Datagram(Kind.WELCOME, session), Datagram(Kind.SENSORS, session)
+    return [_packed(1, welcome, _HAS_CRC, needed), _packed(1, sensors, _HAS_CRC, bytes(48))]
+
+
+def _packed(version: int, frame: Datagram, flags: int, payload: bytes) -> bytes:
+    head = (frame.kind, frame.mode, frame.state, frame.actuators, frame.valves, flags, frame.session)
     numbers = (frame.sequence % _WRAP, frame.acknowledged % _WRAP, frame.stamp, frame.echo)
-    datagram = bytearray(_HEADER.pack(MAGIC, VERSION, *head, *numbers, 0, 0) + payload)
+    datagram = bytearray(_HEADER.pack(MAGIC, version, *head, *numbers, 0, 0) + payload)
     _CRC.pack_into(datagram, _CRC_AT, zlib.crc32(datagram))
     return bytes(datagram)
 
 
 def decode(datagram: bytes) -> Datagram:
-    """Frame of a datagram; raises ShortDatagramError if it ends too early, LinkError for any other fault."""
+    """Frame of a datagram; raises ShortDatagramError if it ends too early, VersionError, LinkError."""
     if len(datagram) < _HEADER.size:
         raise ShortDatagramError(f"{len(datagram)} bytes are too few for a frame; its header takes {_HEADER.size}")
     magic, version, kind, mode, state, actuators, valves, flags, session, *rest = _HEADER.unpack_from(datagram)
@@ -191,10 +248,10 @@ def decode(datagram: bytes) -> Datagram:
     if magic != MAGIC:
         raise LinkError(f"a frame begins with {MAGIC!r}, not {magic!r}")
     if version != VERSION:
-        raise LinkError(f"a frame of version {version}; known is {VERSION}")
+        raise VersionError(version, kind, session)
     if not (1 <= kind <= len(Kind) and mode < len(LinkMode) and state < len(PlantState)):
         raise LinkError(f"kind {kind}, mode {mode}, state {state}: one of them does not exist")
-    size = _HEADER.size + _payload_size(Kind(kind), actuators, valves)
+    size = _HEADER.size + _payload_size(Kind(kind), actuators, valves, flags)
     if len(datagram) < size:
         raise ShortDatagramError(f"{len(datagram)} bytes of a frame of {size}")
     if len(datagram) > size:
@@ -212,11 +269,11 @@ def decode(datagram: bytes) -> Datagram:
     return Datagram(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
 
 
-def _payload_size(kind: Kind, actuators: int, valves: int) -> int:
+def _payload_size(kind: Kind, actuators: int, valves: int, flags: int) -> int:
     return {
         Kind.WELCOME: _WELCOME.size + actuators * _ACTUATOR.size,
-        Kind.COMMAND: 8 * valves,
-        Kind.SENSORS: 8 * (6 + 2 * actuators),
+        Kind.COMMAND: 8 * (valves + (_WRENCH if flags & _HAS_WRENCH else 0)),
+        Kind.SENSORS: 8 * (6 + 2 * actuators + MOTION),
         Kind.STATUS: 8 * len(COUNTS),
     }.get(kind, 0)
 

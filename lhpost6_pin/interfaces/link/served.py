@@ -13,12 +13,12 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from ...control.plug import Feedback
 from ...control.valves import per_actuator, valve_counts
 from ...core.arrays import Array
 from ...core.errors import LinkError, SimulationError
 from ...core.names import SAMPLE_RATE
 from ...mechanics.equilibrium import Equilibrium
+from ...mechanics.interface import motion_numbers, wrench_of
 from ...mechanics.plant import Plant
 from ...simulation.running import RunningPlant
 from ...simulation.snapshot import EVERY, Watch
@@ -30,10 +30,12 @@ from .protocol import (
     LinkMode,
     PlantState,
     ShortDatagramError,
+    VersionError,
     Welcome,
     decode,
     encode,
     is_newer,
+    refusal,
 )
 
 __all__ = ["MISSED_FRAMES", "PATIENCE", "RAMP", "SESSION", "ServedPlant"]
@@ -80,12 +82,13 @@ class ServedPlant:
     def _begin(self) -> None:
         """A plant at rest that waits for its first command."""
         self._table = RunningPlant(self.plant, self._rest)
-        self.state, self.sample, self._sensed = PlantState.WAITING, 0, _numbers(self._table.sensors())
+        self.state, self.sample, self._sensed = PlantState.WAITING, 0, _numbers(self._table)
         self._newest = self._acted = self._acted_stamp = self._newest_stamp = self._missed = 0
         self._fresh, self._asked = False, self._rest.spool
         self.spool, self._from = self._rest.spool, self._rest.spool
         self._ramp = self._on_ramp = RAMP  # samples of the ramp, and those done
         self._answer = b""
+        self._wrench: Array | None = None  # from outside, that the plant has not taken yet
 
     @property
     def client(self) -> Hashable:
@@ -105,6 +108,10 @@ class ServedPlant:
         except ShortDatagramError:
             self.counts["short"] += 1
             return []
+        except VersionError as error:
+            self.counts["malformed"] += 1
+            log.warning("%s: %s", sender, error)
+            return refusal(error.session) if (error.version, error.kind) == (1, Kind.HELLO) else []
         except LinkError as error:
             self.counts["malformed"] += 1
             log.debug("datagram of %s: %s", sender, error)
@@ -173,7 +180,9 @@ class ServedPlant:
         self.counts["lost"] += (frame.sequence - self._newest - 1) % (1 << 32)
         self.counts["superseded"] += self._fresh
         self._newest, self._newest_stamp = frame.sequence, frame.stamp
-        self._asked = np.clip(per_actuator(frame.numbers, self._valves, self._curves), -1.0, 1.0)
+        values = frame.numbers[: self._width]
+        self._asked = np.clip(per_actuator(values, self._valves, self._curves), -1.0, 1.0)
+        self._wrench = frame.wrench if frame.wrench is not None else self._wrench
         if frame.echo:
             self.answer_time.add(now - frame.echo)
         if self.state == PlantState.WAITING:
@@ -206,10 +215,11 @@ class ServedPlant:
                 share = self._on_ramp / self._ramp
                 self.spool = self._from + share * share * (3.0 - 2.0 * share) * (target - self._from)
             try:
-                self._table.advance(self.spool)
+                self._table.advance(self.spool, None if self._wrench is None else wrench_of(self._wrench))
+                self._wrench = None
                 if self.watcher is not None and self._table.sample % EVERY == 0:
                     self.watcher(self._table.snapshot())
-                numbers = _numbers(self._table.sensors())
+                numbers = _numbers(self._table)
                 if not np.isfinite(numbers).all():
                     raise SimulationError(f"stopped at {self._table.time:.4f} s: a sensor is not finite")
                 self.sample, self._sensed = self._table.sample, numbers
@@ -232,6 +242,7 @@ class ServedPlant:
         return encode(self._frame(Kind.STATUS)._replace(counts=since))
 
 
-def _numbers(sensors: Feedback) -> Array:
-    """Sensors in the order of their frame."""
-    return np.concatenate([sensors.acceleration, sensors.displacement, sensors.force])
+def _numbers(table: RunningPlant) -> Array:
+    """Sensors and motion of the interface in the order of their frame."""
+    sensors, motion = table.sensors(), motion_numbers(table.interface_motion())
+    return np.concatenate([sensors.acceleration, sensors.displacement, sensors.force, motion])

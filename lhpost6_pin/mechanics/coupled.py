@@ -1,0 +1,138 @@
+"""The interface of a specimen that is not part of the plant's equations: motion of its base in, wrench out.
+
+    class Tower:
+        inertia = pin.Inertia(2.0e4, np.array([0, 0, 0.3]), 1e4 * np.eye(3))    # rigidly attached part
+
+        def init(self, base, gravity):                                # at rest under gravity
+            return memory, wrench
+
+        def step(self, memory, base, dt):                             # dt [s] after the last call
+            return wrench
+
+`lhpost6 run MOTION --specimen tower.py:Tower` mounts it; so does `machine.with_specimen(Tower())` in Python.
+
+The wrench (`pin.Force`) is that of the specimen on the platen at the base point in base axes, weight included; a bar
+pulled upwards by the platen pulls it down. The base point and its axes are placed on the platen (`position`, `rpy`).
+
+The part of the specimen that is rigidly attached to its base, `inertia` (`pin.Inertia` at the base point, base axes;
+`pin.Inertia.Zero()` if there is none), belongs to the platen in the plant's equations; the wrench contains it all the
+same. A method `interface_mass(dt)` may state the whole matrix M_inf (6, 6), linear first, with which the wrench follows
+an acceleration of the base at once; without it a copy of the memory is probed (`simulation.coupling`).
+"""
+
+import inspect
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from ..core.errors import ParameterError, SimulationError
+from ..core.user_code import call_user, make_attribute
+from ..machine.machine import Machine
+from ..machine.user_specimen import UserSpecimen
+
+__all__ = ["BaseMotion", "CoupledSpecimen", "base_at_rest", "base_placement", "checked_wrench", "coupled_specimen"]
+__all__ += ["rigid_wrench", "start_coupled", "step_coupled"]
+
+
+class BaseMotion(NamedTuple):
+    """Motion of a specimen's base at one instant.
+
+    pose in {s}; twist and acceleration at the base point in base axes. acceleration.linear is the classical one of the
+    base point, as accelerometers measure it, less gravity; acceleration.angular the rate of the angular velocity.
+    """
+
+    pose: pin.SE3
+    twist: pin.Motion
+    acceleration: pin.Motion
+
+
+class CoupledSpecimen(Protocol):
+    """A specimen that exchanges motion and wrench with the platen. It may hold its state in `memory`."""
+
+    inertia: pin.Inertia
+
+    def init(self, base: BaseMotion, gravity: float) -> tuple[Any, pin.Force]:
+        """Memory of one run and wrench, at rest under gravity [m/s2] on a base at rest."""
+
+    def step(self, memory: Any, base: BaseMotion, dt: float) -> pin.Force:
+        """Wrench dt [s] after the last call, of the motion of the base at that instant; called in order."""
+
+
+def coupled_specimen(machine: Machine) -> CoupledSpecimen | None:
+    """Specimen of a machine that is coupled, made ready; None if it has none.
+
+    Raises ParameterError for an object that is no specimen, naming what it lacks.
+    """
+    described = machine.specimen
+    if not isinstance(described, UserSpecimen):
+        return None
+    maker: Any = described.maker
+    if inspect.isfunction(maker) and next(iter(inspect.signature(maker).parameters), "") == "ops":
+        from .opensees import OpenSeesSpecimen
+
+        return OpenSeesSpecimen(maker, described.name)
+    made = maker
+    if inspect.isclass(maker) or inspect.isfunction(maker):
+        made = make_attribute(described.source, maker, ParameterError)
+    for method in ("init", "step"):
+        if not callable(getattr(made, method, None)):
+            raise ParameterError(
+                f"{described.source} has no {method}(); a specimen has init(base, gravity) and step(memory, base, dt), "
+                "an OpenSees model is a function build(ops, base)"
+            )
+    if not isinstance(getattr(made, "inertia", None), pin.Inertia):
+        raise ParameterError(
+            f"{described.source} has no inertia; name the rigidly attached part, inertia = pin.Inertia(...), or none: "
+            "inertia = pin.Inertia.Zero()"
+        )
+    if not np.isfinite(made.inertia.toDynamicParameters()).all() or made.inertia.mass < 0.0:
+        raise ParameterError(f"{described.source}: inertia has a mass of {made.inertia.mass:g} kg, or is not finite")
+    found: CoupledSpecimen = made
+    return found
+
+
+def base_at_rest(machine: Machine) -> BaseMotion:
+    """Base of a machine's specimen at rest in the zero-position."""
+    specimen = machine.specimen
+    assert specimen is not None
+    pose = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position, float))
+    return BaseMotion(pose, pin.Motion.Zero(), pin.Motion.Zero())
+
+
+def base_placement(machine: Machine) -> pin.SE3:
+    """Placement of the base of a machine's specimen in {b}, at B with the platen's axes."""
+    return pin.SE3(np.eye(3), -np.array(machine.platen.centre_of_gravity)) * base_at_rest(machine).pose
+
+
+def start_coupled(coupled: CoupledSpecimen, base: BaseMotion, gravity: float) -> tuple[Any, pin.Force]:
+    """Memory and wrench of a specimen at rest; raises SimulationError naming what fails."""
+    found = call_user(coupled, "init", "", SimulationError, base, gravity)
+    if not isinstance(found, tuple) or len(found) != 2:
+        raise SimulationError(f"{type(coupled).__name__}.init must return (memory, wrench); it returned {found!r}")
+    return found[0], checked_wrench(coupled, found[1], "at rest")
+
+
+def step_coupled(coupled: CoupledSpecimen, memory: Any, base: BaseMotion, dt: float, when: str) -> pin.Force:
+    """Wrench of a specimen after dt [s]; raises SimulationError naming the specimen and `when` it fails."""
+    wrench = call_user(coupled, "step", f" {when}", SimulationError, memory, base, dt)
+    return checked_wrench(coupled, wrench, when)
+
+
+def checked_wrench(coupled: object, wrench: Any, when: str) -> pin.Force:
+    """Wrench as finite numbers; raises SimulationError naming the specimen and `when` it gave it."""
+    name = type(coupled).__name__
+    if not isinstance(wrench, pin.Force):
+        raise SimulationError(f"{name} returned {type(wrench).__name__} {when}; a wrench is a pin.Force")
+    if not np.isfinite(wrench.vector).all():
+        axis = ("fx", "fy", "fz", "mx", "my", "mz")[int(np.argmin(np.isfinite(wrench.vector)))]
+        raise SimulationError(f"{name} returned a wrench {when} whose {axis} is not finite")
+    return wrench
+
+
+def rigid_wrench(inertia: pin.Inertia, base: BaseMotion, gravity: float) -> pin.Force:
+    """Wrench on the platen of a rigid body attached to the base: -(I (a - g) + v x* I v), at the base point."""
+    twist = base.twist
+    spatial = pin.Motion(base.acceleration.linear - np.cross(twist.angular, twist.linear), base.acceleration.angular)
+    spatial.linear = spatial.linear + gravity * base.pose.rotation[2]
+    return -(inertia * spatial + twist.cross(inertia * twist))

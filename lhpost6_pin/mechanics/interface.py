@@ -1,0 +1,65 @@
+"""The platen's side of an interface: motion of a base on it, and its apparent mass there."""
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from ..core.arrays import Array
+from .coupled import BaseMotion
+from .plant import Plant
+from .rigid_body import platen_inertia
+from .schemes import A, V
+from .workspace import Workspace
+
+__all__ = ["apparent_mass", "base_motion", "mass_at_b", "motion_numbers", "motion_of_numbers", "top_placement"]
+__all__ += ["wrench_of"]
+
+
+def top_placement(plant: Plant) -> pin.SE3:
+    """Placement in {b} of C with the platen's axes: the base of wrenches from outside."""
+    return pin.SE3(np.eye(3), -np.array(plant.machine.platen.centre_of_gravity))
+
+
+def base_motion(plant: Plant, ws: Workspace, placement: pin.SE3) -> BaseMotion:
+    """Motion of a base placed in {b}, from pose, V and A of a workspace."""
+    axes, v = plant.axes, np.zeros((2, 6))
+    v[0, axes], v[1, axes] = ws.motion[V][: axes.size], ws.motion[A][: axes.size]
+    if plant.machine.motion == "free":
+        pose = pin.XYZQUATToSE3(ws.q[:7])
+    else:
+        moved = np.zeros(6)
+        moved[axes] = ws.q[: axes.size]
+        pose = pin.SE3(np.eye(3), np.array(plant.machine.platen.centre_of_gravity) + moved[:3])
+    twist = placement.actInv(pin.Motion(v[0]))
+    spatial = placement.actInv(pin.Motion(v[1]))
+    classical = pin.Motion(spatial.linear + np.cross(twist.angular, twist.linear), spatial.angular)
+    return BaseMotion(pose * placement, twist, classical)
+
+
+def motion_numbers(base: BaseMotion) -> Array:
+    """Motion of a base (18,): position [m], Euler angles [rad], twist, acceleration, as links and FMUs hand it on."""
+    pose = base.pose
+    parts = pose.translation, pin.rpy.matrixToRpy(pose.rotation), base.twist.vector, base.acceleration.vector
+    return np.concatenate(parts)
+
+
+def motion_of_numbers(numbers: Array) -> BaseMotion:
+    """Motion of a base from the numbers of `motion_numbers`."""
+    pose = pin.SE3(pin.rpy.rpyToMatrix(*numbers[3:6]), numbers[:3])
+    return BaseMotion(pose, pin.Motion(numbers[6:12]), pin.Motion(numbers[12:18]))
+
+
+def wrench_of(numbers: ArrayLike) -> pin.Force:
+    """Wrench of six numbers, force first, or itself."""
+    return numbers if isinstance(numbers, pin.Force) else pin.Force(np.array(numbers, float))
+
+
+def mass_at_b(placement: pin.SE3, mass: Array) -> Array:
+    """Mass matrix (6, 6) of a base, linear first, at B in platen axes; placement of the base in {b}."""
+    to_base = placement.inverse().action
+    return np.asarray(to_base.T @ mass @ to_base)
+
+
+def apparent_mass(plant: Plant) -> Array:
+    """Mass matrix (6, 6) of the platen with all that is rigidly attached, at B in platen axes."""
+    return platen_inertia(plant.model, plant.machine)[1]

@@ -1,0 +1,125 @@
+"""Response of a specimen in a run: its modes and points, springs in its joints, and the wrench at its base."""
+
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from ..core.arrays import Array
+from ..core.errors import SimulationError
+from ..machine.specimen_forms import influence_of
+from ..mechanics.modes import ModalMotion, modal_motion
+from ..mechanics.plant import Plant
+from ..mechanics.pose import platen_motion, rotation
+from ..mechanics.rigid_body import make_model
+from ..mechanics.specimen_mount import base_twist
+from .coupling import CouplingResult
+
+__all__ = ["base_wrench", "modes_of_run", "point_response", "spring_energy", "twists_of_run"]
+
+
+class History(Protocol):
+    """States of a plant over time, as of a run: q (n, nq), v and a (n, nv), z (n, n_states)."""
+
+    @property
+    def plant(self) -> Plant:
+        """Plant."""
+
+    @property
+    def q(self) -> Array:
+        """Configurations."""
+
+    @property
+    def v(self) -> Array:
+        """Velocities."""
+
+    @property
+    def a(self) -> Array:
+        """Accelerations."""
+
+    @property
+    def z(self) -> Array:
+        """Hidden states."""
+
+
+def twists_of_run(run: History) -> tuple[Array, Array, Array]:
+    """Twist of B and its rate (n, 6), and gravity (n, 3) [m/s2], in platen axes, along a run."""
+    plant = run.plant
+    twist, rate = np.zeros((2, len(run.q), 6))
+    twist[:, plant.axes], rate[:, plant.axes] = (x[:, : plant.axes.size] for x in (run.v, run.a))
+    turn = rotation(platen_motion(plant, run.q, run.v, run.a).displacement[:, 3:])
+    return twist, rate, -plant.machine.platen.gravity * turn[:, 2, :]
+
+
+def modes_of_run(run: History) -> ModalMotion:
+    """Modes of the specimen along a run."""
+    return modal_motion(run.plant.modes, run.plant.coupling, run.z, *twists_of_run(run))
+
+
+def spring_energy(run: History) -> tuple[Array, Array]:
+    """Power [W] into, and energy [J] of, the springs in a specimen's joints along a run, each (n,)."""
+    power, energy = np.zeros((2, len(run.q)))
+    for spring in run.plant.springs:
+        at = run.q[:, spring["q"]]
+        if spring["turns"]:
+            at = np.arctan2(run.q[:, spring["q"] + 1], at)
+        power += spring["stiffness"] * (at - spring["rest"]) * run.v[:, spring["v"]]
+        energy += 0.5 * spring["stiffness"] * (at - spring["rest"]) ** 2
+    return power, energy
+
+
+def point_response(run: History) -> dict[str, Array]:
+    """Motion of a modal specimen's points (n, n_points) along their directions, in base axes.
+
+    displacement and velocity relative to the base [m or rad], absolute acceleration [m/s2 or rad/s2]. Empty without
+    points.
+    """
+    plant, specimen = run.plant, run.plant.machine.specimen
+    if specimen is None or specimen.contents is None or not specimen.contents.points:
+        return {}
+    twist, rate, _ = twists_of_run(run)
+    to_base = base_twist(plant.machine, specimen)
+    base, moved = rate @ to_base.T, twist @ to_base.T
+    base[:, :3] += np.cross(moved[:, 3:], moved[:, :3])
+    carried = base @ influence_of(specimen.contents.points).T
+    if specimen.modes is None:
+        return {"displacement": 0.0 * carried, "velocity": 0.0 * carried, "acceleration": carried}
+    modes, shape = modes_of_run(run), specimen.modes.shape
+    return {
+        "displacement": modes.displacement @ shape.T,
+        "velocity": modes.velocity @ shape.T,
+        "acceleration": carried + modes.acceleration @ shape.T,
+    }
+
+
+def base_wrench(run: History) -> Array:
+    """Wrench (n, 6) [N, N m] of the platen on the specimen at its base, in base axes, linear first.
+
+    Base shear, axial force and overturning moment, weight included: the specimen's inertia and
+    weight by pin.rnea of the model without the platen, less the reaction of its modes; of a coupled specimen what it
+    exchanged.
+    Raises SimulationError for a bare table.
+    """
+    plant, specimen = run.plant, run.plant.machine.specimen
+    if specimen is None:
+        raise SimulationError("a bare table carries no specimen; mount one (--specimen)")
+    if plant.coupled is not None:
+        exchanged: CouplingResult = run.coupling  # type: ignore[attr-defined]
+        return -exchanged.wrench
+    model = _without_platen(plant)
+    data, found = model.createData(), np.zeros((len(run.q), 6))
+    for k, (q, v, a) in enumerate(zip(run.q, run.v, run.a, strict=True)):
+        pin.rnea(model, data, q, v, a)
+        found[k] = data.f[1].vector
+    if plant.modes.size:
+        found -= modes_of_run(run).reaction
+    return found @ np.linalg.inv(base_twist(plant.machine, specimen))
+
+
+def _without_platen(plant: Plant) -> Any:
+    """The plant's model with no inertia of the platen itself."""
+    model, bare = plant.model.copy(), make_model(replace(plant.machine, specimen=None))
+    left = model.inertias[1].toDynamicParameters() - bare.inertias[1].toDynamicParameters()
+    model.inertias[1] = pin.Inertia.FromDynamicParameters(left) if left[0] > 0.0 else pin.Inertia.Zero()
+    return model

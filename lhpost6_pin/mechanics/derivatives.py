@@ -1,9 +1,8 @@
 """Forces, rates and accelerations of a plant at one state."""
 
-import pinocchio as pin
-
 from ..core.arrays import Array
 from ..core.compiled import compiled
+from .leg_model import make_dynamics
 from .plant import Plant
 from .schemes import TAU, V_SEEN, A, V, rates_stage
 from .tables import unpack_tables
@@ -16,7 +15,7 @@ def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
     """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
     status = evaluate(plant, ws, spool)
     if status == 0:
-        ws.motion[A] = pin.aba(plant.model, plant.model.createData(), ws.q, ws.motion[V], ws.motion[TAU])
+        ws.motion[A] = make_dynamics(plant)(ws.q, ws.motion[V], ws.motion[TAU])
     return status
 
 

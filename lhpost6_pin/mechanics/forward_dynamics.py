@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import compiled_inline
 from ..machine.machine import Machine
-from .rigid_body import platen_inertia
+from .rigid_body import platen_body, platen_inertia
 
 __all__ = ["INERTIA", "inertia_table", "platen_acceleration"]
 
@@ -16,22 +16,27 @@ INERTIA = np.dtype(
         ("plain", np.float64, (6, 6)),  # spatial inertia of the platen body at B, linear first
         ("inverse", np.float64, (6, 6)),  # of plain plus directional mass, on the free axes, zero elsewhere
         ("gravity", np.float64),  # [m/s2]
+        ("bodies", np.int64),  # 1: moving parts are bodies of their own (`moving_parts`), inverse is not used
+        ("extra", np.float64, (6, 6)),  # of the platen beyond plain then, which no Inertia can hold
     ]
 )
 
 
 def inertia_table(model: Any, machine: Machine, axes: NDArray[np.int64]) -> NDArray[np.void]:
-    """Table (one row) of the rigid body; all zero for an articulated specimen."""
+    """Table (one row) of the rigid body; all zero for an articulated specimen on a platen with lumped parts."""
     table = np.zeros(1, INERTIA)
-    if model.nv > axes.size:
+    if model.nv > axes.size and machine.bodies == "lumped":
         return table
     plain, full = platen_inertia(model, machine)
     table["plain"] = plain
+    table["gravity"] = machine.platen.gravity
+    if machine.bodies == "full":
+        table["bodies"], table["extra"] = 1, platen_body(machine)[1]
+        return table
     block = np.ix_(axes, axes)
     inverse = np.zeros((6, 6))
     inverse[block] = np.linalg.inv(full[block])
     table["inverse"] = inverse
-    table["gravity"] = machine.platen.gravity
     return table
 
 

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from ..core.arrays import Array
 from .plant import Plant
 from .port_path import ports_along
-from .pose import PlatenMotion, leg_displacements, plant_motion
+from .pose import PlantMotion, PlatenMotion, leg_displacements, plant_motion
+from .required_wrench import moving_wrenches
 
 __all__ = ["displacement_of", "legs_at", "platen_pose_at", "required_wrench_at", "wrench_at"]
 
@@ -58,7 +59,7 @@ def required_wrench_at(plant: Plant, pose: pin.SE3, twist: pin.Motion, accelerat
     """Wrench at C in {c} that gives the platen its inertial force and holds its weight (Eqs. 4-24 to 4-29).
 
     twist at C in {c}; acceleration is the rate of its components. For a platen that is free, with a rigid specimen at
-    most: pin.rnea, and what the directional mass adds.
+    most: pin.rnea, and what the directional mass or moving parts as bodies add.
     """
     turned = pin.SE3(pose.rotation, np.zeros(3))
     rate = turned.actInv(acceleration)
@@ -72,7 +73,9 @@ def required_wrench_at(plant: Plant, pose: pin.SE3, twist: pin.Motion, accelerat
     pin.rnea(plant.model, data := plant.model.createData(), q, *body)
     total = data.f[1]
     extra = plant.body[0]["mass_extra"] * a_b + plant.body[0]["weight_extra"] * pose.rotation[2]
-    return _body_in_c(plant, pose).act(total + pin.Force(extra, np.zeros(3)))
+    inertia, weight = moving_wrenches(plant, PlantMotion(q[None], body[0][None], body[1][None]))
+    parts = pin.Force((inertia - weight)[0])
+    return _body_in_c(plant, pose).act(total + pin.Force(extra, np.zeros(3)) + parts)
 
 
 def _body_in_c(plant: Plant, pose: pin.SE3) -> pin.SE3:

@@ -23,7 +23,7 @@ from ..effects.evaluate import advance_states, apply_forces, state_rates, wrench
 from .ports import evaluate_ports, platen_pose
 
 __all__ = ["DS", "FORCE", "SD", "A", "DQ", "S", "TAU", "V", "V_MID", "V_SEEN"]
-__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "staggered_stage", "steps_a_sample"]
+__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "set_twist", "staggered_stage", "steps_a_sample"]
 
 V, A, V_MID, V_SEEN, DQ, TAU = range(6)
 """Rows of `motion`: velocity, acceleration, velocity at mid-step and as forces see it, step of the pose, torque."""

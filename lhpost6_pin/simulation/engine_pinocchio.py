@@ -1,6 +1,7 @@
 """The per-step engine: compiled stages around pin.aba and pin.integrate; the default, and the fused engine's oracle.
 
-Joints of a specimen are part of the same model and the same ABA.
+Joints of a specimen are part of the same model and the same ABA. Moving parts of the legs as bodies are a second model
+(`leg_model`), chosen once a run.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import pinocchio as pin
 from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..mechanics.derivatives import rates_at
+from ..mechanics.leg_model import make_dynamics
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, staggered_stage
 from ..mechanics.tables import unpack_tables
@@ -35,8 +37,7 @@ def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
 
 
 def _semi_implicit(plant: Plant, dt: float) -> Stepper:
-    model, data, packed = plant.model, plant.model.createData(), plant.tables.packed
-    aba, integrate = pin.aba, pin.integrate
+    model, packed, dynamics, integrate = plant.model, plant.tables.packed, make_dynamics(plant), pin.integrate
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, buffer = ws.motion, ws.buffer
@@ -48,7 +49,7 @@ def _semi_implicit(plant: Plant, dt: float) -> Stepper:
             status = _staggered(q, dt, packed, buffer, held)
             if status:
                 break
-            kick(motion, aba(model, data, q, v_seen, tau), dt)
+            kick(motion, dynamics(q, v_seen, tau), dt)
         ws.q[:] = q
         return status
 
@@ -56,7 +57,7 @@ def _semi_implicit(plant: Plant, dt: float) -> Stepper:
 
 
 def _euler(plant: Plant, dt: float) -> Stepper:
-    model, data = plant.model, plant.model.createData()
+    model, dynamics = plant.model, make_dynamics(plant)
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, z = ws.motion, ws.z
@@ -65,7 +66,7 @@ def _euler(plant: Plant, dt: float) -> Stepper:
             status = rates_at(plant, ws, ws.q, ws.z, held)
             if status:
                 return status
-            motion[A] = pin.aba(model, data, ws.q, motion[V], motion[TAU])
+            motion[A] = dynamics(ws.q, motion[V], motion[TAU])
             ws.q[:] = pin.integrate(model, ws.q, dt * motion[V])
             motion[V] += dt * motion[A]
             z += dt * ws.zd
@@ -88,7 +89,7 @@ def _local_rate(model: Any, n_platen: int, q0: Array, q: Array, moved: Array, v:
 
 
 def _rk4(plant: Plant, dt: float) -> Stepper:
-    model, data, n_platen = plant.model, plant.model.createData(), plant.axes.size
+    model, dynamics, n_platen = plant.model, make_dynamics(plant), plant.axes.size
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, q0 = ws.motion, ws.q
@@ -104,7 +105,7 @@ def _rk4(plant: Plant, dt: float) -> Stepper:
                 if status:
                     return status
                 step = _local_rate(model, n_platen, q0, q, reach * dt * step, v)
-                dv, dz = pin.aba(model, data, q, v, motion[TAU]), ws.zd
+                dv, dz = dynamics(q, v, motion[TAU]), ws.zd
                 if reach == 0.0:
                     motion[A] = dv
                 for total, rate in zip(sums, (step, dv, dz), strict=True):

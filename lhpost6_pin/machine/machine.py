@@ -20,7 +20,7 @@ from .parameters import EffectEntry, Parameters, load_parameters, override_param
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
-from .structure import BODIES, MOTIONS, Structure
+from .structure import BODIES, ESTIMATES, MOTIONS, Structure
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -102,10 +102,22 @@ class Machine(Structure):
         return self.with_params({f"{a.kind}.valves": count for a in self.actuators if a.area_b is not None})
 
     def with_bodies(self, bodies: str) -> "Machine":
-        """Return a copy with the moving parts of its legs "lumped" to the platen, or as bodies of their own ("full")."""
+        """Return a copy with moving parts of its legs "lumped" to the platen, or as bodies of their own ("full")."""
         words = {**self.parameters.words, "machine.bodies": bodies}
         parameters = replace(self.parameters, words=words)
         return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
+
+    def with_inertia(self, estimate: str) -> "Machine":
+        """Return a copy with mass and moments of inertia of an estimate of the file, "first" or "second" (Table 4.1).
+
+        Raises ParameterError if the machine's file has no such estimate.
+        """
+        found = {key: f"estimates.{estimate}.{key}" for key in ("mass", "inertia")}
+        if estimate not in ESTIMATES or not all(path in self.parameters for path in found.values()):
+            known = [e for e in ESTIMATES if f"estimates.{e}.mass" in self.parameters]
+            said = f"choose {' or '.join(known)}" if known else "its file states no estimates of the platen's inertia"
+            raise ParameterError(f"{self.parameters.origin}: no estimate {estimate!r}; {said}")
+        return self.with_params({f"platen.{key}": self.parameters[path] for key, path in found.items()})
 
     def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
         """Return a copy with the servovalves open that a record's attributes state, none stated: as it is.

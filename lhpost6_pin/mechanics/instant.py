@@ -14,10 +14,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
+from .leg_model import LegModel
 from .plant import Plant
 from .port_path import ports_along
-from .pose import PlantMotion, PlatenMotion, leg_displacements, plant_motion
-from .required_wrench import moving_wrenches
+from .pose import PlatenMotion, leg_displacements, plant_motion
 
 __all__ = ["displacement_of", "legs_at", "platen_pose_at", "required_wrench_at", "wrench_at"]
 
@@ -73,9 +73,9 @@ def required_wrench_at(plant: Plant, pose: pin.SE3, twist: pin.Motion, accelerat
     pin.rnea(plant.model, data := plant.model.createData(), q, *body)
     total = data.f[1]
     extra = plant.body[0]["mass_extra"] * a_b + plant.body[0]["weight_extra"] * pose.rotation[2]
-    inertia, weight = moving_wrenches(plant, PlantMotion(q[None], body[0][None], body[1][None]))
-    parts = pin.Force((inertia - weight)[0])
-    return _body_in_c(plant, pose).act(total + pin.Force(extra, np.zeros(3)) + parts)
+    if plant.machine.bodies == "full":
+        total = total + LegModel(plant).required_wrench(q, *body)
+    return _body_in_c(plant, pose).act(total + pin.Force(extra, np.zeros(3)))
 
 
 def _body_in_c(plant: Plant, pose: pin.SE3) -> pin.SE3:

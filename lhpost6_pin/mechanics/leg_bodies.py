@@ -1,4 +1,4 @@
-"""Barrels and rods of the legs as slender bodies whose lump in the zero-position is the machine's mass along and across.
+"""Barrels and rods of the legs as slender bodies; their lump in the zero-position is the machine's masses.
 
 A leg on swivels or pins has a rod, uniform from the platen point back, and a barrel, uniform from the base point; they
 turn about the base point together and the rod slides. With L the distance of the two points, the platen point feels the

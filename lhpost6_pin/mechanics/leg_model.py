@@ -1,8 +1,8 @@
 """Barrels and rods of all legs as a Pinocchio model, whose motion follows from the platen's: M = sum G' M_leg G.
 
-A leg on swivels has two rotations at its base point and a slider; a bearing actuator's rod slides upright. Their joint
-positions x, velocities G V and bias accelerations G' V are functions of the platen's pose and twist. CRBA gives the legs'
-mass matrix, RNEA at the bias acceleration the forces that hold them on that motion, weight included:
+A leg on swivels has two rotations at its base point and a slider; a bearing actuator's rod slides upright. Positions x,
+velocities G V and bias accelerations G' V of these joints are functions of the platen's pose and twist (`leg_motion`).
+CRBA gives the legs' mass matrix, RNEA at the bias acceleration the forces that hold them on that motion and carry them:
 
     (M_platen + G' M_legs G) dV/dt = tau - h_platen - G' rnea(x, G V, G' V)
 
@@ -10,7 +10,6 @@ Measured against constrained dynamics (`scripts/moving_parts.py`): the projectio
 singular massless bearing, and costs less.
 """
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -19,14 +18,11 @@ import numpy as np
 import pinocchio as pin
 
 from ..core.arrays import Array
-from ..core.compiled import compiled
+from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
 from .leg_bodies import LegBody, leg_bodies
-from .moving_parts import solve_positive
+from .leg_motion import follow_platen, solve_projected
 from .plant import Plant
-from .ports import platen_pose
-from .schemes import set_twist
-from .spatial import cross, from_body, to_body
 
 __all__ = ["Dynamics", "LegModel", "make_dynamics", "make_leg_model"]
 
@@ -42,14 +38,15 @@ class LegModel:
         self.plant = plant
         self.model, self._zero = make_leg_model(plant.machine)
         self._data = self.model.createData()
-        n = self.model.nv
+        n, slots = self.model.nv, [[c.kind] * (1 if _upright(c) else 3) for c in plant.machine.components]
+        self.kinds = [kind for kinds in slots for kind in kinds]  # of each joint's component
         self.position, self.velocity, self.bias = np.zeros((3, n))
         self.jacobian = np.zeros((n, 6))
 
     def follow(self, q: Array, v: Array) -> None:
         """Fill position, Jacobian, velocity and bias acceleration of the legs' joints for a pose and twist."""
         tables, out = self.plant.tables, (self.position, self.jacobian, self.velocity, self.bias)
-        _follow(q, v, tables.axes, tables.legs, tables.body, self._zero, *out)
+        follow_platen(q, v, tables.axes, tables.legs, tables.body, self._zero, *out)
 
     def forces(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Mass matrix (n, n) and forces (n,) of the legs' joints on the platen's motion with dV/dt = 0."""
@@ -62,6 +59,18 @@ class LegModel:
         mass, force = self.forces(q, v)
         return self.jacobian.T @ mass @ self.jacobian, self.jacobian.T @ force
 
+    def required_wrench(self, q: Array, twist: Array, rate: Array) -> pin.Force:
+        """Wrench at B in platen axes that moves and holds the legs, and moves the platen's `extra`, by RNEA.
+
+        twist (6,) and its rate (6,) are those of B in platen axes, linear first.
+        """
+        self.follow(q, twist[self.plant.axes])
+        onward = self.jacobian @ rate + self.bias
+        force = pin.rnea(self.model, self._data, self.position, self.velocity, onward)
+        extra = self.plant.tables.inertia[0]["extra"]
+        turned = pin.Motion(twist).cross(pin.Force(extra @ twist))
+        return pin.Force(self.jacobian.T @ force + extra @ rate) + turned
+
 
 def make_leg_model(machine: Machine) -> tuple[Any, Array]:
     """The pin.Model of barrels and rods, and the legs' axes in the zero-position (n_legs, 3, 3), x along the leg."""
@@ -73,7 +82,7 @@ def make_leg_model(machine: Machine) -> tuple[Any, Array]:
         zero[k] = _axes_along(np.subtract(component.platen_point, component.base_point))
         place = pin.SE3(zero[k], np.array(component.base_point))
         parent = 0
-        if getattr(component, "mount", "none") != "bearing":
+        if not _upright(component):
             parent = model.addJoint(0, pin.JointModelRZ(), place, f"{component.name}_turn")
             place = pin.SE3.Identity()
             parent = model.addJoint(parent, pin.JointModelRY(), place, f"{component.name}_tilt")
@@ -81,6 +90,11 @@ def make_leg_model(machine: Machine) -> tuple[Any, Array]:
         slider = model.addJoint(parent, pin.JointModelPX(), place, f"{component.name}_extension")
         model.appendBodyToJoint(slider, _rod(body), pin.SE3.Identity())
     return model, zero
+
+
+def _upright(component: Actuator | Strut) -> bool:
+    """Whether a leg has the slider alone: a bearing actuator."""
+    return getattr(component, "mount", "none") == "bearing"
 
 
 def _rod(body: LegBody) -> Any:
@@ -101,126 +115,6 @@ def _axes_along(direction: Array) -> Array:
     return np.column_stack([x, y, np.cross(x, y)])
 
 
-@compiled
-def _set_row(G, n, frame, rho, scale, axis, e):
-    """Row n of G: scale times the velocity of the point at rho along e, a direction in the leg's axes."""
-    ex = axis[0, 0] * e[0] + axis[0, 1] * e[1] + axis[0, 2] * e[2]
-    ey = axis[1, 0] * e[0] + axis[1, 1] * e[1] + axis[1, 2] * e[2]
-    ez = axis[2, 0] * e[0] + axis[2, 1] * e[1] + axis[2, 2] * e[2]
-    x, y, z = to_body(frame, (ex, ey, ez))
-    G[n, 0], G[n, 1], G[n, 2] = scale * x, scale * y, scale * z
-    G[n, 3], G[n, 4], G[n, 5] = cross(rho, (scale * x, scale * y, scale * z))
-
-
-@compiled
-def _follow(q, v, axes, legs, body, zero, x, G, rate, bias):
-    """Fill positions x, Jacobian G, velocities and bias accelerations of the legs' joints (`make_leg_model`)."""
-    frame = np.zeros((8, 3))
-    platen_pose(q, axes, body, frame)
-    set_twist(v, axes, frame)
-    twist = np.empty(6)
-    twist[:3] = frame[4]
-    twist[3:] = frame[5]
-    n = 0
-    for i in range(legs.size):
-        leg = legs[i]
-        if leg.bearing == 1:
-            _follow_bearing(frame, leg, body[0].plane, n, x, G, bias)
-            n += 1
-            continue
-        axis = zero[i]
-        gx, gy, gz = from_body(frame, leg.rho)
-        ax = frame[3, 0] + gx - leg.base_point[0]
-        ay = frame[3, 1] + gy - leg.base_point[1]
-        az = frame[3, 2] + gz - leg.base_point[2]
-        d0 = axis[0, 0] * ax + axis[1, 0] * ay + axis[2, 0] * az
-        d1 = axis[0, 1] * ax + axis[1, 1] * ay + axis[2, 1] * az
-        d2 = axis[0, 2] * ax + axis[1, 2] * ay + axis[2, 2] * az
-        length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-        turn, tilt = math.atan2(d1, d0), -math.asin(d2 / length)
-        ca, sa, cb, sb = math.cos(turn), math.sin(turn), math.cos(tilt), math.sin(tilt)
-        x[n], x[n + 1], x[n + 2] = turn, tilt, length
-        # directions in which turn, tilt and length move the platen point, and what they divide by
-        _set_row(G, n, frame, leg.rho, 1.0 / (length * cb), axis, (-sa, ca, 0.0))
-        _set_row(G, n + 1, frame, leg.rho, 1.0 / length, axis, (-sb * ca, -sb * sa, -cb))
-        _set_row(G, n + 2, frame, leg.rho, 1.0, axis, (cb * ca, cb * sa, -sb))
-        a, b, c = 0.0, 0.0, 0.0
-        for j in range(6):
-            a += G[n, j] * twist[j]
-            b += G[n + 1, j] * twist[j]
-            c += G[n + 2, j] * twist[j]
-        spin = cross(frame[5], leg.rho)
-        onward = cross(frame[5], (frame[4, 0] + spin[0], frame[4, 1] + spin[1], frame[4, 2] + spin[2]))
-        for k in range(3):  # acceleration of the platen point with dV/dt = 0, along the three directions
-            bias[n + k] = G[n + k, 0] * onward[0] + G[n + k, 1] * onward[1] + G[n + k, 2] * onward[2]
-        bias[n] += 2.0 * a * b * sb / cb - 2.0 * c * a / length
-        bias[n + 1] -= 2.0 * c * b / length + a * a * sb * cb
-        bias[n + 2] += length * (b * b + a * a * cb * cb)
-        n += 3
-    for k in range(n):
-        rate[k] = 0.0
-        for j in range(6):
-            rate[k] += G[k, j] * twist[j]
-
-
-@compiled
-def _follow_bearing(frame, leg, plane, n, x, G, bias):
-    """Position, Jacobian row and bias acceleration of a bearing actuator's length."""
-    e, v, w = frame[2], frame[4], frame[5]
-    away = (frame[3, 0] - leg.base_point[0], frame[3, 1] - leg.base_point[1], frame[3, 2] - leg.base_point[2])
-    b = to_body(frame, away)
-    length = (b[2] + plane) / e[2]
-    x[n] = length
-    G[n, 0] = G[n, 1] = G[n, 5] = 0.0
-    G[n, 2], G[n, 3], G[n, 4] = 1.0 / e[2], (length * e[1] - b[1]) / e[2], (b[0] - length * e[0]) / e[2]
-    rate = G[n, 2] * v[2] + G[n, 3] * w[0] + G[n, 4] * w[1]
-    # L n_z = (B - A) . n + plane, differentiated twice; n' = w x z, n'' = w x (w x z) in platen axes
-    first = (w[1], -w[0], 0.0)
-    second = cross(w, first)
-    curve = cross(w, v)[2] + 2.0 * (v[0] * first[0] + v[1] * first[1])
-    curve += b[0] * second[0] + b[1] * second[1] + b[2] * second[2]
-    curve -= 2.0 * rate * (e[0] * first[0] + e[1] * first[1])
-    curve -= length * (e[0] * second[0] + e[1] * second[1] + e[2] * second[2])
-    bias[n] = curve / e[2]
-
-
-@compiled
-def _solve(M, h, legs, force, G, tables, frame, q, v, tau, a):
-    """Acceleration of platen, legs and specimen joints: a holds the result; M, the model's own, is overwritten."""
-    axes, extra, n = tables.axes, tables.inertia[0].extra, tau.size
-    platen_pose(q, axes, tables.body, frame)
-    set_twist(v, axes, frame)
-    moved, momentum, total = np.zeros((G.shape[0], 6)), np.zeros(6), np.zeros(6)
-    for i in range(G.shape[0]):
-        for j in range(G.shape[0]):
-            mass = legs[min(i, j), max(i, j)]  # the upper triangle
-            if mass != 0.0:
-                for k in range(6):
-                    moved[i, k] += mass * G[j, k]
-        for k in range(6):
-            total[k] += G[i, k] * force[i]
-    for i in range(6):
-        for j in range(3):
-            momentum[i] += extra[i, j] * frame[4, j] + extra[i, 3 + j] * frame[5, j]
-    bend, drift = cross(frame[5], momentum), cross(frame[4], momentum)
-    turning = cross(frame[5], momentum[3:])
-    for i in range(3):
-        total[i] += bend[i]
-        total[3 + i] += turning[i] + drift[i]
-    for i in range(n):
-        a[i] = tau[i] - h[i]
-        for j in range(i):
-            M[i, j] = M[j, i]
-    for i in range(axes.size):
-        a[i] -= total[axes[i]]
-        for j in range(axes.size):
-            more = extra[axes[i], axes[j]]
-            for k in range(G.shape[0]):
-                more += G[k, axes[i]] * moved[k, axes[j]]
-            M[i, j] += more
-    solve_positive(M, n, a)
-
-
 def make_dynamics(plant: Plant) -> Dynamics:
     """Forward dynamics of a plant on Pinocchio: ABA, with moving parts as bodies the projection of CRBA and RNEA."""
     model, data = plant.model, plant.model.createData()
@@ -233,7 +127,7 @@ def make_dynamics(plant: Plant) -> Dynamics:
         mass, force = legs.forces(q, v)
         own = np.ascontiguousarray(crba(model, data, q))
         bias, a = effects(model, data, q, v), np.empty(model.nv)
-        _solve(own, bias, mass, force, legs.jacobian, tables, frame, q, v, tau, a)
+        solve_projected(own, bias, mass, force, legs.jacobian, tables, frame, q, v, tau, a)
         return a
 
     return acceleration

@@ -1,15 +1,14 @@
 """Moving parts of the legs as bodies, projected onto the platen: M = sum G' M_leg G, in closed form and compiled.
 
-All in platen axes at B, V = (v, omega). A leg on swivels (`leg_bodies`) is known by its platen point P alone: with u its
-direction, a_P the acceleration of P and u' = (v_P - L' u)/L, the force on the platen point that its motion requires is
+All in platen axes at B, V = (v, omega). A leg on swivels (`leg_bodies`) moves as its platen point P does: with u its
+direction, a_P the acceleration of P and u' = (v_P - L' u)/L, it requires the force on the platen point
 
     f = m_r (u . a_P + c |u'|^2) u + J/L^2 a_P,across + L' (J'/L - 2 J/L^2) u',    J' = dJ/dL = 2 m_r (L - c)
 
-c the distance of the rod's centre behind P. Its weight is that of a potential g (s(L) u_z), s = m_b l_b/2 + m_r (L - c).
-The rod of a bearing actuator has one coordinate, the leg's length, with rate row J_L: m J_L' (J_L a + bias).
-What the identified inertia of the platen has beyond an Inertia, `extra`, moves as a constant matrix in platen axes does:
-extra dV/dt + V x* (extra V). All of it conserves energy. Pinocchio's CRBA and RNEA of the legs (`leg_model`) are the
-oracle.
+c the distance of the rod's centre behind P. Its weight has the potential g s(L) u_z, s = m_b l_b/2 + m_r (L - c). The
+rod of a bearing actuator has one coordinate, the leg's length, with the rate row J_L: m J_L' (J_L a + bias). What the
+identified inertia of the platen has beyond an Inertia, `extra`, moves as a constant matrix in platen axes does: extra
+dV/dt + V x* (extra V). All of it conserves energy. Pinocchio's CRBA and RNEA of the legs (`leg_model`) are the oracle.
 """
 
 import math

@@ -60,7 +60,7 @@ def rigid_wrenches(plant: Plant, motion: PlantMotion, turn: Array) -> tuple[Arra
 
 
 def moving_wrenches(plant: Plant, motion: PlantMotion) -> tuple[Array, Array]:
-    """Inertial wrench and weight (n, 6) at B in platen axes of moving parts that are bodies; zero where they are lumped.
+    """Inertial wrench and weight (n, 6) at B in platen axes of moving parts that are bodies; zero if they are lumped.
 
     The motion's rows may hold joints of a specimen behind the platen's.
     """

@@ -194,7 +194,7 @@ def _powers(q, v, z, tables, ws, spools, flows, created):
 
 
 def _rigid_energies(run: Run) -> tuple[Array, Array]:
-    """Power [W] and energy [J], each (2, n): kinetic, and potential in gravity, of platen, moving parts and specimen."""
+    """Power [W] and energy [J], each (2, n), of platen, moving parts and specimen: kinetic, potential in gravity."""
     plant = run.plant
     model, data = plant.model, plant.model.createData()
     weight = plant.body[0]["weight_extra"]

@@ -49,7 +49,7 @@ def constrained(machine: Machine) -> tuple[Any, Any, Any]:
     legs, _ = make_leg_model(machine)
     model = pin.appendModel(plant.model, legs, 0, pin.SE3.Identity())
     model.gravity = legs.gravity
-    centre, constraints = np.array(machine.platen.centre_of_gravity), []
+    centre, constraints = np.array(machine.platen.centre_of_gravity), pin.StdVec_RigidConstraintModel()
     for component in machine.components:
         if getattr(component, "mount", "none") == "bearing":
             continue
@@ -75,7 +75,8 @@ def forward_dynamics(machine: Machine) -> dict[str, float]:
     # legs on swivels alone, for the comparison with point constraints; extra as well, which Pinocchio has not
     massless = machine.with_params(vertical__mass_along=0.0).with_bodies("full")
     plant, model, constraints = constrained(massless)
-    data, datas = model.createData(), [c.createData() for c in constraints]
+    data, datas = model.createData(), pin.StdVec_RigidConstraintData()
+    datas.extend(c.createData() for c in constraints)
     pin.initConstraintDynamics(model, data, constraints)
     x, velocity, force = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
     x[:7], velocity[:6], force[:6] = q, v, tau

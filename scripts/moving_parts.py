@@ -77,7 +77,7 @@ def forward_dynamics(machine: Machine) -> dict[str, float]:
     plant, model, constraints = constrained(massless)
     data, datas = model.createData(), pin.StdVec_RigidConstraintData()
     datas.extend(c.createData() for c in constraints)
-    pin.initConstraintDynamics(model, data, constraints)
+    pin.initConstraintDynamics(model, data, constraints, datas)
     x, velocity, force = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
     x[:7], velocity[:6], force[:6] = q, v, tau
     legs = LegModel(plant)

@@ -7,7 +7,17 @@ import typer
 
 from .app import command, print_result, progress_bar, stderr
 from .live_view import LiveOptions, watched
-from .options import ControllerName, Json, MotionOptions, Out, SpecimenOptions, Valves, find_controller, folder_for
+from .options import (
+    Cancel,
+    ControllerName,
+    Json,
+    MotionOptions,
+    Out,
+    SpecimenOptions,
+    Valves,
+    find_controller,
+    folder_for,
+)
 
 __all__ = ["export_fmu", "link", "serve"]
 
@@ -68,6 +78,7 @@ def link(
     port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of `lhpost6 serve`.")] = 46946,
     out: Out = None,
     controller: ControllerName = None,
+    cancel: Cancel = None,
     valves: Valves = 0,
     json: Json = False,
 ) -> None:
@@ -78,6 +89,7 @@ def link(
     from ..mechanics.equilibrium import find_equilibrium
     from ..mechanics.plant import make_plant
     from ..simulation.rehearse import loop_for
+    from ..tuning.cancel import cancelling
 
     table = machine.load(valves)
     chosen = find_controller(controller, table)
@@ -87,6 +99,7 @@ def link(
     folder = folder_for(out, name)
     plant = make_plant(table)
     loop = loop_for(plant, find_equilibrium(plant), chosen, target)
+    loop = loop if cancel is None else cancelling(loop, target, cancel)
     with LinkClient(host, port) as client, progress_bar(f"{name} at {host}:{port}") as progress:
         done = run_over_link(client, plant, loop, progress=progress)
         counts = dict(client.close())

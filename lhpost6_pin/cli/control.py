@@ -86,19 +86,28 @@ def replay(
     drive: Annotated[Path, typer.Argument(help="Drive file written by `lhpost6 iterate`.")],
     steps: opt.StepOptions,
     machine: opt.SpecimenOptions,
+    scale: Annotated[float, typer.Option(help="Factor of the drive and of its target motion.")] = 1.0,
+    beyond: opt.Beyond = False,
     out: opt.Out = None,
     controller: opt.SettingsName = None,
     valves: opt.Valves = 0,
     json: opt.Json = False,
 ) -> None:
-    """Replay a drive file in closed loop, compared with its target motion; writes record.nc and report.html."""
+    """Replay a drive file in closed loop, compared with its target motion; writes record.nc and report.html.
+
+    --scale multiplies both; the table is not linear, so that a drive fits its target best at the scale it was iterated.
+    """
+    from ..mechanics.plant import make_plant
+    from ..simulation.motion_limits import check_motion_limits
     from ..simulation.rehearse import rehearse
-    from ..tuning.drives import check_circumstances, load_drive
+    from ..tuning.drives import check_circumstances, load_drive, scaled_drive
 
     table = machine.load(valves)
     settings = opt.find_settings(controller, table)
     options = steps.checked(table)
-    found = load_drive(drive)
+    found = scaled_drive(load_drive(drive), scale)
+    if scale != 1.0 and not beyond:
+        check_motion_limits(make_plant(table), found.target)
     check_circumstances(str(drive), found.attrs, table, settings.name)
     if found.mode != settings.mode:
         raise SimulationError(

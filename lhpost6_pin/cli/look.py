@@ -48,12 +48,23 @@ def view(
 
 @command()
 def info(machine: MachineOptions, json: Json = False) -> None:
-    """Print a machine: every number with unit, uncertainty and source; assumed values are marked."""
+    """Print a machine: every number with unit, uncertainty and source; assumed values are marked.
+
+    With --bodies full also the moving parts, and where they differ from their lump.
+    """
+    from ..show.moving_tables import moving_parts_entries, print_moving_parts
     from ..show.results import machine_entries
     from ..show.tables import print_machine
 
     table = machine.load()
-    print_result(json, lambda: machine_entries(table), lambda: print_machine(table))
+    bodies = table.bodies == "full"
+
+    def show() -> None:
+        print_machine(table)
+        if bodies:
+            print_moving_parts(table)
+
+    print_result(json, lambda: {**machine_entries(table), **(moving_parts_entries(table) if bodies else {})}, show)
 
 
 @command()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-__all__ = ["Beyond", "CampaignFolder", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
+__all__ = ["Beyond", "CampaignFolder", "Cancel", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
 __all__ += ["MotionOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName", "SpecimenOptions"]
 __all__ += ["StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring", "record_name"]
 
@@ -65,6 +65,13 @@ PhaseSettingsName = Annotated[
         autocompletion=_settings,
     ),
 ]
+Cancel = Annotated[
+    str | None,
+    typer.Option(
+        help="Amplitude-phase control and harmonic cancellation of a sine-like motion: axis and fundamental [Hz], "
+        "such as x=0.5."
+    ),
+]
 ControllerName = Annotated[
     str | None,
     typer.Option(help="Controller settings: name or TOML file; or your own, FILE.py:NAME.", autocompletion=_settings),
@@ -77,12 +84,32 @@ class MachineOptions:
 
     machine: MachineName = "lhpost6"
     override: Annotated[Path | None, typer.Option(help="TOML file with parameters to replace, effects to add.")] = None
+    inertia: Annotated[
+        str | None,
+        typer.Option(
+            help="Effective inertia of the platen: first (computed, M_eff,1) or second (identified, M_eff,2) estimate "
+            "of Table 4.1; default: as in the machine file; an override goes on top.",
+            autocompletion=completing(lambda: ("first", "second")),
+        ),
+    ] = None
+    bodies: Annotated[
+        str | None,
+        typer.Option(
+            help="Moving parts of the legs: lumped to the platen, or full: barrels and rods as bodies; default: as in "
+            "the machine file.",
+            autocompletion=completing(lambda: ("lumped", "full")),
+        ),
+    ] = None
 
     def load(self) -> "Machine":
-        """Machine by shipped name or file, with the numbers of an override file."""
+        """Machine by shipped name or file, with the numbers of an override file and the options given."""
         from ..machine.machine import load_machine
 
-        return load_machine(self.machine, self.override)
+        table = load_machine(self.machine, None if self.inertia else self.override)
+        if self.inertia is not None:
+            table = table.with_inertia(self.inertia)
+            table = table if self.override is None else table.with_params(self.override)
+        return table if self.bodies is None else table.with_bodies(self.bodies)
 
 
 @dataclass(frozen=True)
@@ -154,6 +181,11 @@ class MotionOptions:
         typer.Option(help=r"Azimuth that the table's x gets: turns a file's horizontal components \[deg]."),
     ] = None
 
+    rotation_factor: Annotated[
+        float | None,
+        typer.Option(help="Factor of a file's rotations; the report's test SFU has 1000."),
+    ] = None
+
     def target(self, table: "Machine", beyond: bool = False) -> "Target":
         """Target of the motion at the controller's rate; raises OutOfRangeError beyond the limits, unless allowed."""
         from ..mechanics.plant import make_plant
@@ -183,12 +215,15 @@ class MotionOptions:
                 raise MotionError(f"--set {item}: write key=value")
             options[key.strip()] = _number_or_text(value.strip())
         about_file = {"time_step": self.dt, "units": self.unit, "channels": self.channels, "rotate": self.rotate}
+        about_file["rotation_factor"] = self.rotation_factor
         about_file = {key: value for key, value in about_file.items() if value is not None}
         first, *files = self.motion
         if not _is_file(first) and files and not any(map(_is_file, files)):
             raise MotionError(f"one motion at a time; got {', '.join(self.motion)}, none of which is a file")
         if about_file and not (files or _is_file(first)):
-            raise MotionError(f"{first}: --dt, --unit, --channels and --rotate are for motions from files")
+            raise MotionError(
+                f"{first}: --dt, --unit, --channels, --rotate and --rotation-factor are for motions from files"
+            )
         options |= about_file
         return load_motion(self.motion, **options) if _is_file(first) else find_motion(first, files, **options)
 

@@ -34,6 +34,7 @@ def run(
     aic: Annotated[
         Path | None, typer.Option(help="Condition the drive with this inverse (inverse.nc of `lhpost6 iterate`).")
     ] = None,
+    cancel: opt.Cancel = None,
     valves: opt.Valves = 0,
     beyond: opt.Beyond = False,
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
@@ -43,6 +44,7 @@ def run(
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
     from ..simulation.rehearse import rehearse
+    from ..tuning.cancel import cancelling
     from ..tuning.drives import check_circumstances
 
     if record_rate < 1 or SAMPLE_RATE % record_rate:
@@ -66,6 +68,7 @@ def run(
             chosen,
             attrs={"test": name, "title": title},
             inverse=inverse,
+            adapt=None if cancel is None else lambda loop: cancelling(loop, target, cancel),
             record_every=SAMPLE_RATE // record_rate,
             beyond_limits=True,
             progress=progress,

@@ -65,6 +65,7 @@ _CHAMBER: dict[str, Any] = {
     "replaces": "actuator_force",
     "differentiated": True,
 }
+_GIVEN: dict[str, Any] = {"role": "command", "errors": ()}  # free of noise, and nothing is estimated of it
 _PLATEN: dict[str, Any] = {
     "dims": _AXIS,
     "role": "motion",
@@ -130,6 +131,24 @@ LAYOUT: Mapping[str, Channel] = {
     ),
     "reference_displacement": Channel(
         dims=_AXIS, units="m, rad", long_name="displacement the test asked for", role="command", errors=()
+    ),
+    **{
+        f"drive_{mode}": Channel(
+            dims=_AXIS, units=units, long_name=f"drive: input of reference generators in {mode} mode", **_GIVEN
+        )
+        for mode, units in (("acceleration", "m/s2, rad/s2"), ("velocity", "m/s, rad/s"), ("displacement", "m, rad"))
+    },
+    "spool_command_b": Channel(
+        **_GIVEN,
+        dims=("time", "horizontal"),
+        units="1",
+        long_name="normalised fourth-stage spool command of servovalve B, where A's is spool_command",
+    ),
+    "spool_position_b": Channel(
+        dims=("time", "horizontal"),
+        units="1",
+        long_name="normalised fourth-stage spool position of servovalve B, where A's is spool_position",
+        errors=(),
     ),
     "pressure_difference": Channel(
         **_PRESSURE,

@@ -27,6 +27,7 @@ from ..data.fusion import fuse_motion
 from ..data.records import is_measured, require, sample_interval
 from ..data.sensors import SensorSet
 from ..data.signals import Band, differentiate
+from ..data.valve_pairs import with_joint_spools
 from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
@@ -182,7 +183,7 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
 
     Raises RecordError for a record without platen motion, or with a channel of it that is not finite.
     """
-    record = _decimated(record, policy.rate)
+    record = _decimated(with_joint_spools(plant.machine, record), policy.rate)
     dt = sample_interval(record)
     columns = {n: record[n].values for n, c in LAYOUT.items() if n in record and c.residuals and c.role != "motion"}
     channels = {name: np.ascontiguousarray(x.reshape(len(x), -1), float) for name, x in columns.items()}

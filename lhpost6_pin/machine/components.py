@@ -50,7 +50,8 @@ class Actuator:
     mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
     valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are None without chamber B,
     pad quantities None without a bearing. full_command, if stated, is the voltage of an open valve. `load_cell_share`
-    is the share of the oil's force that moves what is ahead of a load cell, piston and rod.
+    is the share of the oil's force that moves what is ahead of a load cell, piston and rod. Rod and barrel lengths from
+    the platen and the base point are needed where its moving parts are bodies (`mechanics.leg_bodies`).
     """
 
     name: str
@@ -80,6 +81,8 @@ class Actuator:
     pad_yield: float = quantity_field("m", bound="positive", optional=True)
     pad_shape: float = quantity_field("1", bound="fraction", optional=True)
     load_cell_share: float = quantity_field("1", bound="fraction", optional=True)
+    rod_length: float = quantity_field("m", bound="positive", optional=True)
+    barrel_length: float = quantity_field("m", bound="positive", optional=True)
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,8 @@ class Strut:
     seal_shape: float = quantity_field("1", bound="fraction")
     mass_along: float = quantity_field("kg", bound="nonnegative")
     mass_across: float = quantity_field("kg", bound="nonnegative")
+    rod_length: float = quantity_field("m", bound="positive", optional=True)
+    barrel_length: float = quantity_field("m", bound="positive", optional=True)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from .parameters import EffectEntry, Parameters, load_parameters, override_param
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
-from .structure import MOTIONS, Structure
+from .structure import BODIES, ESTIMATES, MOTIONS, Structure
 from .user_specimen import load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
@@ -103,6 +103,24 @@ class Machine(Structure):
             return self
         return self.with_params({f"{a.kind}.valves": count for a in self.actuators if a.area_b is not None})
 
+    def with_bodies(self, bodies: str) -> "Machine":
+        """Return a copy with moving parts of its legs "lumped" to the platen, or as bodies of their own ("full")."""
+        words = {**self.parameters.words, "machine.bodies": bodies}
+        parameters = replace(self.parameters, words=words)
+        return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
+
+    def with_inertia(self, estimate: str) -> "Machine":
+        """Return a copy with mass and moments of inertia of an estimate of the file, "first" or "second" (Table 4.1).
+
+        Raises ParameterError if the machine's file has no such estimate.
+        """
+        found = {key: f"estimates.{estimate}.{key}" for key in ("mass", "inertia")}
+        if estimate not in ESTIMATES or not all(path in self.parameters for path in found.values()):
+            known = [e for e in ESTIMATES if f"estimates.{e}.mass" in self.parameters]
+            said = f"choose {' or '.join(known)}" if known else "its file states no estimates of the platen's inertia"
+            raise ParameterError(f"{self.parameters.origin}: no estimate {estimate!r}; {said}")
+        return self.with_params({f"platen.{key}": self.parameters[path] for key, path in found.items()})
+
     def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
         """Return a copy with the servovalves open that a record's attributes state, none stated: as it is.
 
@@ -165,6 +183,7 @@ def build_machine(
     options = {
         "motion": _word(parameters, "machine.motion", MOTIONS),
         "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
+        "bodies": _word(parameters, "machine.bodies", BODIES) if "machine.bodies" in words else BODIES[0],
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}
@@ -248,7 +267,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str],
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
         "limits": {f.name for f in fields(Limits)},
-        "machine": {"name", "title", "motion", "thrust", "controller", "sensors"},
+        "machine": {"name", "title", "motion", "thrust", "bodies", "controller", "sensors"},
         **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
         **{name: both | {"kind", "valves"} for name in components},
         **{name: {f.name for f in fields(Floor)} for name in floors},

@@ -6,10 +6,16 @@ from ..core.names import AXES
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
-__all__ = ["MOTIONS", "Structure"]
+__all__ = ["BODIES", "ESTIMATES", "MOTIONS", "Structure"]
 
 MOTIONS = ("free", "x", "y", "z", "xy", "xz", "yz", "xyz")
 """Freedom of a platen: six degrees of freedom, or displacements along guides, which hold it against turning."""
+
+BODIES = ("lumped", "full")
+"""Moving parts of the legs: lumped to the platen (Table 4.1), or bodies of their own."""
+
+ESTIMATES = ("first", "second")
+"""Estimates of the effective inertia (Table 4.1): M_eff,1, computed, and M_eff,2, identified."""
 
 EQUAL_AREAS = 0.01
 """Relative difference of a piston's areas up to which its rod counts as double."""
@@ -23,6 +29,7 @@ class Structure:
     title: str
     motion: str
     thrust: str
+    bodies: str  # moving parts of the legs: "lumped" to the platen, or "full", as bodies of their own
     controller: str  # shipped name of its settings; empty: none
     sensors: str  # shipped name of its sensors file; empty: none
     platen: Platen

@@ -1,34 +1,27 @@
 """Forces, rates and accelerations of a plant at one state."""
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
-import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
+from .leg_model import Dynamics, make_dynamics
 from .plant import Plant
 from .rigid_body import platen_inertia
 from .schemes import TAU, V_SEEN, A, V, rates_stage
 from .tables import unpack_tables
 from .workspace import Workspace, unpack_workspace
 
-__all__ = ["Forward", "evaluate", "evaluate_derivatives", "forward_dynamics", "rates_at"]
+__all__ = ["evaluate", "evaluate_derivatives", "forward_dynamics", "rates_at"]
 
 
-Forward = Callable[[Array, Array, Array], Array]
-"""Accelerations (nv,) of q, v and torque."""
-
-
-def forward_dynamics(plant: Plant) -> Forward:
-    """Accelerations (nv,) of q, v and torque, by pin.aba; with modes of a specimen on the mass that they reduce.
+def forward_dynamics(plant: Plant) -> Dynamics:
+    """`make_dynamics` of a plant, with modes of a specimen on the mass that they reduce.
 
     aba divides the torque by the mass M of platen and specimen as a rigid body; modes leave M - sum G G^T (`modes`),
     both constant in platen axes: its acceleration is (M - sum G G^T)^-1 M times that of aba.
     """
-    aba = partial(pin.aba, plant.model, plant.model.createData())
-    if not plant.modes.size:
+    aba = make_dynamics(plant)
+    if not plant.modes.size or plant.machine.bodies == "full":  # whose projection takes the modes' share itself
         return aba
     _, full = platen_inertia(plant.model, plant.machine)
     block = np.ix_(plant.axes, plant.axes)

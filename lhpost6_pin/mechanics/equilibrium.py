@@ -16,6 +16,8 @@ from ..laws.orifice import spool_for_opening
 from ..laws.supply import varies
 from .modes import rest_of_modes
 from .plant import Plant, State
+from .pose import PlantMotion
+from .required_wrench import moving_wrenches
 from .schemes import TAU, forces_stage, pose_stage
 from .workspace import make_workspace
 
@@ -54,7 +56,9 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     gravity = pin.rnea(
         plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)
     )
-    needed = gravity[:free] - ws.motion[TAU][:free]
+    still = PlantMotion(start.q[None], start.v[None], start.v[None])
+    weight = moving_wrenches(plant, still)[1][0, plant.axes]
+    needed = gravity[:free] - weight - ws.motion[TAU][:free]
     columns = ws.JB[1][: plant.spools, plant.axes].T  # (free, n_actuators)
     force, *_ = np.linalg.lstsq(columns, needed, rcond=None)
     miss = np.abs(columns @ force - needed).max()

@@ -7,32 +7,42 @@ from numpy.typing import NDArray
 
 from ..core.compiled import compiled_inline
 from ..machine.machine import Machine
-from .rigid_body import platen_inertia
+from .rigid_body import platen_body, platen_inertia
 
 __all__ = ["INERTIA", "inertia_table", "platen_acceleration"]
 
 INERTIA = np.dtype(
     [
         ("plain", np.float64, (6, 6)),  # spatial inertia of the platen body at B, linear first
-        # of plain plus directional mass, less what modes of a specimen take, on the free axes, zero elsewhere
+        ("modal", np.float64, (6, 6)),  # share of the mass that modes of a specimen take
+        # of plain plus directional mass less modal, on the free axes, zero elsewhere
         ("inverse", np.float64, (6, 6)),
         ("gravity", np.float64),  # [m/s2]
+        ("bodies", np.int64),  # 1: moving parts are bodies of their own (`moving_parts`), inverse is not used
+        ("extra", np.float64, (6, 6)),  # of the platen beyond plain then, which no Inertia can hold
     ]
 )
 
 
 def inertia_table(model: Any, machine: Machine, axes: NDArray[np.int64], modes: NDArray[np.void]) -> NDArray[np.void]:
-    """Table (one row) of the rigid body; all zero for an articulated specimen. modes (`modes.MODE`) reduce its mass."""
+    """Table (one row) of the rigid body; all zero for an articulated specimen on a platen with lumped parts.
+
+    modes (`modes.MODE`) reduce its mass.
+    """
     table = np.zeros(1, INERTIA)
-    if model.nv > axes.size:
+    if model.nv > axes.size and machine.bodies == "lumped":
         return table
     plain, full = platen_inertia(model, machine)
     table["plain"] = plain
+    table["modal"] = modes["participation"].T @ modes["participation"]
+    table["gravity"] = machine.platen.gravity
+    if machine.bodies == "full":
+        table["bodies"], table["extra"] = 1, platen_body(machine)[1]
+        return table
     block = np.ix_(axes, axes)
     inverse = np.zeros((6, 6))
-    inverse[block] = np.linalg.inv((full - modes["participation"].T @ modes["participation"])[block])
+    inverse[block] = np.linalg.inv((full - table["modal"][0])[block])
     table["inverse"] = inverse
-    table["gravity"] = machine.platen.gravity
     return table
 
 

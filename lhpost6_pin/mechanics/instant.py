@@ -14,6 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
+from .leg_model import LegModel
 from .plant import Plant
 from .port_path import ports_along
 from .pose import PlatenMotion, leg_displacements, plant_motion
@@ -58,7 +59,7 @@ def required_wrench_at(plant: Plant, pose: pin.SE3, twist: pin.Motion, accelerat
     """Wrench at C in {c} that gives the platen its inertial force and holds its weight (Eqs. 4-24 to 4-29).
 
     twist at C in {c}; acceleration is the rate of its components. For a platen that is free, with a rigid specimen at
-    most: pin.rnea, and what the directional mass adds.
+    most: pin.rnea, and what the directional mass or moving parts as bodies add.
     """
     turned = pin.SE3(pose.rotation, np.zeros(3))
     rate = turned.actInv(acceleration)
@@ -72,6 +73,8 @@ def required_wrench_at(plant: Plant, pose: pin.SE3, twist: pin.Motion, accelerat
     pin.rnea(plant.model, data := plant.model.createData(), q, *body)
     total = data.f[1]
     extra = plant.body[0]["mass_extra"] * a_b + plant.body[0]["weight_extra"] * pose.rotation[2]
+    if plant.machine.bodies == "full":
+        total = total + LegModel(plant).required_wrench(q, *body)
     return _body_in_c(plant, pose).act(total + pin.Force(extra, np.zeros(3)))
 
 

@@ -20,6 +20,7 @@ from ..core.compiled import compiled, compiled_inline
 from ..effects.modifiers import thrust_shares
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS
+from .leg_bodies import leg_bodies
 from .spatial import from_body, matrix_to_rpy, quaternion_to_matrix, to_body
 
 __all__ = [
@@ -47,6 +48,11 @@ LEG = np.dtype(
             np.float64,
         ),  # bearing: 0 thrust along the vertical (Eq. 4-23), 1 along the normal (3-27)
         ("swivel", np.int64),  # number of the first of its five swivel ports, -1 without
+        # its moving parts as bodies (`leg_bodies`), zero where they are lumped to the platen
+        ("rod_mass", np.float64),  # [kg]
+        ("rod_centre", np.float64),  # of the rod, behind the platen point [m]
+        ("turning", np.float64),  # of the barrel about the base point, and of the rod about its centre [kg m2]
+        ("first_moment", np.float64),  # of the barrel about the base point [kg m]
     ]
 )
 """Table row of a leg: an actuator or a strut."""
@@ -83,6 +89,10 @@ def leg_table(machine: Machine) -> NDArray[np.void]:
         elif mount == "swivel":
             row["swivel"] = turn
             turn += len(SWIVEL_TURNS)
+    if machine.bodies == "full":
+        for row, body in zip(legs, leg_bodies(machine), strict=True):
+            row["rod_mass"], row["rod_centre"] = body.rod_mass, body.rod_centre
+            row["turning"], row["first_moment"] = body.turning, body.first_moment
     turned = thrust_shares(machine.modifiers, [c.name for c in machine.components])
     legs["normal_thrust"] += np.multiply(-1.0 if machine.thrust == "normal" else 1.0, turned)
     return legs
@@ -94,8 +104,9 @@ def body_table(machine: Machine) -> NDArray[np.void]:
     body = np.zeros(1, BODY)
     body["rho_c"] = -np.array(platen.centre_of_gravity)
     body["plane"] = platen.bearing_plane[2] - platen.centre_of_gravity[2]
-    body["mass_extra"] = platen.directional_mass
-    body["weight_extra"] = platen.directional_mass[2] * platen.gravity
+    if machine.bodies == "lumped":
+        body["mass_extra"] = platen.directional_mass
+        body["weight_extra"] = platen.directional_mass[2] * platen.gravity
     return body
 
 

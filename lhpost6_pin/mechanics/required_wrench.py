@@ -5,6 +5,8 @@ that no Inertia holds (see `rigid_body`):
 
     inertia = I dV/dt + V x* (I V) + dM (dv/dt + omega x v)              (Eqs. 4-26, 4-28)
     weight  = I g_b + (m_z - m_0) g_b                                    (Eq. 4-24)
+
+Moving parts as bodies add their own (`moving_parts`), and dM is zero.
 """
 
 import numpy as np
@@ -12,11 +14,15 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..core.errors import SimulationError
+from .moving_parts import add_moving_parts
 from .plant import Plant
+from .ports import platen_pose
 from .pose import PlantMotion
+from .schemes import set_twist
 from .spatial import act_force, cross, to_body
 
-__all__ = ["floor_wrench", "refuse_joints", "require_alike", "required_wrench", "rigid_wrenches", "wrenches_at_c"]
+__all__ = ["floor_wrench", "moving_wrenches", "refuse_joints", "require_alike", "required_wrench", "rigid_wrenches"]
+__all__ += ["wrenches_at_c"]
 
 
 def refuse_joints(plant: Plant) -> None:
@@ -37,6 +43,8 @@ def refuse_joints(plant: Plant) -> None:
 def require_alike(some: Plant, other: Plant) -> bool:
     """Whether two plants require the same wrench for a motion."""
     one, two = ((p.tables.inertia.tobytes(), p.body["mass_extra"].tobytes()) for p in (some, other))
+    if "full" in (some.machine.bodies, other.machine.bodies) and some.legs.tobytes() != other.legs.tobytes():
+        return False
     return one == two and bool(some.body["weight_extra"] == other.body["weight_extra"])
 
 
@@ -51,7 +59,38 @@ def rigid_wrenches(plant: Plant, motion: PlantMotion, turn: Array) -> tuple[Arra
     twist[:, plant.axes], rate[:, plant.axes] = motion.v, motion.a
     inertia, weight = np.zeros((2, n, 6))
     _rigid_wrenches(twist, rate, np.ascontiguousarray(turn), plant.tables, inertia, weight)
+    if plant.machine.bodies == "full":
+        more = moving_wrenches(plant, motion)
+        return inertia + more[0], weight + more[1]
     return inertia, weight
+
+
+def moving_wrenches(plant: Plant, motion: PlantMotion) -> tuple[Array, Array]:
+    """Inertial wrench and weight (n, 6) at B in platen axes of moving parts that are bodies; zero if they are lumped.
+
+    The motion's rows may hold joints of a specimen behind the platen's.
+    """
+    n, free = len(motion.q), plant.axes.size
+    inertia, weight = np.zeros((2, n, 6))
+    if plant.machine.bodies == "full":
+        rate = np.zeros((n, 6))
+        rate[:, plant.axes] = motion.a[:, :free]
+        q, v = np.ascontiguousarray(motion.q), np.ascontiguousarray(motion.v[:, :free])
+        _moving_wrenches(q, v, rate, plant.tables, inertia, weight)
+    return inertia, weight
+
+
+@compiled
+def _moving_wrenches(q, v, rate, tables, inertia, weight):
+    frame, M, row = np.zeros((8, 3)), np.zeros((6, 6)), np.zeros(6)
+    for k in range(q.shape[0]):
+        platen_pose(q[k], tables.axes, tables.body, frame)
+        set_twist(v[k], tables.axes, frame)
+        M[:] = 0.0
+        add_moving_parts(frame, tables.legs, tables.body, tables.inertia, row, M, inertia[k], weight[k])
+        for i in range(6):
+            for j in range(6):
+                inertia[k, i] += M[i, j] * rate[k, j]
 
 
 @compiled

@@ -3,7 +3,10 @@
 A Pinocchio Inertia has one mass; the platen's identified masses differ by direction (Table 4.1). The Inertia at B
 carries the isotropic part m_0 = min(m_x, m_y, m_z) and the rotational inertia, the joint's armature the rest
 dM = M - m_0; what is then missing of Eqs. 4-24 and 4-26, the bias -dM (omega x v_B) and the weight (m_z - m_0) g, is
-added as a wrench by `stage.wrench_on_platen`. Together they are the report's equations to rounding.
+added as a wrench by `evaluate.wrench_on_platen`. Together they are the report's equations to rounding.
+
+With moving parts as bodies (machine.bodies = full) the platen is what their lump in the zero-position leaves of the
+effective inertia (`platen_body`), so that the total there is the effective inertia of the machine file.
 """
 
 from collections.abc import Sequence
@@ -21,7 +24,7 @@ from ..machine.user_specimen import UserSpecimen
 from .coupled import CoupledSpecimen, base_at_rest, coupled_specimen
 from .specimen_mount import mount_specimen
 
-__all__ = ["free_axes", "lumped_inertia", "make_model", "platen_inertia"]
+__all__ = ["free_axes", "lumped_inertia", "make_model", "platen_body", "platen_inertia"]
 
 
 def free_axes(machine: Machine) -> NDArray[np.int64]:
@@ -47,12 +50,11 @@ def make_model(machine: Machine, coupled: CoupledSpecimen | None = None) -> Any:
         placement = pin.SE3(np.eye(3), np.array(platen.centre_of_gravity))
     index = model.addJoint(0, joint, placement, "platen")
     model.addJointFrame(index)
-    inertia = _with_added(pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia)), machine)
-    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
+    body, beyond = platen_body(machine)
+    model.appendBodyToJoint(index, _with_added(body, machine), pin.SE3.Identity())
     top = pin.SE3(np.eye(3), -np.array(platen.centre_of_gravity))
     model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
-    armature = np.zeros(6)
-    armature[:3] = platen.directional_mass
+    armature = np.diag(beyond) if machine.bodies == "lumped" else np.zeros(6)
     if isinstance(machine.specimen, UserSpecimen):
         coupled = coupled or coupled_specimen(machine)
         assert coupled is not None
@@ -94,15 +96,47 @@ def _with_added(inertia: Any, machine: Machine) -> Any:
     return inertia
 
 
-def platen_inertia(model: Any, machine: Machine) -> tuple[Array, Array]:
-    """Spatial inertia of the platen body (6, 6) at B, linear first, and the same with the directional mass added.
+def platen_body(machine: Machine) -> tuple[Any, Array]:
+    """Inertia of the platen at B (pin.Inertia), and what its effective inertia has beyond it (6, 6), linear first.
 
-    The first includes a rigid specimen; the fused engine uses both. [kg, kg m, kg m2]
+    Lumped: the isotropic mass, and the directional mass beyond it. Moving parts as bodies: what their lump leaves of
+    the effective inertia, as an Inertia of its vertical mass, first and second moments; beyond it are the differences
+    of the horizontal masses and of their first moments. Raises ParameterError if the lump leaves no inertia.
+    """
+    platen = machine.platen
+    effective = np.diag([*platen.mass, *platen.inertia])
+    if machine.bodies == "lumped":
+        lumped = pin.Inertia(platen.isotropic_mass, np.zeros(3), np.diag(platen.inertia))
+        return lumped, np.diag([*platen.directional_mass, 0.0, 0.0, 0.0])
+    alone = effective - _legs_lump(machine)
+    axes = free_axes(machine)
+    if np.linalg.eigvalsh(alone[np.ix_(axes, axes)])[0] <= 0.0 or alone[2, 2] <= 0.0:
+        raise ParameterError(
+            f"{machine.parameters.origin}: mass_along and mass_across of the legs leave the platen no inertia; "
+            "lighten them, or take machine.bodies = lumped"
+        )
+    mass, coupling = alone[2, 2], alone[3:, :3]
+    first = pin.unSkew(0.5 * (coupling - coupling.T))
+    lever = first / mass
+    body = pin.Inertia(mass, lever, alone[3:, 3:] + mass * pin.skewSquare(lever, lever))
+    return body, alone - body.matrix()
+
+
+def _legs_lump(machine: Machine) -> Array:
+    """Moving parts of all legs lumped to the platen in the zero-position (6, 6), at B."""
+    parts = lumped_inertia((0.0,), (0.0, 0.0, 0.0), machine)
+    return np.asarray(sum(parts.values()))
+
+
+def platen_inertia(model: Any, machine: Machine) -> tuple[Array, Array]:
+    """Spatial inertia of the platen body (6, 6) at B, linear first, and the effective one in the zero-position.
+
+    Both include a rigid specimen; the effective one adds the directional mass, and moving parts that are bodies of
+    their own. [kg, kg m, kg m2]
     """
     plain = np.array(model.inertias[1].matrix())
-    extra = np.zeros(6)
-    extra[:3] = machine.platen.directional_mass
-    return plain, plain + np.diag(extra)
+    full = plain + platen_body(machine)[1]
+    return plain, full + _legs_lump(machine) if machine.bodies == "full" else full
 
 
 def lumped_inertia(platen_mass: Sequence[float], platen_inertia: Sequence[float], machine: Machine) -> dict[str, Array]:

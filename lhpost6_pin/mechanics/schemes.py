@@ -25,7 +25,7 @@ from .modes import add_modal_wrench, advance_modes, modal_rates
 from .ports import evaluate_ports, platen_pose
 
 __all__ = ["DS", "FORCE", "SD", "A", "DQ", "S", "SPRING", "TAU", "V", "V_MID", "V_SEEN"]
-__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "staggered_stage", "steps_a_sample"]
+__all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "set_twist", "staggered_stage", "steps_a_sample"]
 
 V, A, V_MID, V_SEEN, DQ, TAU, SPRING = range(7)
 """Rows of `motion`: velocity, acceleration, velocity at mid-step and as forces see it, step of the pose, torque, and

@@ -1,9 +1,13 @@
 """Reading ground-motion files of any known kind, one for all axes or one for each component."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..core.errors import MotionError, instead_of
 from .at2 import is_at2, read_at2
@@ -26,6 +30,7 @@ _OPTIONS: dict[str, tuple[Any, str]] = {
     "units": (str | Mapping, "a unit for all axes, such as g or mm, or from Python one by axis"),
     "channels": (str | Mapping, "a channel or column by axis, as in x=2,y=1"),
     "rotate": (Real, "the azimuth of the table's x in degrees"),
+    "rotation_factor": (Real, "a factor of the rotations"),
 }
 """Options of `load_motion`: types in Python, and in words."""
 
@@ -40,6 +45,7 @@ def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
     - `channels`: axis to channel, as ``{"x": 2, "y": 1}`` or ``"x=2,y=1"``: number of a channel or column, name of a
       column, or number of a file where there are several.
     - `rotate`: azimuth [deg] of the table's x, to which the two horizontal components are turned.
+    - `rotation_factor`: multiplies roll, pitch and yaw; the report's test SFU has 1000.
     - `time_step` [s], `units`: for files that do not say.
 
     Raises MotionError naming the file, line or option and what to do; a format that is not known with those that are.
@@ -63,7 +69,19 @@ def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
     elif any(component.axis for component in components):
         channels = None  # its reader has heeded them
     kind = f"{forms[0]} file{'s' if together else ''} {', '.join(Path(path).name for path in paths)}"
-    return assemble(components, name or Path(paths[0]).stem, kind, channels=channels, rotate=rotate)
+    motion = assemble(components, name or Path(paths[0]).stem, kind, channels=channels, rotate=rotate)
+    factor = options.get("rotation_factor")
+    return motion if factor is None else _with_rotations(motion, float(factor))
+
+
+def _with_rotations(motion: GroundMotion, factor: float) -> GroundMotion:
+    """Motion with its rotations multiplied; raises MotionError for one without, or a factor that is not finite."""
+    if not math.isfinite(factor):
+        raise MotionError(f"{motion.name}: rotation factor {factor}; give a finite number")
+    if not motion.samples[:, 3:].any():
+        raise MotionError(f"{motion.name}: has no rotations to multiply by {factor:g}; leave --rotation-factor out")
+    samples = motion.samples * np.repeat([1.0, factor], 3)
+    return replace(motion, samples=samples, source=f"{motion.source}; rotations times {factor:g}")
 
 
 def _read(path: Path, stated: dict[str, Any], channels: Channels | None) -> tuple[str, list[Component]]:

@@ -81,7 +81,7 @@ def print_machine(machine: Machine) -> None:
     print_blocks(
         f"{machine.name}: {machine.title}",
         f"{len(machine.actuators)} actuators ({', '.join(machine.actuator_names)}), {len(machine.struts)} struts, "
-        f"platen motion {machine.motion}, bearing thrust {machine.thrust}",
+        f"platen motion {machine.motion}, bearing thrust {machine.thrust}, moving parts {machine.bodies}",
         Table("", ("quantity", "value", "unit", "sd (ours)", "evidence", "source"), rows),
         "* assumed: not published; replace it with --override",
         _effects_table("Force effects, in ledger order", machine.effects),

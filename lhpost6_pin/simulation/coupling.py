@@ -41,8 +41,9 @@ from ..mechanics.coupled import (
     start_coupled,
     step_coupled,
 )
-from ..mechanics.derivatives import Forward, evaluate, forward_dynamics
+from ..mechanics.derivatives import evaluate, forward_dynamics
 from ..mechanics.interface import apparent_mass, base_motion, mass_at_b
+from ..mechanics.leg_model import Dynamics
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import TAU, A, V
 from ..mechanics.workspace import Workspace
@@ -182,7 +183,7 @@ class Coupling:
         table = apparent_mass(plant)[np.ix_(axes, axes)]
         share = np.linalg.solve(table + self._added[np.ix_(axes, axes)], table)
         accelerate = forward_dynamics(plant)
-        self._forward: Forward = accelerate
+        self._forward: Dynamics = accelerate
         if self._added.any():
             self._forward = lambda q, v, tau: share @ accelerate(q, v, tau)
         self._step = make_stepper(plant, scheme, dt, self._forward)

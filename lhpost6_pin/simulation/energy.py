@@ -31,7 +31,11 @@ from ..effects.actuator import oil_power
 from ..effects.dispatch import power
 from ..effects.registry import HYDRAULIC, LAWS
 from ..effects.supply import supply_pressures
-from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage
+from ..mechanics.moving_parts import leg_energies
+from ..mechanics.ports import platen_pose
+from ..mechanics.pose import PlantMotion
+from ..mechanics.required_wrench import moving_wrenches
+from ..mechanics.schemes import FORCE, SD, V_SEEN, S, forces_stage, pose_stage, set_twist
 from .ledger import history_of, number_of
 from .simulate import Run
 from .specimen_response import modes_of_run, spring_energy, twists_of_run
@@ -200,7 +204,7 @@ def _powers(q, v, z, tables, ws, spools, flows, created):
 
 
 def _rigid_energies(run: Run) -> tuple[Array, Array]:
-    """Power [W] and energy [J], each (2, n): kinetic, and potential in gravity, of platen and specimen."""
+    """Power [W] and energy [J], each (2, n), of platen, moving parts and specimen: kinetic, potential in gravity."""
     plant = run.plant
     model, data = plant.model, plant.model.createData()
     weight = plant.body[0]["weight_extra"]
@@ -213,4 +217,21 @@ def _rigid_energies(run: Run) -> tuple[Array, Array]:
         power[1, k] = holding + weight * rate[2]
         energy[0, k] = pin.computeKineticEnergy(model, data, q, v)
         energy[1, k] = pin.computePotentialEnergy(model, data, q) + weight * data.liMi[1].translation[2]
+    if plant.machine.bodies == "full":
+        free, of_bodies = plant.axes, np.zeros((2, len(run.time)))
+        _leg_energies(np.ascontiguousarray(run.q), np.ascontiguousarray(run.v), plant.tables, of_bodies)
+        inertia, down = moving_wrenches(plant, PlantMotion(run.q, run.v, run.a))
+        for k, wrench in enumerate((inertia, -down)):
+            power[k] += np.einsum("ij,ij->i", wrench[:, free], run.v[:, : free.size])
+        energy += of_bodies
     return power, energy
+
+
+@compiled
+def _leg_energies(q, v, tables, energy):
+    """Fill energy (2, n): kinetic and potential, of moving parts that are bodies [J]."""
+    frame = np.zeros((8, 3))
+    for k in range(q.shape[0]):
+        platen_pose(q[k], tables.axes, tables.body, frame)
+        set_twist(v[k], tables.axes, frame)
+        energy[0, k], energy[1, k] = leg_energies(frame, tables.legs, tables.body, tables.inertia)

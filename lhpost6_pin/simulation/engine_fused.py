@@ -10,8 +10,9 @@ import numpy as np
 
 from ..control.loop import control_sample
 from ..core.arrays import Array
-from ..core.compiled import compiled
+from ..core.compiled import compiled, compiled_inline
 from ..mechanics.forward_dynamics import platen_acceleration
+from ..mechanics.moving_parts import bodies_acceleration
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
 from ..mechanics.spatial import integrate
 
@@ -49,10 +50,19 @@ class Log(NamedTuple):
     spool: Array  # (n, n_actuators) mean over the sample
 
 
+@compiled_inline
+def _forward(tables, ws, work, a):
+    """Forward dynamics: fill a (n_axes,) from the torque, pose and twist in ws; work (9, 6) is scratch."""
+    if tables.inertia[0].bodies == 0:
+        platen_acceleration(tables.inertia, tables.axes, ws.frame, ws.motion[TAU], work, a)
+    else:
+        bodies_acceleration(tables, ws.frame, ws.motion[TAU], work, a)
+
+
 @compiled
 def _accelerate(tables, ws, a):
     """Fill a (n_axes,) from the torque, pose and twist in ws."""
-    platen_acceleration(tables.inertia, tables.axes, ws.frame, ws.motion[TAU], np.empty((2, 6)), a)
+    _forward(tables, ws, np.empty((9, 6)), a)
 
 
 @compiled
@@ -126,7 +136,7 @@ def run_fused(span, tables, ws, control, signals, log):
     dt, steps, motion, q = span.dt, span.steps, ws.motion, ws.q
     nu = signals.command.shape[1]
     window = signals.spool if span.closed else np.zeros((steps, nu))
-    work, a = np.zeros((2, 6)), np.zeros(motion.shape[1])
+    work, a = np.zeros((9, 6)), np.zeros(motion.shape[1])
     per_sample = signals.spool.shape[0] // max(1, signals.command.shape[0])
     clipped = 0
     if span.scheme == 0:
@@ -160,7 +170,7 @@ def run_fused(span, tables, ws, control, signals, log):
                 status = staggered_stage(q, dt, tables, ws, window[j])
                 if status != 0:
                     break
-                platen_acceleration(tables.inertia, tables.axes, ws.frame, motion[TAU], work, a)
+                _forward(tables, ws, work, a)
                 kick(motion, a, dt)
             elif span.scheme == 1:
                 status = _euler_step(dt, tables, ws, window[j])

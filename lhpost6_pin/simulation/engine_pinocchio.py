@@ -1,6 +1,7 @@
 """The per-step engine: compiled stages around pin.aba and pin.integrate; the default, and the fused engine's oracle.
 
-Joints of a specimen are part of the same model and the same ABA.
+Joints of a specimen are part of the same model and the same ABA. Moving parts of the legs as bodies are a second model
+(`leg_model`), chosen once a run.
 """
 
 from collections.abc import Callable
@@ -11,7 +12,8 @@ import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from ..mechanics.derivatives import Forward, forward_dynamics, rates_at
+from ..mechanics.derivatives import forward_dynamics, rates_at
+from ..mechanics.leg_model import Dynamics
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, staggered_stage
 from ..mechanics.tables import unpack_tables
@@ -23,7 +25,7 @@ Stepper = Callable[[Workspace, Array], int]
 """Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
 
 
-def make_stepper(plant: Plant, scheme: str, dt: float, forward: Forward | None = None) -> Stepper:
+def make_stepper(plant: Plant, scheme: str, dt: float, forward: Dynamics | None = None) -> Stepper:
     """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand.
 
     forward: accelerations of q, v and torque, in place of the plant's `forward_dynamics`.
@@ -38,7 +40,7 @@ def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
 
-def _semi_implicit(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+def _semi_implicit(plant: Plant, dt: float, accelerate: Dynamics) -> Stepper:
     model, packed, integrate = plant.model, plant.tables.packed, pin.integrate
 
     def advance(ws: Workspace, spool: Array) -> int:
@@ -58,7 +60,7 @@ def _semi_implicit(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
     return advance
 
 
-def _euler(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+def _euler(plant: Plant, dt: float, accelerate: Dynamics) -> Stepper:
     model = plant.model
 
     def advance(ws: Workspace, spool: Array) -> int:
@@ -90,7 +92,7 @@ def _local_rate(model: Any, n_platen: int, q0: Array, q: Array, moved: Array, v:
     return out
 
 
-def _rk4(plant: Plant, dt: float, accelerate: Forward) -> Stepper:
+def _rk4(plant: Plant, dt: float, accelerate: Dynamics) -> Stepper:
     model, n_platen = plant.model, plant.axes.size
 
     def advance(ws: Workspace, spool: Array) -> int:

@@ -20,7 +20,7 @@ from ..core.errors import UnknownNameError
 from ..effects.registry import PORTS
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlantMotion
-from ..mechanics.required_wrench import rigid_wrenches, wrenches_at_c
+from ..mechanics.required_wrench import moving_wrenches, rigid_wrenches, wrenches_at_c
 from ..mechanics.schemes import V_SEEN, forces_stage, pose_stage
 from ..mechanics.spatial import act_force
 from ..mechanics.tables import Tables
@@ -188,4 +188,5 @@ def _articulated(run: "Run | States") -> tuple[Array, Array]:
     twist, rise = np.zeros((2, len(run.time), 6))
     twist[:, plant.axes], rise[:, plant.axes] = (x[:, : plant.axes.size] for x in (run.v, run.a))
     inertia[:, :3] += body["mass_extra"] * (rise[:, :3] + np.cross(twist[:, 3:], twist[:, :3]))
-    return inertia, weight
+    more = moving_wrenches(plant, PlantMotion(run.q, run.v, run.a))
+    return inertia + more[0], weight + more[1]

@@ -11,6 +11,7 @@ from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
+from ..machine.structure import BODIES
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
@@ -102,6 +103,8 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         facts["interface_energy"] = run.coupling.energy
         facts["interface_energy_error"] = run.coupling.energy_error
         facts["interface_growth"] = run.coupling.stability.growth
+    if machine.bodies != BODIES[0]:
+        facts["moving_parts"] = f"bodies = {machine.bodies}"
     if valves:
         facts["valves_per_horizontal_actuator"] = int(valves[0])
     return make_record(run.time, channels, labels, {**facts, **attrs})

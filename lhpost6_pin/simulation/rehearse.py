@@ -1,7 +1,7 @@
 """Simulated tests of a machine: a motion rehearsed in closed loop, or a record's spools replayed in open loop."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -15,8 +15,10 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE
 from ..core.progress import Progress
+from ..data.channels import LAYOUT
 from ..data.records import require
 from ..data.signals import resample_band_limited
+from ..data.valve_pairs import with_joint_spools
 from ..machine.machine import Machine
 from ..mechanics.equilibrium import Equilibrium, find_equilibrium, specimen_at_rest
 from ..mechanics.plant import Plant, State, make_plant
@@ -47,12 +49,14 @@ def rehearse(
     beyond_limits: bool = False,
     record_every: int = 1,
     progress: Progress | None = None,
+    adapt: Callable[[ClosedLoop | PluggedLoop], ClosedLoop] | None = None,
     **options: Any,
 ) -> SimulatedTest:
     """Reproduce a target in closed loop from rest; options go to `simulate` (scheme, steps_per_second, engine).
 
     settings are those of the 469D, or a user's own controller. The drive of the 469D is a given `drive` (n, 6), or that
-    of the target, conditioned by adaptive inverse control with `inverse`.
+    of the target, conditioned by adaptive inverse control with `inverse`. `adapt` changes the loop before it runs, such
+    as by sine cancellers (`tuning.cancel`).
 
     Raises OutOfRangeError if the target exceeds the capacity of the machine, unless `beyond_limits`; SimulationError
     for invalid options.
@@ -61,6 +65,7 @@ def rehearse(
     if not beyond_limits:
         check_motion_limits(plant, target)
     loop = loop_for(plant, find_equilibrium(plant), settings, target, drive, inverse)
+    loop = loop if adapt is None else adapt(loop)
     run = simulate(plant, loop, samples=len(target.time), record_every=record_every, progress=progress, **options)
     run = _usable(run)
     motion = (target.displacement, target.velocity, target.acceleration)
@@ -72,7 +77,12 @@ def rehearse(
         "motion": target.reference.motion,
         "source": target.reference.source,
     }
-    return SimulatedTest(run, record_of_run(run, {**facts, **attrs}, reference))
+    record = record_of_run(run, {**facts, **attrs}, reference)
+    if isinstance(settings, ControllerSettings) and isinstance(loop, ClosedLoop) and (drive is not None or inverse):
+        name, driven = f"drive_{settings.mode}", loop.drive[::record_every, :6][: len(run.time)]
+        about = {"units": LAYOUT[name].units, "long_name": LAYOUT[name].long_name}
+        record[name] = (LAYOUT[name].dims, np.array(driven), about)
+    return SimulatedTest(run, record)
 
 
 def loop_for(
@@ -106,7 +116,8 @@ def replay(
 ) -> SimulatedTest:
     """Drive the plant with a record's spool positions, from rest with the pressures of its first sample.
 
-    The spools of a simulated record at the controller's rate are held over each sample (as they were); those of any
+    Where two servovalves of an actuator were recorded apart, it follows their joint spool (`data.valve_pairs`). The
+    spools of a simulated record at the controller's rate are held over each sample (as they were); those of any
     other are interpolated, band-limited, to the model steps. Raises RecordError naming missing channels, or the
     specimen of the record if the machine has none.
     """
@@ -116,7 +127,9 @@ def replay(
         require(record, "chamber_pressure_b")
     plant = make_plant(machine)
     names = list(machine.actuator_names)
-    recorded = record["spool_position"].sel(actuator=names).transpose("time", "actuator").values
+    recorded = (
+        with_joint_spools(machine, record)["spool_position"].sel(actuator=names).transpose("time", "actuator").values
+    )
     rate = (len(recorded) - 1) / float(record["time"][-1] - record["time"][0])
     steps = options.get("steps_per_second", 4 * SAMPLE_RATE)
     held = record.attrs.get("kind") == "simulated" and abs(rate - SAMPLE_RATE) < 1e-6 * SAMPLE_RATE

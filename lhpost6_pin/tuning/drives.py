@@ -6,6 +6,7 @@ motion (`wanted_displacement`, `wanted_velocity`, `wanted_acceleration`).
 
 import logging
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from ..machine.machine import Machine
 from ..machine.parameters import LARGEST, unusable
 from ..motions import Reference, Target
 
-__all__ = ["Drive", "check_circumstances", "circumstances", "load_drive", "save_drive"]
+__all__ = ["Drive", "check_circumstances", "circumstances", "load_drive", "save_drive", "scaled_drive"]
 
 log = logging.getLogger(__name__)
 
@@ -124,3 +125,15 @@ def load_drive(path: Path | str) -> Drive:
     motion = {quantity: arrays[f"wanted_{quantity}"] for quantity in _UNITS}
     target = Target(time=time, **motion, reference=reference)
     return Drive(arrays["drive"], mode, target, dict(data.attrs))
+
+
+def scaled_drive(drive: Drive, factor: float) -> Drive:
+    """A drive and its target times a factor; raises RecordError for one that is not finite, or zero."""
+    if not (np.isfinite(factor) and factor != 0.0):
+        raise RecordError(f"a drive cannot be scaled by {factor:g}; give a number other than zero")
+    if factor == 1.0:
+        return drive
+    target = drive.target
+    moved = {name: factor * getattr(target, name) for name in _UNITS}
+    reference = replace(target.reference, scale=factor * target.reference.scale)
+    return drive._replace(values=factor * drive.values, target=replace(target, reference=reference, **moved))

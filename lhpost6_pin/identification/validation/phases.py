@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from ...control import ControllerSettings, load_controller
+from ...control.filters import MODES
 from ...core.arrays import Array
 from ...core.errors import LhpostError, RecordError
 from ...core.files import shipped
@@ -108,13 +109,25 @@ def _closed_loop(test: PreparedTest) -> Phase:
     target, drive = _drive_of(test.test.record, settings, test.basis.numbers.number("reference.high"))
     engine = fastest_engine(test.plant)
     ran = rehearse(test.plant.machine, target, settings, attrs={}, drive=drive, beyond_limits=True, engine=engine)
+    ran = ran._replace(record=_with_valve_b(test.test.record, ran.record))
     both = SimulatedComparison(test, ran, None)
     both.notes.append(note)
-    phase = _of_run(3, both, ("spool_command",))
+    if any(f"drive_{mode}" in test.test.record for mode in MODES):
+        both.notes.append("driven by the recorded drive")
+    phase = _of_run(3, both, ("spool_command", *(["spool_command_b"] if "spool_command_b" in ran.record else [])))
     velocity = phase.pair("velocity")
     assert velocity is not None
     moving = [a.column for a in phase.of("velocity") if a.moves]
     return replace(phase, lags=both.lags(target.velocity, velocity, moving))
+
+
+def _with_valve_b(measured: xr.Dataset, ran: xr.Dataset) -> xr.Dataset:
+    """A run's record with the command of servovalves B, which is that of A, where the test has it."""
+    if "spool_command_b" not in measured:
+        return ran
+    names = [str(name) for name in measured["horizontal"].values]
+    command = ran["spool_command"].sel(actuator=names).transpose("time", "actuator").values
+    return ran.assign(spool_command_b=(("time", "horizontal"), command)).assign_coords(horizontal=names)
 
 
 def _of_run(number: int, both: SimulatedComparison, channels: Sequence[str]) -> Phase:
@@ -146,10 +159,15 @@ def _settings_of(record: xr.Dataset, given: ControllerSettings | None) -> tuple[
 def _drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> tuple[Target, Array | None]:
     """Target at the controller's rate, and the drive (n, 6) if the test replayed one.
 
-    Velocity and acceleration of the reference are those stored, else low-passed derivatives up to `high` [Hz]. Raises
-    RecordError without reference_displacement, or for a drive file that is missing or of another mode.
+    The drive is the recorded one (`drive_acceleration` and the like, by the mode of the reference generators), else
+    that of the drive file that the record names. Velocity and acceleration of the reference are those stored, else
+    low-passed derivatives up to `high` [Hz]. Raises RecordError without reference_displacement, or for a drive that is
+    missing or of another mode.
     """
-    if "drive" in record.attrs:
+    modes = [mode for mode in MODES if f"drive_{mode}" in record]
+    if modes and settings.mode not in modes:
+        raise RecordError(f"the recorded drive is for {modes[0]} mode; {settings.name} has {settings.mode} mode")
+    if not modes and "drive" in record.attrs:
         found = load_drive(Path(str(record.attrs["drive"])))
         if found.mode != settings.mode:
             raise RecordError(f"{record.attrs['drive']} is for {found.mode} mode; {settings.name} has {settings.mode}")
@@ -162,6 +180,7 @@ def _drive_of(record: xr.Dataset, settings: ControllerSettings, high: float) -> 
     for name in ("reference_velocity", "reference_acceleration"):
         motion.append(record[name].values if name in record else differentiate(motion[-1], dt, high))
     x, v, a = (resample_band_limited(values, time, clock) for values in motion)
+    drive = resample_band_limited(record[f"drive_{settings.mode}"].values, time, clock) if modes else None
     axes = tuple((axis, axis) for axis in AXES)
     name = str(record.attrs.get("test", "test"))
-    return Target(clock, x, v, a, Reference(name, "reference of the record", 1.0, axes, 0.0, high, 0.0)), None
+    return Target(clock, x, v, a, Reference(name, "reference of the record", 1.0, axes, 0.0, high, 0.0)), drive

@@ -28,6 +28,7 @@ _WORDS = {
     "chamber_pressure_a": "Pressures in chambers A",
     "chamber_pressure_b": "Pressures in chambers B",
     "spool_command": "Fourth-stage spool commands",
+    "spool_command_b": "Fourth-stage spool commands of servovalves B",
 }
 
 

@@ -27,6 +27,7 @@ _NAMES = {
     "chamber_pressure_a": "pressure in chamber A",
     "chamber_pressure_b": "pressure in chamber B",
     "spool_command": "spool command",
+    "spool_command_b": "spool command of servovalve B",
 }
 _SHADES = (0.01, 0.03, 0.10, 0.30, np.inf)
 """RRMSE up to which a cell has each shade."""
@@ -85,7 +86,7 @@ def summary_blocks(found: Validation) -> list[Block]:
 
 def _spool_blocks(found: Validation) -> list[Block]:
     """The largest RRMSE of the spool commands of the closed loop."""
-    rows = [(p.test, a) for p in found.phases for a in p.of("spool_command") if a.moves]
+    rows = [(p.test, a) for p in found.phases for a in (*p.of("spool_command"), *p.of("spool_command_b")) if a.moves]
     if not rows:
         return []
     test, worst = max(rows, key=lambda row: row[1].rrmse_aligned)
@@ -158,7 +159,7 @@ def test_blocks(found: Validation, test: str) -> list[Block]:
         axes = _shown_axes(motion or phase)
         figures: list[Block] = []
         figures += [force_figure(phase, motion, axes)] if phase.number == 1 else motion_blocks(phase, axes)
-        figures += actuator_blocks(phase, "spool_command")
+        figures += [*actuator_blocks(phase, "spool_command"), *actuator_blocks(phase, "spool_command_b")]
         for quantity in ACTUATORS:
             drawn = actuator_blocks(phase, quantity)
             figures += [details(f"Every actuator: {named(quantity)}", *drawn)] if drawn else []

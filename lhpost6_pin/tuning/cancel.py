@@ -1,0 +1,64 @@
+"""Amplitude-phase control and harmonic cancellation of a sine-like motion, for any closed loop of the 469D.
+
+    loop = cancelling(loop, target, "x=0.5")          # axis, fundamental [Hz]
+
+The cancellers of `sine` learn on the wanted acceleration of the target, at the level of its fundamental: the amplitude
+of its displacement at that frequency over the cycle around each sample, over the largest.
+"""
+
+import math
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from ..core.arrays import Array
+from ..core.errors import SimulationError
+from ..core.names import AXES, SAMPLE_RATE
+from ..motions import Target
+from ..simulation.simulate import ClosedLoop, PluggedLoop
+from .identify import section, tuning_numbers
+from .sine import axis_row, with_cancellers
+
+__all__ = ["cancelling", "fundamental_level"]
+
+
+def cancelling(loop: ClosedLoop | PluggedLoop, target: Target, sine: str) -> ClosedLoop:
+    """The loop with cancellers of a fundamental, "AXIS=HERTZ", and of its harmonics in the band of the table.
+
+    Raises SimulationError for a user's own controller, which has none, an axis that is not free or does not move, a
+    frequency outside the band, or settings that are not in acceleration mode.
+    """
+    axis, _, text = sine.partition("=")
+    axis = axis.strip()
+    try:
+        frequency = float(text)
+    except ValueError:
+        raise SimulationError(f"--cancel {sine}: write an axis and its fundamental in hertz, such as x=0.5") from None
+    if isinstance(loop, PluggedLoop):
+        raise SimulationError("--cancel is for the 469D's drive; a controller of your own does without")
+    parameters = tuning_numbers()
+    numbers = section(parameters, "sine")
+    low, high = parameters.number("noise.slow_low"), parameters.number("feedforward_targets.high")
+    if not (math.isfinite(frequency) and low <= frequency <= high):
+        raise SimulationError(
+            f"--cancel {sine}: outside the table's band; choose a fundamental from {low:g} to {high:g} Hz"
+        )
+    axis_row(loop.controller.plant, axis)
+    level = fundamental_level(target.displacement[:, AXES.index(axis)], frequency)
+    if not level.any():
+        raise SimulationError(
+            f"--cancel {sine}: the motion has nothing at {frequency:g} Hz in {axis}; name its own axis"
+        )
+    count = min(int(numbers.harmonics), int(high / frequency))
+    controller = with_cancellers(loop.controller, axis, frequency, count, numbers.time_constant)
+    return loop._replace(controller=controller, drive=np.column_stack([loop.drive, target.acceleration, level]))
+
+
+def fundamental_level(x: Array, frequency: float) -> Array:
+    """Amplitude (n,) of a signal at a frequency [Hz] over the cycle around each sample, over its largest; 0 to 1."""
+    turning = np.exp(-2j * np.pi * frequency / SAMPLE_RATE * np.arange(len(x)))
+    cycle = max(1, round(SAMPLE_RATE / frequency))
+    parts = [uniform_filter1d(part, cycle, mode="constant") for part in ((x * turning).real, (x * turning).imag)]
+    size = np.hypot(*parts)
+    most = float(size.max())
+    return size / most if most > 0.0 else np.zeros(len(x))

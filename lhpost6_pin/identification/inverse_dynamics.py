@@ -22,6 +22,7 @@ from ..core.compiled import compiled
 from ..core.errors import SimulationError
 from ..effects.evaluate import advance_states
 from ..effects.registry import LAWS, actuator_rows, law_of
+from ..mechanics.interface_wrench import driven_specimen, specimen_wrenches
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import PlatenMotion, kinematic_jacobian, plant_motion
@@ -34,7 +35,10 @@ from .residual_kernels import wrench_residual
 LOAD_ROUNDS, LOAD_ROUNDING = 20, 1e-12
 """Rounds at most in which loads and the friction under them are found, and the relative change that ends them."""
 
-__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "with_loads"]
+BASE_SHEAR, SPECIMEN = "base_shear", "specimen"
+"""Names in the ledger of the wrenches that a specimen's floors, as measured, and a mounted specimen exert."""
+
+__all__ = ["BASE_SHEAR", "SPECIMEN", "Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "with_loads"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,11 @@ class Decomposition:
     def residual(self) -> Array:
         """Required less measured actuator wrench (n, 6): what the model does not explain."""
         return self.required - self.measured
+
+    @property
+    def carried(self) -> Array:
+        """Wrench (n, 6) on the platen of what it carries: the residual without the model's, or the floors', part."""
+        return self.residual + self._of([BASE_SHEAR, SPECIMEN])
 
     @property
     def struts(self) -> Array:
@@ -101,6 +110,7 @@ def inverse_dynamics(
     strut_pressure: ArrayLike | None = None,
     *,
     floor_acceleration: ArrayLike | None = None,
+    mounted: Plant | None = None,
     path: Array | None = None,
     model_step: bool = False,
 ) -> Decomposition:
@@ -109,7 +119,8 @@ def inverse_dynamics(
     time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
     is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). floor_acceleration
     (n, n_floors) [m/s2] are those measured on a specimen's floors: their base shear is the effect `base_shear` of the
-    ledger. model_step: the samples are steps of a semi-implicit run, whose forces see the last step's velocity
+    ledger. mounted is the plant with a specimen, where `plant` is without: the wrench on the platen of that specimen,
+    its joints driven by the motion (`driven_specimen`), is the effect `specimen` of the ledger. model_step: the samples are steps of a semi-implicit run, whose forces see the last step's velocity
     (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
@@ -136,12 +147,18 @@ def inverse_dynamics(
     seen = moved._replace(v=v)
     ports = ports_along(plant, seen)
     required = required_wrench(plant, seen, ports.turn)
-    floors = None if floor_acceleration is None else floor_wrench(plant, np.asarray(floor_acceleration, float))
-    loaded = with_loads(plant, ports, required if floors is None else required + floors, z, measured[0])
+    carried: dict[str, Array] = {}  # wrenches on the platen at B in platen axes
+    if floor_acceleration is not None:
+        carried[BASE_SHEAR] = -floor_wrench(plant, np.asarray(floor_acceleration, float))
+    if mounted is not None:
+        carried[SPECIMEN] = specimen_wrenches(mounted, *driven_specimen(mounted, seen, dt))
+    for load in carried.values():
+        required[:, plant.axes] -= load[:, plant.axes]
+    loaded = with_loads(plant, ports, required, z, measured[0])
     ledger = _without_oil(force_ledger(states._replace(z=loaded)), plant)
-    if floors is not None:
-        shear = -wrenches_at_c(plant, ports.turn, floors)[:, None]
-        ledger = replace(ledger, effects=(*ledger.effects, "base_shear"), wrench=np.hstack([ledger.wrench, shear]))
+    for name, load in carried.items():
+        on_platen = wrenches_at_c(plant, ports.turn, load)[:, None]
+        ledger = replace(ledger, effects=(*ledger.effects, name), wrench=np.hstack([ledger.wrench, on_platen]))
     return Decomposition(states, ledger, tuple(names), force, wrench, plant.spools)
 
 

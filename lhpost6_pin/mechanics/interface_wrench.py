@@ -26,6 +26,9 @@ from .workspace import make_workspace
 __all__ = ["INTERFACE_AXES", "at_interface", "bare", "driven_specimen", "interface_force", "interface_lever"]
 __all__ += ["specimen_wrenches", "wrenches_at_b"]
 
+_HEAVY = 1e15
+"""Inertia [kg, kg m2] of a platen whose acceleration no specimen changes by more than rounding."""
+
 INTERFACE_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Base shear in x and y, axial force, overturning moments about x and y, torsion."""
 
@@ -83,26 +86,24 @@ def _beyond(both: list[tuple[Any, Any]], q: Array, v: Array, a: Array) -> Array:
 def driven_specimen(plant: Plant, motion: PlantMotion, dt: float, step: float = 1.0 / 2048) -> PlantMotion:
     """Motion (n, nq), (n, nv), (n, nv) of a plant whose platen is prescribed: its specimen's joints respond from rest.
 
-    M_jj a_j = tau_j - h_j, with h the torques by RNEA of the prescribed motion at a_j = 0, and tau_j those of the
-    joints' own stiffness and damping. Runge-Kutta 4 with steps of at most `step` [s]; the platen's motion between
-    samples by linear interpolation. A rigid specimen has no joints: the motion is returned as it is.
+    By ABA of a platen too heavy for the joints to move, with the force that gives it the prescribed acceleration; the
+    joints have their own stiffness and damping. Runge-Kutta 4 with steps of at most `step` [s]; the platen's motion
+    between samples by linear interpolation. A rigid specimen has no joints: the motion is returned as it is.
     """
-    platen, model = plant.axes.size, plant.model
-    if model.nv == platen:
+    platen = plant.axes.size
+    if plant.model.nv == platen:
         return motion
+    model = plant.model.copy()
+    model.armature[:platen] = _HEAVY
     data, ws = model.createData(), make_workspace(plant, plant.zero_state())
-    z, spool, joints = plant.zero_state().z, np.zeros(plant.spools), slice(platen, None)
-    own = int(model.nqs[1])
+    z, spool, own = plant.zero_state().z, np.zeros(plant.spools), int(model.nqs[1])
 
     def acceleration(q: Array, v: Array, a: Array) -> Array:
         """Acceleration (nv - platen,) of the joints."""
         ws.motion[V_SEEN] = v
         rates_at(plant, ws, q, z, spool)
-        held = np.zeros(model.nv)
-        held[:platen] = a
-        lacking = ws.motion[TAU][joints] - pin.rnea(model, data, q, v, held)[joints]
-        mass = np.triu(pin.crba(model, data, q))[joints, joints]
-        return np.asarray(np.linalg.solve(mass + np.triu(mass, 1).T, lacking))
+        ws.motion[TAU, :platen] = _HEAVY * a
+        return np.asarray(pin.aba(model, data, q, v, ws.motion[TAU])[platen:])
 
     substeps = max(1, int(np.ceil(dt / step - 1e-9)))
     h, n = dt / substeps, len(motion.q)

@@ -134,8 +134,8 @@ def decompose(
     from ..show.result_tables import print_agreement
     from ..show.results import agreement_entries
 
-    table = machine.load()
     measured = load_record(record)
+    table = machine.onto_for(machine.load_bare(), [measured])
     folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces")
     known = None
     if is_measured(measured) or sensors:
@@ -171,9 +171,10 @@ def validate(
     if not words <= {"1", "2", "3"}:
         raise ParameterError(f"--phases {phases}: write some of 1,2,3 with commas between them")
     numbers = tuple(sorted(map(int, words)))
-    table = machine.load()
-    settings = opt.find_settings(controller, table) if controller else None
-    tests = load_campaign(campaign, table)
+    bare = machine.load_bare()
+    settings = opt.find_settings(controller, bare) if controller else None
+    tests = load_campaign(campaign, bare)
+    table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_validation")
     with progress_bar(f"validating {table.name} on {tests.name}") as progress:
@@ -206,8 +207,9 @@ def calibrate(
     from ..show.result_tables import print_calibration
     from ..show.results import calibration_entries
 
-    table = machine.load()
-    tests = usable_tests(load_campaign(campaign, table))
+    bare = machine.load_bare()
+    tests = usable_tests(load_campaign(campaign, bare))
+    table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_calibration")
     with progress_bar(f"calibrating {table.name} on {tests.name}") as progress:

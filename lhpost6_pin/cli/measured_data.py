@@ -143,7 +143,7 @@ def decompose(
     found = decompose_record(table, measured, known, cutoff=cutoff, align=not no_align)
     agreement, work = find_agreement(found), find_work(found)
     files = [folder / name for name in ("ledger.nc", "report.html")]
-    save_ledger(found, files[0], work, str(record))
+    save_ledger(found, files[0], work, str(record), agreement.interface)
     write_decompose_report(found, agreement, work, files[1], command=repeating_command())
     print_result(json, lambda: agreement_entries(found, agreement), lambda: print_agreement(found, agreement), files)
 

@@ -92,9 +92,9 @@ class Decomposition:
 
     @property
     def dissipative_measured(self) -> Array:
-        """The same from measured forces: inertia less weight, actuators and struts (the model's without pressures)."""
+        """The same from measured forces: inertia less weight, load, actuators and struts (the model's without pressures)."""
         struts = self.struts if self.struts_measured is None else self.struts_measured
-        return self.ledger.inertia - self._of(["gravity"]) - self.measured - struts
+        return self.ledger.inertia - self._of(["gravity", BASE_SHEAR, SPECIMEN]) - self.measured - struts
 
     def _of(self, effects: Iterable[str]) -> Array:
         """Sum of the wrenches (n, 6) of those effects that make a force."""

@@ -24,8 +24,17 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 __all__ = ["Beyond", "CampaignFolder", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
-__all__ += ["MotionOptions", "MountOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName", "SpecimenOptions"]
-__all__ += ["StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring", "record_name"]
+__all__ += [
+    "MotionOptions",
+    "MountOptions",
+    "Out",
+    "PhaseSettingsName",
+    "SensorsName",
+    "SettingsName",
+    "SpecimenOptions",
+]
+__all__ += ["StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring"]
+__all__ += ["record_name"]
 
 
 def _refuse_no_jobs(jobs: int) -> int:

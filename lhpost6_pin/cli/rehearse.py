@@ -64,7 +64,8 @@ def run(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     folder = opt.folder_for(out, name)
-    given, more = chosen, []
+    given = chosen
+    more: list[Path] = []
     if retune:
         if inverse is not None:
             raise SimulationError("--aic is an inverse of the controller as it was; --retune changes it")

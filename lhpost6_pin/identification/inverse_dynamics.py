@@ -92,7 +92,7 @@ class Decomposition:
 
     @property
     def dissipative_measured(self) -> Array:
-        """The same from measured forces: inertia less weight, load, actuators and struts (the model's without pressures)."""
+        """The same from measured forces: inertia less weight, load, actuators, struts (modelled, if not measured)."""
         struts = self.struts if self.struts_measured is None else self.struts_measured
         return self.ledger.inertia - self._of(["gravity", BASE_SHEAR, SPECIMEN]) - self.measured - struts
 
@@ -120,8 +120,8 @@ def inverse_dynamics(
     is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). floor_acceleration
     (n, n_floors) [m/s2] are those measured on a specimen's floors: their base shear is the effect `base_shear` of the
     ledger. mounted is the plant with a specimen, where `plant` is without: the wrench on the platen of that specimen,
-    its joints driven by the motion (`driven_specimen`), is the effect `specimen` of the ledger. model_step: the samples are steps of a semi-implicit run, whose forces see the last step's velocity
-    (`schemes.staggered_stage`).
+    its joints driven by the motion (`driven_specimen`), is the effect `specimen` of the ledger. model_step: the samples
+    are steps of a semi-implicit run, whose forces see the last step's velocity (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
     if plant.model.nv != plant.axes.size:

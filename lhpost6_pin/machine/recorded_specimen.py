@@ -63,7 +63,7 @@ def recorded_mounting(attrs: Mapping[str, Any], said: str) -> Mounting | None:
             f"{said} was made with specimen {name!r} of {file}, which is not there; mount it with --specimen FILE"
         )
     position, rpy = places
-    return Mounting(file, position, rpy, locked)  # type: ignore[arg-type]
+    return Mounting(file, position, rpy, locked)
 
 
 def _is_shipped(path: Path, name: str) -> bool:

@@ -1,6 +1,6 @@
 """The wrench at the interface of a specimen and the platen: base shear, axial force, overturning moment, torsion.
 
-    wrench = at_interface(plant, specimen_wrenches(plant, run.q, run.v, run.a))    # (n, 6) of the specimen on the platen
+    wrench = at_interface(plant, specimen_wrenches(plant, run.q, run.v, run.a))    # (n, 6), on the platen
     force = interface_force(plant, q, v, a)                                        # pin.Force at one instant
 
 The interface is the point of the platen's top where the specimen's root is mounted, with the axes of the platen. The
@@ -121,10 +121,13 @@ def driven_specimen(plant: Plant, motion: PlantMotion, dt: float, step: float = 
     return out
 
 
-def _joint_step(model: Any, at: list[PlantMotion], q: Array, v: Array, h: float, acceleration: Any) -> tuple[Array, Array]:
+def _joint_step(
+    model: Any, at: list[PlantMotion], q: Array, v: Array, h: float, acceleration: Any
+) -> tuple[Array, Array]:
     """One step of Runge-Kutta 4 of the joints; `at` is the platen's motion at its start, middle and end."""
     platen, own = len(at[0].v), len(at[0].q)
-    rates, turns = [], []
+    rates: list[Array] = []
+    turns: list[Array] = []
     for reach, place in ((0.0, at[0]), (0.5, at[1]), (0.5, at[1]), (1.0, at[2])):
         local, seen = np.zeros(model.nv), v.copy()
         if rates:

@@ -22,8 +22,8 @@ from .report.calibrate_sections import misfit_table, parameter_table, ratio_tabl
 from .report.control_blocks import gain_table
 from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
-from .report.interface_section import interface_table
 from .report.friction_section import friction_table
+from .report.interface_section import interface_table
 from .report.iterate_report import iteration_tables
 from .report.page import Table
 from .report.sine_report import sine_table
@@ -86,7 +86,7 @@ def print_calibration(calibration: Calibration) -> None:
 
 
 def print_agreement(found: Decomposed, agreement: WrenchAgreement) -> None:
-    """Print the interface wrench of a specimen, the residual with its expected size, and errors of the modelled forces, axis by axis."""
+    """Print a specimen's interface wrench, the residual with its expected size, and errors of the modelled forces."""
     how = f"Modelled against measured forces up to {found.comparison.band.high:g} Hz"
     interface = [] if agreement.interface is None else [interface_table(agreement.interface)]
     print_blocks(*interface, how, *residual_tables(found, agreement), *match_tables(found, agreement))

@@ -177,7 +177,9 @@ def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
 def _interface_entries(found: InterfaceWrench) -> Entries:
     """Peaks of a specimen's wrench on the platen at the interface, with half of their intervals."""
     sources = _picked(found, "noise", "sensors", "parameters")
-    rms = {name: np.sqrt(np.mean(np.square(np.broadcast_to(x, found.wrench.shape)), axis=0)) for name, x in sources.items()}
+    rms = {
+        name: np.sqrt(np.mean(np.square(np.broadcast_to(x, found.wrench.shape)), axis=0)) for name, x in sources.items()
+    }
     return {
         "place_from_c": found.place,
         "confidence": found.confidence,

@@ -97,7 +97,7 @@ def _response_of(inverse: InverseFilter, f: Array, axes: list[str]) -> Complex:
     kept = [k for k, name in enumerate(inverse.axes) if name in axes]
     taps = inverse.taps[:, kept][:, :, kept].reshape(len(lag), -1)
     spectrum = np.vstack([np.exp(-2j * np.pi * np.outer(part, lag)) @ taps for part in np.array_split(f, 40)])
-    out[np.ix_(np.arange(len(f)), own, own)] = spectrum.reshape(len(f), len(own), len(own))
+    out[np.ix_(np.arange(len(f)), np.array(own), np.array(own))] = spectrum.reshape(len(f), len(own), len(own))
     return out
 
 

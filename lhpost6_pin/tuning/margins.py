@@ -78,9 +78,7 @@ def linear_table(controller: Controller) -> LinearTable:
     linear = linearize(plant, rest.state, rest.spool)
     nv, axes = linear.nv, plant.axes
     carried = set(plant.states) - set(bare(plant).states)
-    oil = (
-        2 * nv + i for i, name in enumerate(plant.states) if "pressure" in name or "flow" in name or name in carried
-    )
+    oil = (2 * nv + i for i, name in enumerate(plant.states) if "pressure" in name or "flow" in name or name in carried)
     keep = [*range(2 * nv), *oil]
     a, b = linear.A[np.ix_(keep, keep)], linear.B[keep]
     # spool per actuator velocity: the controller inverts the flow curve about the opening at rest

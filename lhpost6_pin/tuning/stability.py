@@ -2,8 +2,8 @@
 
 The linear table at rest without dry friction (`margins`) is discretised exactly: commands are held over a sample and
 arrive after the delay of their valves, a whole number of samples and a part. The controller's own difference equations
-(high-pass of the force feedback, reset integrator, notches, force balance) close the loop. Margins assume a stable loop;
-this says whether it is.
+(high-pass of the force feedback, reset integrator, notches, force balance) close the loop. Margins assume a stable
+loop; this says whether it is.
 """
 
 from dataclasses import dataclass
@@ -64,7 +64,9 @@ class LoopCheck:
         parts = []
         for axis, m in zip(self.axes, self.margins, strict=True):
             if axis in shown:
-                gain = f"{20.0 * np.log10(m.gain):.1f} dB at {m.gain_frequency:.3g} Hz" if np.isfinite(m.gain) else "any"
+                gain = (
+                    f"{20.0 * np.log10(m.gain):.1f} dB at {m.gain_frequency:.3g} Hz" if np.isfinite(m.gain) else "any"
+                )
                 turn = f", {np.degrees(m.phase):.0f} deg at {m.phase_frequency:.3g} Hz" if np.isfinite(m.phase) else ""
                 parts.append(f"{axis} {gain}{turn}")
         start = "The control loop is stable, with thin margins" if self.thin else "The control loop is stable"
@@ -92,7 +94,7 @@ def check_loop(controller: Controller, table: LinearTable | None = None) -> Loop
 
 
 def closed_loop_rates(controller: Controller, table: LinearTable) -> tuple[Array, Array]:
-    """Rates s [1/s] of the closed loop's motions, exp(s t), and their shapes, a column each, the table's states first."""
+    """Rates s [1/s] of the closed loop's motions exp(s t), and their shapes, a column each (`closed_loop`)."""
     values, shapes = np.linalg.eig(closed_loop(controller, table))
     tiny = np.finfo(float).tiny  # finite memory decays in a few samples: rates of minus infinity
     return SAMPLE_RATE * np.log(np.maximum(np.abs(values), tiny)) + 1j * SAMPLE_RATE * np.angle(values), shapes
@@ -125,7 +127,9 @@ def closed_loop(controller: Controller, table: LinearTable) -> Array:
     wanted = wanted + gains["reset"] * (summed + place) + rows["force_gain"][:, None] * (high * on_axes + passed)
     after = []
     for k in range(sections):
-        b0, b1, b2, a1, a2 = np.where((rows["notches"] > k)[:, None], rows["notch"][:, k], [1.0, 0, 0, 0, 0]).T[..., None]
+        b0, b1, b2, a1, a2 = np.where((rows["notches"] > k)[:, None], rows["notch"][:, k], [1.0, 0, 0, 0, 0]).T[
+            ..., None
+        ]
         first, second = notches[2 * k : 2 * k + 2]
         out = b0 * wanted + first
         after += [b1 * wanted - a1 * out + second, b2 * wanted - a2 * out]

@@ -107,14 +107,14 @@ def ledger_dataset(
         table.append((f"platen_{name}", ("time", "coordinate"), values, units, about))
     if interface is not None:
         at = "of the specimen on the platen at the interface, platen axes"
-        for name, wrench, about in (
+        for name, values, about in (
             ("interface", interface.wrench, f"wrench {at}, from measured forces"),
             ("interface_sd", interface.sd, "standard deviation of the interface wrench"),
             ("interface_model", interface.predicted, f"wrench {at}, of the mounted model"),
             ("interface_floors", interface.floors, f"wrench {at}, of the floors' masses and accelerations"),
         ):
-            if wrench is not None:
-                table.append((name, ("time", "axis"), wrench, "N, N m", about))
+            if values is not None:
+                table.append((name, ("time", "axis"), values, "N, N m", about))
     coordinates = {
         "time": ("time", found.time, {"units": "s", "long_name": "time"}),
         "effect": list(effects),

@@ -17,7 +17,13 @@ import pinocchio as pin
 from scipy.stats import norm
 
 from ...core.arrays import Array
-from ...mechanics.interface_wrench import INTERFACE_AXES, at_interface, driven_specimen, specimen_wrenches, wrenches_at_b
+from ...mechanics.interface_wrench import (
+    INTERFACE_AXES,
+    at_interface,
+    driven_specimen,
+    specimen_wrenches,
+    wrenches_at_b,
+)
 from ...mechanics.pose import PlantMotion, rotation
 from ..inverse_dynamics import BASE_SHEAR, SPECIMEN
 from .record import Decomposed, decompose_numbers
@@ -74,9 +80,7 @@ class InterfaceWrench:
             k = int(np.argmax(np.abs(self.wrench[:, j])))
             expected = np.nan if self.predicted is None else self.predicted[:, j]
             best = float(np.asarray(expected).flat[int(np.argmax(np.abs(expected)))])
-            found.append(
-                InterfacePeak(name, float(self.wrench[k, j]), float(self.time[k]), float(width[k, j]), best)
-            )
+            found.append(InterfacePeak(name, float(self.wrench[k, j]), float(self.time[k]), float(width[k, j]), best))
         return tuple(found)
 
 
@@ -87,7 +91,7 @@ def interface_at(found: Decomposed, wrench: Array) -> Array:
 
 
 def find_interface(found: Decomposed, noise: Array, sensors: Array, parameters: Array) -> InterfaceWrench | None:
-    """Interface wrench of a decomposed record with standard deviations (n, 6); None where the platen carries nothing."""
+    """Interface wrench of a record with standard deviations (n, 6); None where the platen carries nothing."""
     machine, ledger = found.mounted.machine, found.forces.ledger
     effects = {name: ledger.wrench[:, ledger.effect(name)] for name in (BASE_SHEAR, SPECIMEN) if name in ledger.effects}
     if machine.specimen is None and not effects:

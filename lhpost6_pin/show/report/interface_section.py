@@ -7,7 +7,7 @@ from ...identification.decompose.interface import InterfacePeak, InterfaceWrench
 from ...mechanics.interface_wrench import INTERFACE_AXES
 from .page import Block, Headline, Table, number
 from .plots import BLACK, BLUE, ORANGE, SKY, VERMILLION, Row, Trace, time_figure
-from .scales import Scale, percent, shown_as
+from .scales import Scale, shown_as
 from .specimen_section import FORCE, INTERFACE_NAMES, MOMENT
 
 __all__ = ["interface_blocks", "interface_headlines", "interface_sentence", "interface_table"]
@@ -22,6 +22,10 @@ SIMULATED = {"color": BLACK, "width": 1.0, "dash": "dot"}
 
 def _scale(component: str) -> Scale:
     return FORCE if component.startswith("f") else MOMENT
+
+
+def _share(found: InterfaceWrench) -> str:
+    return f"{100.0 * found.confidence:.0f}\N{NO-BREAK SPACE}%"
 
 
 def interface_table(found: InterfaceWrench) -> Table:
@@ -39,7 +43,7 @@ def interface_table(found: InterfaceWrench) -> Table:
                 column = values[:, INTERFACE_AXES.index(peak.component)]
                 shown.append(number(float(column[np.argmax(np.abs(column))]) * scale.factor))
         rows.append(shown)
-    header = ["Component", "Unit", "Peak", *[f"{percent(found.confidence)} interval"] * bool(known), "Time"]
+    header = ["Component", "Unit", "Peak", *[f"{_share(found)} interval"] * bool(known), "Time"]
     header += ["Mounted model"] * (found.predicted is not None) + ["Floors"] * (found.floors is not None)
     header += ["Simulated"] * (found.simulated is not None)
     at = ", ".join(f"{x:g}" for x in found.place)
@@ -51,7 +55,7 @@ def interface_blocks(found: InterfaceWrench, step: float) -> list[Block]:
     curves = [("from measured forces", found.wrench, MEASURED)]
     if found.sd.any():
         width = found.half_width
-        curves[:0] = [(f"{percent(found.confidence)} interval", found.wrench - width, BOUND)]
+        curves[:0] = [(f"{_share(found)} interval", found.wrench - width, BOUND)]
         curves[1:1] = [("", found.wrench + width, BOUND)]
     named = ("mounted model", found.predicted, PREDICTED), ("floors' masses times accelerations", found.floors, FLOORS)
     curves += [(name, x, line) for name, x, line in named if x is not None]
@@ -80,7 +84,7 @@ def interface_headlines(found: InterfaceWrench) -> list[Headline]:
         peak = max((by_name[name] for name in names), key=lambda one: abs(one.value))
         note = f"{INTERFACE_NAMES[peak.component]}, at {peak.time:.2f} s"
         if found.sd.any():
-            note += f"; ± {shown_as(peak.half_width, _scale(peak.component))} at {percent(found.confidence)}"
+            note += f"; ± {shown_as(peak.half_width, _scale(peak.component))} at {_share(found)}"
         tiles.append(Headline(shown_as(abs(peak.value), _scale(peak.component)), f"Peak {label}", note))
     return tiles
 
@@ -112,10 +116,10 @@ def _sources(found: InterfaceWrench) -> list[Block]:
     header = ("Component", "Unit", "Noise", "Sensors' calibration", "Bare table's parameters", "All")
     of = f"{found.stated} parameters of the bare table have the standard deviation that the machine file states"
     if found.calibrated:
-        of = f"{found.calibrated} parameters have that of a calibration or override, {found.stated} that of the machine file"
+        of = f"{found.calibrated} parameters have that of a calibration or override, {found.stated} the machine file's"
     return [
         Table("Standard deviations over time, RMS", header, rows),
-        f"Interval: normal, at each instant. Noise by a second draw; gains, offsets and skews of sensors and parameters "
+        "Interval: normal, at each instant. Noise by a second draw; gains, offsets and skews of sensors and parameters "
         f"of the bare table one by one, added in squares as independent. {of}; a calibration of the bare table "
         "(“lhpost6 calibrate”, its file for --override) narrows them. Parameters without a stated deviation, and "
         "geometry, are taken as exact.",

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ...core.errors import UnknownNameError
 from ...tuning.interaction import Interaction
-from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
 from .interaction_section import interaction_blocks
+from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
 from .run_components import force_blocks, pressure_blocks, strut_blocks
 from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses
 from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
@@ -82,7 +82,8 @@ def write_run_report(
 
     `limits` maps names of `LIMIT_NAMES` to capacities (SI; not-a-number means no limit, as does 0
     except for `actuator_pull`), `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name,
-    value, unit, source, assumed), `interaction` is that of table and specimen. Missing channels are named in their sections.
+    value, unit, source, assumed), `interaction` is that of table and specimen. Missing
+    channels are named in their sections.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
     limit.
     """
@@ -98,7 +99,11 @@ def write_run_report(
     sections = [
         Section("tracking", "Target and achieved", tracking_blocks(record, found)),
         *([Section("specimen", "Specimen response", response)] if response else []),
-        *([Section("interaction", "Table and specimen", interaction_blocks(record, interaction))] if interaction else []),
+        *(
+            [Section("interaction", "Table and specimen", interaction_blocks(record, interaction))]
+            if interaction
+            else []
+        ),
         Section("spectra", "Response spectra", spectrum_blocks(record)),
         Section("forces", "Actuator forces", force_blocks(record, bounds)),
         Section("pressures", "Chamber pressures", pressure_blocks(record, bounds)),
@@ -128,6 +133,10 @@ def write_run_report(
     absent = tuple(name for name in EXPECTED if name not in record)
     lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), absent
     return RunSummary(save_page(page, path), verdict, level, *lists)
+
+
+def _interaction(record: xr.Dataset, found: Interaction) -> Section:
+    return Section("interaction", "Table and specimen", interaction_blocks(record, found))
 
 
 def _checked(limits: Mapping[str, ArrayLike]) -> Limits:

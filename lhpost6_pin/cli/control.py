@@ -11,6 +11,7 @@ from ..core.names import AXES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import completing
+from .loop_check import checked_loop, interaction_of, loop_facts
 from .rehearse import save_run
 
 __all__ = ["iterate", "replay", "sine", "tune"]
@@ -71,6 +72,7 @@ def iterate(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     folder = opt.folder_for(out, f"{name}_iterated")
+    checked_loop(table, settings, machine)
     with progress_bar(f"iterating {name} on {table.name}") as progress:
         result = iterate_drive(table, target, settings, most=most, gain=gain, progress=progress)
     facts = circumstances(table, settings.name)
@@ -115,7 +117,8 @@ def replay(
         )
     name = f"{found.target.reference.motion.replace('/', '_')}_replay"
     folder = opt.folder_for(out, name)
-    attrs = {"test": name, "title": f"{name} on {table.name}", "drive": str(drive)}
+    facts = loop_facts(checked_loop(table, settings, machine), machine)
+    attrs = {"test": name, "title": f"{name} on {table.name}", "drive": str(drive), **facts}
     with progress_bar(f"{name} on {table.name}") as progress:
         test = rehearse(
             table,
@@ -127,7 +130,7 @@ def replay(
             progress=progress,
             **options,
         )
-    save_run(test, folder, json)
+    save_run(test, folder, json, interaction=interaction_of(table, settings, settings, None))
 
 
 @command()
@@ -159,6 +162,7 @@ def sine(
     folder = opt.folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz")
     if not beyond:
         check_motion_limits(plant, sine_target(axis, amplitude, frequency)[0])
+    checked_loop(table, settings, machine)
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command())

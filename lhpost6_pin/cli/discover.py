@@ -9,7 +9,7 @@ import typer
 
 from .app import command, print_result, progress_bar, repeating_command
 from .live_view import NoOpen
-from .options import CampaignFolder, Jobs, Json, MachineName, Out, SensorsName, folder_for, measuring
+from .options import CampaignFolder, Jobs, Json, MachineName, MountOptions, Out, SensorsName, folder_for, measuring
 
 __all__ = ["demo", "discover"]
 
@@ -17,6 +17,7 @@ __all__ = ["demo", "discover"]
 @command()
 def discover(
     campaign: CampaignFolder,
+    mount: MountOptions,
     model: Annotated[
         Path | None,
         typer.Option("--model", "--override", help="TOML file of parameters and effects to replace."),
@@ -45,8 +46,9 @@ def discover(
     from ..show.report.discover_report import save_discovery
     from ..show.result_tables import print_discovery
 
-    table = load_machine(machine, model)
-    tests = usable_tests(load_campaign(campaign, table))
+    bare = load_machine(machine, model)
+    tests = usable_tests(load_campaign(campaign, bare))
+    table = mount.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, measuring(campaign, machine))
     held = None if hold_out is None else [] if hold_out == ["none"] else hold_out
     folder = folder_for(out, f"{tests.name}_discovery")

@@ -1,5 +1,6 @@
 """Commands that show a record, a machine and an installation: view, info, capacity, doctor."""
 
+import logging
 import threading
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,8 @@ import typer
 from .app import command, print_result
 from .live_view import ViewOptions, show_address
 from .options import Json, MachineOptions, SpecimenOptions
+
+log = logging.getLogger(__name__)
 
 __all__ = ["capacity", "doctor", "info", "view"]
 
@@ -30,8 +33,13 @@ def view(
     from ..data.records import load_record
     from ..show.viewer import Look, live_animation, show_record
 
-    table = machine.load()
     test, over = load_record(record), [load_record(path) for path in others or []]
+    table = machine.onto_for(machine.load_bare(), [test])
+    if table.specimen is None and (carried := str(test.attrs.get("specimen", "none"))) != "none":
+        log.warning(
+            "%s was made with specimen %r, and its place is not stated: it is not drawn; mount it with --specimen",
+            record, carried,
+        )  # fmt: skip
     look = Look(fps, options.amplify, gap, options.force_change)
     if export is not None:
         show_record(table, test, over, look).save(export)

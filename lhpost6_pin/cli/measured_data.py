@@ -135,8 +135,8 @@ def decompose(
     from ..show.result_tables import print_agreement
     from ..show.results import agreement_entries
 
-    table = machine.load()
     measured = load_record(record)
+    table = machine.onto_for(machine.load_bare(), [measured])
     folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces")
     known = None
     if is_measured(measured) or sensors:
@@ -144,7 +144,7 @@ def decompose(
     found = decompose_record(table, measured, known, cutoff=cutoff, align=not no_align)
     agreement, work = find_agreement(found), find_work(found)
     files = [folder / name for name in ("ledger.nc", "report.html")]
-    save_ledger(found, files[0], work, str(record))
+    save_ledger(found, files[0], work, str(record), agreement.interface)
     write_decompose_report(found, agreement, work, files[1], command=repeating_command())
     print_result(json, lambda: agreement_entries(found, agreement), lambda: print_agreement(found, agreement), files)
 
@@ -172,9 +172,10 @@ def validate(
     if not words <= {"1", "2", "3"}:
         raise ParameterError(f"--phases {phases}: write some of 1,2,3 with commas between them")
     numbers = tuple(sorted(map(int, words)))
-    table = machine.load()
-    settings = opt.find_settings(controller, table) if controller else None
-    tests = load_campaign(campaign, table)
+    bare = machine.load_bare()
+    settings = opt.find_settings(controller, bare) if controller else None
+    tests = load_campaign(campaign, bare)
+    table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_validation")
     with progress_bar(f"validating {table.name} on {tests.name}") as progress:
@@ -207,8 +208,9 @@ def calibrate(
     from ..show.result_tables import print_calibration
     from ..show.results import calibration_entries
 
-    table = machine.load()
-    tests = usable_tests(load_campaign(campaign, table))
+    bare = machine.load_bare()
+    tests = usable_tests(load_campaign(campaign, bare))
+    table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
     folder = opt.folder_for(out, f"{tests.name}_calibration")
     with progress_bar(f"calibrating {table.name} on {tests.name}") as progress:

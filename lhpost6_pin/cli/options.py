@@ -1,18 +1,21 @@
 """Options shared by commands; bundles of options that load what they select: machine, motion, scheme, controller."""
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import MotionError, ParameterError
+from ..core.errors import MotionError, ParameterError, RecordError
 from ..core.files import shipped, shipped_specimens
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from .completion import complete_motion, completing
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..control import ControllerSettings
     from ..control.plug import UserController
     from ..machine.machine import Machine
@@ -21,8 +24,9 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 __all__ = ["Beyond", "CampaignFolder", "Cancel", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
-__all__ += ["MotionOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName", "SpecimenOptions"]
-__all__ += ["StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring", "record_name"]
+__all__ += ["MotionOptions", "MountOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName"]
+__all__ += ["SpecimenOptions", "StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring"]
+__all__ += ["record_name"]
 
 
 def _refuse_no_jobs(jobs: int) -> int:
@@ -113,8 +117,8 @@ class MachineOptions:
 
 
 @dataclass(frozen=True)
-class SpecimenOptions(MachineOptions):
-    """Options that select a machine and its specimen."""
+class MountOptions:
+    """Options that mount a specimen."""
 
     specimen: Annotated[
         str | None,
@@ -131,12 +135,12 @@ class SpecimenOptions(MachineOptions):
         False
     )
 
-    def load(self, valves: int = 0) -> "Machine":
-        """Machine with its open valves and its specimen, if any; warnings about the specimen are logged."""
+    def onto(self, table: "Machine") -> "Machine":
+        """The machine with the specimen, if any; warnings about the specimen are logged."""
         from ..mechanics.plant import make_plant
         from ..mechanics.specimen_joints import specimen_doubts
 
-        table, at = super().load().with_valves(valves), self.specimen_at
+        at = self.specimen_at
         if self.specimen is None:
             if self.locked or at:
                 raise ParameterError("--locked and --specimen-at concern a specimen; name it with --specimen")
@@ -152,6 +156,47 @@ class SpecimenOptions(MachineOptions):
         for doubt in specimen_doubts(make_plant(loaded)):
             log.warning("%s", doubt)
         return loaded
+
+    def onto_for(self, table: "Machine", records: Sequence["xr.Dataset"]) -> "Machine":
+        """As `onto`; without --specimen the machine with the specimen that all records state, as far as they do.
+
+        Raises RecordError for records with different specimens, or a stated one whose file is not there.
+        """
+        if self.specimen is not None or not records:
+            return self.onto(table)
+        stated = {_specimen_words(record.attrs): record for record in records}
+        if len(stated) > 1:
+            raise RecordError(f"the records were made with different specimens: {'; '.join(stated)}")
+        (record,) = stated.values()
+        self.onto(table)  # raises for --locked without --specimen
+        if "specimen_file" not in record.attrs:  # its place is not stated: what needs it says so
+            return table
+        return table.as_mounted(record.attrs, str(record.encoding.get("source", "the record")))
+
+
+@dataclass(frozen=True)
+class SpecimenOptions(MountOptions, MachineOptions):
+    """Options that select a machine and its specimen."""
+
+    def load(self, valves: int = 0) -> "Machine":
+        """Machine with its open valves and its specimen, if any; warnings about the specimen are logged."""
+        return self.onto(MachineOptions.load(self).with_valves(valves))
+
+    def load_bare(self) -> "Machine":
+        """Machine without a specimen."""
+        return MachineOptions.load(self)
+
+    @property
+    def words(self) -> list[str]:
+        """The options as on a command line, those that are not defaults."""
+        given = {
+            "--machine": self.machine if self.machine != "lhpost6" else None,
+            "--override": self.override,
+            "--specimen": self.specimen,
+            "--specimen-at": self.specimen_at,
+        }
+        named = [word for option, value in given.items() if value is not None for word in (option, str(value))]
+        return [*named, *["--locked"] * self.locked]
 
 
 @dataclass(frozen=True)
@@ -297,6 +342,12 @@ def measuring(campaign: Path, machine: str) -> str:
 def record_name(path: Path, attrs: Any) -> str:
     """Name of a record for its results: that of the file, of the test for a file named record.nc."""
     return path.stem if path.stem != "record" else str(attrs.get("test", "record")).replace("/", "_")
+
+
+def _specimen_words(attrs: Any) -> str:
+    """The specimen that a record states, with its place, in words."""
+    keys = ("specimen", "specimen_position", "specimen_rpy", "specimen_locked")
+    return ", ".join(f"{key} {attrs[key]}" for key in keys if key in attrs)
 
 
 def _is_file(name: str) -> bool:

@@ -1,6 +1,7 @@
 """Commands that run the virtual table: run, open-loop, campaign; and the motions that it can run."""
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,11 +13,13 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
 from .live_view import LiveOptions, watched
+from .loop_check import checked_loop, interaction_of, loop_facts, retuned
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from ..simulation.rehearse import SimulatedTest
+    from ..tuning.interaction import Interaction
 
 log = logging.getLogger(__name__)
 
@@ -36,6 +39,9 @@ def run(
     ] = None,
     cancel: opt.Cancel = None,
     valves: opt.Valves = 0,
+    retune: Annotated[
+        bool, typer.Option("--retune", help="Tune the controller for this table and specimen first, then run with it.")
+    ] = False,
     beyond: opt.Beyond = False,
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
     json: opt.Json = False,
@@ -60,13 +66,20 @@ def run(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     folder = opt.folder_for(out, name)
+    given = chosen
+    more: list[Path] = []
+    if retune:
+        if inverse is not None:
+            raise SimulationError("--aic is an inverse of the controller as it was; --retune changes it")
+        chosen, _, more = retuned(table, chosen, folder)
+    loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{name} at scale {motion.scale:g} on {table.name}"
     with watched(view, table, title, err=json) as watch, progress_bar(f"{name} on {table.name}") as progress:
         test = rehearse(
             table,
             target,
             chosen,
-            attrs={"test": name, "title": title},
+            attrs={"test": name, "title": title, **loop_facts(loop, machine)},
             inverse=inverse,
             adapt=None if cancel is None else lambda loop: cancelling(loop, target, cancel),
             record_every=SAMPLE_RATE // record_rate,
@@ -75,7 +88,8 @@ def run(
             watch=watch,
             **options,
         )
-    save_run(test, folder, json)
+    shown = interaction_of(table, given, chosen, inverse)
+    save_run(test, folder, json, interaction=shown, more=more)
 
 
 @command("open-loop")
@@ -90,9 +104,10 @@ def open_loop(
     from ..data.records import load_record
     from ..simulation.rehearse import replay
 
-    table = machine.load()
+    bare = machine.load_bare()
+    measured = load_record(record, bare.labels)
+    table = machine.onto_for(bare, [measured])
     options = steps.checked(table)
-    measured = load_record(record, table.labels)
     test = opt.record_name(record, measured.attrs)
     name = f"{test}_open_loop"
     if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():
@@ -155,8 +170,18 @@ def motions(
     print_result(json, lambda: motion_entries(name), lambda: print_motions(name))
 
 
-def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Dataset | None" = None) -> None:
+def save_run(
+    test: "SimulatedTest",
+    folder: Path,
+    json: bool,
+    against: "xr.Dataset | None" = None,
+    *,
+    interaction: "Interaction | None" = None,
+    more: Sequence[Path] = (),
+) -> None:
     """Write the record and, unless it is compared `against` a measured test, the report; print a summary.
+
+    interaction: of table and specimen, for the report; more: files that were written before.
 
     Raises typer.Exit if the run stopped on the way.
     """
@@ -166,8 +191,8 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
     from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
 
     done, record = test
-    files, summary = [folder / "record.nc"], None
-    save_record(record, files[0])
+    files, summary = [*more, folder / "record.nc"], None
+    save_record(record, files[-1])
     beyond = joints_beyond(done.plant, done.time, done.q)
     for warning in beyond:
         log.warning("%s", warning)
@@ -178,11 +203,12 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
         files.append(folder / "report.html")
         summary = write_run_report(
             record,
-            files[1],
+            files[-1],
             limits=report_limits(done.plant),
             notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *exchanged],
             command=repeating_command(),
             machine_table=machine_rows(done.plant.machine),
+            interaction=interaction,
         )
     compared = [] if against is None else compare(against, record)
 
@@ -192,7 +218,8 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
         print_run(done, summary)
 
     def entries() -> dict[str, Any]:
-        return run_entries(done, summary) | ({} if against is None else {"against_record": compared})
+        loop = {key: record.attrs[key] for key in ("loop", "loop_summary", "loop_remedy") if key in record.attrs}
+        return run_entries(done, summary) | loop | ({} if against is None else {"against_record": compared})
 
     print_result(json, entries, show, files)
     if done.trouble:

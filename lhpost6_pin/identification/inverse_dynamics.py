@@ -29,12 +29,16 @@ from ..mechanics.required_wrench import floor_wrench, required_wrench, wrenches_
 from ..mechanics.schemes import pose_stage
 from ..mechanics.workspace import make_workspace
 from ..simulation.ledger import Ledger, States, add_at_c, force_ledger
+from ..simulation.specimen_response import driven_wrenches
 from .residual_kernels import wrench_residual
 
 LOAD_ROUNDS, LOAD_ROUNDING = 20, 1e-12
 """Rounds at most in which loads and the friction under them are found, and the relative change that ends them."""
 
-__all__ = ["Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "with_loads"]
+BASE_SHEAR, SPECIMEN = "base_shear", "specimen"
+"""Names in the ledger of the wrenches that a specimen's floors, as measured, and a mounted specimen exert."""
+
+__all__ = ["BASE_SHEAR", "SPECIMEN", "Decomposition", "inverse_dynamics", "leg_wrenches", "march_states", "with_loads"]
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,11 @@ class Decomposition:
         return self.required - self.measured
 
     @property
+    def carried(self) -> Array:
+        """Wrench (n, 6) on the platen of what it carries: the residual without the model's, or the floors', part."""
+        return self.residual + self._of([BASE_SHEAR, SPECIMEN])
+
+    @property
     def struts(self) -> Array:
         """Wrench of the struts (n, 6), of the model (Eq. 4-8), with effects on their gas."""
         return self._of(e.name for e in self.states.plant.machine.effects if LAWS[e.law].acts_on_gas)
@@ -83,9 +92,9 @@ class Decomposition:
 
     @property
     def dissipative_measured(self) -> Array:
-        """The same from measured forces: inertia less weight, actuators and struts (the model's without pressures)."""
+        """The same from measured forces: inertia less weight, load, actuators, struts (modelled, if not measured)."""
         struts = self.struts if self.struts_measured is None else self.struts_measured
-        return self.ledger.inertia - self._of(["gravity"]) - self.measured - struts
+        return self.ledger.inertia - self._of(["gravity", BASE_SHEAR, SPECIMEN]) - self.measured - struts
 
     def _of(self, effects: Iterable[str]) -> Array:
         """Sum of the wrenches (n, 6) of those effects that make a force."""
@@ -101,6 +110,7 @@ def inverse_dynamics(
     strut_pressure: ArrayLike | None = None,
     *,
     floor_acceleration: ArrayLike | None = None,
+    mounted: Plant | None = None,
     path: Array | None = None,
     model_step: bool = False,
 ) -> Decomposition:
@@ -109,8 +119,9 @@ def inverse_dynamics(
     time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
     is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). floor_acceleration
     (n, n_floors) [m/s2] are those measured on a specimen's floors: their base shear is the effect `base_shear` of the
-    ledger. model_step: the samples are steps of a semi-implicit run, whose forces see the last step's velocity
-    (`schemes.staggered_stage`).
+    ledger. mounted is the plant with a specimen, where `plant` is without: the wrench on the platen of that specimen,
+    its joints and modes driven by the motion (`driven_wrenches`), is the effect `specimen` of the ledger. model_step: the samples
+    are steps of a semi-implicit run, whose forces see the last step's velocity (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
     if plant.flexible:
@@ -136,12 +147,18 @@ def inverse_dynamics(
     seen = moved._replace(v=v)
     ports = ports_along(plant, seen)
     required = required_wrench(plant, seen, ports.turn)
-    floors = None if floor_acceleration is None else floor_wrench(plant, np.asarray(floor_acceleration, float))
-    loaded = with_loads(plant, ports, required if floors is None else required + floors, z, measured[0])
+    carried: dict[str, Array] = {}  # wrenches on the platen at B in platen axes
+    if floor_acceleration is not None:
+        carried[BASE_SHEAR] = -floor_wrench(plant, np.asarray(floor_acceleration, float))
+    if mounted is not None:
+        carried[SPECIMEN] = driven_wrenches(mounted, seen, dt)
+    for load in carried.values():
+        required[:, plant.axes] -= load[:, plant.axes]
+    loaded = with_loads(plant, ports, required, z, measured[0])
     ledger = _without_oil(force_ledger(states._replace(z=loaded)), plant)
-    if floors is not None:
-        shear = -wrenches_at_c(plant, ports.turn, floors)[:, None]
-        ledger = replace(ledger, effects=(*ledger.effects, "base_shear"), wrench=np.hstack([ledger.wrench, shear]))
+    for name, load in carried.items():
+        on_platen = wrenches_at_c(plant, ports.turn, load)[:, None]
+        ledger = replace(ledger, effects=(*ledger.effects, name), wrench=np.hstack([ledger.wrench, on_platen]))
     return Decomposition(states, ledger, tuple(names), force, wrench, plant.spools)
 
 

@@ -18,6 +18,7 @@ from ..effects.registry import LAWS
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
 from .library import effect_entry, make_named_effect, size_of
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
+from .recorded_specimen import recorded_mounting
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
@@ -122,12 +123,22 @@ class Machine(Structure):
         return self.with_params({f"platen.{key}": self.parameters[path] for key, path in found.items()})
 
     def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
-        """Return a copy with the servovalves open that a record's attributes state, none stated: as it is.
+        """Return a copy with the specimen and the open servovalves that a record's attributes state, if any.
 
-        Raises what `refuse_unmounted` does.
+        Raises what `as_mounted` does.
         """
-        self.refuse_unmounted(attrs, said)
-        return self.with_valves(int(attrs.get("valves_per_horizontal_actuator", 0)))
+        return self.as_mounted(attrs, said).with_valves(int(attrs.get("valves_per_horizontal_actuator", 0)))
+
+    def as_mounted(self, attrs: Mapping[str, Any], said: str) -> "Machine":
+        """Return a copy with the specimen that a record, `said` in words, was made with; one that is mounted stays.
+
+        Raises RecordError if its place or its file is not known.
+        """
+        mounting = None if self.specimen else recorded_mounting(attrs, said)
+        if mounting is None:
+            self.refuse_unmounted(attrs, said)
+            return self
+        return self.with_specimen(mounting.file, mounting.position, mounting.rpy, locked=mounting.locked)
 
     def refuse_unmounted(self, attrs: Mapping[str, Any], said: str) -> None:
         """Raise RecordError if a record, `said` in words, was made with a specimen and this table is bare."""

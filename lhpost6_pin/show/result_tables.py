@@ -23,6 +23,7 @@ from .report.control_blocks import gain_table
 from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
 from .report.friction_section import friction_table
+from .report.interface_section import interface_table
 from .report.iterate_report import iteration_tables
 from .report.page import Table
 from .report.sine_report import sine_table
@@ -85,9 +86,10 @@ def print_calibration(calibration: Calibration) -> None:
 
 
 def print_agreement(found: Decomposed, agreement: WrenchAgreement) -> None:
-    """Print the residual with its expected size, and errors of the modelled forces, axis by axis."""
+    """Print a specimen's interface wrench, the residual with its expected size, and errors of the modelled forces."""
     how = f"Modelled against measured forces up to {found.comparison.band.high:g} Hz"
-    print_blocks(how, *residual_tables(found, agreement), *match_tables(found, agreement))
+    interface = [] if agreement.interface is None else [interface_table(agreement.interface)]
+    print_blocks(*interface, how, *residual_tables(found, agreement), *match_tables(found, agreement))
 
 
 def print_discovery(found: Discovery) -> None:

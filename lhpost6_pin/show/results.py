@@ -13,6 +13,7 @@ from ..identification.calibration import Calibration
 from ..identification.calibration.result import verdict_on
 from ..identification.calibration.scale import scale_summary
 from ..identification.decompose import Decomposed, WrenchAgreement
+from ..identification.decompose.interface import InterfaceWrench
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..simulation.simulate import Run
@@ -172,7 +173,32 @@ def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
         }
         own = {name: values[k] for name, values in residual.items()}
         axes[AXES[k]] = forces | {"delay": agreement.actuators.delay[k], "residual": own}
-    return {"compared_up_to_hz": found.comparison.band.high, "axes": axes}
+    entries = {"compared_up_to_hz": found.comparison.band.high, "axes": axes}
+    return entries if agreement.interface is None else {**entries, "interface": _interface_entries(agreement.interface)}
+
+
+def _interface_entries(found: InterfaceWrench) -> Entries:
+    """Peaks of a specimen's wrench on the platen at the interface, with half of their intervals."""
+    sources = _picked(found, "noise", "sensors", "parameters")
+    rms = {
+        name: np.sqrt(np.mean(np.square(np.broadcast_to(x, found.wrench.shape)), axis=0)) for name, x in sources.items()
+    }
+    return {
+        "place_from_c": found.place,
+        "confidence": found.confidence,
+        "parameters_calibrated": found.calibrated,
+        "parameters_stated": found.stated,
+        "components": {
+            peak.component: {
+                "peak": peak.value,
+                "time": peak.time,
+                "half_width": peak.half_width,
+                "mounted_model": None if found.predicted is None else peak.predicted,
+                **{f"{name}_sd": values[j] for name, values in rms.items()},
+            }
+            for j, peak in enumerate(found.peaks)
+        },
+    }
 
 
 def _friction_entries(found: Calibration) -> Entries | None:

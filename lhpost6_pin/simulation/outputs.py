@@ -11,13 +11,14 @@ from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
+from ..machine.recorded_specimen import specimen_facts
 from ..machine.structure import BODIES
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
+from ..mechanics.interface_wrench import INTERFACE_AXES, interface_lever
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
-from .ledger import WRENCH_AXES
 from .simulate import Run
-from .specimen_response import point_response
+from .specimen_response import point_response, wrench_on_platen
 
 __all__ = ["record_of_run"]
 
@@ -34,7 +35,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
 
     attrs: further global attributes (`test`, `title`, ...). reference: target at the run's samples, if any; its
     velocity and acceleration are extra variables, as are hidden states, the joints of an articulated specimen and the
-    points of a modal one.
+    points of a modal one; and the wrench of a specimen on the platen.
     """
     plant, machine = run.plant, run.plant.machine
     motion = platen_motion(plant, run.q, run.v, run.a)
@@ -84,15 +85,17 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         about["joint_units"] = " ".join(joint.unit for joint in joints)
         labels["specimen_joint"] = tuple(joint.name for joint in joints)
         channels["specimen_joint_position"] = (("time", "specimen_joint"), specimen_positions(plant, run.q), about)
-    if run.coupling is not None:
-        about = {"units": "N, N m", "long_name": "wrench of the specimen on the platen at its base, axes of the base"}
-        labels["wrench"] = WRENCH_AXES
-        channels["interface_wrench"] = (("time", "wrench"), run.coupling.wrench, about)
+    if machine.specimen is not None:
+        about = {"units": "N, N m", "long_name": "wrench of the specimen on the platen at the interface, platen axes"}
+        at = np.round(interface_lever(plant) - plant.body[0]["rho_c"], 12)
+        about["interface"] = f"at {at[0]:g}, {at[1]:g}, {at[2]:g} m from C"
+        labels["interface_axis"] = INTERFACE_AXES
+        channels["specimen_wrench"] = (("time", "interface_axis"), wrench_on_platen(run), about)
     valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
     facts: dict[str, Any] = {
         "kind": "simulated",
         "machine": machine.name,
-        "specimen": machine.specimen.name if machine.specimen else "none",
+        **specimen_facts(machine.specimen),
         "scheme": run.scheme,
         "steps_per_second": run.steps_per_second,
         "engine": run.engine,

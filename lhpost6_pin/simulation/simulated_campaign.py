@@ -145,7 +145,7 @@ def as_sensed(
     channels: dict[str, Any] = {}
     group_of = {channel: group for group, members in sensor_groups().items() for channel in members}
     for name in map(str, record.data_vars):
-        if name.startswith(("hidden_", "specimen_joint")):
+        if name.startswith(("hidden_", "specimen_")):
             continue
         values = record[name].values.astype(float)
         if name in LAYOUT and LAYOUT[name].held:

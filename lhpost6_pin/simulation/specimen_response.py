@@ -1,7 +1,7 @@
 """Response of a specimen in a run: its modes and points, springs in its joints, and the wrench at its base."""
 
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -9,14 +9,17 @@ import pinocchio as pin
 from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..machine.specimen_forms import influence_of
+from ..mechanics.interface_wrench import driven_specimen, specimen_wrenches
+from ..mechanics.modal_march import march_modes
 from ..mechanics.modes import ModalMotion, modal_motion
 from ..mechanics.plant import Plant
-from ..mechanics.pose import platen_motion, rotation
+from ..mechanics.pose import PlantMotion, platen_motion, rotation
 from ..mechanics.rigid_body import make_model
 from ..mechanics.specimen_mount import base_twist
 from .coupling import CouplingResult
 
-__all__ = ["base_wrench", "modes_of_run", "point_response", "spring_energy", "twists_of_run"]
+__all__ = ["base_wrench", "driven_wrenches", "modes_of_run", "point_response", "spring_energy", "twists_of_run"]
+__all__ += ["wrench_on_platen"]
 
 
 class History(Protocol):
@@ -115,6 +118,38 @@ def base_wrench(run: History) -> Array:
     if plant.modes.size:
         found -= modes_of_run(run).reaction
     return found @ np.linalg.inv(base_twist(plant.machine, specimen))
+
+
+def wrench_on_platen(run: History) -> Array:
+    """Wrench (n, 6) [N, N m] of the specimen on the platen at its base, in platen axes: `base_wrench` reversed."""
+    specimen = run.plant.machine.specimen
+    turn = np.eye(3) if specimen is None else pin.rpy.rpyToMatrix(*specimen.rpy)
+    own = base_wrench(run)
+    return -np.hstack([own[:, :3] @ turn.T, own[:, 3:] @ turn.T])
+
+
+def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float) -> Array:
+    """Wrenches (n, 6) [N, N m] of a specimen on the platen at B in platen axes, along a prescribed motion of the platen.
+
+    Its joints and modes respond from rest (`driven_specimen`, `march_modes`). Raises SimulationError for a specimen
+    that is a program.
+    """
+    if plant.coupled is not None:
+        raise SimulationError("a specimen that is a program runs with the table only, not along a recorded motion")
+    moved = driven_specimen(plant, motion, dt)
+    found = specimen_wrenches(plant, *moved)
+    if plant.modes.size:
+        states = _States(plant, *moved, march_modes(plant, motion, dt))
+        found += modes_of_run(states).reaction
+    return found
+
+
+class _States(NamedTuple):
+    plant: Plant
+    q: Array
+    v: Array
+    a: Array
+    z: Array
 
 
 def _without_platen(plant: Plant) -> Any:

@@ -19,11 +19,12 @@ from ..core.names import SAMPLE_RATE
 from ..laws.orifice import opening
 from ..machine.machine import Machine
 from ..mechanics.equilibrium import find_equilibrium
+from ..mechanics.interface_wrench import bare
 from ..mechanics.linearize import SPOOL_STEP, linearize
 from ..mechanics.plant import make_plant
 
-__all__ = ["LoopModel", "Margin", "expected_response", "loop_gain", "make_loop_model", "margins"]
-__all__ += ["without_dry_friction"]
+__all__ = ["LinearTable", "LoopModel", "Margin", "expected_response", "linear_table", "loop_gain"]
+__all__ += ["make_loop_model", "margins", "without_dry_friction"]
 
 FREQUENCIES = np.geomspace(0.05, 400.0, 4000)
 """Frequencies of loops [Hz]: from below the corner of the reset integrator to far above the stiffest oil column, dense
@@ -55,13 +56,29 @@ def without_dry_friction(machine: Machine) -> Machine:
     return machine.with_params(dict.fromkeys(friction, 0.0))
 
 
-def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> LoopModel:
-    """Linear response of a controller's plant to its velocity commands, its force balance closed."""
+@dataclass(frozen=True)
+class LinearTable:
+    """A controller's plant at rest without dry friction: dx/dt = a x + b w, w (n_actuators,) its velocity commands.
+
+    x: local pose and velocity of the plant's nv coordinates, then oil and any states of a specimen. Delays and lags of
+    valves, hold and force balance are not in it.
+    """
+
+    a: Array  # (n, n)
+    b: Array  # (n, n_actuators)
+    nv: int
+    to_c: Array  # (n_axes, n) displacement of C and Euler angles on the free axes
+    to_force: Array  # (n_actuators, n) actuator forces [N]
+
+
+def linear_table(controller: Controller) -> LinearTable:
+    """Linearise a controller's plant about rest."""
     plant = make_plant(without_dry_friction(controller.plant.machine))
     rest = find_equilibrium(plant)
     linear = linearize(plant, rest.state, rest.spool)
     nv, axes = linear.nv, plant.axes
-    oil = (2 * nv + i for i, name in enumerate(plant.states) if "pressure" in name or "flow" in name)
+    carried = set(plant.states) - set(bare(plant).states)
+    oil = (2 * nv + i for i, name in enumerate(plant.states) if "pressure" in name or "flow" in name or name in carried)
     keep = [*range(2 * nv), *oil]
     a, b = linear.A[np.ix_(keep, keep)], linear.B[keep]
     # spool per actuator velocity: the controller inverts the flow curve about the opening at rest
@@ -79,14 +96,26 @@ def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> L
             name = plant.states[first + offset] if offset == 0 or area != 0.0 else None
             if name in pressure:
                 to_force[i, 2 * nv + pressure[name]] = area
+    return LinearTable(a, b, nv, to_c, to_force)
+
+
+def make_loop_model(
+    controller: Controller, frequency: Array = FREQUENCIES, table: LinearTable | None = None
+) -> LoopModel:
+    """Linear response of a controller's plant to its velocity commands, its force balance closed.
+
+    table: that of `linear_table`, if known.
+    """
+    plant = controller.plant
+    table = linear_table(controller) if table is None else table
     s = 2j * np.pi * frequency[:, None, None]
     hold = (1.0 - np.exp(-s / SAMPLE_RATE)) / (s / SAMPLE_RATE)
     late = np.exp(-s * plant.delays) / (1.0 + s * plant.lags) * hold  # (m, 1, n_actuators)
-    states = np.linalg.solve(s * np.eye(len(keep)) - a, b * late)  # per actuator velocity
-    force = to_force @ states
-    legs = controller.jacobian[:, axes]
+    states = np.linalg.solve(s * np.eye(len(table.a)) - table.a, table.b * late)  # per actuator velocity
+    force = table.to_force @ states
+    legs = controller.jacobian[:, plant.axes]
     rate = np.linalg.solve(np.eye(plant.spools) + controller.balance @ force, legs.astype(complex))
-    displacement, on_axes = to_c @ states @ rate, legs.T @ (force @ rate)
+    displacement, on_axes = table.to_c @ states @ rate, legs.T @ (force @ rate)
     return LoopModel(frequency, np.asarray(displacement, np.complex128), np.asarray(on_axes, np.complex128))
 
 

@@ -9,7 +9,17 @@
 
 from .agreement import Level, Match, WrenchAgreement, find_agreement
 from .dataset import Work, find_work, ledger_dataset, save_ledger
+from .interface import InterfaceWrench, find_interface
 from .record import ComparisonBand, Decomposed, decompose_numbers, decompose_record
 
-__all__ = ["WrenchAgreement", "ComparisonBand", "Decomposed", "Level", "Match", "Work", "decompose_numbers"]
-__all__ += ["decompose_record", "find_agreement", "find_work", "ledger_dataset", "save_ledger"]
+__all__ = [
+    "InterfaceWrench",
+    "WrenchAgreement",
+    "ComparisonBand",
+    "Decomposed",
+    "Level",
+    "Match",
+    "Work",
+    "decompose_numbers",
+]
+__all__ += ["decompose_record", "find_agreement", "find_interface", "find_work", "ledger_dataset", "save_ledger"]

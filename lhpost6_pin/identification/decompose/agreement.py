@@ -10,7 +10,7 @@ expected from:
 Errors are propagated linearly, each at one standard deviation, as independent: their effects add in squares.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -26,6 +26,7 @@ from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import leg_wrenches
 from ..prepare import AS_RECORDED, prepare_test
 from ..residuals import evaluate_residuals, follow
+from .interface import InterfaceWrench, find_interface, interface_at
 from .record import Decomposed, decompose_numbers, decompose_test
 
 __all__ = ["WrenchAgreement", "Explanation", "Level", "Match", "find_agreement"]
@@ -53,6 +54,20 @@ class Level(NamedTuple):
     varying: Array
 
 
+class Change(NamedTuple):
+    """Changes (n, 6) at C in {c} of the residual, and of what the platen carries (`Decomposition.carried`)."""
+
+    residual: Array
+    carried: Array
+
+
+class Changes(NamedTuple):
+    """Sum in squares of changes."""
+
+    residual: Level
+    interface: Array  # (n, 6) over time, at the interface
+
+
 @dataclass(frozen=True)
 class WrenchAgreement:
     """Agreement of a decomposed record with its measured forces."""
@@ -66,6 +81,7 @@ class WrenchAgreement:
     parameters: Level  # expected from the machine's numbers
     noise_range: float  # relative uncertainty of the noise
     coverage: float  # standard deviations of sensors and parameters that are allowed
+    interface: InterfaceWrench | None  # None: no specimen, and no floors measured
 
     @property
     def noise_ratio(self) -> Array:
@@ -98,19 +114,23 @@ def find_agreement(found: Decomposed, *, seed: int = 0) -> WrenchAgreement:
     """Compare forces, and the residual with that expected from noise (drawn from seed), sensors and parameters."""
     numbers, forces, sensors = decompose_numbers(), found.forces, found.sensors
     required, struts = numbers.number("judgement.correlation"), forces.struts_measured
-    noise, none = np.zeros(6), Level(np.zeros(6), np.zeros(6))
+    none = Changes(Level(np.zeros(6), np.zeros(6)), np.zeros((len(found.time), 6)))
+    noise = by_sensors = by_parameters = none
     if sensors is not None:
-        noise = _noise(found, sensors, np.random.default_rng(seed))
+        noise = summed(found, [_noise(found, sensors, np.random.default_rng(seed))])
+        by_sensors = summed(found, _by_sensors(found, sensors))
+        by_parameters = summed(found, _by_parameters(found))
     return WrenchAgreement(
         actuators=_match(found, forces.measured, forces.required, required),
         struts=None if struts is None else _match(found, struts, forces.struts, required),
         dissipative=_match(found, forces.dissipative_measured, forces.dissipative, required),
         residual=_level(forces.residual),
-        noise=noise,
-        sensors=none if sensors is None else _summed(found, _by_sensors(found, sensors)),
-        parameters=none if sensors is None else _summed(found, _by_parameters(found)),
+        noise=noise.residual.varying,
+        sensors=by_sensors.residual,
+        parameters=by_parameters.residual,
         noise_range=0.0 if sensors is None else sensors.noise_range,
         coverage=numbers.number("judgement.coverage"),
+        interface=find_interface(found, noise.interface, by_sensors.interface, by_parameters.interface),
     )
 
 
@@ -129,24 +149,25 @@ def _level(x: Array) -> Level:
     return Level(x.mean(axis=0), x.std(axis=0))
 
 
-def _summed(found: Decomposed, changes: Iterator[Array]) -> Level:
-    """Sum in squares of the levels of changes (n, 6) of the residual."""
-    total = np.zeros((2, 6))
+def summed(found: Decomposed, changes: Iterable[Change]) -> Changes:
+    """Sum in squares of independent changes: levels of the residual, and of what is carried over time."""
+    total, carried = np.zeros((2, 6)), np.zeros((len(found.time), 6))
     for change in changes:
-        total += np.square(_level(found.compared(change)))
-    return Level(*np.sqrt(total))
+        total += np.square(_level(found.compared(change.residual)))
+        carried += np.square(interface_at(found, found.compared(change.carried)))
+    return Changes(Level(*np.sqrt(total)), np.sqrt(carried))
 
 
-def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Array:
-    """Standard deviation (6,) of the residual's change by a second draw of noise."""
+def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Change:
+    """Change by a second draw of noise."""
     policy = AS_RECORDED._replace(band=found.comparison.band)
     noisier = prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors, policy)
-    change = decompose_test(found.plant, noisier)[0].residual - found.whole.residual
-    return np.asarray(found.compared(change).std(axis=0))
+    drawn = decompose_test(found.mounted, noisier)[0]
+    return Change(drawn.residual - found.whole.residual, drawn.carried - found.whole.carried)
 
 
-def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
-    """Change (n, 6) of the residual by one standard deviation of each calibration error."""
+def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Change]:
+    """Changes by one standard deviation of each calibration error."""
     whole, record = found.whole, found.record
     unit = leg_wrenches(found.plant, whole.states.q, np.ones((len(whole.states.time), whole.actuators)))
     ways = (("actuator_force",), ("chamber_pressure_a", "chamber_pressure_b"), ("pressure_difference",))
@@ -157,24 +178,30 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Array]:
             if area is None:
                 continue
             values = record[channel].sel({LAYOUT[channel].dims[1]: actuator.name}).values
-            yield unit[:, k] * (area * sensors.gain_sd(channel) * values[:, None])
-            yield unit[:, k] * (area * sensors.offset_sd(channel))
+            yield _of_force(unit[:, k] * (area * sensors.gain_sd(channel) * values[:, None]))
+            yield _of_force(unit[:, k] * (area * sensors.offset_sd(channel)))
     skew = np.hypot(sensors.delay_sd(LAYOUT[channels[0]].group or channels[0]), sensors.delay_sd("platen_displacement"))
-    yield skew * differentiate(whole.measured, found.dt, sensors.band.high)
+    yield _of_force(skew * differentiate(whole.measured, found.dt, sensors.band.high))
     used = [name for name in ("actuator_displacement", "platen_displacement", "platen_acceleration") if name in record]
     gain = max(sensors.gain_sd(name) for name in used)
     for axis in found.plant.axes:
         scaled = [x.copy() for x in found.test.motion]
         for x in scaled:
             x[:, axis] *= 1.0 + gain
-        other = replace(found.test, motion=PlatenMotion(*scaled))
-        yield evaluate_residuals(found.plant, other, ("wrench",)).wrench - whole.residual
+        moved = decompose_test(found.mounted, replace(found.test, motion=PlatenMotion(*scaled)))[0]
+        yield Change(moved.residual - whole.residual, moved.carried - whole.carried)
 
 
-def _by_parameters(found: Decomposed) -> Iterator[Array]:
-    """Change (n, 6) of the residual by one standard deviation of each number of the platen and the kinds."""
+def _of_force(change: Array) -> Change:
+    """A change (n, 6) of the measured forces alone."""
+    return Change(change, change)
+
+
+def _by_parameters(found: Decomposed) -> Iterator[Change]:
+    """Changes by one standard deviation of each number of the platen and the kinds."""
     machine, measured = found.plant.machine, found.test
     nominal = follow(found.plant, measured)
+    as_is = evaluate_residuals(found.plant, measured, ("wrench",), path=nominal).wrench
     sections = {"platen", *(c.kind for c in machine.components)}
     for path, quantity in machine.parameters.items():
         section, _, name = path.partition(".")
@@ -187,4 +214,4 @@ def _by_parameters(found: Decomposed) -> Iterator[Array]:
             value = shifted.tolist() if isinstance(quantity.value, tuple) else float(shifted[0])
             plant = make_plant(machine.with_params({path: value}))
             moved = follow(plant, measured, (found.plant, nominal))
-            yield evaluate_residuals(plant, measured, ("wrench",), path=moved).wrench - found.whole.residual
+            yield _of_force(evaluate_residuals(plant, measured, ("wrench",), path=moved).wrench - as_is)

@@ -18,6 +18,7 @@ from ...data.channels import LAYOUT
 from ...mechanics.pose import rotation
 from ...mechanics.rigid_body import platen_inertia
 from ...simulation.ledger import WRENCH_AXES
+from .interface import InterfaceWrench
 from .record import Decomposed
 
 __all__ = ["Work", "delivered_by", "find_work", "ledger_dataset", "save_ledger"]
@@ -72,7 +73,9 @@ def find_work(found: Decomposed) -> Work:
     return Work(found.time, effects, power, energy, energy.sum(axis=1), kinetic - kinetic[0])
 
 
-def ledger_dataset(found: Decomposed, work: Work | None = None, source: str = "") -> xr.Dataset:
+def ledger_dataset(
+    found: Decomposed, work: Work | None = None, source: str = "", interface: InterfaceWrench | None = None
+) -> xr.Dataset:
     """Forces, motion, power and energy with dims time, effect, component, axis, coordinate; source names the record.
 
     Actuators' effects hold what was measured, and `unexplained` the rest, so that all effects add up to the inertia.
@@ -102,6 +105,16 @@ def ledger_dataset(found: Decomposed, work: Work | None = None, source: str = ""
         units = LAYOUT[f"platen_{name}"].units
         about = f"platen {name} of C in {{s}}; Euler angles"
         table.append((f"platen_{name}", ("time", "coordinate"), values, units, about))
+    if interface is not None:
+        at = "of the specimen on the platen at the interface, platen axes"
+        for name, values, about in (
+            ("interface", interface.wrench, f"wrench {at}, from measured forces"),
+            ("interface_sd", interface.sd, "standard deviation of the interface wrench"),
+            ("interface_model", interface.predicted, f"wrench {at}, of the mounted model"),
+            ("interface_floors", interface.floors, f"wrench {at}, of the floors' masses and accelerations"),
+        ):
+            if values is not None:
+                table.append((name, ("time", "axis"), values, "N, N m", about))
     coordinates = {
         "time": ("time", found.time, {"units": "s", "long_name": "time"}),
         "effect": list(effects),
@@ -113,9 +126,15 @@ def ledger_dataset(found: Decomposed, work: Work | None = None, source: str = ""
     return xr.Dataset(variables, coordinates, _attributes(found, source))
 
 
-def save_ledger(found: Decomposed, path: Path | str, work: Work | None = None, source: str = "") -> None:
+def save_ledger(
+    found: Decomposed,
+    path: Path | str,
+    work: Work | None = None,
+    source: str = "",
+    interface: InterfaceWrench | None = None,
+) -> None:
     """Write `ledger_dataset` whole or not at all, in float64 and uncompressed."""
-    plain = ledger_dataset(found, work, source)
+    plain = ledger_dataset(found, work, source, interface)
     encoding = {name: {"_FillValue": None} for name in plain.data_vars}
     # through memory: HDF5 that meets a full disk crashes the process when it closes
     with write_whole(path) as beside, memoryview(plain.to_netcdf(engine="h5netcdf", encoding=encoding)) as content:
@@ -123,7 +142,7 @@ def save_ledger(found: Decomposed, path: Path | str, work: Work | None = None, s
 
 
 def _attributes(found: Decomposed, source: str) -> dict[str, str | float]:
-    record, machine, band = found.record, found.plant.machine, found.comparison.band
+    record, machine, band = found.record, found.mounted.machine, found.comparison.band
     return {
         "title": f"Forces behind {record.attrs.get('title', found.test.name)}",
         "test": found.test.name,

@@ -23,6 +23,7 @@ from ...data.sensors import SensorSet
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
+from ...mechanics.interface_wrench import bare
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import Decomposition, inverse_dynamics
@@ -60,6 +61,7 @@ class Decomposed:
     inside: slice  # samples of `whole` that are compared
     delays: Mapping[str, Delay]  # removed, by group
     notes: tuple[str, ...]  # sources of motion and forces
+    mounted: Plant  # with the specimen, if there is one
 
     @property
     def record(self) -> xr.Dataset:
@@ -68,7 +70,7 @@ class Decomposed:
 
     @property
     def plant(self) -> Plant:
-        """Plant whose equations were used."""
+        """Plant whose equations were used, without a specimen: its wrench is an effect of the ledger."""
         return self.whole.states.plant
 
     @property
@@ -103,11 +105,14 @@ def decompose_record(
 
     cutoff [Hz] is by default that of `decompose.toml`.
     Actuator forces come from chamber pressures where they were not measured. The number of open servovalves has no
-    effect. Raises RecordError for a record that lacks channels, is not finite, of another machine, out of stroke or too
-    short; SimulationError for a specimen with joints.
+    effect. The specimen is the machine's, else the one that the record names; its wrench on the platen is the effect
+    `specimen` of the ledger. Raises RecordError for a record that lacks channels, is not finite, of another machine or
+    specimen, out of stroke or too short.
     """
+    machine = machine.as_mounted(record.attrs, source_of(record))
     check_usable(machine, record)
-    numbers, dt, plant = decompose_numbers(), sample_interval(record), make_plant(machine)
+    numbers, dt, mounted = decompose_numbers(), sample_interval(record), make_plant(machine)
+    plant = bare(mounted)
     high = numbers.number("comparison.cutoff") if cutoff is None else cutoff
     if not high > 0.0:
         raise RecordError(f"the cutoff must be above zero (got {high:g} Hz)")
@@ -126,7 +131,7 @@ def decompose_record(
         sensors = None
     delays = find_delays(plant, [record], policy)
     test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=band))
-    whole, notes = decompose_test(plant, test)
+    whole, notes = decompose_test(mounted, test)
     if delays:
         removed = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())
         notes = (*notes, f"Skews removed: {removed}.")
@@ -137,11 +142,16 @@ def decompose_record(
         )
     inside = slice(cut, n - cut)
     forces, motion = _filtered(whole, test.motion, band, test.dt, inside)
-    return Decomposed(test, sensors, comparison, whole, forces, motion, inside, delays, notes)
+    return Decomposed(test, sensors, comparison, whole, forces, motion, inside, delays, notes, mounted)
 
 
 def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[str, ...]]:
-    """Inverse dynamics of a test, and notes on the sources of its forces and motion."""
+    """Inverse dynamics of a test, and notes on the sources of its forces and motion.
+
+    The equations are those of the table without specimen; the wrench of a specimen on the plant is an effect, as its
+    model predicts it, or as its floors' accelerations show it where they were measured.
+    """
+    mounted, plant = plant, bare(plant)
     record, force = test.record, actuator_forces(plant.machine, test.channels)
     if force is None:
         if "chamber_pressure_a" in test.channels:
@@ -164,9 +174,11 @@ def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tup
         notes.append(f"Simulated without noise: the platen's motion is the record's own{step}")
     time = record["time"].values
     floors = test.channels.get("floor_acceleration") if plant.machine.floors else None
+    modelled = mounted if mounted is not plant and floors is None and mounted.coupled is None else None
     found = inverse_dynamics(
-        *(plant, time, test.motion, force, struts), floor_acceleration=floors, path=test.path, model_step=at_steps
-    )
+        *(plant, time, test.motion, force, struts),
+        floor_acceleration=floors, mounted=modelled, path=test.path, model_step=at_steps,
+    )  # fmt: skip
     return found, tuple(notes)
 
 

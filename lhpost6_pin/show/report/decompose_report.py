@@ -9,6 +9,7 @@ from ...identification.decompose import Decomposed, Match, Work, WrenchAgreement
 from ...identification.decompose.agreement import Explanation
 from .control_blocks import DEFAULTS, assumed_in, load_of, numbers_used
 from .decompose_plots import component_figure, effect_blocks, moved_axes, six_row_blocks, work_figure
+from .interface_section import interface_blocks, interface_headlines, interface_sentence
 from .page import Block, Headline, Level, Page, Section, Table, bullet_list, number, save_page
 from .scales import force_scale, percent, shown_as
 
@@ -38,8 +39,12 @@ def write_decompose_report(
     found: Decomposed, agreement: WrenchAgreement, work: Work, path: Path | str, *, command: str = ""
 ) -> Path:
     """Write the self-contained HTML report of a decomposed record to `path` and return the path."""
-    record, machine = found.record, found.plant.machine
+    record, machine, interface = found.record, found.mounted.machine, agreement.interface
     verdict, level = _verdict(found, agreement)
+    first = []
+    if interface is not None:
+        verdict = f"{interface_sentence(interface)} {verdict}"
+        first.append(Section("interface", "Specimen: interface wrench", interface_blocks(interface, found.dt)))
     span = f"{number(float(found.time[-1] - found.time[0]))} s at {1 / found.dt:.6g} samples a second"
     page = Page(
         kind=f"Inverse dynamics · {record.attrs.get('kind', 'test')}",
@@ -52,6 +57,7 @@ def write_decompose_report(
         level=level,
         headlines=_headlines(found, agreement),
         sections=[
+            *first,
             Section("residual", "Residual", _residual_blocks(found, agreement)),
             Section("agreement", "Agreement by axis", [MATCH, *match_tables(found, agreement)]),
             Section("six-rows", "Modelled and measured forces", six_row_blocks(found)),
@@ -91,7 +97,7 @@ def _verdict(found: Decomposed, agreement: WrenchAgreement) -> tuple[str, Level]
 
 def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     moved = [AXES.index(a) for a in moved_axes(found)] or list(found.plant.axes)
-    tiles = []
+    tiles = [] if agreement.interface is None else interface_headlines(agreement.interface)
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
         worst = max(moved, key=lambda k: float(match.rrmse_varying[k]))
         note = f"{AXES[worst]}; {percent(float(match.rrmse[worst]))} including the mean"

@@ -10,14 +10,17 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...core.errors import UnknownNameError
+from ...tuning.interaction import Interaction
+from .interaction_section import interaction_blocks
 from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
-from .run_components import force_blocks, pressure_blocks, specimen_blocks, strut_blocks
+from .run_components import force_blocks, pressure_blocks, strut_blocks
 from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses
 from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
 from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
 from .run_spools import spool_blocks
 from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
+from .specimen_section import response_blocks
 
 __all__ = ["LIMIT_NAMES", "RunSummary", "metrics_table", "write_run_report"]
 
@@ -73,12 +76,14 @@ def write_run_report(
     notes: Sequence[str] | None = None,
     command: str | None = None,
     machine_table: Iterable[Sequence[Any]] | None = None,
+    interaction: Interaction | None = None,
 ) -> RunSummary:
     """Write the self-contained HTML report of a test to `path` and return its summary.
 
     `limits` maps names of `LIMIT_NAMES` to capacities (SI; not-a-number means no limit, as does 0
     except for `actuator_pull`), `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name,
-    value, unit, source, assumed). Missing channels are named in their sections.
+    value, unit, source, assumed), `interaction` is that of table and specimen. Missing
+    channels are named in their sections.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
     limit.
     """
@@ -90,15 +95,20 @@ def write_run_report(
     uses = limit_uses(record, found, spools, bounds)
     verdict, level = verdict_of_run(record, found, spools, uses, notes)
     motion = [f"platen_{quantity}" for quantity in QUANTITIES]
-    joints = "specimen_joint_position" in record
+    response = response_blocks(record)
     sections = [
         Section("tracking", "Target and achieved", tracking_blocks(record, found)),
+        *([Section("specimen", "Specimen response", response)] if response else []),
+        *(
+            [Section("interaction", "Table and specimen", interaction_blocks(record, interaction))]
+            if interaction
+            else []
+        ),
         Section("spectra", "Response spectra", spectrum_blocks(record)),
         Section("forces", "Actuator forces", force_blocks(record, bounds)),
         Section("pressures", "Chamber pressures", pressure_blocks(record, bounds)),
         Section("spools", "Servovalve spools", spool_blocks(record, spools)),
         Section("struts", "Hold-down struts", strut_blocks(record, bounds)),
-        *([Section("specimen", "Specimen", specimen_blocks(record))] if joints else []),
         Section("drift", "Drift", drift_blocks(record)),
         Section("limits", "Demand over capacity", limit_blocks(uses)),
         Section(
@@ -123,6 +133,10 @@ def write_run_report(
     absent = tuple(name for name in EXPECTED if name not in record)
     lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), absent
     return RunSummary(save_page(page, path), verdict, level, *lists)
+
+
+def _interaction(record: xr.Dataset, found: Interaction) -> Section:
+    return Section("interaction", "Table and specimen", interaction_blocks(record, found))
 
 
 def _checked(limits: Mapping[str, ArrayLike]) -> Limits:

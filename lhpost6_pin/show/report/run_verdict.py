@@ -30,7 +30,7 @@ def verdict_of_run(
     if stopped != "none":  # the part before the stop does not represent the test
         sentences = [f"The run {stopped}: tracking is not judged.", clipped, "See the notes."]
         return " ".join(filter(None, sentences)), "bad"
-    tracked, level = _followed(record, found)
+    tracked, level = _followed(record, found, clipped=bool(clipped))
     beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
     sentences = [clipped, tracked]
     if beyond:
@@ -43,6 +43,11 @@ def verdict_of_run(
         sentences.append("No spool reached its limit.")
     if clipped or beyond:
         level = "bad"
+    loop = str(record.attrs.get("loop", "stable"))
+    if loop != "stable":
+        remedy = f" (mend it by “{record.attrs['loop_remedy']}”)" if "loop_remedy" in record.attrs else ""
+        sentences.append(f"{record.attrs.get('loop_summary', f'The control loop is {loop}')}{remedy}.")
+        level = "bad" if loop == "unstable" else "attention" if level in ("good", "plain") else level
     if notes:
         level = "attention" if level in ("good", "plain") else level
         sentences.append("See the notes.")
@@ -54,7 +59,8 @@ def headlines(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headl
     return [_worst_rrmse(found), _peak_displacement(found), _governing_limit(uses)]
 
 
-def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[str, Level]:
+def _followed(record: xr.Dataset, found: Sequence[Tracking], *, clipped: bool) -> tuple[str, Level]:
+    """Sentence on tracking and its level; with clipped commands a small error is no proof that the table followed."""
     worst = {quantity: _worst(found, quantity) for quantity in FOLLOWED}
     tracked = [(row, FOLLOWED[quantity]) for quantity, row in worst.items() if row]
     if not tracked:
@@ -63,11 +69,13 @@ def _followed(record: xr.Dataset, found: Sequence[Tracking]) -> tuple[str, Level
         return f"Tracking cannot be judged: {why}.", "plain"
     good = all(row.rrmse_aligned <= allowed for row, allowed in tracked)
     start = "The table tracked its target" if good else "The table did not track its target closely enough"
+    if good and clipped:
+        start = "Errors are within the criteria, but with clipped commands the table does not follow its target"
     words = " and ".join(
         f"{row.quantity} {percent(row.rrmse_aligned)} ({row.axis}, criterion {100 * allowed:.0f} %)"
         for row, allowed in tracked
     )
-    return f"{start}: worst RRMSE, delay removed, {words}.", "good" if good else "attention"
+    return f"{start}: worst RRMSE, delay removed, {words}.", "good" if good and not clipped else "attention"
 
 
 def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:

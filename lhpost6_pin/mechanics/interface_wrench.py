@@ -1,0 +1,151 @@
+"""The wrench at the interface of a specimen and the platen: base shear, axial force, overturning moment, torsion.
+
+    wrench = at_interface(plant, specimen_wrenches(plant, run.q, run.v, run.a))    # (n, 6), on the platen
+    force = interface_force(plant, q, v, a)                                        # pin.Force at one instant
+
+The interface is the point of the platen's top where the specimen's root is mounted, with the axes of the platen. The
+specimen is what the Pinocchio model has beyond the bare table's: with f_1 the force that RNEA transmits through the
+platen's joint, the specimen acts on the platen with f_1(bare table) - f_1(table with specimen). Its weight is included.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from ..core.arrays import Array
+from .derivatives import rates_at
+from .plant import Plant, make_plant
+from .pose import PlantMotion
+from .rigid_body import make_model
+from .schemes import TAU, V_SEEN
+from .workspace import make_workspace
+
+__all__ = ["INTERFACE_AXES", "at_interface", "bare", "driven_specimen", "interface_force", "interface_lever"]
+__all__ += ["specimen_wrenches", "wrenches_at_b"]
+
+_HEAVY = 1e15
+"""Inertia [kg, kg m2] of a platen whose acceleration no specimen changes by more than rounding."""
+
+INTERFACE_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Base shear in x and y, axial force, overturning moments about x and y, torsion."""
+
+
+def bare(plant: Plant) -> Plant:
+    """The plant without its specimen."""
+    return plant if plant.machine.specimen is None else make_plant(replace(plant.machine, specimen=None))
+
+
+def interface_lever(plant: Plant) -> Array:
+    """Position (3,) of the interface from B, platen axes [m]; of C where no specimen is mounted."""
+    specimen = plant.machine.specimen
+    place = np.zeros(3) if specimen is None else np.array(specimen.position, float)
+    return np.asarray(plant.body[0]["rho_c"] + place)
+
+
+def at_interface(plant: Plant, wrench: Array) -> Array:
+    """Wrenches (n, 6) at the interface of those at B, both in platen axes [N, N m]."""
+    out = wrench.copy()
+    out[:, 3:] -= np.cross(interface_lever(plant), wrench[:, :3])
+    return out
+
+
+def wrenches_at_b(plant: Plant, turn: Array, wrench: Array) -> Array:
+    """Wrenches (n, 6) at B in platen axes of those at C in {c}; turn (n, 3, 3) is s_R_b. Inverse of `wrenches_at_c`."""
+    force, moment = (np.einsum("nji,nj->ni", turn, x) for x in (wrench[:, :3], wrench[:, 3:]))
+    return np.hstack([force, moment + np.cross(plant.body[0]["rho_c"], force)])
+
+
+def specimen_wrenches(plant: Plant, q: Array, v: Array, a: Array) -> Array:
+    """Wrenches (n, 6) of the specimen on the platen at B in platen axes, from a plant's q, v, a; zero without one."""
+    out = np.zeros((len(q), 6))
+    if plant.machine.specimen is None:
+        return out
+    both = [(m, m.createData()) for m in (make_model(replace(plant.machine, specimen=None)), plant.model)]
+    for k, state in enumerate(zip(q, v, a, strict=True)):
+        out[k] = _beyond(both, *state)
+    return out
+
+
+def interface_force(plant: Plant, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> pin.Force:
+    """Force of the specimen on the platen at one instant, at the interface in platen axes."""
+    rows = (np.asarray(x, float)[None] for x in (q, v, a))
+    return pin.Force(at_interface(plant, specimen_wrenches(plant, *rows))[0])
+
+
+def _beyond(both: list[tuple[Any, Any]], q: Array, v: Array, a: Array) -> Array:
+    forces = []
+    for model, data in both:
+        pin.rnea(model, data, q[: model.nq], v[: model.nv], a[: model.nv])
+        forces.append(data.f[1].vector)
+    return np.asarray(forces[0] - forces[1])
+
+
+def driven_specimen(plant: Plant, motion: PlantMotion, dt: float, step: float = 1.0 / 2048) -> PlantMotion:
+    """Motion (n, nq), (n, nv), (n, nv) of a plant whose platen is prescribed: its specimen's joints respond from rest.
+
+    By ABA of a platen too heavy for the joints to move, with the force that gives it the prescribed acceleration; the
+    joints have their own stiffness and damping. Runge-Kutta 4 with steps of at most `step` [s]; the platen's motion
+    between samples by linear interpolation. A rigid specimen has no joints: the motion is returned as it is.
+    """
+    platen = plant.axes.size
+    if plant.model.nv == platen:
+        return motion
+    model = plant.model.copy()
+    model.armature[:platen] = _HEAVY
+    data, ws = model.createData(), make_workspace(plant, plant.zero_state())
+    z, spool, own = plant.zero_state().z, np.zeros(plant.spools), int(model.nqs[1])
+
+    def acceleration(q: Array, v: Array, a: Array) -> Array:
+        """Acceleration (nv - platen,) of the joints."""
+        ws.motion[V_SEEN] = v
+        rates_at(plant, ws, q, z, spool)
+        ws.motion[TAU, :platen] = _HEAVY * a
+        return np.asarray(pin.aba(model, data, q, v, ws.motion[TAU])[platen:])
+
+    substeps = max(1, int(np.ceil(dt / step - 1e-9)))
+    h, n = dt / substeps, len(motion.q)
+    out = PlantMotion(np.tile(pin.neutral(model), (n, 1)), *np.zeros((2, n, model.nv)))
+    q, v = out.q[0].copy(), np.zeros(model.nv)
+    for k in range(n):
+        q[:own], v[:platen] = motion.q[k], motion.v[k]
+        out.q[k], out.v[k], out.a[k, :platen] = q, v, motion.a[k]
+        out.a[k, platen:] = acceleration(q, v, motion.a[k])
+        if k == n - 1:
+            break
+        at = [_between(motion, k, i / (2.0 * substeps), dt) for i in range(2 * substeps + 1)]
+        for i in range(substeps):
+            q, v = _joint_step(model, at[2 * i : 2 * i + 3], q, v, h, acceleration)
+    return out
+
+
+def _joint_step(
+    model: Any, at: list[PlantMotion], q: Array, v: Array, h: float, acceleration: Any
+) -> tuple[Array, Array]:
+    """One step of Runge-Kutta 4 of the joints; `at` is the platen's motion at its start, middle and end."""
+    platen, own = len(at[0].v), len(at[0].q)
+    rates: list[Array] = []
+    turns: list[Array] = []
+    for reach, place in ((0.0, at[0]), (0.5, at[1]), (0.5, at[1]), (1.0, at[2])):
+        local, seen = np.zeros(model.nv), v.copy()
+        if rates:
+            local[platen:], seen[platen:] = reach * h * turns[-1], v[platen:] + reach * h * rates[-1]
+        moved = pin.integrate(model, q, local)
+        moved[:own], seen[:platen] = place.q, place.v
+        rates.append(acceleration(moved, seen, place.a))
+        turns.append(seen[platen:])
+    local = np.zeros(model.nv)
+    local[platen:] = h / 6.0 * (turns[0] + 2.0 * turns[1] + 2.0 * turns[2] + turns[3])
+    seen = v.copy()
+    seen[platen:] += h / 6.0 * (rates[0] + 2.0 * rates[1] + 2.0 * rates[2] + rates[3])
+    return pin.integrate(model, q, local), seen
+
+
+def _between(motion: PlantMotion, k: int, share: float, dt: float) -> PlantMotion:
+    """Motion of the platen between samples k and k + 1, one row; linear in q, v and a."""
+    q, v, a = ((1.0 - share) * x[k] + share * x[k + 1] for x in motion)
+    if len(q) == 7:
+        q[3:] /= np.linalg.norm(q[3:])
+    return PlantMotion(q, v, a)

@@ -1,0 +1,50 @@
+"""Section of a run report on the specimen: the wrench at its interface with the platen, and its joints."""
+
+import numpy as np
+import xarray as xr
+
+from ...mechanics.interface_wrench import INTERFACE_AXES
+from .page import Block, Table, number
+from .plots import Row, Trace, palette
+from .run_components import draw_over_time, specimen_blocks
+from .run_metrics import channel, sampling
+from .scales import Scale
+
+__all__ = ["FORCE", "INTERFACE_NAMES", "MOMENT", "response_blocks"]
+
+INTERFACE_NAMES = dict(
+    zip(
+        INTERFACE_AXES,
+        ("base shear x", "base shear y", "axial force", "overturning about x", "overturning about y", "torsion"),
+        strict=True,
+    )
+)
+"""Components of the interface wrench in words."""
+FORCE, MOMENT = Scale(1e-3, "kN"), Scale(1e-3, "kN m")
+
+
+def response_blocks(record: xr.Dataset) -> list[Block]:
+    """Return the interface wrench of a specimen, and positions of its free joints, as far as the record holds them."""
+    blocks: list[Block] = []
+    if "specimen_wrench" in record:
+        values = channel(record, "specimen_wrench")
+        start, step = sampling(record)
+        rows = []
+        for j, name in enumerate(INTERFACE_NAMES.values()):
+            scale, k = (FORCE if j < 3 else MOMENT), int(np.nanargmax(np.abs(values[:, j])))
+            cells = (number(x * scale.factor) for x in (values[k, j], values[0, j]))
+            rows.append((name, scale.unit, *cells, f"{start + k * step:.3f} s"))
+        where = record["specimen_wrench"].attrs.get("interface", "")
+        title = f"Wrench of the specimen on the platen at the interface, {where}, platen axes; weight included"
+        blocks.append(Table(title, ("Component", "Unit", "Peak", "at rest", "Time of the peak"), rows))
+        named = list(INTERFACE_NAMES.values())
+        lines = palette(len(named))
+        drawn = [
+            Row(what, [Trace(named[j], values[:, j], lines[j]) for j in own], FORCE if own[0] < 3 else MOMENT)
+            for what, own in (("Base shear", (0, 1)), ("Axial force", (2,)), ("Overturning and torsion", (3, 4, 5)))
+        ]
+        words = "Of the simulated specimen on the platen, from its inertia and weight by RNEA."
+        blocks.append(draw_over_time(record, "interface", "Interface wrench over time", words, drawn))
+    if "specimen_joint_position" in record:
+        blocks += specimen_blocks(record)
+    return blocks

@@ -20,7 +20,7 @@ from .parameters import EffectEntry, Parameters, load_parameters, override_param
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
-from .structure import MOTIONS, Structure
+from .structure import FLOW_READINGS, MOTIONS, Structure
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -39,7 +39,7 @@ class Machine(Structure):
     def effects(self) -> tuple[Effect, ...]:
         """All effects that make forces, in ledger order: the report's, then those added."""
         added = (e for e in self.added_effects if not LAWS[e.law].modifies)
-        return (*standard_effects(self.actuators, self.struts, self.hydraulics), *added)
+        return (*standard_effects(self), *added)
 
     @property
     def modifiers(self) -> tuple[Effect, ...]:
@@ -155,6 +155,7 @@ def build_machine(
     options = {
         "motion": _word(parameters, "machine.motion", MOTIONS),
         "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
+        "flow_reading": _word(parameters, "machine.flow_reading", FLOW_READINGS, FLOW_READINGS[0]),
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}
@@ -209,8 +210,8 @@ def build_machine(
     return machine
 
 
-def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:
-    word = parameters.words.get(path)
+def _word(parameters: Parameters, path: str, valid: tuple[str, ...], default: str | None = None) -> str:
+    word = parameters.words.get(path, default)
     if word not in valid:
         said = "is missing" if word is None else f"= {word!r}"
         raise ParameterError(f"{parameters.origin}: {path} {said}; it should be one of {', '.join(valid)}")
@@ -238,7 +239,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str],
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
         "limits": {f.name for f in fields(Limits)},
-        "machine": {"name", "title", "motion", "thrust", "controller", "sensors"},
+        "machine": {"name", "title", "motion", "thrust", "flow_reading", "controller", "sensors"},
         **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
         **{name: both | {"kind", "valves"} for name in components},
         **{name: {f.name for f in fields(Floor)} for name in floors},

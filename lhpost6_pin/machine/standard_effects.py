@@ -1,16 +1,16 @@
 """The effects of the report's model (Chapter 4) for the components of a machine."""
 
-from collections.abc import Sequence
-
 from ..effects.effect import Effect
-from ..laws.orifice import width_ratios
-from .components import Actuator, Hydraulics, Strut
+from ..laws.orifice import flow_at_full_stroke, width_ratios
+from .components import Actuator, Strut
+from .structure import Structure
 
 __all__ = ["standard_effects"]
 
 
-def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil: Hydraulics) -> tuple[Effect, ...]:
+def standard_effects(structure: Structure) -> tuple[Effect, ...]:
     """The report's effects (Chapter 4) for these components, in ledger order; friction of zero has no row."""
+    actuators, struts = structure.actuators, structure.struts
     found = []
     for valve in ("4-way", "3-way"):
         fed = [(i, a) for i, a in enumerate(actuators) if a.valve == valve]
@@ -20,7 +20,7 @@ def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil
                     f"actuators_{valve.replace('-', '_')}",
                     "hydraulic",
                     tuple(a.name for _, a in fed),
-                    tuple(_hydraulic_numbers(a, oil) for _, a in fed),
+                    tuple(_hydraulic_numbers(a, structure) for _, a in fed),
                     "Eqs. 4-1 to 4-6",
                     tuple(i for i, _ in fed),
                 )
@@ -42,8 +42,11 @@ def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil
     return tuple(found)
 
 
-def _hydraulic_numbers(actuator: Actuator, oil: Hydraulics) -> tuple[float, ...]:
+def _hydraulic_numbers(actuator: Actuator, structure: Structure) -> tuple[float, ...]:
+    oil = structure.hydraulics
     flow = actuator.flow * actuator.valves / oil.rated_pressure**0.5
+    if structure.flow_reading == "full_stroke":
+        flow = flow_at_full_stroke(flow, actuator.flow_curve)
     if actuator.valve == "4-way":
         w1, w2, w3, w4 = width_ratios(actuator.area_a, actuator.area_b)
     else:

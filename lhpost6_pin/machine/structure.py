@@ -6,10 +6,13 @@ from ..core.names import AXES
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
-__all__ = ["MOTIONS", "Structure"]
+__all__ = ["FLOW_READINGS", "MOTIONS", "Structure"]
 
 MOTIONS = ("free", "x", "y", "z", "xy", "xz", "yz", "xyz")
 """Freedom of a platen: six degrees of freedom, or displacements along guides, which hold it against turning."""
+
+FLOW_READINGS = ("printed", "full_stroke")
+"""Readings of Eq. 4-2: `flow` is the factor as printed, or the flow at full stroke of the spool."""
 
 EQUAL_AREAS = 0.01
 """Relative difference of a piston's areas up to which its rod counts as double."""
@@ -23,6 +26,7 @@ class Structure:
     title: str
     motion: str
     thrust: str
+    flow_reading: str  # what `flow` means in Eq. 4-2: one of `FLOW_READINGS`
     controller: str  # shipped name of its settings; empty: none
     sensors: str  # shipped name of its sensors file; empty: none
     platen: Platen

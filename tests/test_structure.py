@@ -15,7 +15,13 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 """The folders: one imports only from those before it. Imports for types alone count."""
 
 PINOCCHIO = {
-    *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
+    *(
+        "mechanics.rigid_body",
+        "mechanics.specimen_mount",
+        "mechanics.kinematics",
+        "mechanics.plant",
+        "mechanics.payload",
+    ),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),

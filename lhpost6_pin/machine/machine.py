@@ -265,10 +265,14 @@ def _check_actuator(actuator: Actuator, origin: str) -> None:
             raise ParameterError(f"{origin}: {actuator.kind}.{key} is missing; a {why} needs it")
     if actuator.valve == "3-way" and actuator.area_b is not None:
         raise ParameterError(f"{origin}: {actuator.kind}.area_b is given, but a 3-way valve has chamber A only")
-    room = min(c for c in (actuator.chamber_a, actuator.chamber_b) if c is not None)
-    if room <= actuator.stroke:
+    if (actuator.bumper_stiffness is None) != (actuator.bumper_travel is None):
         raise ParameterError(
-            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of {room:g} m; "
+            f"{origin}: {actuator.kind}: a bumper needs both bumper_stiffness and bumper_travel; give both or neither"
+        )
+    if actuator.room <= actuator.stroke:
+        raise ParameterError(
+            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of "
+            f"{actuator.room:g} m; "
             "make the chamber longer or the stroke shorter"
         )
 

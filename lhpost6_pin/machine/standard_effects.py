@@ -1,6 +1,7 @@
 """The effects of the report's model (Chapter 4) for the components of a machine."""
 
 from ..effects.effect import Effect
+from ..laws.end_stop import REACH
 from ..laws.orifice import flow_at_full_stroke, width_ratios
 from .components import Actuator, Strut
 from .structure import Structure
@@ -39,6 +40,10 @@ def standard_effects(structure: Structure) -> tuple[Effect, ...]:
         found.append(Effect("pad_friction", "bouc_wen_2d", tuple(a.name for a in pads), slip, "Eqs. 4-12 to 4-17"))
     viscous = tuple((a.viscous,) for a in actuators)
     found.append(Effect("viscous", "viscous", tuple(a.name for a in actuators), viscous, "Eq. 4-19"))
+    stopped = [(a, a.bumper_stiffness) for a in actuators if a.bumper_stiffness]
+    if stopped:
+        ends = tuple((stiffness * REACH, a.stroke, 1.0) for a, stiffness in stopped)
+        found.append(Effect("bumper", "end_stop", tuple(a.name for a, _ in stopped), ends, "beyond the stroke"))
     return tuple(found)
 
 

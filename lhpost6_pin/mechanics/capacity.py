@@ -8,10 +8,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
-from ..effects.registry import parameters_of
-from ..laws.orifice import opening
 from ..machine.machine import Machine
-from .equilibrium import find_equilibrium, unloaded_speeds
 from .plant import Plant, make_plant
 from .pose import kinematic_jacobian, leg_displacements
 from .rigid_body import platen_inertia
@@ -39,35 +36,6 @@ class Capacity(NamedTuple):
 def has_printed_capacity(machine: Machine) -> bool:
     """Whether a machine file states Table 2.2, which `capacity_table` needs."""
     return "table_2_2.force_actuators" in machine.parameters
-
-
-def actuator_speeds(plant: Plant) -> Array:
-    """Steady unloaded piston speeds at full spool, extending and retracting, (n_actuators, 2) [m/s]."""
-    rest = find_equilibrium(plant)
-    speeds = np.empty((plant.spools, 2))
-    for i, row in enumerate(plant.rows[plant.tables.actuators]):
-        p = parameters_of(row)
-        speeds[i] = unloaded_speeds(p, float(rest.force[i]), plant.supply)
-        speeds[i] *= opening(1.0, p.flow_curve)
-    return speeds
-
-
-def make_actuator_check(plant: Plant) -> ActuatorCheck:
-    """Return a check of strokes and valve flow: (displacement, velocity) (n, 6) to shares used, (n, n_actuators).
-
-    The returned function gives (speed over what the valves can feed, actuator names, elongation over stroke). Valves
-    can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
-    """
-    reserve = plant.machine.limits.valve_reserve
-    speeds, strokes = (1.0 - reserve) * actuator_speeds(plant), plant.legs["stroke"][: plant.spools]
-
-    def check(displacement: Array, velocity: Array) -> tuple[Array, tuple[str, ...], Array]:
-        moved, rate = leg_displacements(plant, displacement, velocity)
-        moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
-        share = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
-        return share, plant.machine.actuator_names, np.abs(moved) / strokes
-
-    return check
 
 
 def capacity_table(machine: Machine) -> tuple[Capacity, ...]:
@@ -129,7 +97,7 @@ def _speeds(machine: Machine) -> list[Capacity]:
 def _travel(plant: Plant) -> list[Capacity]:
     """Largest excursion along each axis alone within the actuators' strokes, by bisection."""
     limits = plant.machine.limits.displacement
-    strokes = plant.legs["stroke"][: plant.spools]
+    strokes = np.array([a.stroke for a in plant.machine.actuators])
     lines = []
     for k, axis in enumerate(AXES):
 

@@ -3,7 +3,7 @@
 from .ac156 import required_spectrum
 from .csv import load_csv
 from .library import MotionEntry, find_motion, list_motions, motion_entry, motion_options
-from .limits import ActuatorUtilisation, LimitsSummary, MotionLimits, check_limits, largest_scale
+from .limits import Demand, LimitsSummary, MotionCheck, MotionLimits, check_limits, largest_scale, peak_of_demand
 from .motion import AXES, GroundMotion, make_motion
 from .motion_options import MotionOption
 from .process import Reference, Target, make_target, smooth_step, with_scale
@@ -13,8 +13,9 @@ from .response_spectra import ResponseSpectrum, response_spectrum
 __all__ = [
     "AXES",
     "GroundMotion",
-    "ActuatorUtilisation",
+    "Demand",
     "LimitsSummary",
+    "MotionCheck",
     "MotionEntry",
     "MotionLimits",
     "MotionOption",
@@ -31,6 +32,7 @@ __all__ = [
     "make_motion",
     "make_target",
     "motion_options",
+    "peak_of_demand",
     "required_spectrum",
     "response_spectrum",
     "smooth_step",

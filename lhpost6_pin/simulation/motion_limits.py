@@ -1,8 +1,8 @@
 """The limits of a motion on a machine, and the demand of a target over each of them.
 
 Limits are the displacement, velocity and acceleration of C by axis (section `limits` of the machine file, Table 2.2),
-the stroke of each actuator, and its unloaded velocity at full spool less `limits.valve_reserve`. The capacity of the
-actuators is computed in `mechanics.capacity`; the comparison and the largest scale that fits, in `motions.limits`.
+and those of actuators and parts (`mechanics.motion_demands`): strokes, valve flow less `limits.valve_reserve`, forces
+with the specimen mounted, strengths. The comparison and the largest scale that fits are in `motions.limits`.
 """
 
 import math
@@ -12,18 +12,21 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
-from ..mechanics.capacity import make_actuator_check
-from ..mechanics.plant import Plant
-from ..motions import LimitsSummary, MotionLimits, Target, check_limits
+from ..machine.strength import stated_strength
+from ..machine.structure import FLOW_READINGS
+from ..mechanics.motion_demands import make_motion_check
+from ..mechanics.plant import Plant, make_plant
+from ..motions import LimitsSummary, MotionLimits, Target, check_limits, largest_scale
 
-__all__ = ["check_motion_limits"]
+__all__ = ["check_motion_limits", "fitting_scale"]
 
 
 def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
     """Demand of a target over the capacity of a plant, by limit.
 
-    Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; for a guided machine also
-    where the target moves an axis that is not free.
+    Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; where the flow of valves is
+    exceeded, also the scale by the other reading of Eq. 4-2. For a guided machine also where the target moves an axis
+    that is not free.
     """
     machine, axes = plant.machine, plant.axes
     blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
@@ -33,9 +36,35 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
             f"{target.reference.motion}: {machine.name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
         )
 
+    bounds = _axis_limits(plant)
+    try:
+        return check_limits(target, bounds, make_motion_check(plant))
+    except OutOfRangeError as error:
+        if "actuator velocity" not in error.exceeded:
+            raise
+        raise OutOfRangeError(
+            f"{error}{_by_other_reading(plant, target)}", error.largest_scale, error.exceeded
+        ) from None
+
+
+def fitting_scale(plant: Plant, target: Target) -> float:
+    """Largest scale of the target's motion within all limits."""
+    return largest_scale(target, _axis_limits(plant), make_motion_check(plant))
+
+
+def _axis_limits(plant: Plant) -> MotionLimits:
+    limits, axes = plant.machine.limits, plant.axes
+
     def six(values: tuple[float, ...]) -> Array:
         return np.array([values[k] if k in axes else math.inf for k in range(6)])
 
-    limits = machine.limits
-    bounds = MotionLimits(six(limits.displacement), six(limits.velocity), six(limits.acceleration))
-    return check_limits(target, bounds, make_actuator_check(plant))
+    rise = stated_strength(plant.machine.parameters).rise
+    stated = six(limits.displacement), six(limits.velocity), six(limits.acceleration)
+    return MotionLimits(*stated, rise if math.isfinite(rise) else None)
+
+
+def _by_other_reading(plant: Plant, target: Target) -> str:
+    """The scale that fits by the other reading of Eq. 4-2, as a sentence."""
+    (other,) = (word for word in FLOW_READINGS if word != plant.machine.flow_reading)
+    fits = fitting_scale(make_plant(plant.machine.with_params({"machine.flow_reading": other})), target)
+    return f'. With the other reading of Eq. 4-2 (machine.flow_reading = "{other}") the largest scale is {fits:g}'

@@ -130,6 +130,10 @@ class Machine(Structure):
         """
         return replace(self, specimen=Specimen(find_specimen(urdf), position, rpy, locked))
 
+    def without_specimen(self) -> "Machine":
+        """Return a copy with the bare table."""
+        return replace(self, specimen=None)
+
 
 def load_machine(
     name_or_path: str | Path = "lhpost6", override: Mapping[str, Any] | str | Path | None = None

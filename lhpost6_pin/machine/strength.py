@@ -1,4 +1,4 @@
-"""What the parts of a machine bear, as its file states it in the section `table_2_2`; what is not stated has no limit."""
+"""What the parts of a machine bear, from section `table_2_2` of its file; what is not stated has no limit."""
 
 import math
 from typing import NamedTuple
@@ -9,7 +9,7 @@ __all__ = ["Strength", "stated_strength"]
 
 
 class Strength(NamedTuple):
-    """Strengths and limits of parts (Table 2.2 and its notes); infinity, or zero of a pressure, where none is stated."""
+    """Strengths and limits of parts (Table 2.2, notes); infinity, or zero of a pressure, where none is stated."""
 
     reaction_mass: tuple[float, float] = (math.inf, math.inf)  # along X and Y, note 2 [N]
     platen_up: float = math.inf  # vertical actuators less hold-down, note 6 [N]

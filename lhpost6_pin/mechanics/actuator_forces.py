@@ -4,7 +4,7 @@ An actuator gives between f_min and f_max [N]: supply in one chamber and return 
 between the least pressure that the machine file states (else return) and supply. With f = c + h u, c and h the middle
 and half the width of that range, the shares u of all actuators balance a motion at every instant,
 
-    B (c + h u) = required - B_s f_s          required: inertia less weight (`required_wrench`), f_s: pulls of the struts
+    B (c + h u) = required - B_s f_s     required: inertia less weight (`required_wrench`), f_s: pulls of the struts
 
 Of all solutions the one of least |u| is taken: internal forces of a redundant table are shared by capacity.
 The motion is possible where |u| <= 1. Friction is neglected. Poses beyond a chamber's end are judged in the zero
@@ -26,7 +26,7 @@ from .pose import PlatenMotion, leg_displacements, plant_motion, rotation, solve
 from .required_wrench import required_wrench
 
 __all__ = ["AxisCapacity", "ForceRange", "RequiredForces", "axis_capacity", "force_range", "required_forces"]
-__all__ += ["rest_forces", "wrench_at_bearings"]
+__all__ += ["rest_forces", "unit_shares", "wrench_at_bearings"]
 
 
 class ForceRange(NamedTuple):
@@ -96,9 +96,12 @@ class AxisCapacity(NamedTuple):
 
 
 def axis_capacity(plant: Plant) -> AxisCapacity:
-    """Capacity of the actuators along single axes of the platen at N, the foot of C on the bearing plane; zero if at rest one is beyond."""
+    """Capacity of the actuators along single axes of the platen, at N, the foot of C on the bearing plane.
+
+    Zero where at rest an actuator is at or beyond an end of its range.
+    """
     rest = rest_forces(plant).share[0]
-    per = _unit_shares(plant) @ np.linalg.inv(_to_bearings(plant))  # (n_actuators, 6) at N
+    per = unit_shares(plant) @ np.linalg.inv(_to_bearings(plant))  # (n_actuators, 6) at N
     rise, fall = np.full((2, 6), np.inf)
     for k in plant.axes:
         used = np.abs(per[:, k]) > 1e-9 * np.abs(per[:, k]).max()
@@ -121,7 +124,7 @@ def _to_bearings(plant: Plant) -> Array:
     return matrix
 
 
-def _unit_shares(plant: Plant) -> Array:
+def unit_shares(plant: Plant) -> Array:
     """Shares per unit of the wrench required at B, (n_actuators, 6) [1/N, 1/(N m)], in the zero-position."""
     plant = lock_joints(plant)
     span = force_range(plant)

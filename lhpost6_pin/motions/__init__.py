@@ -3,7 +3,17 @@
 from .ac156 import required_spectrum
 from .csv import load_csv
 from .library import MotionEntry, find_motion, list_motions, motion_entry, motion_options
-from .limits import Demand, LimitsSummary, MotionCheck, MotionLimits, check_limits, largest_scale, peak_of_demand
+from .limits import (
+    Demand,
+    LimitsSummary,
+    MotionCheck,
+    MotionLimits,
+    Peak,
+    check_limits,
+    largest_scale,
+    limit_peaks,
+    peak_of_demand,
+)
 from .motion import AXES, GroundMotion, make_motion
 from .motion_options import MotionOption
 from .process import Reference, Target, make_target, smooth_step, with_scale
@@ -19,12 +29,14 @@ __all__ = [
     "MotionEntry",
     "MotionLimits",
     "MotionOption",
+    "Peak",
     "Reference",
     "ResponseSpectrum",
     "Target",
     "check_limits",
     "find_motion",
     "largest_scale",
+    "limit_peaks",
     "list_motions",
     "motion_entry",
     "load_csv",

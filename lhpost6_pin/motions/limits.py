@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Context
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from .motion import AXES
 from .process import Target
 
 __all__ = ["Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "check_limits", "largest_scale"]
-__all__ += ["peak_of_demand"]
+__all__ += ["limit_peaks", "peak_of_demand"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
@@ -54,6 +54,17 @@ MotionCheck = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Demand]]
 """From displacement, velocity and acceleration (n, 6) of a motion to its demands on a table."""
 
 
+class Motion(Protocol):
+    """A motion of C and Euler angles, such as a target or what was achieved; each (n, 6)."""
+
+    @property
+    def displacement(self) -> np.ndarray: ...
+    @property
+    def velocity(self) -> np.ndarray: ...
+    @property
+    def acceleration(self) -> np.ndarray: ...
+
+
 class Peak(NamedTuple):
     """The largest demand of a motion on one limit."""
 
@@ -63,6 +74,7 @@ class Peak(NamedTuple):
     sample: int
     text: str  # value against limit
     decides: bool = True
+    value: float | None = None  # demand in SI, where it is more than a share
 
 
 @dataclass(frozen=True)
@@ -86,7 +98,7 @@ def check_limits(target: Target, limits: MotionLimits, check: MotionCheck | None
     clause per exceeded quantity, axes before actuators: the governing one with its value, limit, time and sample, and
     the names of the others.
     """
-    peaks = _axis_peaks(target, limits) + (_peaks(target, check, 1.0) if check else [])
+    peaks = limit_peaks(target, limits, check)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
         fits = largest_scale(target, limits, check)
@@ -99,7 +111,7 @@ def check_limits(target: Target, limits: MotionLimits, check: MotionCheck | None
     utilisation: dict[str, dict[str, float]] = {}
     for peak in peaks:
         utilisation.setdefault(peak.quantity, {})[peak.name] = peak.utilisation
-    return LimitsSummary(utilisation, tuple(peaks))
+    return LimitsSummary(utilisation, peaks)
 
 
 def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | None = None) -> float:
@@ -142,8 +154,14 @@ def peak_of_demand(demand: Demand) -> list[Peak]:
         text = f"{100 * share:.4g} % {demand.of}" if np.isfinite(share) else f"infinitely many times {demand.of}"
         if demand.value is not None:
             text = f"{abs(demand.value[sample, i]):.4g} {demand.unit}, {text}"
-        peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides))
+        value = None if demand.value is None else float(demand.value[sample, i])
+        peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides, value))
     return peaks
+
+
+def limit_peaks(motion: Motion, limits: MotionLimits, check: MotionCheck | None = None) -> tuple[Peak, ...]:
+    """Largest demand of a motion on every limit, axes before actuators and parts; nothing is refused."""
+    return (*_axis_peaks(motion, limits), *(_peaks(motion, check, 1.0) if check else []))
 
 
 def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
@@ -159,7 +177,7 @@ def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
     return clauses
 
 
-def _axis_peaks(target: Target, limits: MotionLimits) -> list[Peak]:
+def _axis_peaks(target: Motion, limits: MotionLimits) -> list[Peak]:
     peaks = []
     for quantity, per in zip(_QUANTITIES, ("", "/s", "/s^2"), strict=True):
         values = getattr(target, quantity)
@@ -176,7 +194,7 @@ def _axis_peaks(target: Target, limits: MotionLimits) -> list[Peak]:
     return peaks
 
 
-def _peaks(target: Target, check: MotionCheck, factor: float) -> list[Peak]:
+def _peaks(target: Motion, check: MotionCheck, factor: float) -> list[Peak]:
     with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
         demands = check(*(factor * x for x in (target.displacement, target.velocity, target.acceleration)))
     return [peak for demand in demands for peak in peak_of_demand(demand)]

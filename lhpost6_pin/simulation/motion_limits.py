@@ -6,8 +6,10 @@ with the specimen mounted, strengths. The comparison and the largest scale that 
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
@@ -16,9 +18,10 @@ from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
 from ..mechanics.motion_demands import make_motion_check
 from ..mechanics.plant import Plant, make_plant
-from ..motions import LimitsSummary, MotionLimits, Target, check_limits, largest_scale
+from ..mechanics.pose import PlatenMotion
+from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
 
-__all__ = ["check_motion_limits", "fitting_scale"]
+__all__ = ["Judgement", "check_motion_limits", "fitting_scale", "judge_motion", "judge_record"]
 
 
 def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
@@ -50,6 +53,49 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
 def fitting_scale(plant: Plant, target: Target) -> float:
     """Largest scale of the target's motion within all limits."""
     return largest_scale(target, _axis_limits(plant), make_motion_check(plant))
+
+
+class Judgement(NamedTuple):
+    """A motion against all limits of a plant, and the scale at which its target would be within them."""
+
+    peaks: tuple[Peak, ...]
+    fits: float | None  # None: no target
+
+    @property
+    def governing(self) -> Peak:
+        """The largest demand over capacity."""
+        return max((p for p in self.peaks if p.decides), key=lambda p: p.utilisation)
+
+
+def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = None) -> Judgement:
+    """Demands of a motion on all limits, none refused; raises as `make_motion_check` does."""
+    bounds, check = _axis_limits(plant), make_motion_check(plant)
+    fits = None if target is None else largest_scale(target, bounds, check)
+    return Judgement(limit_peaks(motion, bounds, check), fits)
+
+
+def judge_record(plant: Plant, record: xr.Dataset) -> Judgement | None:
+    """Judgement of a record's achieved motion and of its target; None without motion, or where it is not finite.
+
+    Raises OutOfRangeError if the actuators cannot hold what is mounted at rest.
+    """
+    achieved = _motion_of(record, "platen")
+    if achieved is None:
+        return None
+    wanted, target = _motion_of(record, "reference"), None
+    if wanted is not None and "scale" in record.attrs:
+        attrs = record.attrs
+        made = Reference(str(attrs.get("motion", "motion")), "record", float(attrs["scale"]), (), 0.0, 0.0, 0.0)
+        target = Target(record["time"].values, *wanted, made)
+    return judge_motion(plant, achieved, target)
+
+
+def _motion_of(record: xr.Dataset, who: str) -> PlatenMotion | None:
+    names = [f"{who}_{quantity}" for quantity in ("displacement", "velocity", "acceleration")]
+    if not all(name in record for name in names):
+        return None
+    found = PlatenMotion(*(np.ascontiguousarray(record[name].values, float) for name in names))
+    return found if all(np.isfinite(x).all() for x in found) else None
 
 
 def _axis_limits(plant: Plant) -> MotionLimits:

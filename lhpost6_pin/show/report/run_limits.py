@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
+from ...motions import Peak
 from .page import Block, Table, bar
 from .run_metrics import SpoolUse, Tracking, channel, labels, peaks, sampling
 from .scales import SCALES, axis_scale, shown_as
@@ -21,12 +22,15 @@ __all__ = [
     "limit_blocks",
     "limit_table",
 ]
-__all__ += ["limit_uses", "share_of_limit", "shares_of_limit"]
+__all__ += ["limit_uses", "share_of_limit", "shares_of_limit", "uses_of_peaks"]
 
 Limits = Mapping[str, Array]
 
 TOLERANCE = 1e-3  # relative excess of a sampled peak over its limit that still counts as within
 SHOWN = {"actuator stroke": "displacement", "actuator velocity": "velocity"}
+SHOWN |= {"actuator unloading": "force", "reaction mass strength": "force", "platen strength": "force"}
+SHOWN |= {"piston tilt": "rotation", "axis force": "force", "payload": "force", "axis overturning moment": "moment"}
+SHOWN |= {"axis yaw moment": "moment"}
 SHOWN |= {"push": "force", "pull": "force", "force": "force", "spool": "ratio"}
 
 
@@ -37,6 +41,7 @@ class LimitUse(NamedTuple):
     name: str  # of the axis or actuator
     peak: float  # SI
     share: float  # demand over capacity; infinity for a capacity of zero
+    decides: bool = True  # whether beyond it the test is beyond the table
 
 
 class ForceUse(NamedTuple):
@@ -89,6 +94,15 @@ def limit_uses(
     return [use for use in uses if not np.isnan(use.share)]
 
 
+def uses_of_peaks(peaks: Iterable[Peak]) -> list[LimitUse]:
+    """Return the demands of a motion on forces and strengths, of those that no channel of a record shows."""
+    return [
+        LimitUse(peak.quantity, peak.name, abs(peak.value), peak.utilisation, peak.decides)
+        for peak in peaks
+        if peak.value is not None and peak.quantity in SHOWN
+    ]
+
+
 def _of_actuators(record: xr.Dataset, limits: Limits) -> Iterator[tuple[str, Array, Array]]:
     """Quantities of the actuators, their peaks and demand over capacity."""
     if "actuator_displacement" in record:
@@ -119,7 +133,9 @@ def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
         return ["Neither limits of the machine nor spools are available."]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
-        "velocity is that of the unloaded piston at full spool. All axes and actuators are in the other sections."
+        "velocity is that of the unloaded piston at full spool. Unloading is the loss of a bearing actuator's force, "
+        "from rest to its least chamber pressure; forces and moments along an axis are beyond rest, over the capacity "
+        "along that axis alone. All axes and actuators are in the other sections."
     )
     return [words, limit_table(uses)]
 

@@ -21,13 +21,20 @@ class Strength(NamedTuple):
 
 def stated_strength(parameters: Parameters) -> Strength:
     """Strengths that a machine file states."""
-    found: dict[str, float] = {}
-    names = {"rise": "acceleration_platen_up", "least_pressure": "chamber_pressure_down", "tilt": "platen_tilt"}
-    for name, key in {**names, "payload": "payload"}.items():
-        if f"table_2_2.{key}" in parameters:
-            found[name] = parameters.number(f"table_2_2.{key}")
-    strength = Strength(**found)
+    none = Strength()
+
+    def number(key: str, default: float) -> float:
+        path = f"table_2_2.{key}"
+        return parameters.number(path) if path in parameters else default
+
+    x, y, up = *none.reaction_mass, none.platen_up
     if "table_2_2.force_strength" in parameters:
         x, y, up = parameters.vector("table_2_2.force_strength")
-        strength = strength._replace(reaction_mass=(x, y), platen_up=up)
-    return strength
+    return Strength(
+        reaction_mass=(x, y),
+        platen_up=up,
+        rise=number("acceleration_platen_up", none.rise),
+        least_pressure=number("chamber_pressure_down", none.least_pressure),
+        tilt=number("platen_tilt", none.tilt),
+        payload=number("payload", none.payload),
+    )

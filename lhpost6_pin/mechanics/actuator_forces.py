@@ -70,12 +70,12 @@ def required_forces(plant: Plant, motion: PlatenMotion) -> RequiredForces:
     plant = lock_joints(plant)
     legs, _ = leg_displacements(plant, motion.displacement)
     rooms = [a.room for a in plant.machine.actuators]
-    reachable = (np.abs(legs[:, : plant.spools]) < rooms).all(axis=1)
-    motion = motion._replace(displacement=np.where(reachable[:, None], motion.displacement, 0.0))
+    reachable = np.all(np.abs(legs[:, : plant.spools]) < rooms, axis=1, keepdims=True)
+    motion = motion._replace(displacement=np.where(reachable, motion.displacement, 0.0))
     moved = plant_motion(plant, motion)
     turn = rotation(motion.displacement[:, 3:])
     wrench = required_wrench(plant, moved, turn)
-    elongation = np.where(reachable[:, None], legs[:, plant.spools :], 0.0)
+    elongation = np.where(reachable, legs[:, plant.spools :], 0.0)
     pull = -strut_pressures(plant.machine, elongation) * [s.area for s in plant.machine.struts]
     share, span = np.zeros((len(wrench), plant.spools)), force_range(plant)
     q = np.ascontiguousarray(moved.q)
@@ -136,7 +136,7 @@ def unit_shares(plant: Plant) -> Array:
 
 
 @compiled
-def _shares(q, wrench, pull, tables, n_ports, middle, half, share):
+def _shares(q, wrench, pull, tables, n_ports, middle, half, share):  # type: ignore[no-untyped-def]
     axes, legs, body = tables.axes, tables.legs, tables.body
     free, count = axes.size, middle.size
     frame, s = np.zeros((8, 3)), np.zeros(n_ports)

@@ -99,19 +99,22 @@ def flow_readings(machine: Machine) -> tuple[FlowReading, ...]:
     ]
     if "table_2_2_payload.weight" in par:
         weight = par.number("table_2_2_payload.weight")
-        down = [float(axis_speeds(with_payload(plant, weight))[2, 1]) for plant in plants]
+        down, full = (float(axis_speeds(with_payload(plant, weight))[2, 1]) for plant in plants)
         stated = par.vector("table_2_2_payload.velocity")[2]
-        rows.append(FlowReading("peak velocity z, payload", *down, stated, f"Table 2.2, {weight / 1e6:g} MN"))
+        rows.append(FlowReading("peak velocity z, payload", down, full, stated, f"Table 2.2, {weight / 1e6:g} MN"))
     if "table_2_2.velocity_measured" in par:
         measured = par["table_2_2.velocity_measured"]
-        x = (float(speeds[0][0]), float(speeds[1][0]))
-        rows.append(FlowReading("velocity x reached", *x, par.number("table_2_2.velocity_measured"), measured.source))
+        slow, fast = float(speeds[0][0]), float(speeds[1][0])
+        rows.append(
+            FlowReading("velocity x reached", slow, fast, par.number("table_2_2.velocity_measured"), measured.source)
+        )
     return tuple(rows)
 
 
 def _stated(machine: Machine) -> dict[str, float]:
     """What the machine file states of the bare table, by the names of the rows."""
-    limits, found = machine.limits, {}
+    limits = machine.limits
+    found: dict[str, float] = {}
     for k in machine.axes:
         axis = AXES[k]
         found |= {f"peak displacement {axis}": limits.displacement[k]}

@@ -49,7 +49,7 @@ class Peaks(NamedTuple):
     displacement: float
     velocity: float
     acceleration: float
-    pseudo_velocity: Array | None  # (len(FREQUENCIES),); None where there is no acceleration
+    pseudo_velocity: Array  # (len(FREQUENCIES),), not-a-number where samples are too few
 
     def envelope(self) -> Array:
         """Peak velocity over frequency of the sines whose peaks these are."""
@@ -67,12 +67,11 @@ def motion_peaks(record: xr.Dataset) -> dict[str, Peaks]:
         columns = [channel(record, source)[:, names.index(axis)] for source in sources]
         if not all(np.isfinite(column).all() for column in columns):
             continue
-        spectrum, shown = None, np.full(len(FREQUENCIES), np.nan)
-        slow = FREQUENCIES <= 0.1 / step
+        shown, slow = np.full(len(FREQUENCIES), np.nan), FREQUENCIES <= 0.1 / step  # peaks are taken at samples
         if slow.any():
-            spectrum = response_spectrum(columns[2], step, 1.0 / FREQUENCIES[slow], DAMPING).pseudo_velocity
-            shown[slow] = spectrum
-        found[axis] = Peaks(*(float(np.abs(column).max()) for column in columns), shown)
+            shown[slow] = response_spectrum(columns[2], step, 1.0 / FREQUENCIES[slow], DAMPING).pseudo_velocity
+        displacement, velocity, acceleration = (float(np.abs(column).max()) for column in columns)
+        found[axis] = Peaks(displacement, velocity, acceleration, shown)
     return found
 
 
@@ -127,10 +126,8 @@ def _paper(axis: str, loads: Sequence[Load], motion: Peaks | None) -> Figure:
         if envelope.max() > 0.0:
             top = max(top, 2.0 * float(envelope.max()))
             low = min(low, max(float(envelope[envelope > 0.0].min()), 1e-4 * top))
-        if motion.pseudo_velocity is not None:
-            curves.append(
-                Curve("pseudo-velocity spectrum", FREQUENCIES, motion.pseudo_velocity * scale.factor, SPECTRUM)
-            )
+        spectrum = motion.pseudo_velocity * scale.factor
+        curves.append(Curve("pseudo-velocity spectrum", FREQUENCIES, spectrum, SPECTRUM))
         curves.append(Curve("peaks of the motion", FREQUENCIES, envelope, PEAKS))
     mesh, notes = _mesh(axis, scale, (low, top))
     panel = Panel(f"Peak velocity [{scale.unit}]", [*mesh, *curves], log=True, span=(low, top))

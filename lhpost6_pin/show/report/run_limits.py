@@ -17,6 +17,7 @@ __all__ = [
     "ForceUse",
     "LimitUse",
     "Limits",
+    "demand_table",
     "force_use",
     "governing_limits",
     "limit_blocks",
@@ -138,6 +139,19 @@ def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
         "along that axis alone. All axes and actuators are in the other sections."
     )
     return [words, limit_table(uses)]
+
+
+def demand_table(peaks: Iterable[Peak]) -> Table:
+    """Return the largest demand of a motion on each quantity in words, the governing one first."""
+    most: dict[str, Peak] = {}
+    for peak in peaks:
+        if peak.quantity not in most or peak.utilisation > most[peak.quantity].utilisation:
+            most[peak.quantity] = peak
+    rows = [
+        (peak.quantity.capitalize(), peak.name, peak.text, bar(peak.utilisation, TOLERANCE))
+        for peak in sorted(most.values(), key=lambda peak: -peak.utilisation)
+    ]
+    return Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)
 
 
 def limit_table(uses: Sequence[LimitUse]) -> Table:

@@ -18,7 +18,7 @@ from .pose import kinematic_jacobian, leg_displacements
 from .rigid_body import platen_inertia
 
 __all__ = ["Capacity", "FlowReading", "capacity_table", "flow_readings", "has_printed_capacity", "payload_table"]
-__all__ += ["axis_speeds", "axis_travel"]
+__all__ += ["actuator_speeds", "axis_speeds", "axis_travel"]
 
 PER = {"m": "m/s", "rad": "rad/s"}
 

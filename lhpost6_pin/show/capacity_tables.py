@@ -68,14 +68,14 @@ def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
 
 def performance_loads(machine: Machine, *, payload: bool = True) -> tuple[Load, ...]:
     """Performance of the bare table, and with its specimen or, bare, with the payload that Table 2.2 states."""
-    plant = make_plant(machine)
+    plant, band = make_plant(machine), machine.limits.bandwidth
     if machine.specimen is not None:
-        bare = make_plant(machine.without_specimen())
-        return Load("bare table", table_performance(bare)), Load(machine.specimen.name, table_performance(plant))
-    loads = [Load("bare table", table_performance(plant))]
+        bare = table_performance(make_plant(machine.without_specimen()))
+        return Load("bare table", bare, band), Load(machine.specimen.name, table_performance(plant), band)
+    loads = [Load("bare table", table_performance(plant), band)]
     if payload and "table_2_2_payload.weight" in machine.parameters:
         weight = machine.parameters.number("table_2_2_payload.weight")
-        loads.append(Load(f"payload of {weight / 1e6:g} MN", table_performance(with_payload(plant, weight))))
+        loads.append(Load(f"payload of {weight / 1e6:g} MN", table_performance(with_payload(plant, weight)), band))
     return tuple(loads)
 
 

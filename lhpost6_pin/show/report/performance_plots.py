@@ -41,6 +41,7 @@ class Load(NamedTuple):
 
     name: str  # "bare table", or the specimen's
     axes: Sequence[AxisPerformance]
+    bandwidth: float = math.inf  # stated, up to which the table is used [Hz]
 
 
 class Peaks(NamedTuple):
@@ -82,7 +83,7 @@ def performance_blocks(
     words = (
         "Four-way logarithmic paper: lines rising to the right are equal displacement, lines falling equal "
         "acceleration. A sine below the curve is within all limits of this axis: strokes and tilt, valve flow less its "
-        "reserve, forces of the actuators with what is mounted, strengths, and stated limits."
+        "reserve, forces of the actuators with what is mounted, strengths, and stated limits. Dotted: stated bandwidth."
     )
     if motion:
         words += (
@@ -132,8 +133,10 @@ def _paper(axis: str, loads: Sequence[Load], motion: Peaks | None) -> Figure:
     mesh, notes = _mesh(axis, scale, (low, top))
     panel = Panel(f"Peak velocity [{scale.unit}]", [*mesh, *curves], log=True, span=(low, top))
     words = "Peak velocity of a sine over its frequency; diagonals: displacement and acceleration."
-    name = f"performance-{axis}"
-    figure = chart_figure(name, axis_title(axis), words, [panel], frequency_axis(*BAND), row_height=ROW_HEIGHT)
+    name, ends = f"performance-{axis}", [loads[0].bandwidth] if loads[0].bandwidth < BAND[1] else []
+    figure = chart_figure(
+        name, axis_title(axis), words, [panel], frequency_axis(*BAND), row_height=ROW_HEIGHT, marks=ends
+    )
     silent = {"showlegend": False, "hoverinfo": "skip"}
     traces = [{**trace, **silent} if i < len(mesh) else trace for i, trace in enumerate(figure.traces)]
     layout = {**figure.layout, "annotations": [*figure.layout["annotations"], *notes]}

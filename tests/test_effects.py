@@ -26,6 +26,7 @@ def stirred(machine) -> Run:
 
 def test_the_machine_has_the_reports_effects_in_ledger_order(machine):
     names = ["actuators_4_way", "actuators_3_way", "hold_down", "seal_friction", "pad_friction", "viscous"]
+    names += ["bumper"]
     assert [e.name for e in machine.effects] == names
     assert all(e.source for e in machine.effects)
 

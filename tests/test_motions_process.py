@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lhpost6_pin.core.errors import MotionError, OutOfRangeError
 from lhpost6_pin.motions import (
     AXES,
-    ActuatorUtilisation,
+    Demand,
     GroundMotion,
     MotionLimits,
     check_limits,
@@ -181,10 +181,16 @@ def limited(**changes: tuple[str, float]) -> MotionLimits:
     return MotionLimits(**arrays)
 
 
-def leg_across(displacement: np.ndarray, velocity: np.ndarray, stroke: float = 0.02) -> ActuatorUtilisation:
+def leg_across(d: np.ndarray, v: np.ndarray, a: np.ndarray, stroke: float = 0.02) -> list[Demand]:
     """A leg across the motion, 3 m long."""
-    length = np.sqrt(3.0**2 + displacement[:, :1] ** 2) - 3.0
-    return ActuatorUtilisation(np.abs(velocity[:, :1]) / 100, ("H1",), length / stroke)
+    return actuators(("H1",), np.abs(v[:, :1]) / 100, (np.sqrt(3.0**2 + d[:, :1] ** 2) - 3.0) / stroke)
+
+
+def actuators(names: tuple[str, ...], velocity: np.ndarray, stroke: np.ndarray) -> list[Demand]:
+    return [
+        Demand("actuator velocity", names, velocity, "of the unloaded velocity of its valves"),
+        Demand("actuator stroke", names, stroke, "of its stroke"),
+    ]
 
 
 def test_an_over_range_target_names_axis_value_limit_time_and_the_scale_that_fits():
@@ -235,9 +241,9 @@ def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_
     limits = MotionLimits(np.full(6, 1e-3), np.full(6, 1e-3), np.full(6, 1e-3))  # all 18 exceeded
     names = tuple(f"H{i}" for i in range(1, 5))
 
-    def legs(displacement: np.ndarray, velocity: np.ndarray) -> ActuatorUtilisation:
+    def legs(displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[Demand]:
         share = np.abs(velocity[:, :1]) * np.array([50.0, 90.0, 70.0, 1e-3])
-        return ActuatorUtilisation(share, names, 100 * np.abs(displacement[:, :1]) * np.array([[1.0, 2.0, 0.0, 0.0]]))
+        return actuators(names, share, 100 * np.abs(displacement[:, :1]) * np.array([[1.0, 2.0, 0.0, 0.0]]))
 
     target = make_target(motion)
     with pytest.raises(OutOfRangeError) as caught:

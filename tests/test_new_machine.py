@@ -19,8 +19,7 @@ from lhpost6_pin.machine.draft.draft import draft_machine
 from lhpost6_pin.machine.draft.stated import read_stated
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import load_parameters
-from lhpost6_pin.mechanics.capacity import actuator_speeds
-from lhpost6_pin.mechanics.equilibrium import unloaded_speeds
+from lhpost6_pin.mechanics.equilibrium import actuator_speeds, unloaded_speeds
 from lhpost6_pin.mechanics.plant import make_plant
 
 KNOWN = {"mass": "310 kg +- 20 %", "area": "24 cm2", "stroke": "+-125 mm", "supply_pressure": "14 MPa"}

@@ -17,7 +17,7 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.leg_model", "mechanics.linearize"),
-    *("mechanics.instant",),
+    *("mechanics.instant", "mechanics.payload"),
     *("mechanics.coupled", "mechanics.interface", "mechanics.opensees", "simulation.coupling", "simulation.running"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from .app import command, print_result
+from .app import command, print_result, repeating_command
 from .live_view import ViewOptions, show_address
-from .options import Json, MachineOptions, SpecimenOptions
+from .options import Json, MachineOptions, SpecimenOptions, Valves, folder_for
 
 log = logging.getLogger(__name__)
 
@@ -76,20 +76,34 @@ def info(machine: MachineOptions, json: Json = False) -> None:
 
 
 @command()
-def capacity(machine: MachineOptions, json: Json = False) -> None:
-    """Compare the capacity of the model with Table 2.2, and print the oil-column modes."""
-    from ..mechanics.capacity import has_printed_capacity
+def capacity(
+    machine: SpecimenOptions,
+    valves: Valves = 0,
+    out: Annotated[Path | None, typer.Option(help="Directory of report.html with the performance curves.")] = None,
+    json: Json = False,
+) -> None:
+    """Print what the table gives with what is mounted, beside Table 2.2, which limits govern, and its modes."""
+    from ..show.capacity_tables import capacity_tables, machine_capacity
+    from ..show.report import write_capacity_report
     from ..show.results import capacity_entries
-    from ..show.tables import print_capacity, print_modes
+    from ..show.tables import print_modes
+    from ..show.terminal import print_blocks
 
-    table = machine.load()
+    table = machine.load(valves)
+    found, files = machine_capacity(table), []
+    tables = capacity_tables(found)
+    if out is not None:
+        load = table.specimen.name if table.specimen else "bare"
+        path = folder_for(out, "capacity") / "report.html"
+        files.append(
+            write_capacity_report(path, f"{table.name}, {load}", found.loads, tables[:-1], command=repeating_command())
+        )
 
     def show() -> None:
-        if has_printed_capacity(table):
-            print_capacity(table)
+        print_blocks(*tables)
         print_modes(table)
 
-    print_result(json, lambda: capacity_entries(table), show)
+    print_result(json, lambda: capacity_entries(found), show, files)
 
 
 @command()

@@ -189,17 +189,20 @@ def save_run(
     from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
     from ..show.results import run_entries
     from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
+    from ..simulation.trouble import run_doubts
 
     done, record = test
     files, summary = [*more, folder / "record.nc"], None
     save_record(record, files[-1])
-    beyond = joints_beyond(done.plant, done.time, done.q)
+    beyond = [*joints_beyond(done.plant, done.time, done.q), *run_doubts(done)]
     for warning in beyond:
         log.warning("%s", warning)
     exchanged = [done.coupling.summary] if done.coupling else []
     if against is None:
+        from ..show.capacity_tables import judged, performance_loads
         from ..show.report import write_run_report
 
+        demands, fits = judged(done.plant, record)
         files.append(folder / "report.html")
         summary = write_run_report(
             record,
@@ -209,6 +212,9 @@ def save_run(
             command=repeating_command(),
             machine_table=machine_rows(done.plant.machine),
             interaction=interaction,
+            demands=demands,
+            loads=performance_loads(done.plant.machine, payload=False),
+            fits=fits,
         )
     compared = [] if against is None else compare(against, record)
 

@@ -48,10 +48,10 @@ class MotionError(LhpostError):
 class OutOfRangeError(LhpostError):
     """A motion exceeds the capacity of the machine; the message names the limit and the largest scale that fits."""
 
-    def __init__(self, message: str, largest_scale: float | None = None) -> None:
-        """`largest_scale`: the scale that fits, if known."""
+    def __init__(self, message: str, largest_scale: float | None = None, exceeded: tuple[str, ...] = ()) -> None:
+        """`largest_scale`: the scale that fits, if known; `exceeded`: the quantities beyond their limits."""
         super().__init__(message)
-        self.largest_scale = largest_scale
+        self.largest_scale, self.exceeded = largest_scale, exceeded
 
 
 class SimulationError(LhpostError):

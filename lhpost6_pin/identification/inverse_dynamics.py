@@ -120,8 +120,8 @@ def inverse_dynamics(
     is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). floor_acceleration
     (n, n_floors) [m/s2] are those measured on a specimen's floors: their base shear is the effect `base_shear` of the
     ledger. mounted is the plant with a specimen, where `plant` is without: the wrench on the platen of that specimen,
-    its joints and modes driven by the motion (`driven_wrenches`), is the effect `specimen` of the ledger. model_step: the samples
-    are steps of a semi-implicit run, whose forces see the last step's velocity (`schemes.staggered_stage`).
+    its joints and modes driven by the motion (`driven_wrenches`), is the effect `specimen` of the ledger. model_step:
+    the samples are steps of a semi-implicit run, whose forces see the last step's velocity (`schemes.staggered_stage`).
     Raises RecordError naming the sample where a leg is out of its stroke, SimulationError for a specimen with joints.
     """
     if plant.flexible:

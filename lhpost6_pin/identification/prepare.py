@@ -31,6 +31,7 @@ from ..data.valve_pairs import with_joint_spools
 from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
+from ..mechanics.strokes import stroke_ends
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
 __all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
@@ -181,6 +182,7 @@ def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> 
 def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, policy: Policy) -> MeasuredTest:
     """A test from its aligned record: decimated, its motion fused. Without sensors the motion is the record's own.
 
+    A test that reached the end of a stroke is logged as a warning.
     Raises RecordError for a record without platen motion, or with a channel of it that is not finite.
     """
     record = _decimated(with_joint_spools(plant.machine, record), policy.rate)
@@ -194,10 +196,17 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     name = str(record.attrs.get("test", "test"))
     if sensors is None or (not is_measured(record) and set(MOTION) <= set(record.data_vars)):
         motion = PlatenMotion(*(record[channel].values.astype(float) for channel in MOTION))
+        _warn_of_strokes(plant, name, record, motion)
         return MeasuredTest(name, dt, motion, channels, rates, record=record)
     band = None if "platen_acceleration" in record else policy.band
     fused = fuse_motion(plant, record, sensors, band=band, shares=policy.shares)
+    _warn_of_strokes(plant, name, record, fused.motion)
     return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, record)
+
+
+def _warn_of_strokes(plant: Plant, test: str, record: xr.Dataset, motion: PlatenMotion) -> None:
+    for end in stroke_ends(plant, record["time"].values, motion.displacement):
+        log.warning("%s: %s; forces of an end stop are in its record from then on", test, end)
 
 
 def _decimated(record: xr.Dataset, rate: float) -> xr.Dataset:

@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 from ..core.compiled import compiled
 from .contract import Law
 
-__all__ = ["LAW", "EndStop", "force", "power"]
+__all__ = ["LAW", "REACH", "EndStop", "force", "power"]
 
 REACH = 0.1
 """Stroke beyond the start of an end stop at which its force is stated [m]."""

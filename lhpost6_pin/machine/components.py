@@ -50,8 +50,9 @@ class Actuator:
     mount: "swivel" (its end follows a platen point) or "bearing" (it stays vertical, the platen slides on it).
     valve: "4-way" (two chambers) or "3-way" (chamber A only). `chamber_b` and `area_b` are None without chamber B,
     pad quantities None without a bearing. full_command, if stated, is the voltage of an open valve. `load_cell_share`
-    is the share of the oil's force that moves what is ahead of a load cell, piston and rod. Rod and barrel lengths from
-    the platen and the base point are needed where its moving parts are bodies (`mechanics.leg_bodies`).
+    is the share of the oil's force that moves what is ahead of a load cell, piston and rod. An elastic bumper, if
+    stated, begins where the stroke ends. Rod and barrel lengths from the platen and the base point are needed where its
+    moving parts are bodies (`mechanics.leg_bodies`).
     """
 
     name: str
@@ -83,6 +84,20 @@ class Actuator:
     load_cell_share: float = quantity_field("1", bound="fraction", optional=True)
     rod_length: float = quantity_field("m", bound="positive", optional=True)
     barrel_length: float = quantity_field("m", bound="positive", optional=True)
+    bumper_stiffness: float = quantity_field("N/m", bound="positive", optional=True)
+    bumper_travel: float = quantity_field("m", bound="positive", optional=True)
+
+    @property
+    def room(self) -> float:
+        """Elongation at which the shorter chamber holds no more oil [m]."""
+        return min(c for c in (self.chamber_a, self.chamber_b) if c is not None)
+
+    @property
+    def hard_stop(self) -> float:
+        """Largest elongation either way [m]: the stroke and its bumper, or half the way to the end of a chamber."""
+        if self.bumper_travel is None:
+            return self.stroke
+        return min(self.stroke + self.bumper_travel, 0.5 * (self.stroke + self.room))
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from .recorded_specimen import recorded_mounting
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
-from .structure import BODIES, ESTIMATES, MOTIONS, Structure
+from .structure import BODIES, ESTIMATES, FLOW_READINGS, MOTIONS, Structure
 from .user_specimen import load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
@@ -42,7 +42,7 @@ class Machine(Structure):
     def effects(self) -> tuple[Effect, ...]:
         """All effects that make forces, in ledger order: the report's, then those added."""
         added = (e for e in self.added_effects if not LAWS[e.law].modifies)
-        return (*standard_effects(self.actuators, self.struts, self.hydraulics), *added)
+        return (*standard_effects(self), *added)
 
     @property
     def modifiers(self) -> tuple[Effect, ...]:
@@ -169,6 +169,10 @@ class Machine(Structure):
             return replace(self, specimen=load_user_specimen(source, position, rpy))
         return replace(self, specimen=Specimen(find_specimen(name_or_path), position, rpy, locked))
 
+    def without_specimen(self) -> "Machine":
+        """Return a copy with the bare table."""
+        return replace(self, specimen=None)
+
 
 def load_machine(
     name_or_path: str | Path = "lhpost6", override: Mapping[str, Any] | str | Path | None = None
@@ -194,7 +198,8 @@ def build_machine(
     options = {
         "motion": _word(parameters, "machine.motion", MOTIONS),
         "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
-        "bodies": _word(parameters, "machine.bodies", BODIES) if "machine.bodies" in words else BODIES[0],
+        "bodies": _word(parameters, "machine.bodies", BODIES, BODIES[0]),
+        "flow_reading": _word(parameters, "machine.flow_reading", FLOW_READINGS, FLOW_READINGS[0]),
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}
@@ -249,8 +254,8 @@ def build_machine(
     return machine
 
 
-def _word(parameters: Parameters, path: str, valid: tuple[str, ...]) -> str:
-    word = parameters.words.get(path)
+def _word(parameters: Parameters, path: str, valid: tuple[str, ...], default: str | None = None) -> str:
+    word = parameters.words.get(path, default)
     if word not in valid:
         said = "is missing" if word is None else f"= {word!r}"
         raise ParameterError(f"{parameters.origin}: {path} {said}; it should be one of {', '.join(valid)}")
@@ -278,7 +283,7 @@ def _check_names(parameters: Parameters, components: list[str], kinds: set[str],
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
         "limits": {f.name for f in fields(Limits)},
-        "machine": {"name", "title", "motion", "thrust", "bodies", "controller", "sensors"},
+        "machine": {"name", "title", "motion", "thrust", "bodies", "flow_reading", "controller", "sensors"},
         **{name: both | {"role", "mount", "valve", "valves"} for name in kinds},
         **{name: both | {"kind", "valves"} for name in components},
         **{name: {f.name for f in fields(Floor)} for name in floors},
@@ -306,10 +311,14 @@ def _check_actuator(actuator: Actuator, origin: str) -> None:
             raise ParameterError(f"{origin}: {actuator.kind}.{key} is missing; a {why} needs it")
     if actuator.valve == "3-way" and actuator.area_b is not None:
         raise ParameterError(f"{origin}: {actuator.kind}.area_b is given, but a 3-way valve has chamber A only")
-    room = min(c for c in (actuator.chamber_a, actuator.chamber_b) if c is not None)
-    if room <= actuator.stroke:
+    if (actuator.bumper_stiffness is None) != (actuator.bumper_travel is None):
         raise ParameterError(
-            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of {room:g} m; "
+            f"{origin}: {actuator.kind}: a bumper needs both bumper_stiffness and bumper_travel; give both or neither"
+        )
+    if actuator.room <= actuator.stroke:
+        raise ParameterError(
+            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of "
+            f"{actuator.room:g} m; "
             "make the chamber longer or the stroke shorter"
         )
 

@@ -1,16 +1,17 @@
 """The effects of the report's model (Chapter 4) for the components of a machine."""
 
-from collections.abc import Sequence
-
 from ..effects.effect import Effect
-from ..laws.orifice import width_ratios
-from .components import Actuator, Hydraulics, Strut
+from ..laws.end_stop import REACH
+from ..laws.orifice import flow_at_full_stroke, width_ratios
+from .components import Actuator, Strut
+from .structure import Structure
 
 __all__ = ["standard_effects"]
 
 
-def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil: Hydraulics) -> tuple[Effect, ...]:
+def standard_effects(structure: Structure) -> tuple[Effect, ...]:
     """The report's effects (Chapter 4) for these components, in ledger order; friction of zero has no row."""
+    actuators, struts = structure.actuators, structure.struts
     found = []
     for valve in ("4-way", "3-way"):
         fed = [(i, a) for i, a in enumerate(actuators) if a.valve == valve]
@@ -20,7 +21,7 @@ def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil
                     f"actuators_{valve.replace('-', '_')}",
                     "hydraulic",
                     tuple(a.name for _, a in fed),
-                    tuple(_hydraulic_numbers(a, oil) for _, a in fed),
+                    tuple(_hydraulic_numbers(a, structure) for _, a in fed),
                     "Eqs. 4-1 to 4-6",
                     tuple(i for i, _ in fed),
                 )
@@ -39,11 +40,18 @@ def standard_effects(actuators: Sequence[Actuator], struts: Sequence[Strut], oil
         found.append(Effect("pad_friction", "bouc_wen_2d", tuple(a.name for a in pads), slip, "Eqs. 4-12 to 4-17"))
     viscous = tuple((a.viscous,) for a in actuators)
     found.append(Effect("viscous", "viscous", tuple(a.name for a in actuators), viscous, "Eq. 4-19"))
+    stopped = [(a, a.bumper_stiffness) for a in actuators if a.bumper_stiffness]
+    if stopped:
+        ends = tuple((stiffness * REACH, a.stroke, 1.0) for a, stiffness in stopped)
+        found.append(Effect("bumper", "end_stop", tuple(a.name for a, _ in stopped), ends, "beyond the stroke"))
     return tuple(found)
 
 
-def _hydraulic_numbers(actuator: Actuator, oil: Hydraulics) -> tuple[float, ...]:
+def _hydraulic_numbers(actuator: Actuator, structure: Structure) -> tuple[float, ...]:
+    oil = structure.hydraulics
     flow = actuator.flow * actuator.valves / oil.rated_pressure**0.5
+    if structure.flow_reading == "full_stroke":
+        flow = flow_at_full_stroke(flow, actuator.flow_curve)
     if actuator.valve == "4-way":
         w1, w2, w3, w4 = width_ratios(actuator.area_a, actuator.area_b)
     else:

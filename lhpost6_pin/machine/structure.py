@@ -6,7 +6,7 @@ from ..core.names import AXES
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
-__all__ = ["BODIES", "ESTIMATES", "MOTIONS", "Structure"]
+__all__ = ["BODIES", "ESTIMATES", "FLOW_READINGS", "MOTIONS", "Structure"]
 
 MOTIONS = ("free", "x", "y", "z", "xy", "xz", "yz", "xyz")
 """Freedom of a platen: six degrees of freedom, or displacements along guides, which hold it against turning."""
@@ -16,6 +16,9 @@ BODIES = ("lumped", "full")
 
 ESTIMATES = ("first", "second")
 """Estimates of the effective inertia (Table 4.1): M_eff,1, computed, and M_eff,2, identified."""
+
+FLOW_READINGS = ("printed", "full_stroke")
+"""Readings of Eq. 4-2: `flow` is the factor as printed, or the flow at full stroke of the spool."""
 
 EQUAL_AREAS = 0.01
 """Relative difference of a piston's areas up to which its rod counts as double."""
@@ -30,6 +33,7 @@ class Structure:
     motion: str
     thrust: str
     bodies: str  # moving parts of the legs: "lumped" to the platen, or "full", as bodies of their own
+    flow_reading: str  # what `flow` means in Eq. 4-2: one of `FLOW_READINGS`
     controller: str  # shipped name of its settings; empty: none
     sensors: str  # shipped name of its sensors file; empty: none
     platen: Platen

@@ -1,147 +1,245 @@
-"""Capacity of the machine by the model, beside Table 2.2."""
+"""Capacity of the machine by the model beside what its file states: Table 2.2, bare and with payload, or limits."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.errors import OutOfRangeError
 from ..core.names import AXES
-from ..effects.registry import parameters_of
-from ..laws.orifice import opening
 from ..machine.machine import Machine
-from .equilibrium import find_equilibrium, unloaded_speeds
+from ..machine.strength import stated_strength
+from ..machine.structure import FLOW_READINGS
+from .actuator_forces import axis_capacity, force_range
+from .equilibrium import actuator_speeds
+from .payload import lock_joints, with_payload
 from .plant import Plant, make_plant
 from .pose import kinematic_jacobian, leg_displacements
 from .rigid_body import platen_inertia
 
-__all__ = ["Capacity", "capacity_table", "has_printed_capacity", "actuator_speeds", "make_actuator_check"]
+__all__ = ["Capacity", "FlowReading", "capacity_table", "flow_readings", "has_printed_capacity", "payload_table"]
+__all__ += ["actuator_speeds", "axis_speeds", "axis_travel"]
 
-ActuatorCheck = Callable[[Array, Array], tuple[Array, tuple[str, ...], Array]]
+PER = {"m": "m/s", "rad": "rad/s"}
 
 
 class Capacity(NamedTuple):
-    """One line: what, the model's value, Table 2.2's, its unit and how the model's came about."""
+    """One line: what, the model's value, what is stated (None: nothing), its unit and how the model's came about."""
 
     name: str
     model: float
-    printed: float
+    printed: float | None
     unit: str
     how: str
 
     @property
-    def deviation(self) -> float:
-        """Model over Table 2.2, less one."""
-        return self.model / self.printed - 1.0
+    def deviation(self) -> float | None:
+        """Model over what is stated, less one."""
+        return None if self.printed is None else self.model / self.printed - 1.0
+
+
+class FlowReading(NamedTuple):
+    """Peak velocities by both readings of Eq. 4-2 beside what is stated or was measured [m/s, rad/s]."""
+
+    name: str
+    printed_equation: float
+    full_stroke: float
+    stated: float
+    source: str
 
 
 def has_printed_capacity(machine: Machine) -> bool:
-    """Whether a machine file states Table 2.2, which `capacity_table` needs."""
+    """Whether a machine file states Table 2.2."""
     return "table_2_2.force_actuators" in machine.parameters
 
 
-def actuator_speeds(plant: Plant) -> Array:
-    """Steady unloaded piston speeds at full spool, extending and retracting, (n_actuators, 2) [m/s]."""
-    rest = find_equilibrium(plant)
-    speeds = np.empty((plant.spools, 2))
-    for i, row in enumerate(plant.rows[plant.tables.actuators]):
-        p = parameters_of(row)
-        speeds[i] = unloaded_speeds(p, float(rest.force[i]), plant.supply)
-        speeds[i] *= opening(1.0, p.flow_curve)
-    return speeds
-
-
-def make_actuator_check(plant: Plant) -> ActuatorCheck:
-    """Return a check of strokes and valve flow: (displacement, velocity) (n, 6) to shares used, (n, n_actuators).
-
-    The returned function gives (speed over what the valves can feed, actuator names, elongation over stroke). Valves
-    can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
-    """
-    reserve = plant.machine.limits.valve_reserve
-    speeds, strokes = (1.0 - reserve) * actuator_speeds(plant), plant.legs["stroke"][: plant.spools]
-
-    def check(displacement: Array, velocity: Array) -> tuple[Array, tuple[str, ...], Array]:
-        moved, rate = leg_displacements(plant, displacement, velocity)
-        moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
-        share = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
-        return share, plant.machine.actuator_names, np.abs(moved) / strokes
-
-    return check
-
-
 def capacity_table(machine: Machine) -> tuple[Capacity, ...]:
-    """Peak forces, accelerations, velocities, rotations and strokes of a six-axis machine against Table 2.2.
+    """Peak forces, accelerations, velocities and strokes with what is mounted, beside what the machine file states.
 
-    Peak velocities are with all servovalves open (two on each double-acting actuator), as the table's are.
-    Raises OutOfRangeError for a guided machine, for which there is no such table.
+    Table 2.2 where the file has it, with all servovalves open as there, else its section `limits`. Forces and
+    accelerations with a specimen have nothing stated beside them.
     """
-    if machine.motion != "free" or "table_2_2.force_actuators" not in machine.parameters:
-        raise OutOfRangeError(
-            f"{machine.name} has no Table 2.2 to compare with; it is a {machine.motion}-guided machine"
+    plant, printed = lock_joints(make_plant(machine)), has_printed_capacity(machine)
+    open_valves = machine.with_valves(2) if printed else machine
+    rows = [*_forces(plant), *_accelerations(plant), *_speeds(open_valves), *_travel(plant)]
+    stated = _stated(machine)
+    return tuple(row._replace(printed=stated.get(row.name)) for row in rows)
+
+
+def payload_table(machine: Machine) -> tuple[Capacity, ...]:
+    """The columns of Table 2.2 for a centred rigid payload; empty if a machine file states none."""
+    par = machine.parameters
+    if "table_2_2_payload.weight" not in par:
+        return ()
+    bare = machine.with_valves(2)
+    plant = with_payload(make_plant(bare), par.number("table_2_2_payload.weight"))
+    x, y, down = par.vector("table_2_2_payload.acceleration")
+    actuators = par.vector("table_2_2_payload.acceleration_actuators")
+    stated = {f"peak acceleration {name}": actuators[k] for k, name in enumerate(("X", "Y", "Z up"))}
+    stated |= {"peak acceleration X, reaction mass": x, "peak acceleration Y, reaction mass": y}
+    stated |= {"peak acceleration Z down": down, "peak force Z down": par.number("table_2_2_payload.force_down")}
+    stated["peak acceleration Z up, platen"] = par.number("table_2_2_payload.acceleration_up")
+    velocity = par.vector("table_2_2_payload.velocity")
+    stated |= {f"peak velocity {AXES[k]}": velocity[k] for k in range(2)} | {"peak velocity z down": velocity[2]}
+    rows = [*_forces(plant), *_accelerations(plant), *_speeds_of(plant)]
+    return tuple(row._replace(printed=stated[row.name]) for row in rows if row.name in stated)
+
+
+def flow_readings(machine: Machine) -> tuple[FlowReading, ...]:
+    """Evidence on the two readings of Eq. 4-2: peak velocities by each beside those stated, and one measured."""
+    if not has_printed_capacity(machine):
+        return ()
+    par, bare = machine.parameters, machine.with_valves(2)
+    plants = [make_plant(bare.with_params({"machine.flow_reading": word})) for word in FLOW_READINGS]
+    speeds = [axis_speeds(plant).min(axis=1) for plant in plants]
+    limits = machine.limits.velocity
+    rows = [
+        FlowReading(f"peak velocity {AXES[k]}", float(speeds[0][k]), float(speeds[1][k]), limits[k], "Table 2.2, bare")
+        for k in machine.axes
+    ]
+    if "table_2_2_payload.weight" in par:
+        weight = par.number("table_2_2_payload.weight")
+        down, full = (float(axis_speeds(with_payload(plant, weight))[2, 1]) for plant in plants)
+        stated = par.vector("table_2_2_payload.velocity")[2]
+        rows.append(FlowReading("peak velocity z, payload", down, full, stated, f"Table 2.2, {weight / 1e6:g} MN"))
+    if "table_2_2.velocity_measured" in par:
+        measured = par["table_2_2.velocity_measured"]
+        slow, fast = float(speeds[0][0]), float(speeds[1][0])
+        rows.append(
+            FlowReading("velocity x reached", slow, fast, par.number("table_2_2.velocity_measured"), measured.source)
         )
-    plant = make_plant(machine)
-    return (*_forces(plant), *_speeds(machine), *_travel(plant))
+    return tuple(rows)
+
+
+def _stated(machine: Machine) -> dict[str, float]:
+    """What the machine file states of the bare table, by the names of the rows."""
+    limits = machine.limits
+    found: dict[str, float] = {}
+    for k in machine.axes:
+        axis = AXES[k]
+        found |= {f"peak displacement {axis}": limits.displacement[k]}
+        for word in ("", " up", " down") if axis == "z" else ("",):
+            found[f"peak velocity {axis}{word}"] = limits.velocity[k]
+        name = axis.upper() if k < 3 else axis
+        found[f"peak acceleration {name}{' down' if axis == 'z' else ''}"] = limits.acceleration[k]
+    if machine.specimen is not None:
+        return {name: value for name, value in found.items() if "acceleration" not in name}
+    if has_printed_capacity(machine):
+        par = machine.parameters
+        for what in ("force", "acceleration"):
+            printed = par.vector(f"table_2_2.{what}_actuators")
+            found |= {f"peak {what} {name}": printed[k] for k, name in enumerate(("X", "Y", "Z up"))}
+        found |= {f"peak acceleration {'XY'[k]}, reaction mass": limits.acceleration[k] for k in range(2)}
+        found["peak force Z down"] = par.number("table_2_2.force_down")
+        found["peak acceleration Z up, platen"] = par.number("table_2_2.acceleration_platen_up")
+    return found
 
 
 def _forces(plant: Plant) -> list[Capacity]:
-    machine, par = plant.machine, plant.machine.parameters
-    high, low = plant.supply[:2]
-    jacobian = kinematic_jacobian(plant)
-    area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
-    push, pull = high * area_a - low * area_b, low * area_a - high * area_b
-    hold_down = sum(s.pressure * s.area for s in machine.struts)
-    printed, accelerations = (par.vector(f"table_2_2.{x}_actuators") for x in ("force", "acceleration"))
+    """Largest forces of all actuators together along x, y and z, hold-down counted."""
+    jacobian, span = kinematic_jacobian(plant), force_range(plant)
+    pressures = f"{span.least[-1] / plant.actuators.area_a[-1] / 1e6:.3g} MPa"
+    hold_down = sum(s.pressure * s.area for s in plant.machine.struts)
     rows = []
-    for k, name in enumerate("XY"):
-        force = float(np.sum(np.maximum(jacobian[:, k] * push, jacobian[:, k] * pull)))
-        rows.append((f"peak force {name}", force, printed[k], "N", "supply against return in all actuators"))
-    up = float(jacobian[:, 2] @ np.where(jacobian[:, 2] > 0.0, push, pull)) - hold_down
-    rows.append(("peak force Z up", up, printed[2], "N", "supply in all chambers, less hold-down"))
-    left = par.number("table_2_2.chamber_pressure_down")
-    down, most = hold_down - float(jacobian[:, 2] @ (left * area_a)), par.number("table_2_2.force_down")
-    rows.append(("peak force Z down", down, most, "N", f"hold-down less {left / 1e6:.3g} MPa in the chambers"))
-    _, mass = platen_inertia(plant.model, machine)
+    for k in (k for k in plant.axes if k < 3):
+        along = jacobian[:, k]
+        up, down = (float(np.sum(np.maximum(s * along * span.most, s * along * span.least))) for s in (1.0, -1.0))
+        if k < 2:
+            how = "supply against return in all actuators"
+            rows.append(Capacity(f"peak force {'XYZ'[k]}", min(up, down), None, "N", how))
+            continue
+        how = "supply in all chambers" + ", less hold-down" * bool(hold_down)
+        rows.append(Capacity("peak force Z up", up - hold_down, None, "N", how))
+        one_way = not plant.machine.double_acting or bool(hold_down)
+        how = f"hold-down less {pressures} in the chambers" if one_way else "return against supply in all actuators"
+        rows.append(Capacity("peak force Z down", down + hold_down, None, "N", how))
+    return rows
+
+
+def _accelerations(plant: Plant) -> list[Capacity]:
+    """Peak force and weight over effective mass; moments beyond rest over inertia; strengths over mass."""
+    machine, strength = plant.machine, stated_strength(plant.machine.parameters)
+    mass = platen_inertia(plant.model, machine)[1]
     weight = mass[2, 2] * machine.platen.gravity
-    for k, name in enumerate(("X", "Y", "Z up")):
-        value = (rows[k][1] - (weight if k == 2 else 0.0)) / mass[k, k]
-        rows.append((f"peak acceleration {name}", value, accelerations[k], "m/s2", "peak force over effective mass"))
-    value, most = (down + weight) / mass[2, 2], machine.limits.acceleration[2]
-    rows.append(("peak acceleration Z down", value, most, "m/s2", "peak force and weight over effective mass"))
-    return [Capacity(*row) for row in rows]
+    forces = {row.name.removeprefix("peak force "): row.model for row in _forces(plant)}
+    rows = []
+    for name, force in forces.items():
+        k = "XYZ".index(name[0])
+        net = force + {"Z up": -weight, "Z down": weight}.get(name, 0.0)
+        how = "peak force over effective mass" if k < 2 else "peak force and weight over effective mass"
+        rows.append(Capacity(f"peak acceleration {name}", net / mass[k, k], None, "m/s2", how))
+    for name, force in zip("XY", strength.reaction_mass, strict=True):
+        if np.isfinite(force):
+            k, how = "XY".index(name), f"strength of the reaction mass, {force / 1e6:.3g} MN, over effective mass"
+            rows.append(Capacity(f"peak acceleration {name}, reaction mass", force / mass[k, k], None, "m/s2", how))
+    if np.isfinite(strength.platen_up):
+        how = f"strength of the platen, {strength.platen_up / 1e6:.3g} MN, less weight over effective mass"
+        value = (strength.platen_up - weight) / mass[2, 2]
+        rows.append(Capacity("peak acceleration Z up, platen", value, None, "m/s2", how))
+    if machine.motion == "free":
+        rise, fall = axis_capacity(plant)
+        for k in (3, 4, 5):
+            how = "moment of the actuators beyond rest, shared as least norm, over inertia about B"
+            value = float(min(rise[k], fall[k]) / mass[k, k])
+            rows.append(Capacity(f"peak acceleration {AXES[k]}", value, None, "rad/s2", how))
+    return rows
+
+
+def axis_speeds(plant: Plant) -> Array:
+    """Steady unloaded speeds along single axes, up and down, of the slowest actuator, (6, 2); nan if not free."""
+    jacobian, speeds = kinematic_jacobian(plant), actuator_speeds(plant)
+    found = np.full((6, 2), np.nan)
+    for k in plant.axes:
+        for i, sign in enumerate((1.0, -1.0)):
+            rate = sign * jacobian[:, k]
+            moving = np.abs(rate) > 1e-9
+            found[k, i] = np.min(np.where(rate > 0.0, speeds[:, 0], speeds[:, 1])[moving] / np.abs(rate[moving]))
+    return found
 
 
 def _speeds(machine: Machine) -> list[Capacity]:
-    plant = make_plant(machine.with_valves(2))
-    jacobian, speeds = kinematic_jacobian(plant), actuator_speeds(plant)
-    lines = []
-    for k, axis in enumerate(AXES):
-        for sign, word in ((1.0, " up"), (-1.0, " down")) if axis == "z" else ((1.0, ""),):
-            rate = sign * jacobian[:, k]
-            moving = np.abs(rate) > 1e-9
-            slowest = np.min(np.where(rate > 0.0, speeds[:, 0], speeds[:, 1])[moving] / np.abs(rate[moving]))
-            unit, how = "m/s" if k < 3 else "rad/s", "slowest actuator, unloaded, full spool"
-            name, printed = f"peak velocity {axis}{word}", machine.limits.velocity[k]
-            lines.append(Capacity(name, float(slowest), printed, unit, how))
-    return lines
+    return _speeds_of(make_plant(machine))
 
 
-def _travel(plant: Plant) -> list[Capacity]:
-    """Largest excursion along each axis alone within the actuators' strokes, by bisection."""
+def _speeds_of(plant: Plant) -> list[Capacity]:
+    rows, how = [], "slowest actuator, unloaded, full spool"
+    for k, (up, down) in enumerate(axis_speeds(plant)):
+        unit = PER["m" if k < 3 else "rad"]
+        if AXES[k] == "z" and np.isfinite(up):
+            rows += [
+                Capacity(f"peak velocity z {w}", float(v), None, unit, how) for w, v in (("up", up), ("down", down))
+            ]
+        elif np.isfinite(up):
+            rows.append(Capacity(f"peak velocity {AXES[k]}", float(min(up, down)), None, unit, how))
+    return rows
+
+
+def axis_travel(plant: Plant, reach: float = 4.0) -> Array:
+    """Largest excursion along each axis alone within the actuators' strokes (6,), by bisection; nan if not free.
+
+    Searched up to `reach` times the stated limit.
+    """
     limits = plant.machine.limits.displacement
-    strokes = plant.legs["stroke"][: plant.spools]
-    lines = []
-    for k, axis in enumerate(AXES):
+    strokes = np.array([a.stroke for a in plant.machine.actuators])
+    found = np.full(6, np.nan)
+    for k in plant.axes:
 
         def used(size: float, k: int = k) -> float:
             pose = np.zeros((2, 6))
             pose[0, k], pose[1, k] = size, -size
             return float(np.max(np.abs(leg_displacements(plant, pose)[0][:, : plant.spools]) / strokes))
 
-        low, high = 0.0, 4.0 * limits[k]
+        low, high = 0.0, reach * limits[k]
         while high - low > 1e-6 * high:
             middle = 0.5 * (low + high)
             low, high = (low, middle) if used(middle) > 1.0 else (middle, high)
-        unit = "m" if k < 3 else "rad"
-        lines.append(Capacity(f"peak displacement {axis}", low, limits[k], unit, "strokes of the actuators alone"))
-    return lines
+        found[k] = low
+    return found
+
+
+def _travel(plant: Plant) -> list[Capacity]:
+    travel, how = axis_travel(plant), "strokes of the actuators alone"
+    free: Sequence[int] = [int(k) for k in plant.axes]
+    return [
+        Capacity(f"peak displacement {AXES[k]}", float(travel[k]), None, "m" if k < 3 else "rad", how) for k in free
+    ]

@@ -12,7 +12,7 @@ from ..effects.actuator import start_line
 from ..effects.registry import actuator_rows, parameters_of
 from ..effects.supply import steady_supply, supply_pressures
 from ..laws.hydraulic import Hydraulic, leak_flows, valve_flows
-from ..laws.orifice import spool_for_opening
+from ..laws.orifice import opening, spool_for_opening
 from ..laws.supply import varies
 from .modes import rest_of_modes
 from .plant import Plant, State
@@ -21,7 +21,8 @@ from .required_wrench import moving_wrenches
 from .schemes import TAU, forces_stage, pose_stage
 from .workspace import make_workspace
 
-__all__ = ["Equilibrium", "find_equilibrium", "rest_pressures", "specimen_at_rest", "unloaded_speeds"]
+__all__ = ["Equilibrium", "actuator_speeds", "find_equilibrium", "rest_pressures", "specimen_at_rest"]
+__all__ += ["unloaded_speeds"]
 
 Pressures = tuple[float, ...]
 """Supply and return pressure [Pa], perhaps with what follows in `laws.supply.Supply`."""
@@ -117,11 +118,15 @@ def _fill(plant: Plant, force: Array, supply: Pressures, z: Array, spool: Array)
         k = row["state"]
         z[k : k + len(pressures)] = pressures
         if not all(low <= p <= high for p in pressures):
-            name = plant.machine.actuators[i].name
+            name, said = plant.machine.actuators[i].name, ", ".join(f"{p / 1e6:.3g}" for p in pressures)
+            if force[i] >= 0.0 and any(p > high for p in pressures):
+                what = "beyond its supply"
+                hint = "lighten the specimen, move it towards the centre, or raise hydraulics.supply_pressure"
+            else:
+                what, hint = "which unloads it", "the specimen lifts the platen there: move it towards the centre"
             raise SimulationError(
-                f"{name} must give {force[i]:.4g} N at rest, beyond its supply: "
-                f"{', '.join(f'{p / 1e6:.3g}' for p in pressures)} MPa is not between {low / 1e6:.3g} and "
-                f"{high / 1e6:.3g} MPa; lighten the specimen or raise hydraulics.supply_pressure"
+                f"{name} must give {force[i]:.4g} N at rest, {what}: {said} MPa is not between {low / 1e6:.3g} and "
+                f"{high / 1e6:.3g} MPa; {hint}"
             )
         start_line(row, spool[i], pressures[0], pressures[-1], high, low, z)
 
@@ -213,3 +218,14 @@ def unloaded_speeds(p: Hydraulic, force: float, supply: Pressures) -> tuple[floa
         pressure_a, _ = np.linalg.solve(matrix, np.array([a * source_a + b * source_b, force]))
         speeds.append(float(math.sqrt(a * abs(source_a - pressure_a))))
     return speeds[0], speeds[1]
+
+
+def actuator_speeds(plant: Plant) -> Array:
+    """Steady unloaded piston speeds at full spool, extending and retracting, (n_actuators, 2) [m/s]."""
+    rest = find_equilibrium(plant)
+    speeds = np.empty((plant.spools, 2))
+    for i, row in enumerate(plant.rows[plant.tables.actuators]):
+        p = parameters_of(row)
+        speeds[i] = unloaded_speeds(p, float(rest.force[i]), plant.supply)
+        speeds[i] *= opening(1.0, p.flow_curve)
+    return speeds

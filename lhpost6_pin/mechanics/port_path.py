@@ -30,24 +30,29 @@ class PortPath(NamedTuple):
 
 
 def ports_along(plant: Plant, motion: PlantMotion) -> PortPath:
-    """Ports along a motion; raises RecordError naming the sample where a leg is out of its stroke."""
+    """Ports along a motion; raises RecordError naming the sample where a leg has no oil left in a chamber."""
     n, count = len(motion.q), len(plant.ports)
     s, rate, slip = np.zeros((n, count)), np.zeros((n, count)), np.zeros((n, count))
     column, turn = np.zeros((n, count, 6)), np.zeros((n, 3, 3))
     ws = make_workspace(plant, plant.zero_state())
     q, v = (np.ascontiguousarray(x) for x in (motion.q, motion.v))
     path = PortPath(s, rate, slip, column, turn)
-    sample, status = _ports_along(q, v, plant.tables, ws, path)
-    if status:
-        names = (*plant.machine.actuator_names, *plant.machine.strut_names)
-        what = f"{names[status - 1]} is out of its stroke" if status > 0 else "the motion is not finite"
+    _ports_along(q, v, plant.tables, ws, path)
+    moved = np.abs(path.s[:, : plant.spools])
+    bad = np.argwhere(~(moved < [a.room for a in plant.machine.actuators]))
+    lost = np.flatnonzero(~np.isfinite(path.s).all(axis=1))
+    if len(bad) or len(lost):
+        sample = min([*bad[:1, 0], *lost[:1]])
+        what = "the motion is not finite"
+        if sample not in lost:
+            what = f"{plant.machine.actuator_names[bad[0, 1]]} is out of its stroke, beyond the end of a chamber"
         raise RecordError(f"platen_displacement at sample {sample}: {what}; check its channels, units and offsets")
     return path
 
 
 @compiled
 def _ports_along(q, v, tables, ws, path):
-    """Fill the path; returns (sample, status) of the first pose that cannot be, or (n, 0)."""
+    """Fill the path; where a pose is not finite, so is the path."""
     axes, frame, port, J = tables.axes, ws.frame, ws.port, ws.JB[0]
     step = np.zeros(axes.size)
     for k in range(q.shape[0]):
@@ -55,9 +60,7 @@ def _ports_along(q, v, tables, ws, path):
             difference(q[k - 1], q[k], axes, step)
             set_twist(step, axes, frame)
             port_rates(J, frame, port[DS])
-        status = pose_stage(q[k], tables, ws)
-        if status != 0:
-            return k, status
+        pose_stage(q[k], tables, ws)
         if k > 0:  # the mean of the rates at both ends
             port_rates(J, frame, port[SD])
             for i in range(port.shape[1]):
@@ -67,4 +70,3 @@ def _ports_along(q, v, tables, ws, path):
         path.s[k] = port[S]
         path.column[k] = ws.JB[1]
         path.turn[k] = frame[:3]
-    return q.shape[0], 0

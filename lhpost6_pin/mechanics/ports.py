@@ -42,7 +42,7 @@ LEG = np.dtype(
         ("rho", np.float64, 3),  # platen point from B, body axes, control zero-position [m]
         ("base_point", np.float64, 3),  # base point in {s} [m]
         ("zero_length", np.float64),  # length in the control zero-position [m]
-        ("stroke", np.float64),  # largest |s| [m]
+        ("stroke", np.float64),  # largest |s| [m]: the hard stop
         (
             "normal_thrust",
             np.float64,
@@ -79,7 +79,7 @@ def leg_table(machine: Machine) -> NDArray[np.void]:
         row["rho"] = np.array(component.platen_point) - centre
         row["base_point"] = component.base_point
         row["zero_length"] = math.dist(component.platen_point, component.base_point)
-        row["stroke"] = getattr(component, "stroke", math.inf)
+        row["stroke"] = getattr(component, "hard_stop", math.inf)
         row["pad"] = row["swivel"] = -1
         mount = getattr(component, "mount", "none")
         if mount == "bearing":

@@ -36,6 +36,7 @@ __all__ = [
     "plant_motion",
     "platen_motion",
     "rotation",
+    "solve_positive",
 ]
 
 
@@ -192,7 +193,7 @@ def pose_acceleration(frame, body, axes, v, a, out):
 
 
 @compiled
-def _solve(matrix, right):
+def solve_positive(matrix, right):
     """Solution of a small positive definite system by Cholesky; not finite where it is singular."""
     n = right.size
     for i in range(n):
@@ -224,9 +225,9 @@ def gauss_newton_step(displacement, s, K, axes, pose):
         miss = s[i] - displacement[i]
         for a in range(free):
             right[a] += K[i, axes[a]] * miss
-            for b in range(a + 1):  # `_solve` reads the lower triangle
+            for b in range(a + 1):  # `solve_positive` reads the lower triangle
                 normal[a, b] += K[i, axes[a]] * K[i, axes[b]]
-    step = _solve(normal, right)
+    step = solve_positive(normal, right)
     largest = 0.0
     for a in range(free):
         pose[axes[a]] -= step[a]

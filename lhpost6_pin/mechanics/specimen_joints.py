@@ -7,7 +7,8 @@ import numpy as np
 from ..core.arrays import Array
 from .plant import Plant
 
-__all__ = ["SpecimenJoint", "joints_beyond", "specimen_doubts", "specimen_joints", "specimen_positions"]
+__all__ = ["SpecimenJoint", "joints_beyond", "specimen_doubts", "specimen_joints", "specimen_mass"]
+__all__ += ["specimen_positions"]
 
 
 class SpecimenJoint(NamedTuple):
@@ -55,7 +56,7 @@ def specimen_doubts(plant: Plant) -> list[str]:
     if specimen is None:
         return []
     found = []
-    weight = _mass(plant) * machine.platen.gravity
+    weight = specimen_mass(plant) * machine.platen.gravity
     if "table_2_2.payload" in machine.parameters:
         most = machine.parameters.number("table_2_2.payload")
         if weight > most:
@@ -87,7 +88,7 @@ def joints_beyond(plant: Plant, time: Array, q: Array) -> list[str]:
     return found
 
 
-def _mass(plant: Plant) -> float:
+def specimen_mass(plant: Plant) -> float:
     """Mass of the specimen [kg]: what the model has beyond the bare table's, and the weight of a coupled one."""
     own = float(sum(i.mass for i in plant.model.inertias)) - plant.machine.platen.isotropic_mass
     return own - float(plant.rest_external[2]) / plant.machine.platen.gravity

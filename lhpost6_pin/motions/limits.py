@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, Context
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from ..core.errors import OutOfRangeError
 from .motion import AXES
 from .process import Target
 
-__all__ = ["ActuatorCheck", "ActuatorUtilisation", "LimitsSummary", "MotionLimits", "check_limits", "largest_scale"]
+__all__ = ["Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "check_limits", "largest_scale"]
+__all__ += ["limit_peaks", "peak_of_demand"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
+_CLOSE = 1e-4  # relative width to which the largest scale is bracketed
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +26,7 @@ class MotionLimits:
     displacement: np.ndarray  # (6,) [m, rad]
     velocity: np.ndarray  # (6,) [m/s, rad/s]
     acceleration: np.ndarray  # (6,) [m/s^2, rad/s^2]
+    rise: float | None = None  # acceleration of z upwards [m/s^2], where it differs
 
     def __post_init__(self) -> None:
         """Convert to read-only arrays; raises ValueError unless all are positive."""
@@ -35,88 +38,135 @@ class MotionLimits:
             object.__setattr__(self, quantity, values)
 
 
-class ActuatorUtilisation(NamedTuple):
-    """Demand of a motion over capacity, by actuator; above 1 it exceeds the capacity."""
+class Demand(NamedTuple):
+    """Demand of a motion on one kind of capacity, by axis, actuator or part."""
 
-    velocity: np.ndarray  # (n, n_actuators) velocity over that of the unloaded piston at full spool
-    names: Sequence[str]  # (n_actuators,)
-    stroke: np.ndarray  # (n, n_actuators) elongation over half stroke
+    quantity: str  # such as "actuator velocity"
+    names: Sequence[str]  # (m,)
+    share: np.ndarray  # (n, m) demand over capacity, signed or not; above 1 it exceeds the capacity
+    of: str  # what the capacity is, after "37 %"
+    value: np.ndarray | None = None  # (n, m) demand in SI
+    unit: str = ""  # of `value`
+    decides: bool = True  # whether a motion beyond it is refused
 
 
-ActuatorCheck = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Sequence[str], np.ndarray]]
-"""From displacement and velocity (n, 6) to an `ActuatorUtilisation` (or a tuple in its order)."""
+MotionCheck = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Demand]]
+"""From displacement, velocity and acceleration (n, 6) of a motion to its demands on a table."""
 
 
-@dataclass(frozen=True)
-class LimitsSummary:
-    """Demand over capacity by quantity ("actuator velocity" and "actuator stroke" included), then axis or actuator."""
-
-    utilisation: dict[str, dict[str, float]]
+class Motion(Protocol):
+    """A motion of C and Euler angles, such as a target or what was achieved; each (n, 6)."""
 
     @property
-    def highest(self) -> tuple[str, str, float]:
-        """Quantity, axis or actuator, and value of the governing utilisation."""
-        rows = ((quantity, name, value) for quantity, row in self.utilisation.items() for name, value in row.items())
-        return max(rows, key=lambda item: item[2])
+    def displacement(self) -> np.ndarray: ...
+    @property
+    def velocity(self) -> np.ndarray: ...
+    @property
+    def acceleration(self) -> np.ndarray: ...
 
 
-class _Peak(NamedTuple):
+class Peak(NamedTuple):
+    """The largest demand of a motion on one limit."""
+
     quantity: str
     name: str
     utilisation: float
     sample: int
     text: str  # value against limit
+    decides: bool = True
+    value: float | None = None  # demand in SI, where it is more than a share
 
 
-def check_limits(target: Target, limits: MotionLimits, actuator_check: ActuatorCheck | None = None) -> LimitsSummary:
+@dataclass(frozen=True)
+class LimitsSummary:
+    """Demand over capacity by quantity, then axis, actuator or part; each peak with its value and sample."""
+
+    utilisation: dict[str, dict[str, float]]
+    peaks: tuple[Peak, ...] = ()
+
+    @property
+    def highest(self) -> tuple[str, str, float]:
+        """Quantity, axis or actuator, and value of the governing utilisation."""
+        rows = [(p.quantity, p.name, p.utilisation) for p in self.peaks if p.decides]
+        return max(rows, key=lambda item: item[2])
+
+
+def check_limits(target: Target, limits: MotionLimits, check: MotionCheck | None = None) -> LimitsSummary:
     """Utilisation of the table by a target.
 
-    `actuator_check` adds the actuators' strokes and the flow of their valves. Raises OutOfRangeError with the largest
-    scale within the limits, then a clause per exceeded quantity, axes before actuators: the governing one with its
-    value, limit, time and sample, and the names of the others.
+    `check` adds demands on actuators and parts. Raises OutOfRangeError with the largest scale within the limits, then a
+    clause per exceeded quantity, axes before actuators: the governing one with its value, limit, time and sample, and
+    the names of the others.
     """
-    peaks = _axis_peaks(target, limits) + (_actuator_peaks(target, actuator_check, 1.0) if actuator_check else [])
-    over = [peak for peak in peaks if peak.utilisation > _FULL]
+    peaks = limit_peaks(target, limits, check)
+    over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
-        fits = largest_scale(target, limits, actuator_check)
+        fits = largest_scale(target, limits, check)
         raise OutOfRangeError(
             f"{target.reference.motion} at scale {target.reference.scale:g} exceeds the capacity of the table. "
             f"The largest scale that fits is {fits:g}; exceeded: {'; '.join(_clauses(over, target.time))}",
             fits,
+            tuple(dict.fromkeys(peak.quantity for peak in over)),
         )
     utilisation: dict[str, dict[str, float]] = {}
     for peak in peaks:
         utilisation.setdefault(peak.quantity, {})[peak.name] = peak.utilisation
-    return LimitsSummary(utilisation)
+    return LimitsSummary(utilisation, peaks)
 
 
-def largest_scale(target: Target, limits: MotionLimits, actuator_check: ActuatorCheck | None = None) -> float:
+def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | None = None) -> float:
     """Largest scale of the target's motion within all limits, rounded down to three digits.
 
-    Infinity for a target at rest (or below floating-point resolution). Actuator lengths are not linear in the pose:
-    with `actuator_check` the scale is found by bisection below that of the axes.
+    Infinity for a target at rest (or below floating-point resolution). Actuator lengths and forces are not linear in
+    the motion: with `check` the scale is bracketed below that of the axes, guided by the share of each trial.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
 
-    def exceeds(trial: float) -> bool:
-        peaks = _actuator_peaks(target, actuator_check, trial) if actuator_check else []
-        return any(peak.utilisation > _FULL for peak in peaks)
+    def used(trial: float) -> float:
+        peaks = _peaks(target, check, trial) if check else []
+        return max((peak.utilisation for peak in peaks if peak.decides), default=0.0)
 
-    factor = 1 / highest
-    if exceeds(factor):
-        low, high = 0.0, factor
-        while high - low > 1e-4 * high:
-            middle = (low + high) / 2
-            low, high = (low, middle) if exceeds(middle) else (middle, high)
-        factor = low
-    return _round_down(factor * abs(target.reference.scale))
+    low, high = 0.0, 1 / highest
+    share = used(high)
+    if share <= _FULL:
+        return _round_down(high * abs(target.reference.scale))
+    trial = high
+    while high - low > _CLOSE * high:
+        # demands are nearly proportional to the scale: just below where the last share would be one, else halfway
+        guess = (1.0 - 0.5 * _CLOSE) * trial / share if 0.0 < share < np.inf else 0.0
+        trial = guess if low < guess < high else (low + high) / 2
+        share = used(trial)
+        low, high = (low, trial) if share > _FULL else (trial, high)
+        if 1.0 - _CLOSE < share <= _FULL:
+            break
+    return _round_down(low * abs(target.reference.scale))
 
 
-def _clauses(over: Sequence[_Peak], time: np.ndarray) -> list[str]:
+def peak_of_demand(demand: Demand) -> list[Peak]:
+    """Largest share of each axis, actuator or part of a demand."""
+    shares = np.nan_to_num(np.abs(demand.share), nan=np.inf, posinf=np.inf)
+    peaks = []
+    for i, name in enumerate(demand.names):
+        sample = int(np.argmax(shares[:, i]))
+        share = float(shares[sample, i])
+        text = f"{100 * share:.4g} % {demand.of}" if np.isfinite(share) else f"infinitely many times {demand.of}"
+        if demand.value is not None:
+            text = f"{abs(demand.value[sample, i]):.4g} {demand.unit}, {text}"
+        value = None if demand.value is None else float(demand.value[sample, i])
+        peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides, value))
+    return peaks
+
+
+def limit_peaks(motion: Motion, limits: MotionLimits, check: MotionCheck | None = None) -> tuple[Peak, ...]:
+    """Largest demand of a motion on every limit, axes before actuators and parts; nothing is refused."""
+    return (*_axis_peaks(motion, limits), *(_peaks(motion, check, 1.0) if check else []))
+
+
+def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
     """One clause per quantity: its governing axis or actuator in full, the others by name; axes first."""
-    groups: dict[str, list[_Peak]] = {}
+    groups: dict[str, list[Peak]] = {}
     for peak in sorted(over, key=lambda peak: (peak.quantity not in _QUANTITIES, -peak.utilisation)):
         groups.setdefault(peak.quantity, []).append(peak)
     clauses = []
@@ -127,33 +177,27 @@ def _clauses(over: Sequence[_Peak], time: np.ndarray) -> list[str]:
     return clauses
 
 
-def _axis_peaks(target: Target, limits: MotionLimits) -> list[_Peak]:
+def _axis_peaks(target: Motion, limits: MotionLimits) -> list[Peak]:
     peaks = []
     for quantity, per in zip(_QUANTITIES, ("", "/s", "/s^2"), strict=True):
-        values = np.abs(getattr(target, quantity))
+        values = getattr(target, quantity)
         for i, axis in enumerate(AXES):
-            sample = int(np.argmax(values[:, i]))
-            value, limit = float(values[sample, i]), float(getattr(limits, quantity)[i])
+            bounds = np.full(len(values), getattr(limits, quantity)[i])
+            if limits.rise is not None and (quantity, axis) == ("acceleration", "z"):
+                bounds[values[:, i] > 0.0] = limits.rise
+            shares = np.abs(values[:, i]) / bounds
+            sample = int(np.argmax(shares))
+            value, limit = abs(float(values[sample, i])), float(bounds[sample])
             unit = ("m" if i < 3 else "rad") + per
-            peaks.append(_Peak(quantity, axis, value / limit, sample, f"{value:.4g} {unit} against {limit:.4g} {unit}"))
+            text = f"{value:.4g} {unit} against {limit:.4g} {unit}"
+            peaks.append(Peak(quantity, axis, value / limit, sample, text))
     return peaks
 
 
-def _actuator_peaks(target: Target, actuator_check: ActuatorCheck, factor: float) -> list[_Peak]:
+def _peaks(target: Motion, check: MotionCheck, factor: float) -> list[Peak]:
     with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
-        velocity, names, stroke = actuator_check(factor * target.displacement, factor * target.velocity)
-    peaks = []
-    for quantity, shares, of in (
-        ("actuator velocity", velocity, "of the unloaded velocity of its valves"),
-        ("actuator stroke", stroke, "of its stroke"),
-    ):
-        values = np.nan_to_num(np.abs(shares), nan=np.inf, posinf=np.inf)
-        for i, name in enumerate(names):
-            sample = int(np.argmax(values[:, i]))
-            value = float(values[sample, i])
-            share = f"{100 * value:.4g} %" if np.isfinite(value) else "infinitely many times"
-            peaks.append(_Peak(quantity, name, value, sample, f"{share} {of}"))
-    return peaks
+        demands = check(*(factor * x for x in (target.displacement, target.velocity, target.acceleration)))
+    return [peak for demand in demands for peak in peak_of_demand(demand)]
 
 
 def _round_down(value: float) -> float:

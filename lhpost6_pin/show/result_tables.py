@@ -24,7 +24,7 @@ from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
 from .report.friction_section import friction_table
 from .report.interface_section import interface_table
-from .report.iterate_report import iteration_tables
+from .report.iterate_report import iteration_tables, target_demands
 from .report.page import Table
 from .report.sine_report import sine_table
 from .report.tune_report import tuning_tables
@@ -55,7 +55,7 @@ def print_tuning(tuning: Tuning) -> None:
 
 def print_iterations(result: Iterated) -> None:
     """Print the errors of every iteration, and the stopping criterion."""
-    print_blocks(*iteration_tables(result), f"stopped: {result.reason}")
+    print_blocks(*iteration_tables(result), target_demands(result), f"stopped: {result.reason}")
 
 
 def print_sine(test: SineTest) -> None:

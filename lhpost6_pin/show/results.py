@@ -20,8 +20,10 @@ from ..simulation.simulate import Run
 from ..tuning.iterate import Iterated
 from ..tuning.sine import SineTest
 from ..tuning.tune import Tuning
+from . import capacity_tables
 
 if TYPE_CHECKING:
+    from .capacity_tables import MachineCapacity
     from .report.run_report import RunSummary
 
 __all__ = [
@@ -57,14 +59,13 @@ def machine_entries(machine: Machine) -> Entries:
     }
 
 
-def capacity_entries(machine: Machine) -> Entries:
-    """Capacity against Table 2.2 (if the machine has that table), and the oil-column modes."""
-    from ..mechanics.capacity import capacity_table, has_printed_capacity
+def capacity_entries(found: "MachineCapacity") -> Entries:
+    """Capacity with what is mounted, limits by axis, and the oil-column modes of the bare table."""
     from ..mechanics.linearize import oil_column_modes
 
-    lines = capacity_table(machine) if has_printed_capacity(machine) else None
+    machine = found.machine
     return {
-        "capacity": lines and [{**line._asdict(), "deviation": line.deviation} for line in lines],
+        **capacity_tables.capacity_entries(found),
         "modes": oil_column_modes(machine),
         "modes_with_friction_and_leaks": oil_column_modes(machine, undamped=False),
     }

@@ -25,7 +25,6 @@ __all__ = [
     "Compared",
     "compare",
     "machine_rows",
-    "print_capacity",
     "print_comparison",
     "print_findings",
     "print_machine",
@@ -51,7 +50,7 @@ def machine_rows(machine: Machine) -> list[tuple[str, str, str, str, bool]]:
 
 def report_limits(plant: "Plant") -> dict[str, Any]:
     """Limits for a run report: Table 2.2, strokes, velocities and forces of actuators, supply, strut areas."""
-    from ..mechanics.capacity import actuator_speeds
+    from ..mechanics.equilibrium import actuator_speeds
 
     machine = plant.machine
     area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
@@ -114,18 +113,6 @@ def _inertia_table(machine: Machine) -> Table:
         *(f"{what} {axis} [{unit}]" for what, unit in (("mass", "t"), ("inertia", "t m2")) for axis in "XYZ"),
     )
     return Table("Effective inertia about B, composed from the parts (printed in Table 4.1)", header, rows)
-
-
-def print_capacity(machine: Machine) -> None:
-    """Print the capacity of the model and Table 2.2, with deviations."""
-    from ..mechanics.capacity import capacity_table
-
-    rows = [
-        (line.name, f"{line.model:.4g}", f"{line.printed:.4g}", line.unit, f"{100 * line.deviation:+.1f} %", line.how)
-        for line in capacity_table(machine)
-    ]
-    header = ("capacity", "model", "Table 2.2", "unit", "deviation", "how")
-    print_blocks(Table("Capacity, all servovalves open", header, rows))
 
 
 def print_modes(machine: Machine) -> None:

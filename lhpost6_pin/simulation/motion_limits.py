@@ -1,29 +1,35 @@
 """The limits of a motion on a machine, and the demand of a target over each of them.
 
 Limits are the displacement, velocity and acceleration of C by axis (section `limits` of the machine file, Table 2.2),
-the stroke of each actuator, and its unloaded velocity at full spool less `limits.valve_reserve`. The capacity of the
-actuators is computed in `mechanics.capacity`; the comparison and the largest scale that fits, in `motions.limits`.
+and those of actuators and parts (`mechanics.motion_demands`): strokes, valve flow less `limits.valve_reserve`, forces
+with the specimen mounted, strengths. The comparison and the largest scale that fits are in `motions.limits`.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
-from ..mechanics.capacity import make_actuator_check
-from ..mechanics.plant import Plant
-from ..motions import LimitsSummary, MotionLimits, Target, check_limits
+from ..machine.strength import stated_strength
+from ..machine.structure import FLOW_READINGS
+from ..mechanics.motion_demands import make_motion_check
+from ..mechanics.plant import Plant, make_plant
+from ..mechanics.pose import PlatenMotion
+from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
 
-__all__ = ["check_motion_limits"]
+__all__ = ["Judgement", "check_motion_limits", "fitting_scale", "judge_motion", "judge_record"]
 
 
 def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
     """Demand of a target over the capacity of a plant, by limit.
 
-    Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; for a guided machine also
-    where the target moves an axis that is not free.
+    Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; where the flow of valves is
+    exceeded, also the scale by the other reading of Eq. 4-2. For a guided machine also where the target moves an axis
+    that is not free.
     """
     machine, axes = plant.machine, plant.axes
     blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
@@ -33,9 +39,78 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
             f"{target.reference.motion}: {machine.name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
         )
 
+    bounds = _axis_limits(plant)
+    try:
+        return check_limits(target, bounds, make_motion_check(plant))
+    except OutOfRangeError as error:
+        if "actuator velocity" not in error.exceeded:
+            raise
+        raise OutOfRangeError(
+            f"{error}{_by_other_reading(plant, target)}", error.largest_scale, error.exceeded
+        ) from None
+
+
+def fitting_scale(plant: Plant, target: Target) -> float:
+    """Largest scale of the target's motion within all limits."""
+    return largest_scale(target, _axis_limits(plant), make_motion_check(plant))
+
+
+class Judgement(NamedTuple):
+    """A motion against all limits of a plant, and the scale at which its target would be within them."""
+
+    peaks: tuple[Peak, ...]
+    fits: float | None  # None: no target
+
+    @property
+    def governing(self) -> Peak:
+        """The largest demand over capacity."""
+        return max((p for p in self.peaks if p.decides), key=lambda p: p.utilisation)
+
+
+def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = None) -> Judgement:
+    """Demands of a motion on all limits, none refused; raises as `make_motion_check` does."""
+    bounds, check = _axis_limits(plant), make_motion_check(plant)
+    fits = None if target is None else largest_scale(target, bounds, check)
+    return Judgement(limit_peaks(motion, bounds, check), fits)
+
+
+def judge_record(plant: Plant, record: xr.Dataset) -> Judgement | None:
+    """Judgement of a record's achieved motion and of its target; None without motion, or where it is not finite.
+
+    Raises OutOfRangeError if the actuators cannot hold what is mounted at rest.
+    """
+    achieved = _motion_of(record, "platen")
+    if achieved is None:
+        return None
+    wanted, target = _motion_of(record, "reference"), None
+    if wanted is not None and "scale" in record.attrs:
+        attrs = record.attrs
+        made = Reference(str(attrs.get("motion", "motion")), "record", float(attrs["scale"]), (), 0.0, 0.0, 0.0)
+        target = Target(record["time"].values, *wanted, made)
+    return judge_motion(plant, achieved, target)
+
+
+def _motion_of(record: xr.Dataset, who: str) -> PlatenMotion | None:
+    names = [f"{who}_{quantity}" for quantity in ("displacement", "velocity", "acceleration")]
+    if not all(name in record for name in names):
+        return None
+    found = PlatenMotion(*(np.ascontiguousarray(record[name].values, float) for name in names))
+    return found if all(np.isfinite(x).all() for x in found) else None
+
+
+def _axis_limits(plant: Plant) -> MotionLimits:
+    limits, axes = plant.machine.limits, plant.axes
+
     def six(values: tuple[float, ...]) -> Array:
         return np.array([values[k] if k in axes else math.inf for k in range(6)])
 
-    limits = machine.limits
-    bounds = MotionLimits(six(limits.displacement), six(limits.velocity), six(limits.acceleration))
-    return check_limits(target, bounds, make_actuator_check(plant))
+    rise = stated_strength(plant.machine.parameters).rise
+    stated = six(limits.displacement), six(limits.velocity), six(limits.acceleration)
+    return MotionLimits(*stated, rise if math.isfinite(rise) else None)
+
+
+def _by_other_reading(plant: Plant, target: Target) -> str:
+    """The scale that fits by the other reading of Eq. 4-2, as a sentence."""
+    (other,) = (word for word in FLOW_READINGS if word != plant.machine.flow_reading)
+    fits = fitting_scale(make_plant(plant.machine.with_params({"machine.flow_reading": other})), target)
+    return f'. With the other reading of Eq. 4-2 (machine.flow_reading = "{other}") the largest scale is {fits:g}'

@@ -27,6 +27,7 @@ from ..motions import Target
 from .motion_limits import check_motion_limits
 from .outputs import record_of_run
 from .simulate import ClosedLoop, OpenLoop, PluggedLoop, Run, simulate
+from .trouble import with_pressure_trouble
 
 __all__ = ["SimulatedTest", "loop_for", "rehearse", "replay"]
 
@@ -67,7 +68,7 @@ def rehearse(
     loop = loop_for(plant, find_equilibrium(plant), settings, target, drive, inverse)
     loop = loop if adapt is None else adapt(loop)
     run = simulate(plant, loop, samples=len(target.time), record_every=record_every, progress=progress, **options)
-    run = _usable(run)
+    run = with_pressure_trouble(_usable(run))
     motion = (target.displacement, target.velocity, target.acceleration)
     reference = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
     name = settings.name if isinstance(settings, ControllerSettings) else type(settings).__name__
@@ -141,7 +142,7 @@ def replay(
         middle = (np.arange(samples * (steps // SAMPLE_RATE)) + 0.5) / steps
         spool = resample_band_limited(recorded, t_old, np.minimum(middle, t_old[-1]))
     run = simulate(plant, OpenLoop(spool, _start(plant, record)), samples=samples, progress=progress, **options)
-    run = _usable(run)
+    run = with_pressure_trouble(_usable(run))
     return SimulatedTest(run, record_of_run(run, {"spool_interpolation": "held" if held else "band-limited", **attrs}))
 
 

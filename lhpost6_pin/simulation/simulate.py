@@ -270,10 +270,10 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
 def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:
     """Meaning of a stage's status other than 0, and the remedy."""
     if status > 0:
-        leg = (*plant.machine.actuator_names, *plant.machine.strut_names)[status - 1]
-        stroke = plant.legs["stroke"][status - 1]
+        actuator = plant.machine.actuators[status - 1]  # a strut has no stroke
+        bumper = f" through its bumper to the hard stop at {actuator.hard_stop:g} m" if actuator.bumper_travel else ""
         return (
-            f"stopped at {time:.4f} s: {leg} left its stroke of +-{stroke:g} m; "
+            f"stopped at {time:.4f} s: {actuator.name} left its stroke of +-{actuator.stroke:g} m{bumper}; "
             "scale the motion down, look at the controller, or start from the record's own pose and pressures"
         )
     hint = "take the scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"

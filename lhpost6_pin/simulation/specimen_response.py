@@ -129,7 +129,7 @@ def wrench_on_platen(run: History) -> Array:
 
 
 def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float) -> Array:
-    """Wrenches (n, 6) [N, N m] of a specimen on the platen at B in platen axes, along a prescribed motion of the platen.
+    """Wrenches (n, 6) [N, N m] of a specimen on the platen at B in platen axes, along a prescribed motion of it.
 
     Its joints and modes respond from rest (`driven_specimen`, `march_modes`). Raises SimulationError for a specimen
     that is a program.

@@ -15,9 +15,9 @@ from lhpost6_pin.effects.registry import LAWS
 from lhpost6_pin.machine.library import Family, Shape, families, make_effect
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.parameters import EVIDENCE
-from lhpost6_pin.mechanics.capacity import capacity_table
 from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.motions import MotionEntry, list_motions
+from lhpost6_pin.show.capacity_tables import MachineCapacity, capacity_tables, machine_capacity
 
 from .markdown import cell, code_cell, number, table
 from .theory import page_of_law
@@ -118,13 +118,15 @@ def _law_link(law: str) -> str:
     return f"[`{law}`](LAWS/{page_of_law(law)}.md)"
 
 
-def capacity() -> str:
-    """Capacity of the model beside Table 2.2."""
-    rows = [
-        (r.name, f"{r.model:.4g}", f"{r.printed:.4g}", r.unit, f"{100 * r.deviation:+.1f} %", r.how)
-        for r in capacity_table(load_machine())
-    ]
-    return table(("capacity", "model", "Table 2.2", "unit", "deviation", "how"), rows)
+@cache
+def _machine_capacity() -> MachineCapacity:
+    return machine_capacity(load_machine())
+
+
+def capacity(kind: str = "bare") -> str:
+    """Capacity of the model beside Table 2.2: bare, with its payload, readings of Eq. 4-2, or governing limits."""
+    tables = dict(zip(("bare", "payload", "readings", "limits"), capacity_tables(_machine_capacity()), strict=True))
+    return table(tables[kind].header, tables[kind].rows)
 
 
 def modes() -> str:

@@ -7,6 +7,7 @@ and a discovery.
 """
 
 from .calibrate_report import write_calibrate_report
+from .capacity_report import write_capacity_report
 from .decompose_report import write_decompose_report
 from .iterate_report import write_iterate_report
 from .run_report import write_run_report
@@ -15,6 +16,7 @@ from .tune_report import write_tune_report
 
 __all__ = [
     "write_calibrate_report",
+    "write_capacity_report",
     "write_decompose_report",
     "write_iterate_report",
     "write_run_report",

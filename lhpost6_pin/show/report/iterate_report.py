@@ -5,16 +5,20 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core.errors import LhpostError
 from ...core.names import AXES
+from ...mechanics.pose import PlatenMotion
+from ...simulation.motion_limits import judge_motion
 from ...tuning.identify import tuning_numbers
 from ...tuning.iterate import Iterated, Iteration
 from .charts import Curve, Panel, XAxis, chart_figure
 from .control_blocks import AXIS_LINES, assumption_blocks, load_of
 from .iterate_plots import compare, drive_blocks, motion_blocks, spectrum_blocks, table_blocks
 from .page import Block, Figure, Headline, Level, Page, Section, Table, details, number, save_page
+from .run_limits import demand_table
 from .scales import milliseconds, percent
 
-__all__ = ["iteration_tables", "write_iterate_report"]
+__all__ = ["iteration_tables", "target_demands", "write_iterate_report"]
 
 # Judgement, not physics: largest acceleration RRMSE of an axis, and its share of the error before iterating.
 REACHED = 0.05
@@ -48,6 +52,7 @@ def write_iterate_report(result: Iterated, path: Path | str, command: str = "") 
             Section("spectra", "Spectra of the error", spectrum_blocks(found)),
             Section("drive", "Drive and reference", drive_blocks(result, found)),
             Section("table", "Transfer function of the table", table_blocks(result.table)),
+            Section("limits", "Demand of the target over capacity", [target_demands(result)]),
             Section("assumptions", "Assumptions and sources", assumption_blocks(machine, NUMBERS)),
         ],
         command=command,
@@ -148,6 +153,16 @@ def iteration_tables(result: Iterated) -> list[Table]:
         Table("Delay removed, of the acceleration", header, rows("delay", milliseconds)),
         Table("Displacement RRMSE, delay removed", header, rows("displacement", percent)),
     ]
+
+
+def target_demands(result: Iterated) -> Table | str:
+    """Return the demand of the target on every limit of the table, or why there is none."""
+    target = result.target
+    motion = PlatenMotion(target.displacement, target.velocity, target.acceleration)
+    try:
+        return demand_table(judge_motion(result.first_run.plant, motion).peaks)
+    except LhpostError as error:
+        return f"{error}."
 
 
 def _stop(result: Iterated) -> Block:

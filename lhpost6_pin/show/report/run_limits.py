@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
+from ...motions import Peak
 from .page import Block, Table, bar
 from .run_metrics import SpoolUse, Tracking, channel, labels, peaks, sampling
 from .scales import SCALES, axis_scale, shown_as
@@ -16,17 +17,21 @@ __all__ = [
     "ForceUse",
     "LimitUse",
     "Limits",
+    "demand_table",
     "force_use",
     "governing_limits",
     "limit_blocks",
     "limit_table",
 ]
-__all__ += ["limit_uses", "share_of_limit", "shares_of_limit"]
+__all__ += ["limit_uses", "share_of_limit", "shares_of_limit", "uses_of_peaks"]
 
 Limits = Mapping[str, Array]
 
 TOLERANCE = 1e-3  # relative excess of a sampled peak over its limit that still counts as within
 SHOWN = {"actuator stroke": "displacement", "actuator velocity": "velocity"}
+SHOWN |= {"actuator unloading": "force", "reaction mass strength": "force", "platen strength": "force"}
+SHOWN |= {"piston tilt": "rotation", "axis force": "force", "payload": "force", "axis overturning moment": "moment"}
+SHOWN |= {"axis yaw moment": "moment"}
 SHOWN |= {"push": "force", "pull": "force", "force": "force", "spool": "ratio"}
 
 
@@ -37,6 +42,7 @@ class LimitUse(NamedTuple):
     name: str  # of the axis or actuator
     peak: float  # SI
     share: float  # demand over capacity; infinity for a capacity of zero
+    decides: bool = True  # whether beyond it the test is beyond the table
 
 
 class ForceUse(NamedTuple):
@@ -89,6 +95,15 @@ def limit_uses(
     return [use for use in uses if not np.isnan(use.share)]
 
 
+def uses_of_peaks(peaks: Iterable[Peak]) -> list[LimitUse]:
+    """Return the demands of a motion on forces and strengths, of those that no channel of a record shows."""
+    return [
+        LimitUse(peak.quantity, peak.name, abs(peak.value), peak.utilisation, peak.decides)
+        for peak in peaks
+        if peak.value is not None and peak.quantity in SHOWN
+    ]
+
+
 def _of_actuators(record: xr.Dataset, limits: Limits) -> Iterator[tuple[str, Array, Array]]:
     """Quantities of the actuators, their peaks and demand over capacity."""
     if "actuator_displacement" in record:
@@ -119,9 +134,24 @@ def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
         return ["Neither limits of the machine nor spools are available."]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
-        "velocity is that of the unloaded piston at full spool. All axes and actuators are in the other sections."
+        "velocity is that of the unloaded piston at full spool. Unloading is the loss of a bearing actuator's force, "
+        "from rest to its least chamber pressure; forces and moments along an axis are beyond rest, over the capacity "
+        "along that axis alone. All axes and actuators are in the other sections."
     )
     return [words, limit_table(uses)]
+
+
+def demand_table(peaks: Iterable[Peak]) -> Table:
+    """Return the largest demand of a motion on each quantity in words, the governing one first."""
+    most: dict[str, Peak] = {}
+    for peak in peaks:
+        if peak.quantity not in most or peak.utilisation > most[peak.quantity].utilisation:
+            most[peak.quantity] = peak
+    rows = [
+        (peak.quantity.capitalize(), peak.name, peak.text, bar(peak.utilisation, TOLERANCE))
+        for peak in sorted(most.values(), key=lambda peak: -peak.utilisation)
+    ]
+    return Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)
 
 
 def limit_table(uses: Sequence[LimitUse]) -> Table:

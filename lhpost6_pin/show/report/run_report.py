@@ -10,11 +10,13 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...core.errors import UnknownNameError
+from ...motions import Peak
 from ...tuning.interaction import Interaction
 from .interaction_section import interaction_blocks
 from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
+from .performance_plots import Load, motion_peaks, performance_blocks
 from .run_components import force_blocks, pressure_blocks, strut_blocks
-from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses
+from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses, uses_of_peaks
 from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
 from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
 from .run_spools import spool_blocks
@@ -77,13 +79,17 @@ def write_run_report(
     command: str | None = None,
     machine_table: Iterable[Sequence[Any]] | None = None,
     interaction: Interaction | None = None,
+    demands: Sequence[Peak] = (),
+    loads: Sequence[Load] = (),
+    fits: str = "",
 ) -> RunSummary:
     """Write the self-contained HTML report of a test to `path` and return its summary.
 
     `limits` maps names of `LIMIT_NAMES` to capacities (SI; not-a-number means no limit, as does 0
     except for `actuator_pull`), `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name,
-    value, unit, source, assumed), `interaction` is that of table and specimen. Missing
-    channels are named in their sections.
+    value, unit, source, assumed), `interaction` is that of table and specimen. `demands` are those of the motion on
+    forces and strengths, `loads` the performance of the table, with `fits` in words at what scale the motion would be
+    within it. Missing channels are named in their sections.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
     limit.
     """
@@ -92,7 +98,8 @@ def write_run_report(
     found = [row for quantity in QUANTITIES for row in track(record, quantity)]
     spools = spool_use(record)
     notes = [*(notes or ()), *_gaps(record)]
-    uses = limit_uses(record, found, spools, bounds)
+    uses = [*limit_uses(record, found, spools, bounds), *uses_of_peaks(demands)]
+    paper = performance_blocks(loads, motion_peaks(record), fits, source="the target") if loads else []
     verdict, level = verdict_of_run(record, found, spools, uses, notes)
     motion = [f"platen_{quantity}" for quantity in QUANTITIES]
     response = response_blocks(record)
@@ -111,6 +118,7 @@ def write_run_report(
         Section("struts", "Hold-down struts", strut_blocks(record, bounds)),
         Section("drift", "Drift", drift_blocks(record)),
         Section("limits", "Demand over capacity", limit_blocks(uses)),
+        *([Section("performance", "Performance curves", paper)] if paper else []),
         Section(
             "metrics",
             "Table of metrics",

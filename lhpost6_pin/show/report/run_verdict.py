@@ -31,7 +31,7 @@ def verdict_of_run(
         sentences = [f"The run {stopped}: tracking is not judged.", clipped, "See the notes."]
         return " ".join(filter(None, sentences)), "bad"
     tracked, level = _followed(record, found, clipped=bool(clipped))
-    beyond = [use for use in uses if use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
+    beyond = [use for use in uses if use.decides and use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
     sentences = [clipped, tracked]
     if beyond:
         shares = {use: f"{number(100 * use.share, 4)}\N{NO-BREAK SPACE}% of its limit" for use in beyond}
@@ -119,7 +119,7 @@ def _governing_limit(uses: Sequence[LimitUse]) -> Headline:
     label = "Governing limit: demand / capacity"
     if not uses:
         return Headline("–", label, "neither limits of the machine nor spools are available")
-    use = governing_limits(uses)[0]
+    use = governing_limits(use for use in uses if use.decides)[0]
     over = use.share >= 1.0 if use.quantity == "spool" else use.share > 1.0 + TOLERANCE
     level: Level = "bad" if over else "attention" if use.share >= NEAR else "good"
     share = percent(use.share) if np.isfinite(use.share) else "no capacity"

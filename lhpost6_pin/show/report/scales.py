@@ -42,6 +42,7 @@ SCALES: dict[str, Scale] = {
     "rotation velocity": Scale(180.0 / np.pi, "deg/s"),
     "rotation acceleration": Scale(180.0 / np.pi, "deg/s²"),
     "force": Scale(1e-6, "MN"),
+    "moment": Scale(1e-6, "MN m"),
     "pressure": Scale(1e-6, "MPa"),
     "ratio": Scale(1.0, "1"),
 }

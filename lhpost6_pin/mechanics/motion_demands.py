@@ -1,0 +1,130 @@
+"""Demands of a motion on actuators and parts of a machine, with what is mounted on it.
+
+Of actuators: velocity over what the valves can feed, elongation over stroke, force between that at rest and the end of
+the actuator's range (`actuator_forces`): push, pull, and of a bearing actuator, which cannot pull, the loss of its
+pressure down to the least stated, beyond which it would lose contact. Of parts, where the machine file states their
+strength: reaction mass, platen, tilt of the pistons, payload. Beside them the required force or moment along each axis
+over the capacity along this axis alone, which does not decide: axes share the actuators.
+"""
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.errors import OutOfRangeError
+from ..core.names import AXES
+from ..machine.strength import Strength, stated_strength
+from ..motions import Demand, MotionCheck
+from .actuator_forces import axis_capacity, force_range, required_forces, rest_forces, wrench_at_bearings
+from .equilibrium import actuator_speeds
+from .plant import Plant
+from .pose import PlatenMotion, leg_displacements, rotation
+from .specimen_joints import specimen_mass
+
+__all__ = ["make_motion_check"]
+
+OVERTURNING = ("roll", "pitch")
+
+
+def make_motion_check(plant: Plant) -> MotionCheck:
+    """Return the demands of a motion (displacement, velocity, acceleration of C and Euler angles, (n, 6) each).
+
+    Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
+    Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
+    """
+    machine = plant.machine
+    speeds = (1.0 - machine.limits.valve_reserve) * actuator_speeds(plant)
+    strokes, names = np.array([a.stroke for a in machine.actuators]), machine.actuator_names
+    strength, rest = stated_strength(machine.parameters), rest_forces(plant)
+    _refuse_unheld(plant, rest.share[0])
+    along, span = axis_capacity(plant), force_range(plant)
+    single = np.array([a.area_b is None for a in machine.actuators])
+
+    def check(displacement: Array, velocity: Array, acceleration: Array) -> list[Demand]:
+        moved, rate = leg_displacements(plant, displacement, velocity)
+        moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
+        fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
+        found = [
+            Demand("actuator velocity", names, fed, "of the unloaded velocity of its valves"),
+            Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke"),
+        ]
+        needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration))
+        beyond, at = needed.share - rest.share, rest.share[0]
+        force = span.middle + span.half * needed.share
+        push, pull = np.maximum(beyond, 0.0) / (1.0 - at), np.maximum(-beyond, 0.0) / (1.0 + at)
+        found.append(Demand("actuator push", names, push, "of its push beyond rest", force, "N"))
+        for some, quantity, of in (
+            (~single, "actuator pull", "of its pull beyond rest"),
+            (single, "actuator unloading", "of its force at rest down to its least chamber pressure"),
+        ):
+            if some.any():
+                these = [name for name, own in zip(names, some, strict=True) if own]
+                found.append(Demand(quantity, these, pull[:, some], of, force[:, some], "N"))
+        in_space = np.einsum("nij,nj->ni", needed.turn, needed.wrench[:, :3])
+        found += _on_parts(plant, strength, displacement, in_space)
+        extra = wrench_at_bearings(plant, needed.wrench - rest.wrench)
+        return [*found, *_along_axes(plant, extra, along)]
+
+    return check
+
+
+def _refuse_unheld(plant: Plant, share: Array) -> None:
+    """Raise OutOfRangeError if an actuator is out of its range at rest."""
+    if (np.abs(share) < 1.0).all():
+        return
+    worst = int(np.argmax(np.abs(share)))
+    name, span = plant.machine.actuator_names[worst], force_range(plant)
+    bound, hint = (
+        (span.least, "move the specimen towards the centre") if share[worst] < 0.0 else (span.most, "lighten it")
+    )
+    force = span.middle[worst] + span.half[worst] * share[worst]
+    raise OutOfRangeError(
+        f"{plant.machine.name} cannot run with what is mounted: {name} must give {force:.4g} N at rest, beyond its "
+        f"limit of {bound[worst]:.4g} N; {hint}",
+        0.0,
+        ("actuator unloading" if share[worst] < 0.0 else "actuator push",),
+    )
+
+
+def _on_parts(plant: Plant, strength: Strength, displacement: Array, force: Array) -> list[Demand]:
+    """Demands on strengths that are stated; force (n, 3) in {s}, required of the actuators less the struts' [N]."""
+    found = []
+    if np.isfinite(strength.reaction_mass).all():
+        level = force[:, :2]
+        share = np.abs(level) / strength.reaction_mass
+        found.append(Demand("reaction mass strength", ("x", "y"), share, "of its strength", level, "N"))
+    if np.isfinite(strength.platen_up):
+        up = np.maximum(force[:, 2:], 0.0)
+        found.append(Demand("platen strength", ("z up",), up / strength.platen_up, "of its strength", up, "N"))
+    if np.isfinite(strength.tilt) and plant.machine.motion == "free":
+        tilt = np.arccos(np.clip(rotation(displacement[:, 3:])[:, 2, 2], -1.0, 1.0))[:, None]
+        found.append(
+            Demand("piston tilt", ("platen",), tilt / strength.tilt, "of what the pistons' seals allow", tilt, "rad")
+        )
+    if np.isfinite(strength.payload) and plant.machine.specimen is not None:
+        weight = np.full((len(force), 1), specimen_mass(plant) * plant.machine.platen.gravity)
+        name = plant.machine.specimen.name
+        found.append(Demand("payload", (name,), weight / strength.payload, "of the payload", weight, "N", False))
+    return found
+
+
+def _along_axes(plant: Plant, wrench: Array, along: tuple[Array, Array]) -> list[Demand]:
+    """Demands by axis, of wrenches (n, 6) beyond rest at N in platen axes."""
+    rise, fall = along
+    share = np.where(wrench >= 0.0, wrench / rise, -wrench / fall)
+    groups: dict[str, list[tuple[str, Array, Array]]] = {}
+    for k in plant.axes:
+        axis = AXES[k]
+        kind = "force" if k < 3 else "overturning moment" if axis in OVERTURNING else "yaw moment"
+        if axis == "z":
+            for word, sign in (("z up", 1.0), ("z down", -1.0)):
+                part = np.where(sign * wrench[:, k] >= 0.0, share[:, k], 0.0)
+                groups.setdefault(kind, []).append((word, part, np.where(part > 0.0, wrench[:, k], 0.0)))
+        else:
+            groups.setdefault(kind, []).append((axis, share[:, k], wrench[:, k]))
+    found = []
+    for kind, rows in groups.items():
+        names, shares, values = zip(*rows, strict=True)
+        unit = "N" if kind == "force" else "N m"
+        of = "of what the actuators give along this axis alone"
+        found.append(Demand(f"axis {kind}", names, np.column_stack(shares), of, np.column_stack(values), unit, False))
+    return found

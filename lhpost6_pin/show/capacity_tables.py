@@ -1,0 +1,144 @@
+"""Tables of a machine's capacity, for a terminal, a report and JSON."""
+
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from ..core.errors import LhpostError
+from ..machine.machine import Machine
+from ..mechanics.capacity import (
+    Capacity,
+    FlowReading,
+    capacity_table,
+    flow_readings,
+    has_printed_capacity,
+    payload_table,
+)
+from ..mechanics.payload import with_payload
+from ..mechanics.performance import table_performance
+from ..mechanics.plant import Plant, make_plant
+from ..motions import Peak
+from ..simulation.motion_limits import judge_record
+from .report.page import Table
+from .report.performance_plots import Load, performance_table
+from .report.scales import SCALES, Scale
+
+__all__ = ["MachineCapacity", "capacity_entries", "capacity_tables", "judged", "machine_capacity", "performance_loads"]
+
+
+SHOWN = {"m/s2": SCALES["acceleration"], "rad": SCALES["rotation"], "N": SCALES["force"]}
+SHOWN |= {"rad/s": SCALES["rotation velocity"], "rad/s2": SCALES["rotation acceleration"]}
+
+
+class MachineCapacity(NamedTuple):
+    """Capacity of a machine with what is mounted."""
+
+    machine: Machine
+    rows: tuple[Capacity, ...]
+    payload: tuple[Capacity, ...]  # with the payload of Table 2.2
+    readings: tuple[FlowReading, ...]
+    loads: tuple[Load, ...]  # bare, and with the specimen or the payload of Table 2.2
+
+
+def machine_capacity(machine: Machine) -> MachineCapacity:
+    """Capacity of a machine; raises SimulationError if it cannot hold its specimen at rest."""
+    bare = machine.specimen is None
+    payload = payload_table(machine) if bare else ()
+    readings = flow_readings(machine) if bare else ()
+    return MachineCapacity(machine, capacity_table(machine), payload, readings, performance_loads(machine))
+
+
+def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
+    """Demands of a record's motion on all limits, and a sentence on the scale at which its target would fit."""
+    try:
+        found = judge_record(plant, record)
+    except LhpostError as error:
+        return (), f"{error}."
+    if found is None:
+        return (), ""
+    if found.fits is None:
+        return found.peaks, ""
+    worst = found.governing
+    return found.peaks, (
+        f"The largest scale of this target within all limits is {found.fits:g}; it was run at "
+        f"{float(record.attrs['scale']):g}. Of the achieved motion {worst.name} {worst.quantity} governs, at "
+        f"{100 * worst.utilisation:.3g} % of its limit."
+    )
+
+
+def performance_loads(machine: Machine, *, payload: bool = True) -> tuple[Load, ...]:
+    """Performance of the bare table, and with its specimen or, bare, with the payload that Table 2.2 states."""
+    plant, band = make_plant(machine), machine.limits.bandwidth
+    if machine.specimen is not None:
+        bare = table_performance(make_plant(machine.without_specimen()))
+        return Load("bare table", bare, band), Load(machine.specimen.name, table_performance(plant), band)
+    loads = [Load("bare table", table_performance(plant), band)]
+    if payload and "table_2_2_payload.weight" in machine.parameters:
+        weight = machine.parameters.number("table_2_2_payload.weight")
+        loads.append(Load(f"payload of {weight / 1e6:g} MN", table_performance(with_payload(plant, weight)), band))
+    return tuple(loads)
+
+
+def capacity_tables(found: MachineCapacity) -> list[Table]:
+    """All tables of a capacity."""
+    machine = found.machine
+    load = "bare table" if machine.specimen is None else f"with {machine.specimen.name}"
+    stated = "Table 2.2" if has_printed_capacity(machine) else "stated"
+    valves = "all servovalves open" if has_printed_capacity(machine) else "servovalves as in its file"
+    header = ("capacity", "model", stated, "unit", "deviation", "how")
+    tables = [Table(f"Capacity, {load}, {valves}", header, [_row(line) for line in found.rows])]
+    if found.payload:
+        weight = machine.parameters.number("table_2_2_payload.weight")
+        title = f"Capacity with a centred rigid payload of {weight / 1e6:g} MN, all servovalves open"
+        tables.append(Table(title, header, [_row(line) for line in found.payload]))
+    if found.readings:
+        rows = [
+            (
+                r.name,
+                *(_shown(v, _scale(r.name)) for v in (r.printed_equation, r.full_stroke, r.stated)),
+                _scale(r.name).unit,
+                r.source,
+            )
+            for r in found.readings
+        ]
+        title = f"Readings of Eq. 4-2 (machine.flow_reading, here {machine.flow_reading}), all servovalves open"
+        header = ("velocity", "printed", "full_stroke", "stated", "unit", "source")
+        tables.append(Table(title, header, rows))
+    return [*tables, performance_table(found.loads)]
+
+
+def _row(line: Capacity) -> tuple[str, ...]:
+    """A row with accelerations in g and angles in degrees, as Table 2.2."""
+    shown = SHOWN.get(line.unit, Scale(1.0, line.unit))
+    deviation = "–" if line.deviation is None else f"{100 * line.deviation:+.1f} %"
+    model, printed = (_shown(value, shown) for value in (line.model, line.printed))
+    return line.name, model, printed, shown.unit, deviation, line.how
+
+
+def _shown(value: float | None, scale: Scale) -> str:
+    return "–" if value is None else f"{value * scale.factor:.3g}"
+
+
+def _scale(name: str) -> Scale:
+    return SHOWN["rad/s"] if name.endswith(("roll", "pitch", "yaw")) else SCALES["velocity"]
+
+
+def capacity_entries(found: MachineCapacity) -> dict[str, Any]:
+    """Capacity, payload, readings of the valve equation and governing limits as plain data."""
+
+    def lines(rows: tuple[Capacity, ...]) -> list[dict[str, Any]]:
+        return [{**line._asdict(), "deviation": line.deviation} for line in rows]
+
+    performance = {
+        load.name: {
+            one.axis: {q: [b._asdict() for b in getattr(one, q)] for q in ("displacement", "velocity", "acceleration")}
+            for one in load.axes
+        }
+        for load in found.loads
+    }
+    return {
+        "capacity": lines(found.rows),
+        "payload": lines(found.payload),
+        "flow_readings": [reading._asdict() for reading in found.readings],
+        "limits": performance,
+    }

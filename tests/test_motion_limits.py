@@ -1,0 +1,211 @@
+"""Limits of a motion with what is mounted: forces, strengths, ends of strokes, and what a run says of them."""
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from machine_cases import plant_named
+
+from lhpost6_pin.core.errors import OutOfRangeError, SimulationError
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.machine.machine import build_machine, load_machine
+from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, required_forces
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.instant import platen_pose_at, required_wrench_at, wrench_at
+from lhpost6_pin.mechanics.payload import lock_joints, with_payload
+from lhpost6_pin.mechanics.performance import table_performance
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.port_path import ports_along
+from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
+from lhpost6_pin.mechanics.strokes import stroke_ends
+from lhpost6_pin.motions import find_motion, make_target, with_scale
+from lhpost6_pin.simulation.motion_limits import check_motion_limits, fitting_scale, judge_motion
+from lhpost6_pin.simulation.simulate import OpenLoop, simulate
+from lhpost6_pin.simulation.trouble import run_doubts, with_pressure_trouble
+
+G = 9.80665
+BLOCK = """<robot name="block"><link name="block"><inertial><origin xyz="{x} 0 {z}"/><mass value="{mass}"/>
+<inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+
+def block(folder, weight: float = 4.9e6, x: float = 0.0, z: float = 0.0):
+    """URDF of a rigid block with its centre at (x, 0, z) from C."""
+    path = folder / "block.urdf"
+    path.write_text(BLOCK.format(x=x, z=z, mass=weight / G, i=1e-3 * weight))
+    return path
+
+
+def sine(axis: str, peak: float, frequency: float = 2.0):
+    """A sine with a peak acceleration [m/s2]."""
+    amplitude = peak / (2.0 * np.pi * frequency) ** 2
+    return make_target(find_motion("sine", axis=axis, amplitude=amplitude, period=1.0 / frequency), rate=2048.0)
+
+
+def test_a_2_g_motion_with_4_9_mn_is_refused_by_the_limit_and_with_the_scale_that_fits(tmp_path):
+    """X: the reaction mass bears 6.8 MN, 1.038 g with the payload; the actuators give 1.604 g."""
+    machine = load_machine().with_params({"horizontal.valves": 2}).with_specimen(block(tmp_path))
+    plant, target = make_plant(machine), sine("x", 2.0 * G)
+    with pytest.raises(
+        OutOfRangeError,
+        match=r"x reaction mass strength .*; H[1-4] actuator pull|actuator pull.*x reaction mass strength",
+    ) as caught:
+        check_motion_limits(plant, target)
+    mass = 168100.0 + 4.9e6 / G
+    peak = float(np.abs(target.acceleration[:, 0]).max())
+    assert caught.value.largest_scale == pytest.approx(6.8e6 / mass / peak, rel=0.01)  # three digits, rounded down
+    assert check_motion_limits(plant, with_scale(target, caught.value.largest_scale)).highest[2] <= 1.0 + 1e-6
+    assert "also" not in str(caught.value).split("reaction mass strength")[0]
+    check_motion_limits(make_plant(load_machine().with_valves(2)), target)  # the bare table can
+
+
+def test_required_forces_balance_the_motion_in_the_report_s_equations():
+    """Independent route: wrenches in the notation of Chapters 3 and 4 at one tilted, moving pose."""
+    plant = plant_named("lhpost6")
+    pose = np.array([[0.2, -0.1, 0.03, 0.006, -0.008, 0.02]])
+    motion = PlatenMotion(
+        pose, np.array([[0.5, 0.3, 0.1, 0.01, 0.02, 0.03]]), np.array([[4.0, -3.0, 2.0, 0.3, 0.2, -0.1]])
+    )
+    found, span = required_forces(plant, motion), force_range(plant)
+    force = span.middle + span.half * found.share[0]
+    moved = plant_motion(plant, motion)
+    place = platen_pose_at(pose[0])
+    given = wrench_at(plant, place, [*force, *found.pull[0]])
+    turn = place.rotation
+    twist = pin.Motion(motion.velocity[0, :3], turn @ moved.v[0, 3:])
+    rate = pin.Motion(motion.acceleration[0, :3], turn @ moved.a[0, 3:])
+    still = required_wrench_at(plant, place, twist, rate)
+    np.testing.assert_allclose(given.vector, still.vector, atol=1e-7 * np.abs(still.vector).max())
+
+
+def test_single_axis_capacity_is_the_closed_form_and_joints_of_a_specimen_do_not_matter():
+    plant = plant_named("lhpost6")
+    capacity, span = axis_capacity(plant), force_range(plant)
+    rest = find_equilibrium(plant).force[4:]
+    assert capacity.rise[2] == pytest.approx(np.sum(span.most[4:] - rest), rel=1e-9)
+    assert capacity.fall[2] == pytest.approx(np.sum(rest - span.least[4:]), rel=1e-9)
+    assert capacity.fall[3] == pytest.approx(6 * 2.871 * (rest[0] - span.least[4]), rel=1e-6)  # all six at one lever
+    machine = load_machine()
+    loose, locked = (make_plant(machine.with_specimen("pendulum", locked=x)) for x in (False, True))
+    one, two = axis_capacity(loose), axis_capacity(locked)
+    np.testing.assert_allclose(one.fall, two.fall, rtol=1e-12)
+    assert lock_joints(locked) is locked
+
+
+def test_a_tall_specimen_is_limited_by_the_unloading_of_a_vertical_actuator(tmp_path):
+    plant = make_plant(load_machine().with_specimen(block(tmp_path, 2e6, z=8.0)))
+    performance = {one.axis: one for one in table_performance(plant)}
+    assert performance["x"].bound("acceleration").by.startswith("unloading of V")
+    limit = performance["x"].bound("acceleration").value
+    still = np.zeros((2, 6))
+    push = np.zeros((2, 6))
+    push[:, 0] = [limit, -limit]
+    shares = {
+        p.quantity: p.utilisation for p in judge_motion(plant, PlatenMotion(still, still, push)).peaks if p.decides
+    }
+    assert max(shares.values()) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_performance_is_the_least_of_three_lines():
+    (one,) = table_performance(plant_named("uniaxial"))
+    bounds = [one.bound(q).value for q in ("displacement", "velocity", "acceleration")]
+    frequency = np.array([0.01, 0.6, 40.0])
+    w = 2.0 * np.pi * frequency
+    np.testing.assert_allclose(one.peak_velocity(frequency), [w[0] * bounds[0], bounds[1], bounds[2] / w[2]])
+    loaded = {o.axis: o for o in table_performance(with_payload(plant_named("lhpost6"), 4.9e6))}
+    assert loaded["z"].bound("acceleration").value / G == pytest.approx(1.632, abs=1e-3)
+
+
+def test_a_specimen_that_unloads_an_actuator_is_to_move_to_the_centre_not_to_have_more_pressure(tmp_path):
+    machine = load_machine().with_specimen(block(tmp_path, 5e6, x=9.0))
+    with pytest.raises(SimulationError, match=r"V[56] must give .* which unloads it: .*towards the centre") as caught:
+        find_equilibrium(make_plant(machine))
+    assert "supply_pressure" not in str(caught.value)
+    with pytest.raises(SimulationError, match=r"beyond its supply: .*raise hydraulics\.supply_pressure"):
+        find_equilibrium(make_plant(load_machine().with_specimen(block(tmp_path, 80e6))))
+    near = load_machine().with_specimen(block(tmp_path, 3.33e6, x=9.0))  # above return pressure, below 125 psi
+    with pytest.raises(OutOfRangeError, match=r"V[56] must give .* at rest, .*move the specimen towards the centre"):
+        check_motion_limits(make_plant(near), sine("x", 1.0))
+
+
+def test_a_motion_beyond_the_valves_says_what_the_other_reading_of_eq_4_2_admits():
+    plant, target = plant_named("lhpost6"), make_target(find_motion("sxh1"), rate=float(SAMPLE_RATE))
+    with pytest.raises(OutOfRangeError, match='flow_reading = "full_stroke"') as caught:
+        check_motion_limits(plant, target)
+    other = make_plant(plant.machine.with_params({"machine.flow_reading": "full_stroke"}))
+    fits = fitting_scale(other, target)
+    assert str(caught.value).endswith(f"the largest scale is {fits:g}") and fits > caught.value.largest_scale
+
+
+def test_tilt_of_pistons_and_upward_acceleration_have_limits_of_their_own():
+    plant, still = plant_named("lhpost6"), np.zeros((2, 6))
+    tilt, up = still.copy(), still.copy()
+    tilt[0, 3:5] = np.radians([1.2, 1.2])
+    up[:, 2] = [40.0, 10.0]  # beyond 3.6 g, which is downwards; 11.9 g upwards
+    peaks = {(p.quantity, p.name): p for p in judge_motion(plant, PlatenMotion(tilt, still, up)).peaks}
+    assert peaks["acceleration", "z"].utilisation == pytest.approx(40.0 / (11.9 * G), rel=1e-6)
+    expected = np.arccos(np.cos(np.radians(1.2)) ** 2) / np.radians(2.0)
+    assert peaks["piston tilt", "platen"].utilisation == pytest.approx(expected, rel=1e-6)
+    lifted = 174420.0 * (40.0 + G) / 22.9e6
+    assert peaks["platen strength", "z up"].utilisation == pytest.approx(lifted, rel=1e-3)  # tilted by 1.7 deg
+
+
+# Ends of strokes ------------------------------------------------------------------------------------------------------
+
+
+def lifted(machine, spool: float, seconds: float = 0.9):
+    """A run with all vertical valves open."""
+    plant = make_plant(machine)
+    rest = find_equilibrium(plant)
+    samples = int(seconds * SAMPLE_RATE)
+    spools = np.tile(rest.spool, (samples, 1))
+    spools[:, 4:] = spool
+    return simulate(plant, OpenLoop(spools, rest.state), samples=samples, engine="fused")
+
+
+def test_within_the_stroke_a_bumper_changes_nothing_and_at_its_end_it_acts_before_the_hard_stop(caplog):
+    machine = load_machine()
+    keys = [f"{kind}.{key}" for kind in ("horizontal", "vertical") for key in ("bumper_stiffness", "bumper_travel")]
+    quantities = {path: q for path, q in machine.parameters.quantities.items() if path not in keys}
+    without = build_machine(replace(machine.parameters, quantities=quantities))
+    with caplog.at_level(logging.WARNING):
+        hard, soft = lifted(without, 0.35), lifted(machine, 0.35)
+    assert hard.trouble is not None and "left its stroke of +-0.127 m;" in hard.trouble
+    n = len(hard.time)
+    assert np.array_equal(hard.q[: n - 1], soft.q[: n - 1]) and np.array_equal(hard.z[: n - 1], soft.z[: n - 1])
+    assert len(soft.time) > n
+    said = run_doubts(soft)
+    assert any(doubt.startswith("V1 reached the end of its stroke of 0.127 m at") for doubt in said)
+    if soft.trouble is not None:
+        assert "through its bumper to the hard stop at 0.1334 m" in soft.trouble
+
+
+def test_a_measured_motion_beyond_the_stroke_is_evaluated_and_one_beyond_the_chamber_is_not():
+    plant = plant_named("lhpost6")
+    displacement = np.zeros((4, 6))
+    displacement[2, 2] = 0.1285
+    still = np.zeros((4, 6))
+    path = ports_along(plant, plant_motion(plant, PlatenMotion(displacement, still, still)))
+    assert path.s[2, 4:10] == pytest.approx(np.full(6, 0.1285))
+    (first, *_) = ends = stroke_ends(plant, np.arange(4) / 512, displacement)
+    assert len(ends) == 6 and first.actuator == "V1" and first.time == 2 / 512
+
+
+# Pressures ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_chamber_below_zero_is_trouble_and_below_the_return_pressure_a_remark():
+    run = lifted(load_machine(), 0.05, 0.05)
+    index = run.plant.state_index("actuators_3_way", "V6", "pressure_a")
+    assert with_pressure_trouble(run).trouble is None and run_doubts(run) == []
+    low, empty = run.z.copy(), run.z.copy()
+    low[30:, index], empty[40:, index] = 0.4e6, -1e4
+    (said,) = run_doubts(replace(run, z=low))
+    assert said.startswith("chamber A of V6 fell to 0.4 MPa, below the return pressure of 0.55 MPa, first at 0.015 s")
+    assert with_pressure_trouble(replace(run, z=low)).trouble is None
+    trouble = with_pressure_trouble(replace(run, z=empty)).trouble
+    assert trouble is not None and "at 0.0195 s: chamber A of V6" in trouble and "lose contact" in trouble
+    assert "cavitation" in trouble
+    exempt = make_plant(load_machine().with_effect("cavitation", ("V6",)))
+    assert with_pressure_trouble(replace(run, z=empty, plant=exempt)).trouble is None

@@ -1,9 +1,11 @@
 """A specimen that exchanges motion and wrench with the plant, against one set of equations for both."""
 
+import re
+
 import numpy as np
 import pinocchio as pin
 import pytest
-from coupled_cases import FULL, SHEAR, Tower, monolithic, tower
+from coupled_cases import FULL, SHEAR, Tower, monolithic, moving, relative, tower
 from machine_cases import machine_named
 from run_cases import at_rest
 
@@ -27,19 +29,6 @@ def carrying(specimen, at=(0.0, 0.0, 0.0), turned=(0.0, 0.0, 0.0)) -> Machine:
     return load_machine().with_params({"hydraulics.supply_pressure": 60e6}).with_specimen(specimen, at, turned)
 
 
-def moving(rest, samples=N):
-    """All axes by sines of a frequency of its own per actuator, about rest."""
-    t = np.arange(samples)[:, None] / SAMPLE_RATE
-    size = np.where(np.arange(len(rest.spool)) < 4, 0.05, 0.015)
-    return OpenLoop(rest.spool + size * np.sin(2 * np.pi * t * np.linspace(3.0, 8.0, len(rest.spool))), rest.state)
-
-
-def relative(found, true):
-    """RRMSE of a motion (n, 6) whose components of one kind share their scale."""
-    parts = (slice(0, 3), slice(3, 6))
-    return max(np.linalg.norm((found - true)[:, p]) / np.linalg.norm(true[:, p]) for p in parts)
-
-
 @pytest.mark.parametrize("free", [FULL, SHEAR], ids=["springs along x, y, z", "riding along z"])
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0, 10.0])
 def test_towers_of_any_mass_follow_the_monolithic_equations(ratio, free):
@@ -48,7 +37,7 @@ def test_towers_of_any_mass_follow_the_monolithic_equations(ratio, free):
     Continuing the wrench costs 5/12 (omega h)^2, 4e-4 at 10 Hz; a tower of ten platens moves the table by it.
     """
     plant, rest = at_rest(carrying(tower(ratio * PLATEN, free=free), (0.5, -0.4, 0.0), (0.0, 0.0, 0.3)))
-    loop = moving(rest)
+    loop = moving(rest, N)
     run = simulate(plant, loop, samples=N)
     q, _ = monolithic(plant, rest.state, np.repeat(loop.spool, 4, axis=0), 1.0 / (4 * SAMPLE_RATE))
     moved, true = run.q - rest.state.q, q[::4][:N] - rest.state.q
@@ -119,7 +108,7 @@ def test_a_rigid_specimen_in_python_is_the_rigid_body_itself():
 
     plant, rest = at_rest(carrying(Block(), (0.3, 0.2, 0.0)))
     assert np.abs(plant.rest_external).max() < 1e-6
-    run = simulate(plant, moving(rest), samples=N)
+    run = simulate(plant, moving(rest, N), samples=N)
     assert abs(run.coupling.work_platen) < 1e-7 * run.coupling.energy  # 1e-8 of the mass by rounding of the pulses
     assert run.coupling.stability.spectral_radius < 1e-6  # rounding of a wrench of 1e6 N under 1 m/s2
 
@@ -187,6 +176,27 @@ def test_faulty_specimens_are_named_with_what_to_mend(stub, message):
         simulate(plant, moving(rest, 8), samples=8)
 
 
+def test_a_specimen_that_fails_on_the_way_ends_the_run_and_keeps_its_results():
+    stub = Stub()
+    plant, rest = at_rest(load_machine().with_specimen(stub))
+    stub.step, whole = _failing_after(stub.step, 20), moving(rest, 64)
+    run = simulate(plant, whole, samples=64)
+    assert re.search(r"Stub.step failed at 0.00\d+ s: KeyError: 'state'", run.trouble)
+    assert len(run.time) == len(run.coupling.wrench) == len(run.a) and 4 < len(run.time) < 20
+
+
+def _failing_after(step, calls):
+    """A step that fails after some calls; the first ones are the probe's."""
+    left = iter(range(calls))
+
+    def limited(*arguments):
+        if next(left, None) is None:
+            raise KeyError("state")
+        return step(*arguments)
+
+    return limited
+
+
 @pytest.mark.parametrize(
     "text, name, message",
     [
@@ -232,7 +242,9 @@ def test_a_running_plant_couples_as_simulate_does():
     for command, q in zip(spool, run.q, strict=True):
         assert np.array_equal(table.state.q, q)
         table.advance(command)
-    assert np.array_equal(table.coupling.wrench, run.coupling.wrench) and np.abs(run.q[-1] - run.q[0]).max() > 1e-5
+    assert (
+        np.array_equal(table.coupling.wrench[0], run.coupling.wrench[-1]) and np.abs(run.q[-1] - run.q[0]).max() > 1e-5
+    )
 
 
 def test_a_specimen_outside_moves_the_table_as_one_inside_does():

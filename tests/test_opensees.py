@@ -3,9 +3,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from coupled_cases import Tower
+from coupled_cases import Tower, moving, relative
 from run_cases import at_rest
-from test_coupling import moving, relative
 
 from lhpost6_pin.core.errors import LhpostError, SimulationError
 from lhpost6_pin.core.files import models_folder
@@ -21,7 +20,7 @@ except LhpostError as missing:
 
 FRAME = models_folder() / "specimens" / "shear_frame.py"
 G = 9.80665
-N = 384
+N = 256
 
 
 def moving_base(t: float) -> BaseMotion:
@@ -97,7 +96,7 @@ def test_the_shipped_frame_moves_the_table_as_its_matrices_do():
     runs = []
     for specimen in (f"{FRAME}:build", floors):
         plant, rest = at_rest(load_machine().with_specimen(specimen))
-        runs.append(simulate(plant, moving(rest), samples=N))
+        runs.append(simulate(plant, moving(rest, N), samples=N))
     by_opensees, by_matrices = (run.q[:, :6] - run.q[0, :6] for run in runs)
     assert runs[0].trouble is None and relative(by_opensees, by_matrices) < 1e-3
     wrenches = [run.coupling.wrench - run.coupling.wrench[0] for run in runs]

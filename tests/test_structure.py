@@ -17,7 +17,7 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
-    *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
+    *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }
 """Modules that may import pinocchio."""

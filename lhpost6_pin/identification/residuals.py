@@ -70,7 +70,7 @@ def follow(
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
     Raises SimulationError for a specimen that moves in modes. What does not differ from the `known` path of the same
-    motion with another plant is reused. start (n_states,) are the friction states at the start of the test, if not zero.
+    motion with another plant is reused. start (n_states,) are the friction states at the start, if not zero.
     """
     if plant.modes.size:
         raise SimulationError("residuals take a platen with a rigid specimen at most; lock its modes (--locked)")

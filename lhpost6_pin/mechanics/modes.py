@@ -184,7 +184,8 @@ def advance_modes(modes, coupling, gravity, frame, dt, z, work):
         work[0, i] = work[1, i] / (1.0 + half * (mode.damping + half * mode.stiffness))
     if coupling.size > 0:
         for _ in range(_SWEEPS):
-            work[3, :] = work[1]
+            for i in range(n):
+                work[3, i] = work[1, i]
             _add_product(coupling, work[0], -half, work[3])
             for i in range(n):
                 work[0, i] = work[3, i] / (1.0 + half * (modes[i].damping + half * modes[i].stiffness))

@@ -18,7 +18,7 @@ PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
     *("mechanics.coupled", "mechanics.interface", "mechanics.opensees", "simulation.coupling", "simulation.running"),
-    *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
+    *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }
 """Modules that may import pinocchio."""

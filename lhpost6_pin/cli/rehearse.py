@@ -161,6 +161,7 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
     from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
     from ..show.results import run_entries
     from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
+    from ..simulation.coupling import DOUBTFUL
 
     done, record = test
     files, summary = [folder / "record.nc"], None
@@ -168,7 +169,8 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
     beyond = joints_beyond(done.plant, done.time, done.q)
     for warning in beyond:
         log.warning("%s", warning)
-    exchanged = [done.coupling.summary] if done.coupling else []
+    exchanged = done.coupling
+    doubts = [exchanged.summary] if exchanged and abs(exchanged.energy_error) > DOUBTFUL else []
     if against is None:
         from ..show.report import write_run_report
 
@@ -177,7 +179,7 @@ def save_run(test: "SimulatedTest", folder: Path, json: bool, against: "xr.Datas
             record,
             files[1],
             limits=report_limits(done.plant),
-            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *exchanged],
+            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *doubts],
             command=repeating_command(),
             machine_table=machine_rows(done.plant.machine),
         )

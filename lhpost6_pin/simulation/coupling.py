@@ -48,11 +48,22 @@ from ..mechanics.schemes import TAU, A, V
 from ..mechanics.workspace import Workspace
 from .engine_pinocchio import make_stepper
 
-__all__ = ["FAILED", "Continued", "Coupling", "CouplingOptions", "CouplingResult", "Stability", "WithOutside"]
+__all__ = [
+    "DOUBTFUL",
+    "FAILED",
+    "Continued",
+    "Coupling",
+    "CouplingOptions",
+    "CouplingResult",
+    "Stability",
+    "WithOutside",
+]
 __all__ += ["make_coupling", "stability_of"]
 
 _LEAD = dict(zip(SCHEMES, (1.0, 0.0, 0.5), strict=True))
 """Instant within a model step, in steps, at which a scheme sees the wrench."""
+DOUBTFUL = 1e-3
+"""Share of the energy through the interface from which what the exchange created is a warning."""
 FAILED = -2
 """Status of a stage whose specimen failed."""
 _NEGATIVE = -1e-3

@@ -61,8 +61,8 @@ def make_loop_model(controller: Controller, frequency: Array = FREQUENCIES) -> L
     rest = find_equilibrium(plant)
     linear = linearize(plant, rest.state, rest.spool)
     nv, axes = linear.nv, plant.axes
-    oil = (2 * nv + i for i, name in enumerate(plant.states) if "pressure" in name or "flow" in name)
-    keep = [*range(2 * nv), *oil]
+    kept = ("pressure", "flow", "specimen.")  # of the hidden states: oil, and modes of a specimen
+    keep = [*range(2 * nv), *(2 * nv + i for i, name in enumerate(plant.states) if any(k in name for k in kept))]
     a, b = linear.A[np.ix_(keep, keep)], linear.B[keep]
     # spool per actuator velocity: the controller inverts the flow curve about the opening at rest
     actuators = plant.actuators

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...core.errors import UnknownNameError
+from .interface_wrench import interface_blocks
 from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
 from .run_components import force_blocks, pressure_blocks, specimen_blocks, strut_blocks
 from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses
@@ -18,6 +19,7 @@ from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
 from .run_spools import spool_blocks
 from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
+from .specimen_points import point_blocks
 
 __all__ = ["LIMIT_NAMES", "RunSummary", "metrics_table", "write_run_report"]
 
@@ -90,7 +92,9 @@ def write_run_report(
     uses = limit_uses(record, found, spools, bounds)
     verdict, level = verdict_of_run(record, found, spools, uses, notes)
     motion = [f"platen_{quantity}" for quantity in QUANTITIES]
-    joints = "specimen_joint_position" in record
+    specimen = [*(specimen_blocks(record) if "specimen_joint_position" in record else [])]
+    specimen += point_blocks(record) if "specimen_displacement" in record else []
+    specimen += interface_blocks(record) if "interface_wrench" in record else []
     sections = [
         Section("tracking", "Target and achieved", tracking_blocks(record, found)),
         Section("spectra", "Response spectra", spectrum_blocks(record)),
@@ -98,7 +102,7 @@ def write_run_report(
         Section("pressures", "Chamber pressures", pressure_blocks(record, bounds)),
         Section("spools", "Servovalve spools", spool_blocks(record, spools)),
         Section("struts", "Hold-down struts", strut_blocks(record, bounds)),
-        *([Section("specimen", "Specimen", specimen_blocks(record))] if joints else []),
+        *([Section("specimen", "Specimen", specimen)] if specimen else []),
         Section("drift", "Drift", drift_blocks(record)),
         Section("limits", "Demand over capacity", limit_blocks(uses)),
         Section(

@@ -136,9 +136,7 @@ class OpenSeesSpecimen:
         ops = self._ops
         held = set(ops.getFixedNodes())
         if all(node in held and len(ops.getFixedDOFs(node)) == 6 for node in ops.getNodeTags()):
-            raise SimulationError(
-                f"{self.name}: the model has no free degree of freedom; OpenSees has nothing to solve"
-            )
+            raise SimulationError(f"{self.name}: the model has no free degree of freedom; OpenSees cannot solve it")
         ops.constraints("Transformation")
         ops.numberer("RCM")
         ops.system("FullGeneral")

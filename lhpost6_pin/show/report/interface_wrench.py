@@ -1,4 +1,4 @@
-"""Section of a run report on the interface of a coupled specimen: forces and moments at its base, and their exchange."""
+"""Section of a run report on the interface of a coupled specimen: wrench at its base, and the exchange."""
 
 import xarray as xr
 

@@ -36,6 +36,20 @@ from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate, simu
 
 FIRST_RESULT = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {args!r}; main()"
 
+FRAME = """
+[mass]
+mass = {{ value = {mass}, unit = "kg" }}
+centre_of_gravity = {{ value = [0, 0, {height}], unit = "m" }}
+inertia = {{ value = {inertia}, unit = "kg m2" }}
+
+[matrices]
+file = "frame.npz"
+mass = {{ variable = "M", unit = "kg" }}
+stiffness = {{ variable = "K", unit = "N/m" }}
+damping = {{ variable = "C", unit = "N s/m" }}
+influence = {{ variable = "R", unit = "1" }}
+"""
+
 
 def best(work: Callable[[], Any], repeats: int) -> float:
     """Seconds of the fastest of some repeats."""
@@ -90,6 +104,32 @@ class Bench:
                     took = best(work, self.repeats)
                     self.add(f"{engine} {scheme} {name}", 1e6 * took / (4 * SAMPLE_RATE * reached), "us/step")
                     self.add(f"{engine} {scheme} {name}", reached / took, "x real time")
+
+    def specimen(self, seconds: float, floors: int = 20) -> None:
+        """Cost of a step with a shear frame of so many storeys by its matrices, against the bare table (fused)."""
+        samples = int(seconds * SAMPLE_RATE)
+        k = 25e6 * (2.0 * np.eye(floors) - np.eye(floors, k=1) - np.eye(floors, k=-1))
+        k[-1, -1] /= 2.0
+        once = np.zeros((floors, floors))
+        once[0, 0] = 4e5  # a damper in the first storey couples the modes
+        height = 3.0 * np.arange(1, floors + 1)
+        influence = np.outer(np.ones(floors), [1.0, 0, 0, 0, 0, 0]) + np.outer(height, [0.0, 0, 0, 0, 1, 0])
+        inertia = [2e3 * float(height @ height)] * 2 + [2e4]
+        for name, damping in (("modes", 2e-3 * k), ("modes with coupled damping", 2e-3 * k + once)):
+            with tempfile.TemporaryDirectory() as folder:
+                np.savez(Path(folder) / "frame.npz", M=2e3 * np.eye(floors), K=k, C=damping, R=influence)
+                path = Path(folder) / "frame.toml"
+                path.write_text(FRAME.format(mass=2e3 * floors, height=height.mean(), inertia=inertia))
+                plant = make_plant(load_machine().with_specimen(path))
+            rest = find_equilibrium(plant)
+            spool = self.spool[:samples] - self.rest.spool + rest.spool
+            times = [np.inf, np.inf]
+            for _ in range(4 * self.repeats):  # in turns: what else the computer does falls on both
+                for i, (each, start) in enumerate(((self.plant, self.rest.state), (plant, rest.state))):
+                    drive = OpenLoop(spool, start)
+                    took = best(lambda p=each, d=drive: simulate(p, d, samples=samples, engine="fused"), 1)
+                    times[i] = min(times[i], took)
+            self.add(f"fused, {floors} {name} of a specimen over the bare table", times[1] / times[0], "x")
 
     def lengths(self, lengths: tuple[int, ...]) -> None:
         """Cost against record length [s] (fused, closed loop)."""
@@ -217,6 +257,7 @@ def main(
     logging.getLogger("lhpost6_pin").setLevel(logging.ERROR)  # runs that stop are expected of euler
     bench = Bench(repeats=1 if quick else 5)
     bench.engines(0.5 if quick else 10.0)
+    bench.specimen(0.5 if quick else 4.0)
     bench.against()
     bench.lengths((1, 2) if quick else (5, 10, 20, 40))
     bench.inverse(1 if quick else 20)

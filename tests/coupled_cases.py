@@ -7,12 +7,15 @@ import pinocchio as pin
 from scipy.linalg import eigh, expm
 
 from lhpost6_pin.core.arrays import Array
+from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.mechanics.coupled import base_placement, rigid_wrench
 from lhpost6_pin.mechanics.derivatives import rates_at
+from lhpost6_pin.mechanics.equilibrium import Equilibrium
 from lhpost6_pin.mechanics.interface import apparent_mass, base_motion, mass_at_b
 from lhpost6_pin.mechanics.plant import Plant, State
 from lhpost6_pin.mechanics.schemes import TAU, V_SEEN, V
 from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.simulate import OpenLoop
 
 FULL = np.ones(3, bool)
 SHEAR = np.array([True, True, False])
@@ -154,3 +157,16 @@ def monolithic(plant: Plant, start: State, spool: Array, dt: float) -> tuple[Arr
         out.append((q, v))
     qs, vs = zip(*out, strict=True)
     return np.array(qs), np.array(vs)
+
+
+def moving(rest: Equilibrium, samples: int) -> OpenLoop:
+    """All axes by sines of a frequency of its own per actuator, about rest."""
+    t = np.arange(samples)[:, None] / SAMPLE_RATE
+    size = np.where(np.arange(len(rest.spool)) < 4, 0.05, 0.015)
+    return OpenLoop(rest.spool + size * np.sin(2 * np.pi * t * np.linspace(3.0, 8.0, len(rest.spool))), rest.state)
+
+
+def relative(found: Array, true: Array) -> float:
+    """RRMSE of a motion (n, 6) whose components of one kind share their scale."""
+    parts = (slice(0, 3), slice(3, 6))
+    return max(np.linalg.norm((found - true)[:, p]) / np.linalg.norm(true[:, p]) for p in parts)

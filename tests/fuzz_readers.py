@@ -367,7 +367,7 @@ CONTENT: dict[Callable[[Any], object], Callable[[Any], object]] = {
     use_procedure: lambda numbers: list(tests_of(numbers)) == ["TX"],
     use_motions: lambda found: [entry.name for entry, _ in found] == [entry.name for entry in list_motions()],
     use_raws: lambda raws: raws and all(np.ptp(raw.values, axis=0).all() for raw in raws),
-    use_specimen: lambda table: table.specimen.urdf.name == "broken.urdf",
+    use_specimen: lambda table: table.specimen.file.stem == "broken",
 }
 """What a valid file of each kind holds, by how it is used."""
 
@@ -419,4 +419,5 @@ READERS = (
     Reader("tdms", "broken.tdms", tdms, load_raw, use_raws, fuzzing.damaged_bytes),
     Reader("parquet", "broken.parquet", parquet, load_raw, use_raws, fuzzing.damaged_bytes),
     Reader("urdf", "broken.urdf", shipped("specimens", "pendulum.urdf"), mounted, use_specimen, text, 0.3),
+    Reader("matrices", "broken.toml", shipped("specimens", "shear_frame.toml"), mounted, use_specimen, toml, 0.3),
 )

@@ -27,7 +27,7 @@ from lhpost6_pin.cli import rehearse as rehearse_commands
 from lhpost6_pin.cli.app import JOBS, command_name
 from lhpost6_pin.control.inverse import InverseFilter, save_inverse
 from lhpost6_pin.core.compiled import cache_folder
-from lhpost6_pin.core.files import shipped
+from lhpost6_pin.core.files import shipped, shipped_specimens
 from lhpost6_pin.core.names import AXES, ENGINES, SCHEMES
 from lhpost6_pin.data.check import check_record
 from lhpost6_pin.data.records import load_record, save_record
@@ -590,7 +590,7 @@ KNOWN = {
     "machine": list(shipped()),
     "controller": list(shipped("controllers")),
     "sensors": list(shipped("sensors")),
-    "specimen": list(shipped("specimens", ".urdf")),
+    "specimen": list(shipped_specimens()),
 }
 
 

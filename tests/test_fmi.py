@@ -378,7 +378,7 @@ def test_a_machine_changed_in_every_way_comes_back(tmp_path):
     machine = with_everything()
     save_machine_file(machine, tmp_path)
     back = load_machine_file(tmp_path)[0]
-    assert back.specimen is not None and back.specimen.urdf.parent == tmp_path
+    assert back.specimen is not None and back.specimen.file.parent == tmp_path
     assert back.parameters == machine.parameters and back.added_effects == machine.added_effects
     for ours, theirs in zip(make_plant(machine).zero_state(), make_plant(back).zero_state(), strict=True):
         np.testing.assert_array_equal(ours, theirs)
@@ -392,7 +392,7 @@ def test_the_fmu_needs_no_file_of_its_machine(tmp_path):
     """Overrides, valves, an effect and a specimen are inside: it runs after the files are gone, as the machine does."""
     machine = with_everything()
     urdf = tmp_path / "moved.urdf"
-    urdf.write_bytes(machine.specimen.urdf.read_bytes())
+    urdf.write_bytes(machine.specimen.file.read_bytes())
     machine = machine.with_specimen(urdf)
     plant, rest = at_rest(machine)
     export_fmu(machine, tmp_path / "a.fmu")

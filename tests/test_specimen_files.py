@@ -3,6 +3,7 @@
 import tomllib
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +12,7 @@ from scipy.linalg import eigh
 
 from lhpost6_pin.core.errors import ParameterError, UnknownNameError
 from lhpost6_pin.core.files import models_folder, shipped_specimens
+from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file, save_machine_file
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.quantity import EVIDENCE
 from lhpost6_pin.machine.specimen import Specimen
@@ -18,6 +20,7 @@ from lhpost6_pin.machine.specimen_file import read_specimen
 from lhpost6_pin.machine.specimen_forms import Point, RigidBody, influence_of, rigid_body_of, spatial_inertia
 from lhpost6_pin.machine.specimen_matrices import Matrices, modes_of
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.show.bodies import load_specimen_bodies, specimen_poses
 
 M = np.diag([20e3, 20e3, 20e3])
 K = 25e6 * np.array([[2.0, -1, 0], [-1, 2, -1], [0, -1, 1]])
@@ -182,6 +185,32 @@ def test_files_of_a_specimen_are_those_that_describe_it(tmp_path):
     np.savez(tmp_path / "a.npz", M=M)
     path = written(tmp_path, MASS + MODES.replace("[modes]", '[modes]\nfile = "a.npz"'))
     assert [p.name for p in Specimen(path).files] == ["own.toml", "a.npz"]
+
+
+def test_a_machine_s_files_carry_those_of_its_specimen(tmp_path):
+    np.savez(tmp_path / "arrays.npz", K=K)
+    stiffness = 'stiffness = { variable = "K", unit = "N/m" }'
+    points = "".join(f'[[point]]\ndirection = "x"\nat = {{ value = [0, 0, {3 * k}], unit = "m" }}\n' for k in (1, 2, 3))
+    mass = f'mass = {{ value = {M.tolist()}, unit = "kg" }}'
+    path = written(tmp_path, f'{MASS}[matrices]\nfile = "arrays.npz"\n{mass}\n{stiffness}\n{points}')
+    machine = load_machine().with_specimen(path, (0.1, 0.2, 0.3))
+    away = tmp_path / "away"
+    away.mkdir()
+    files = save_machine_file(machine, away)
+    assert {f.name for f in files} == {"machine.json", "own.toml", "arrays.npz"}
+    back = load_machine_file(away)[0]
+    assert back.specimen.file == away / "own.toml" and back.specimen.position == (0.1, 0.2, 0.3)
+    np.testing.assert_array_equal(make_plant(machine).modes, make_plant(back).modes)
+
+
+@pytest.mark.parametrize("name", ["block_4_9MN", "pendulum", "shear_frame", "shear_frame_joints", "tall_column"])
+def test_every_form_is_drawn_on_the_platen(name):
+    bodies = load_specimen_bodies(load_machine().with_specimen(name, (1.0, 0.0, 0.0)))
+    poses = specimen_poses(bodies, {}, 1)[0]
+    assert len(bodies.shapes) >= 1
+    for shape in bodies.shapes:
+        placed = pin.XYZQUATToSE3(poses[shape.parentJoint]) * shape.placement
+        assert 0.0 <= placed.translation[0] <= 2.0 and placed.translation[2] > 0.0  # above B, about its base
 
 
 # ---------------------------------------------------------------------------------------- what is refused

@@ -19,7 +19,7 @@ PINOCCHIO = {
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.leg_model", "mechanics.linearize"),
     *("mechanics.instant", "mechanics.payload"),
     *("mechanics.coupled", "mechanics.interface", "mechanics.opensees", "simulation.coupling", "simulation.running"),
-    *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
+    *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }
 """Modules that may import pinocchio."""

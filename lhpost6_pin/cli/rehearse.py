@@ -189,6 +189,7 @@ def save_run(
     from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
     from ..show.results import run_entries
     from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
+    from ..simulation.coupling import DOUBTFUL
     from ..simulation.trouble import run_doubts
 
     done, record = test
@@ -197,7 +198,8 @@ def save_run(
     beyond = [*joints_beyond(done.plant, done.time, done.q), *run_doubts(done)]
     for warning in beyond:
         log.warning("%s", warning)
-    exchanged = [done.coupling.summary] if done.coupling else []
+    exchanged = done.coupling
+    doubts = [exchanged.summary] if exchanged and abs(exchanged.energy_error) > DOUBTFUL else []
     if against is None:
         from ..show.capacity_tables import judged, performance_loads
         from ..show.report import write_run_report
@@ -208,7 +210,7 @@ def save_run(
             record,
             files[-1],
             limits=report_limits(done.plant),
-            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *exchanged],
+            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *doubts],
             command=repeating_command(),
             machine_table=machine_rows(done.plant.machine),
             interaction=interaction,

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
+from ..core.errors import SimulationError
 from ..data.alignment import due_spools
 from ..effects.registry import PORTS, actuator_rows, law_of, shapes_of, states_of
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
@@ -68,9 +69,11 @@ def follow(
 ) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
-    What does not differ from the `known` path of the same motion with another plant is reused. start (n_states,) are
-    the friction states at the start of the test, if not zero.
+    Raises SimulationError for a specimen that moves in modes. What does not differ from the `known` path of the same
+    motion with another plant is reused. start (n_states,) are the friction states at the start, if not zero.
     """
+    if plant.modes.size:
+        raise SimulationError("residuals take a platen with a rigid specimen at most; lock its modes (--locked)")
     there: dict[tuple[object, ...], Array] = {}  # states by what they depend on
     rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
     if known is None or _geometry(known[0]) != _geometry(plant):

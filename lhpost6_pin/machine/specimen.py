@@ -32,14 +32,14 @@ class Specimen:
         return self.file.stem
 
     @property
-    def articulated(self) -> bool:
-        """Whether its file is a URDF."""
+    def is_urdf(self) -> bool:
+        """Whether its file is a URDF; any other states its contents."""
         return self.file.suffix not in (".toml", ".npz", ".mat")
 
     @cached_property
     def contents(self) -> SpecimenContents | None:
         """What a file other than a URDF states; raises ParameterError naming file and entry."""
-        return None if self.articulated else read_specimen(self.file)
+        return None if self.is_urdf else read_specimen(self.file)
 
     @property
     def modes(self) -> Modes | None:
@@ -49,7 +49,7 @@ class Specimen:
     @cached_property
     def joint_springs(self) -> dict[str, JointSpring]:
         """Springs of a URDF's joints by name; raises ParameterError."""
-        return read_joint_springs(self.file.with_suffix(".toml")) if self.articulated else {}
+        return read_joint_springs(self.file.with_suffix(".toml")) if self.is_urdf else {}
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -58,7 +58,7 @@ class Specimen:
         found = [self.file]
         if self.file.suffix != ".toml" and beside.is_file():
             found.append(beside)
-        if not self.articulated and found[-1].suffix == ".toml" and (arrays := array_file_of(found[-1])) is not None:
+        if not self.is_urdf and found[-1].suffix == ".toml" and (arrays := array_file_of(found[-1])) is not None:
             found.append(arrays)
         return tuple(dict.fromkeys(found))
 

@@ -37,7 +37,7 @@ MODE = np.dtype(
 )
 
 _SWEEPS = 2
-"""Gauss-Seidel sweeps for damping that couples modes; their error, (d dt / 2)^3, is below that of the scheme."""
+"""Jacobi sweeps for damping that couples modes; their error, (d dt / 2)^3, is below that of the scheme."""
 
 
 def modal_tables(modes: Modes | None, participation: Array) -> tuple[NDArray[np.void], Array]:
@@ -102,41 +102,29 @@ def modal_motion(
     return ModalMotion(eta, velocity, -load - rate @ part.T, reaction, energy, (velocity * drag).sum(axis=1))
 
 
-@compiled_inline
-def _relative_rates(modes, frame, z, work):
-    """Fill work[0] with eta' = p - G nu for the twist in frame."""
-    n = modes.size
-    first = z.size - n
-    v0, v1, v2 = frame[4, 0], frame[4, 1], frame[4, 2]
-    w0, w1, w2 = frame[5, 0], frame[5, 1], frame[5, 2]
-    for i in range(n):
-        g = modes[i].participation
-        work[0, i] = z[first + i] - (g[0] * v0 + g[1] * v1 + g[2] * v2 + g[3] * w0 + g[4] * w1 + g[5] * w2)
-
-
-@compiled_inline
-def _load(i, modes, coupling, z, work, falls):
-    """Force w^2 eta + D eta' - G_lin g_b on the platen along mode i; falls (3,): gravity in platen axes."""
-    mode, n = modes[i], modes.size
-    g = mode.participation
-    load = mode.stiffness * z[z.size - 2 * n + i] + mode.damping * work[0, i]
-    load -= g[0] * falls[0] + g[1] * falls[1] + g[2] * falls[2]
-    if coupling.size > 0:
-        for j in range(n):
-            load += coupling[i * n + j] * work[0, j]
-    return load
-
-
 @compiled
 def add_modal_wrench(modes, coupling, gravity, frame, z, work):
-    """Add the modes' reaction to rows 6 and 7 of frame, the wrench at B in platen axes; leaves eta' in work[0]."""
+    """Add the modes' reaction to rows 6 and 7 of frame, the wrench at B in platen axes; work (4, n) is scratch.
+
+    Leaves eta' in work[0] and the load w^2 eta + D eta' - G_lin g_b in work[1], as `modal_rates` needs them.
+    """
     n = modes.size
-    _relative_rates(modes, frame, z, work)
-    falls = (-gravity * frame[2, 0], -gravity * frame[2, 1], -gravity * frame[2, 2])
+    at, on = z.size - 2 * n, z.size - n
+    v0, v1, v2 = frame[4, 0], frame[4, 1], frame[4, 2]
+    w0, w1, w2 = frame[5, 0], frame[5, 1], frame[5, 2]
+    g0, g1, g2 = -gravity * frame[2, 0], -gravity * frame[2, 1], -gravity * frame[2, 2]
+    for i in range(n):
+        mode = modes[i]
+        g = mode.participation
+        rate = z[on + i] - (g[0] * v0 + g[1] * v1 + g[2] * v2 + g[3] * w0 + g[4] * w1 + g[5] * w2)
+        work[0, i] = rate
+        work[1, i] = mode.stiffness * z[at + i] + mode.damping * rate - (g[0] * g0 + g[1] * g1 + g[2] * g2)
+    if coupling.size > 0:
+        _add_product(coupling, work[0], 1.0, work[1])
     f0 = f1 = f2 = m0 = m1 = m2 = s0 = s1 = s2 = 0.0
     for i in range(n):
         g = modes[i].participation
-        load, eta = _load(i, modes, coupling, z, work, falls), z[z.size - 2 * n + i]
+        load, eta = work[1, i], z[at + i]
         f0 += g[0] * load
         f1 += g[1] * load
         f2 += g[2] * load
@@ -149,19 +137,28 @@ def add_modal_wrench(modes, coupling, gravity, frame, z, work):
     frame[6, 0] += f0
     frame[6, 1] += f1
     frame[6, 2] += f2
-    frame[7, 0] += m0 + s1 * falls[2] - s2 * falls[1]
-    frame[7, 1] += m1 + s2 * falls[0] - s0 * falls[2]
-    frame[7, 2] += m2 + s0 * falls[1] - s1 * falls[0]
+    frame[7, 0] += m0 + s1 * g2 - s2 * g1
+    frame[7, 1] += m1 + s2 * g0 - s0 * g2
+    frame[7, 2] += m2 + s0 * g1 - s1 * g0
+
+
+@compiled_inline
+def _add_product(matrix, vector, factor, out):
+    """Add factor times a symmetric matrix (n * n,) times a vector to out (n,), column by column."""
+    n = vector.size
+    for j in range(n):
+        by = factor * vector[j]
+        for i in range(n):
+            out[i] += matrix[j * n + i] * by
 
 
 @compiled
-def modal_rates(modes, coupling, gravity, frame, z, work, zd):
-    """Euler, RK4: rates of the modal states, with eta' in work[0] as `add_modal_wrench` leaves it."""
+def modal_rates(modes, z, work, zd):
+    """Euler, RK4: rates of the modal states, from what `add_modal_wrench` leaves in work."""
     n = modes.size
-    falls = (-gravity * frame[2, 0], -gravity * frame[2, 1], -gravity * frame[2, 2])
     for i in range(n):
         zd[z.size - 2 * n + i] = work[0, i]
-        zd[z.size - n + i] = -_load(i, modes, coupling, z, work, falls)
+        zd[z.size - n + i] = -work[1, i]
 
 
 @compiled
@@ -169,15 +166,14 @@ def advance_modes(modes, coupling, gravity, frame, dt, z, work):
     """Semi-implicit: modal states over a step by the implicit midpoint rule, with the twist of mid-step in frame.
 
     The rule keeps the energy of undamped modes and is stable for any w dt. frame holds the rotation at the step's end:
-    gravity in platen axes is taken half a step back. work (3, n) is scratch.
+    gravity in platen axes is taken half a step back. work (4, n) is scratch.
     """
-    n = modes.size
-    half = 0.5 * dt
+    n, half = modes.size, 0.5 * dt
+    at, on = z.size - 2 * n, z.size - n
     v0, v1, v2 = frame[4, 0], frame[4, 1], frame[4, 2]
     w0, w1, w2 = frame[5, 0], frame[5, 1], frame[5, 2]
     e0, e1, e2 = -gravity * frame[2, 0], -gravity * frame[2, 1], -gravity * frame[2, 2]
     g0, g1, g2 = e0 + half * (w1 * e2 - w2 * e1), e1 + half * (w2 * e0 - w0 * e2), e2 + half * (w0 * e1 - w1 * e0)
-    at, on = z.size - 2 * n, z.size - n
     for i in range(n):
         mode = modes[i]
         g = mode.participation
@@ -189,10 +185,10 @@ def advance_modes(modes, coupling, gravity, frame, dt, z, work):
     if coupling.size > 0:
         for _ in range(_SWEEPS):
             for i in range(n):
-                right = work[1, i]
-                for j in range(n):
-                    right -= half * coupling[i * n + j] * work[0, j]
-                work[0, i] = right / (1.0 + half * (modes[i].damping + half * modes[i].stiffness))
+                work[3, i] = work[1, i]
+            _add_product(coupling, work[0], -half, work[3])
+            for i in range(n):
+                work[0, i] = work[3, i] / (1.0 + half * (modes[i].damping + half * modes[i].stiffness))
     for i in range(n):
         z[at + i] += dt * work[0, i]
         z[on + i] = 2.0 * (work[0, i] + work[2, i]) - z[on + i]

@@ -134,6 +134,9 @@ class OpenSeesSpecimen:
     def _read_masses(self) -> None:
         """Mass matrix of the free degrees of freedom, masses of the fixed ones, and their motion with the base."""
         ops = self._ops
+        held = set(ops.getFixedNodes())
+        if all(node in held and len(ops.getFixedDOFs(node)) == 6 for node in ops.getNodeTags()):
+            raise SimulationError(f"{self.name}: the model has no free degree of freedom; OpenSees cannot solve it")
         ops.constraints("Transformation")
         ops.numberer("RCM")
         ops.system("FullGeneral")

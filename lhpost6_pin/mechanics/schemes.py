@@ -172,7 +172,7 @@ def rates_stage(q, z, tables, ws, spool):
     forces_stage(tables, ws, z)
     state_rates(tables.rows, ws.port[S], ws.port[SD], spool, tables.supply, z, ws.zd)
     if tables.modes.size > 0:
-        modal_rates(tables.modes, tables.coupling, tables.inertia[0].gravity, ws.frame, z, ws.modal, ws.zd)
+        modal_rates(tables.modes, z, ws.modal, ws.zd)
     return 0
 
 

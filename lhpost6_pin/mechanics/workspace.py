@@ -26,7 +26,7 @@ class Workspace(NamedTuple):
     frame: Array  # (8, 3)
     force: Array  # (n_rows, 3)
     external: Array  # (6,) wrench on the platen from outside, at B in platen axes, linear first [N, N m]
-    modal: Array  # (3, n_modes) scratch of `modes`
+    modal: Array  # (4, n_modes) scratch of `modes`
 
 
 _HEAD = 6
@@ -38,7 +38,7 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
     states, n, rows = len(plant.states), len(plant.ports), plant.rows.size
     nq, nv, modes = plant.model.nq, plant.model.nv, plant.modes.size
     shapes = [(nq,), (states,), (states,), (7, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS)), (6,)]
-    shapes.append((3, modes))
+    shapes.append((4, modes))
     ends = np.cumsum([_HEAD, *(int(np.prod(shape)) for shape in shapes)])
     buffer = np.zeros(ends[-1])
     buffer[:_HEAD] = nq, states, nv, n, rows, modes
@@ -74,5 +74,5 @@ def unpack_workspace(buffer):
         buffer[frame:force].reshape((8, 3)),
         buffer[force:external].reshape((rows, 3)),
         buffer[external:modal],
-        buffer[modal : modal + 3 * modes].reshape((3, modes)),
+        buffer[modal : modal + 4 * modes].reshape((4, modes)),
     )

@@ -49,11 +49,24 @@ from ..mechanics.schemes import TAU, A, V
 from ..mechanics.workspace import Workspace
 from .engine_pinocchio import make_stepper
 
-__all__ = ["Continued", "Coupling", "CouplingOptions", "CouplingResult", "Stability", "WithOutside"]
+__all__ = [
+    "DOUBTFUL",
+    "FAILED",
+    "Continued",
+    "Coupling",
+    "CouplingOptions",
+    "CouplingResult",
+    "Stability",
+    "WithOutside",
+]
 __all__ += ["make_coupling", "stability_of"]
 
 _LEAD = dict(zip(SCHEMES, (1.0, 0.0, 0.5), strict=True))
 """Instant within a model step, in steps, at which a scheme sees the wrench."""
+DOUBTFUL = 1e-3
+"""Share of the energy through the interface from which what the exchange created is a warning."""
+FAILED = -2
+"""Status of a stage whose specimen failed."""
 _NEGATIVE = -1e-3
 """Least eigenvalue of the interface mass over that of the platen that a probe may show by rounding."""
 
@@ -169,7 +182,10 @@ def _interface_mass(coupled: CoupledSpecimen, base: BaseMotion, gravity: float, 
 
 
 class Coupling:
-    """A plant with a coupled specimen, advanced sample by sample; `advance` is a `Stepper`."""
+    """A plant with a coupled specimen, advanced sample by sample; `advance` is a `Stepper`.
+
+    Attributes: stability; trouble, what the specimen raised when `advance` returned `FAILED`.
+    """
 
     def __init__(self, plant: Plant, scheme: str, dt: float, steps: int, options: CouplingOptions) -> None:
         """Start the specimen at rest. Raises SimulationError for an exchange that would be unstable."""
@@ -193,11 +209,17 @@ class Coupling:
         gravity = plant.machine.platen.gravity
         self._memory, self._wrench = start_coupled(plant.coupled, base_at_rest(plant.machine), gravity)
         self._rest = Continued(plant.rest_external, options.order)
-        self._exchanges, self._t = 0, 0.0
+        self._exchanges, self._t, self._history = 0, 0.0, True
+        self.trouble: str | None = None
         self._moved, self._swept, self._last_v = np.zeros(6), np.zeros(6), np.zeros(6)
         self._works, self._passed, self._peak = np.zeros(2), 0.0, 0.0
         self._wrenches: list[Array] = []
         self._accelerations: list[Array] = []
+
+    def without_history(self) -> "Coupling":
+        """Keep the last sample's rows only, for plants that run without end."""
+        self._history = False
+        return self
 
     def evaluate(self, ws: Workspace, spool: Array) -> int:
         """As `evaluate_derivatives`, with the interface mass."""
@@ -215,8 +237,15 @@ class Coupling:
             if i % self._every == 0:
                 if self._stale and (status := self.evaluate(ws, held[0])):
                     return status
-                self._exchange(ws)
+                try:
+                    self._exchange(ws)
+                except SimulationError as error:  # the results so far are kept
+                    self.trouble = str(error)
+                    return FAILED
                 if i == 0:
+                    if not self._history:
+                        self._wrenches.clear()
+                        self._accelerations.clear()
                     self._wrenches.append(self._wrench.vector.copy())
                     self._accelerations.append(ws.motion[A].copy())
             ws.external[:] = self._rest.at(self._t + self._lead)

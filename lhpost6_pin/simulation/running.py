@@ -55,7 +55,8 @@ class RunningPlant:
         steps = steps_a_sample(scheme, steps_per_second)
         self.plant, self.scheme, self.steps_per_second = plant, scheme, steps_per_second
         self.sample = self.clipped = 0
-        self._coupled = make_coupling(plant, scheme, steps_per_second, coupling)
+        coupled = make_coupling(plant, scheme, steps_per_second, coupling)
+        self._coupled = coupled.without_history() if coupled else None
         self._evaluate = self._coupled.evaluate if self._coupled else partial(evaluate_derivatives, plant)
         self._advance = WithOutside(plant, scheme, 1.0 / steps_per_second, self._coupled)
         self._outside: Continued | None = None
@@ -101,7 +102,7 @@ class RunningPlant:
 
     @property
     def coupling(self) -> CouplingResult | None:
-        """What a coupled specimen exchanged so far."""
+        """What a coupled specimen exchanged so far; its rows are those of the last sample."""
         return self._coupled.result() if self._coupled else None
 
     def snapshot(self) -> Snapshot:
@@ -131,6 +132,8 @@ class RunningPlant:
         self._take(wrench)
         status = self._advance(self._ws, self._window, self._outside)
         self.sample += 1
+        if self._coupled and self._coupled.trouble:
+            raise SimulationError(self._coupled.trouble)
         if status:
             raise SimulationError(diagnosis(self.plant, status, self.time, self.scheme, self.steps_per_second))
 

@@ -113,15 +113,18 @@ def simulate(
         job = _Job(plant, loop, ws, log_, span, spool, command, progress, watch, coupled)
         status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
-    kept = -(-done // record_every)
-    trouble = None if status == 0 else diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
+    exchanged = coupled.result() if coupled else None
+    kept = -(-(done if exchanged is None else min(done, len(exchanged.wrench))) // record_every)
+    trouble = coupled.trouble if coupled else None
+    if status and trouble is None:
+        trouble = diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
     if trouble:
         log.warning(trouble)
     if clipped:
         log.warning("%d spool values beyond full stroke were clipped to it: the motion needs more flow", clipped)
     motion = {name: values[:kept] for name, values in log_._asdict().items()}
-    exchanged = coupled.result().every(record_every, kept) if coupled else None
-    if exchanged:
+    if exchanged is not None:
+        exchanged = exchanged.every(record_every, kept)
         motion["a"] = exchanged.acceleration
     elif scheme != SCHEMES[0]:  # the accelerations logged belong to the start of the last step
         motion["a"] = _accelerations(plant, motion["q"], motion["v"], motion["z"])

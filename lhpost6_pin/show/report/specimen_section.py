@@ -1,4 +1,4 @@
-"""Section of a run report on the specimen: the wrench at its interface with the platen, and its joints."""
+"""Section of a run report on the specimen: the wrench at its interface with the platen, its joints and points."""
 
 import numpy as np
 import xarray as xr
@@ -9,6 +9,7 @@ from .plots import Row, Trace, palette
 from .run_components import draw_over_time, specimen_blocks
 from .run_metrics import channel, sampling
 from .scales import Scale
+from .specimen_points import point_blocks
 
 __all__ = ["FORCE", "INTERFACE_NAMES", "MOMENT", "response_blocks"]
 
@@ -24,7 +25,7 @@ FORCE, MOMENT = Scale(1e-3, "kN"), Scale(1e-3, "kN m")
 
 
 def response_blocks(record: xr.Dataset) -> list[Block]:
-    """Return the interface wrench of a specimen, and positions of its free joints, as far as the record holds them."""
+    """Return the interface wrench of a specimen, its joints, its points and the exchange, as far as they are known."""
     blocks: list[Block] = []
     if "specimen_wrench" in record:
         values = channel(record, "specimen_wrench")
@@ -43,8 +44,22 @@ def response_blocks(record: xr.Dataset) -> list[Block]:
             Row(what, [Trace(named[j], values[:, j], lines[j]) for j in own], FORCE if own[0] < 3 else MOMENT)
             for what, own in (("Base shear", (0, 1)), ("Axial force", (2,)), ("Overturning and torsion", (3, 4, 5)))
         ]
-        words = "Of the simulated specimen on the platen, from its inertia and weight by RNEA."
+        words = "Of the simulated specimen on the platen, weight included."
         blocks.append(draw_over_time(record, "interface", "Interface wrench over time", words, drawn))
+    if "interface_energy" in record.attrs:
+        blocks.append(_exchange(record))
     if "specimen_joint_position" in record:
         blocks += specimen_blocks(record)
+    if "specimen_displacement" in record:
+        blocks += point_blocks(record)
     return blocks
+
+
+def _exchange(record: xr.Dataset) -> Table:
+    """Energy and stability of the exchange with a specimen that is a program."""
+    facts = [
+        ("largest energy that passed the interface [kJ]", number(record.attrs["interface_energy"] / 1e3)),
+        ("created by the exchange, share of it", f"{record.attrs['interface_energy_error']:.2g}"),
+        ("growth of errors per exchange (below 1: stable)", f"{record.attrs['interface_growth']:.2g}"),
+    ]
+    return Table("Exchange", ("Quantity", "Value"), facts)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from .plant import Plant
+from .rigid_body import platen_body
 
 __all__ = ["SpecimenJoint", "joints_beyond", "specimen_doubts", "specimen_joints", "specimen_positions"]
 
@@ -89,4 +90,4 @@ def joints_beyond(plant: Plant, time: Array, q: Array) -> list[str]:
 
 def _mass(plant: Plant) -> float:
     """Mass of the specimen [kg]: what the model has beyond the bare table's."""
-    return float(sum(i.mass for i in plant.model.inertias)) - plant.machine.platen.isotropic_mass
+    return float(sum(i.mass for i in plant.model.inertias)) - float(platen_body(plant.machine)[0].mass)

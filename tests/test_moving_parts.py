@@ -10,6 +10,7 @@ from test_rigid_body import ABOVE, forces_at, random_states
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.names import ENGINES
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import displacement_of, platen_pose_at, required_wrench_at
 from lhpost6_pin.mechanics.leg_bodies import leg_bodies
@@ -22,7 +23,9 @@ from lhpost6_pin.mechanics.ports import platen_pose
 from lhpost6_pin.mechanics.pose import PlantMotion, PlatenMotion, plant_motion, rotation
 from lhpost6_pin.mechanics.required_wrench import require_alike, required_wrench, rigid_wrenches, wrenches_at_c
 from lhpost6_pin.mechanics.rigid_body import platen_inertia
-from lhpost6_pin.mechanics.schemes import TAU, set_twist
+from lhpost6_pin.mechanics.schemes import TAU, A, set_twist
+from lhpost6_pin.mechanics.specimen_joints import specimen_doubts
+from lhpost6_pin.mechanics.workspace import make_workspace
 from lhpost6_pin.simulation.energy import energy_audit
 from lhpost6_pin.simulation.ledger import States, force_ledger
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
@@ -254,12 +257,17 @@ def test_ledger_balances_with_a_specimen_fixed_or_swinging(locked):
     a = make_dynamics(plant)(q, v, ws.motion[TAU])
     ledger = force_ledger(States(plant, np.zeros(1), q[None], v[None], a[None], z[None]))
     close(ledger.residual, np.zeros(6), 1e-12 * np.abs(ledger.inertia).max())
+    lumped = make_plant(machine_named("lhpost6").with_specimen(PENDULUM, ABOVE, locked=locked))
+    assert specimen_doubts(plant) == specimen_doubts(lumped)  # the specimen's mass is what the model has beyond
 
 
 def test_equilibrium_holds_the_bodies_where_they_are():
     rest = find_equilibrium(PLANT)
     ws = forces_at(PLANT, rest.state.q, rest.state.v, rest.state.z)
     assert np.abs(make_dynamics(PLANT)(rest.state.q, rest.state.v, ws.motion[TAU])).max() < 1e-11  # of 400 m/s2 of oil
+    run = make_workspace(PLANT, rest.state)
+    assert evaluate_derivatives(PLANT, run, rest.spool) == 0
+    assert np.abs(run.motion[A]).max() < 1e-11  # the compiled projection, as runs start with it
     assert rest.wrench.linear[2] == pytest.approx(  # what the struts pull down, and all weight
         sum(s.pressure * s.area for s in FULL.struts) - static_wrench(PLANT, np.zeros(6))[2], rel=1e-12
     )

@@ -5,6 +5,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.compiled import compiled
 from .leg_model import Dynamics, make_dynamics
+from .moving_parts import bodies_acceleration
 from .plant import Plant
 from .rigid_body import platen_inertia
 from .schemes import TAU, V_SEEN, A, V, rates_stage
@@ -34,8 +35,17 @@ def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
     """Forces, rates and acceleration at the state in `ws`, as every run needs them at its start."""
     status = evaluate(plant, ws, spool)
     if status == 0:
-        ws.motion[A] = forward_dynamics(plant)(ws.q, ws.motion[V], ws.motion[TAU])
+        if plant.machine.bodies == "full" and not plant.articulated:
+            _accelerate_bodies(plant.tables.packed, ws.buffer)  # no Pinocchio model of the legs to build for one state
+        else:
+            ws.motion[A] = forward_dynamics(plant)(ws.q, ws.motion[V], ws.motion[TAU])
     return status
+
+
+@compiled
+def _accelerate_bodies(packed, buffer):  # type: ignore[no-untyped-def]
+    tables, ws = unpack_tables(packed), unpack_workspace(buffer)
+    bodies_acceleration(tables, ws.frame, ws.motion[TAU], np.empty((9, 6)), ws.motion[A])
 
 
 def evaluate(plant: Plant, ws: Workspace, spool: Array) -> int:

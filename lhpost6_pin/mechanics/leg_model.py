@@ -21,7 +21,7 @@ from ..core.arrays import Array
 from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
 from .leg_bodies import LegBody, leg_bodies
-from .leg_motion import follow_platen, solve_projected
+from .leg_motion import follow_platen, leg_joints, solve_projected
 from .plant import Plant
 
 __all__ = ["Dynamics", "LegModel", "make_dynamics", "make_leg_model"]
@@ -40,13 +40,12 @@ class LegModel:
         self._data = self.model.createData()
         n, slots = self.model.nv, [[c.kind] * (1 if _upright(c) else 3) for c in plant.machine.components]
         self.kinds = [kind for kinds in slots for kind in kinds]  # of each joint's component
-        self.position, self.velocity, self.bias = np.zeros((3, n))
-        self.jacobian = np.zeros((n, 6))
+        self.buffer = np.zeros(9 * n)
+        self.position, self.velocity, self.bias, self.jacobian = leg_joints(self.buffer)
 
     def follow(self, q: Array, v: Array) -> None:
         """Fill position, Jacobian, velocity and bias acceleration of the legs' joints for a pose and twist."""
-        tables, out = self.plant.tables, (self.position, self.jacobian, self.velocity, self.bias)
-        follow_platen(q, v, tables.axes, tables.legs, tables.body, self._zero, *out)
+        follow_platen(q, v, self.plant.tables.packed, self._zero, self.buffer)
 
     def forces(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Mass matrix (n, n) and forces (n,) of the legs' joints on the platen's motion with dV/dt = 0."""
@@ -120,16 +119,14 @@ def make_dynamics(plant: Plant) -> Dynamics:
     model, data = plant.model, plant.model.createData()
     if plant.machine.bodies == "lumped":
         return partial(pin.aba, model, data)
-    legs, tables = LegModel(plant), plant.tables
-    crba, effects, frame, free = pin.crba, pin.nonLinearEffects, np.zeros((8, 3)), plant.axes.size
-    modal = tables.inertia[0]["modal"][np.ix_(plant.axes, plant.axes)]
+    legs, packed = LegModel(plant), plant.tables.packed
+    crba, effects, free = pin.crba, pin.nonLinearEffects, plant.axes.size
+    modal = plant.tables.inertia[0]["modal"][np.ix_(plant.axes, plant.axes)]
 
     def acceleration(q: Array, v: Array, tau: Array) -> Array:
         mass, force = legs.forces(q, v)
-        own = np.ascontiguousarray(crba(model, data, q))
+        own, bias = np.ascontiguousarray(crba(model, data, q)), effects(model, data, q, v)
         own[:free, :free] -= modal
-        bias, a = effects(model, data, q, v), np.empty(model.nv)
-        solve_projected(own, bias, mass, force, legs.jacobian, tables, frame, q, v, tau, a)
-        return a
+        return np.asarray(solve_projected(own, bias, mass, force, legs.buffer, packed, q, v, tau))
 
     return acceleration

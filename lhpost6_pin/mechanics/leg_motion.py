@@ -8,13 +8,14 @@ import math
 
 import numpy as np
 
-from ..core.compiled import compiled
+from ..core.compiled import compiled, compiled_views
 from .moving_parts import solve_positive
 from .ports import platen_pose
 from .schemes import set_twist
 from .spatial import cross, from_body, to_body
+from .tables import unpack_tables
 
-__all__ = ["follow_platen", "solve_projected"]
+__all__ = ["follow_platen", "leg_joints", "solve_projected"]
 
 
 @compiled
@@ -28,12 +29,22 @@ def _set_row(G, n, frame, rho, scale, axis, e):
     G[n, 3], G[n, 4], G[n, 5] = cross(rho, (scale * x, scale * y, scale * z))
 
 
+@compiled_views
+def leg_joints(buffer):
+    """Positions, velocities and bias accelerations (n,), and the Jacobian (n, 6), of a buffer of 9 n numbers."""
+    n = buffer.size // 9
+    return buffer[:n], buffer[n : 2 * n], buffer[2 * n : 3 * n], buffer[3 * n :].reshape((n, 6))
+
+
 @compiled
-def follow_platen(q, v, axes, legs, body, zero, x, G, rate, bias):
-    """Fill positions x, Jacobian G, velocities and bias accelerations of the legs' joints (`make_leg_model`)."""
+def follow_platen(q, v, packed, zero, buffer):
+    """Fill the legs' joints in buffer (`leg_joints`) from pose and twist; packed is `Tables.packed`."""
+    tables = unpack_tables(packed)
+    legs, body = tables.legs, tables.body
+    x, rate, bias, G = leg_joints(buffer)
     frame = np.zeros((8, 3))
-    platen_pose(q, axes, body, frame)
-    set_twist(v, axes, frame)
+    platen_pose(q, tables.axes, body, frame)
+    set_twist(v, tables.axes, frame)
     twist = np.empty(6)
     twist[:3] = frame[4]
     twist[3:] = frame[5]
@@ -101,9 +112,15 @@ def _follow_bearing(frame, leg, plane, n, x, G, bias):
 
 
 @compiled
-def solve_projected(M, h, legs, force, G, tables, frame, q, v, tau, a):
-    """Acceleration of platen, legs and specimen joints: a holds the result; M, the model's own, is overwritten."""
+def solve_projected(M, h, legs, force, buffer, packed, q, v, tau):
+    """Acceleration (nv,) of platen and specimen joints; M, the model's own mass matrix, is overwritten.
+
+    h (nv,) are the model's own bias and weight, legs (n, n) and force (n,) of the legs' joints in buffer.
+    """
+    tables = unpack_tables(packed)
     axes, extra, n = tables.axes, tables.inertia[0].extra, tau.size
+    _, _, _, G = leg_joints(buffer)
+    a, frame = np.empty(n), np.zeros((8, 3))
     platen_pose(q, axes, tables.body, frame)
     set_twist(v, axes, frame)
     moved, momentum, total = np.zeros((G.shape[0], 6)), np.zeros(6), np.zeros(6)
@@ -135,3 +152,4 @@ def solve_projected(M, h, legs, force, G, tables, frame, q, v, tau, a):
                 more += G[k, axes[i]] * moved[k, axes[j]]
             M[i, j] += more
     solve_positive(M, n, a)
+    return a

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from .plant import Plant
+from .rigid_body import platen_body
 
 __all__ = ["SpecimenJoint", "joints_beyond", "specimen_doubts", "specimen_joints", "specimen_mass"]
 __all__ += ["specimen_positions"]
@@ -90,5 +91,5 @@ def joints_beyond(plant: Plant, time: Array, q: Array) -> list[str]:
 
 def specimen_mass(plant: Plant) -> float:
     """Mass of the specimen [kg]: what the model has beyond the bare table's, and the weight of a coupled one."""
-    own = float(sum(i.mass for i in plant.model.inertias)) - plant.machine.platen.isotropic_mass
+    own = float(sum(i.mass for i in plant.model.inertias)) - float(platen_body(plant.machine)[0].mass)
     return own - float(plant.rest_external[2]) / plant.machine.platen.gravity

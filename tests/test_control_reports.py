@@ -135,6 +135,18 @@ def test_a_tuning_that_falls_short_says_where(tmp_path, machine, settings, chang
     assert not NO_NUMBER.search(Reader(page).words)
 
 
+def test_settings_that_were_unstable_before_are_called_so_and_have_no_curve(tmp_path, machine, settings):
+    nothing = replace(delayed(), response=np.nan * delayed().response, coherence=0.0 * delayed().coherence)
+    lost = {"before": nothing, "margin_before": Margin(*(np.nan,) * 4), "delay_after": np.nan}
+    page = Reader(
+        write_tune_report(replace(make_tuning(machine, settings, **lost), was_stable=False), tmp_path / "t.html")
+    )
+    assert f"With the settings before, {settings.name}, the loop is unstable." in page.verdict[1]
+    assert "before: unstable" in page.words and "– to –" not in page.words and not NO_NUMBER.search(page.words)
+    assert {t["name"] for t in page.figures["bode-x"]["traces"]} == {"after", "linear model"}
+    assert len([k for k in page.figures["overview"]["layout"] if k.startswith("yaxis")]) == 1
+
+
 def test_a_loop_that_is_unstable_with_doubled_gains_is_pointed_out(tmp_path, machine, settings):
     page = write_tune_report(replace(make_tuning(machine, settings), doubled=False), tmp_path / "t.html")
     level, verdict = Reader(page).verdict

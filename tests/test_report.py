@@ -257,6 +257,22 @@ def test_the_verdict_leads_with_clipped_spools(tmp_path):
     assert clean.level == "good"
 
 
+@pytest.mark.parametrize(("loop", "level"), [("stable", "good"), ("thin", "attention"), ("unstable", "bad")])
+def test_the_verdict_names_a_loop_without_margin_and_its_remedy(tmp_path, loop, level):
+    record = make_record()
+    record.attrs |= {"loop": loop, "loop_summary": "The control loop is what it is", "loop_remedy": "lhpost6 tune --x"}
+    summary, _ = report(tmp_path, record, limits=LIMITS)
+    assert summary.level == level
+    assert ("lhpost6 tune --x" in summary.verdict) == (loop != "stable")
+
+
+def test_a_target_was_not_followed_with_clipped_commands(tmp_path):
+    record = make_record()
+    record.attrs["spool_values_clipped"] = 21900
+    summary, _ = report(tmp_path, record, limits=LIMITS)
+    assert "The table tracked its target" not in summary.verdict and "does not follow its target" in summary.verdict
+
+
 def test_the_verdict_on_a_run_that_stopped_begins_with_that_and_judges_nothing_else(tmp_path):
     record = make_record()
     record.attrs["trouble"] = "stopped at 0.1606 s: V1 left its stroke of +-0.4 m; scale the motion down"

@@ -50,7 +50,8 @@ def print_tuning(tuning: Tuning) -> None:
     limits = [f"{axis.axis}: {axis.limited_by}" for axis in tuning.axes]
     stable = "stable" if tuning.doubled else "unstable"
     doubled = f"With all master gains doubled, without dry friction: {stable}"
-    print_blocks(*tuning_tables(tuning), changed, *limits, doubled)
+    before = [] if tuning.was_stable else [f"Unstable with the settings before, {tuning.before.name}"]
+    print_blocks(*before, *tuning_tables(tuning), changed, *limits, doubled)
 
 
 def print_iterations(result: Iterated) -> None:

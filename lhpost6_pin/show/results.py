@@ -127,6 +127,7 @@ def tuning_entries(found: Tuning) -> Entries:
     return {
         "tolerance_db": found.tolerance,
         "coherence": found.coherence,
+        "stable_before": found.was_stable,
         "stable_with_gains_doubled": found.doubled,
         "axes": axes,
     }

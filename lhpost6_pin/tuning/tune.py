@@ -77,6 +77,7 @@ class Tuning:
     doubled: bool  # stable with all master gains doubled, in a simulation without dry friction
     model: LoopModel
     expected: Complex  # (m, n, n) response of the linear model with the settings found
+    was_stable: bool = True  # whether the settings before were stable: else they have no response
 
 
 def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress | None = None) -> Tuning:
@@ -123,6 +124,7 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
         tolerance=targets.decibels,
         coherence=targets.coherence,
         doubled=stable,
+        was_stable=len(compared) > 1,
         model=job.model,
         expected=expected_response(job.model, job.controller(tuned)),
     )

@@ -27,7 +27,7 @@ def bode_figure(tuning: Tuning, a: int) -> Figure:
     """Return magnitude, phase without the common delay and as measured, and coherence of axis `a`."""
     axis = tuning.axes[a]
     curves, coherent = [], []
-    for name, transfer, line in (("before", axis.before, BEFORE), ("after", axis.after, AFTER)):
+    for name, transfer, line in _measured(tuning, a):
         f, part = _drawn(transfer.frequency)
         curves.append(_response(name, line, f, transfer.response[part, 0, 0], tuning.delay))
         coherent.append(Curve(name, f, transfer.coherence[part, 0], line))
@@ -49,7 +49,7 @@ def bode_figure(tuning: Tuning, a: int) -> Figure:
 def overview_figure(tuning: Tuning) -> Figure:
     """Return the magnitudes of all axes before and after tuning."""
     panels = []
-    for name in ("before", "after"):
+    for name in ("before", "after") if tuning.was_stable else ("after",):
         curves = []
         for axis in tuning.axes:
             transfer: Transfer = getattr(axis, name)
@@ -58,7 +58,18 @@ def overview_figure(tuning: Tuning) -> Figure:
         band = (-tuning.tolerance, tuning.tolerance)
         panels.append(Panel(f"Magnitude {name} [dB]", curves, span=GAINS, band=band))
     words = f"Reference to achieved acceleration of each axis; the shaded band is ±{tuning.tolerance:g} dB."
-    return _over_frequency("overview", "All axes before and after", words, panels)
+    title = "All axes before and after"
+    if not tuning.was_stable:
+        title = "All axes after tuning"
+        words += " With the settings before, the loop is unstable: it has no response."
+    return _over_frequency("overview", title, words, panels)
+
+
+def _measured(tuning: Tuning, a: int) -> list[tuple[str, Transfer, dict[str, Any]]]:
+    """Responses of axis `a` that were measured: those of unstable settings were not."""
+    axis = tuning.axes[a]
+    both = [("before", axis.before, BEFORE), ("after", axis.after, AFTER)]
+    return both if tuning.was_stable else both[1:]
 
 
 def _over_frequency(name: str, title: str, words: str, panels: list[Panel], **size: int) -> Figure:

@@ -15,6 +15,7 @@ __all__ = ["tuning_tables", "write_tune_report"]
 # Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
 FOLLOWED = (0.1, 20.0)  # [Hz]
 GAIN_MARGIN = 6.0  # [dB]
+UNSTABLE = "unstable"  # of settings without a response
 
 
 def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Path:
@@ -58,10 +59,11 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
     short = [f"{axis.axis} {_band(axis.band_after)}" for axis in tuning.axes if not _follows(axis)]
     low = [a for a in tuning.axes if not 20.0 * np.log10(a.margin_after.gain) >= GAIN_MARGIN]
     margins = ", ".join(f"{axis.axis} {decibels(axis.margin_after.gain)}" for axis in low)
+    before = "" if tuning.was_stable else f"With the settings before, {tuning.before.name}, the loop is unstable. "
     words = [
-        f"Not all axes are within {tuning.tolerance:g} dB and coherent {band}: {', '.join(short)}."
+        f"{before}Not all axes are within {tuning.tolerance:g} dB and coherent {band}: {', '.join(short)}."
         if short
-        else f"Every axis is within {tuning.tolerance:g} dB of its reference and coherent {band}.",
+        else f"{before}Every axis is within {tuning.tolerance:g} dB of its reference and coherent {band}.",
         f"Gain margin below {GAIN_MARGIN:g} dB: {margins}."
         if low
         else f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.",
@@ -76,24 +78,25 @@ def _headlines(tuning: Tuning) -> list[Headline]:
     lost = [axis for axis in tuning.axes if np.isnan(axis.band_after[1])]
     narrow = lost[0] if lost else min(tuning.axes, key=lambda axis: axis.band_after[1])
     close = min(tuning.axes, key=lambda axis: axis.margin_after.gain)
-    late = [axis.delay_after for axis in tuning.axes]
+    late = [axis.delay_after for axis in tuning.axes if np.isfinite(axis.delay_after)]
+    measured = f"measured after tuning: {number(1e3 * min(late))} to {milliseconds(max(late))}" if late else ""
     return [
         Headline(
             _band(narrow.band_after),
             "Narrowest band",
-            f"axis {narrow.axis}; before {_band(narrow.band_before)}",
+            f"axis {narrow.axis}; before: {_band_before(tuning, narrow)}",
             "bad" if lost else "good" if all(map(_follows, tuning.axes)) else "attention",
         ),
         Headline(
             decibels(close.margin_after.gain),
             "Smallest gain margin",
-            f"axis {close.axis}, {_at(close.margin_after.gain_frequency)}; before {decibels(close.margin_before.gain)}",
+            f"axis {close.axis}, {_at(close.margin_after.gain_frequency)}; before: {_margin_before(tuning, close)}",
             "good" if 20.0 * np.log10(close.margin_after.gain) >= GAIN_MARGIN else "attention",
         ),
         Headline(
             milliseconds(tuning.delay),
             "Common target delay",
-            f"measured {number(1e3 * min(late))} to {milliseconds(max(late))}",
+            measured or "not measured: no axis is coherent",
         ),
     ]
 
@@ -103,11 +106,16 @@ def tuning_tables(tuning: Tuning) -> list[Block]:
     bands: list[tuple[str, ...]] = []
     margins: list[list[str]] = []
     for axis in tuning.axes:
-        delays = milliseconds(axis.delay_before), milliseconds(axis.delay_after)
-        spread = _extremes(axis, after=False), _extremes(axis, after=True)
-        bands.append((axis.axis, _band(axis.band_before), _band(axis.band_after), *delays, *spread))
+        before = milliseconds(axis.delay_before), _extremes(axis, after=False)
+        if not tuning.was_stable:
+            before = UNSTABLE, UNSTABLE
+        delays, spread = (before[0], milliseconds(axis.delay_after)), (before[1], _extremes(axis, after=True))
+        bands.append((axis.axis, _band_before(tuning, axis), _band(axis.band_after), *delays, *spread))
         margins.append([axis.axis])
         for margin in (axis.margin_before, axis.margin_after):
+            if margin is axis.margin_before and not tuning.was_stable:
+                margins[-1] += [UNSTABLE, UNSTABLE]
+                continue
             margins[-1].append(f"{decibels(margin.gain)} {_at(margin.gain_frequency)}")
             margins[-1].append(f"{degrees(margin.phase)} {_at(margin.phase_frequency)}")
     what = f"Unbroken band around 1 Hz within {tuning.tolerance:g} dB, coherence at least {tuning.coherence:g}"
@@ -133,7 +141,17 @@ def _extremes(axis: AxisTuning, *, after: bool) -> str:
     measured = axis.after if after else axis.before
     f = measured.frequency
     size = np.abs(measured.response[(f >= FOLLOWED[0]) & (f <= FOLLOWED[1]), 0, 0])
-    return f"{decibels(size.min(), sign=True)} to {decibels(size.max(), sign=True)}" if size.size else "–"
+    if not size.size or not np.isfinite(size).any():
+        return "–"
+    return f"{decibels(np.nanmin(size), sign=True)} to {decibels(np.nanmax(size), sign=True)}"
+
+
+def _band_before(tuning: Tuning, axis: AxisTuning) -> str:
+    return _band(axis.band_before) if tuning.was_stable else UNSTABLE
+
+
+def _margin_before(tuning: Tuning, axis: AxisTuning) -> str:
+    return decibels(axis.margin_before.gain) if tuning.was_stable else UNSTABLE
 
 
 def _limits(tuning: Tuning) -> list[Block]:

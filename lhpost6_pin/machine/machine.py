@@ -101,6 +101,14 @@ class Machine(Structure):
             return self
         return self.with_params({f"{a.kind}.valves": count for a in self.actuators if a.area_b is not None})
 
+    def with_flow_reading(self, reading: str) -> "Machine":
+        """Return a copy with a reading of Eq. 4-2, one of `FLOW_READINGS`; raises UnknownNameError."""
+        if reading not in FLOW_READINGS:
+            raise UnknownNameError("reading of the valve flow", reading, FLOW_READINGS)
+        words = {**self.parameters.words, "machine.flow_reading": reading}
+        parameters = replace(self.parameters, words=words)
+        return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
+
     def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
         """Return a copy with the servovalves open that a record's attributes state, none stated: as it is.
 

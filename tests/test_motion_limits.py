@@ -133,7 +133,7 @@ def test_a_motion_beyond_the_valves_says_what_the_other_reading_of_eq_4_2_admits
     plant, target = plant_named("lhpost6"), make_target(find_motion("sxh1"), rate=float(SAMPLE_RATE))
     with pytest.raises(OutOfRangeError, match='flow_reading = "full_stroke"') as caught:
         check_motion_limits(plant, target)
-    other = make_plant(plant.machine.with_params({"machine.flow_reading": "full_stroke"}))
+    other = make_plant(plant.machine.with_flow_reading("full_stroke"))
     fits = fitting_scale(other, target)
     assert str(caught.value).endswith(f"the largest scale is {fits:g}") and fits > caught.value.largest_scale
 

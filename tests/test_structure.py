@@ -18,7 +18,14 @@ PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.leg_model", "mechanics.linearize"),
     *("mechanics.instant", "mechanics.payload"),
-    *("mechanics.coupled", "mechanics.interface", "mechanics.opensees", "simulation.coupling", "simulation.running"),
+    *(
+        "mechanics.coupled",
+        "mechanics.coupled_specimen",
+        "mechanics.interface",
+        "mechanics.opensees",
+        "simulation.coupling",
+        "simulation.running",
+    ),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }

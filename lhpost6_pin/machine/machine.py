@@ -106,8 +106,16 @@ class Machine(Structure):
 
     def with_bodies(self, bodies: str) -> "Machine":
         """Return a copy with moving parts of its legs "lumped" to the platen, or as bodies of their own ("full")."""
-        words = {**self.parameters.words, "machine.bodies": bodies}
-        parameters = replace(self.parameters, words=words)
+        return self._with_word("bodies", bodies)
+
+    def with_flow_reading(self, reading: str) -> "Machine":
+        """Return a copy with a reading of Eq. 4-2, one of `FLOW_READINGS`; raises UnknownNameError."""
+        if reading not in FLOW_READINGS:
+            raise UnknownNameError("reading of the valve flow", reading, FLOW_READINGS)
+        return self._with_word("flow_reading", reading)
+
+    def _with_word(self, key: str, word: str) -> "Machine":
+        parameters = replace(self.parameters, words={**self.parameters.words, f"machine.{key}": word})
         return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
 
     def with_inertia(self, estimate: str) -> "Machine":

@@ -90,7 +90,7 @@ def flow_readings(machine: Machine) -> tuple[FlowReading, ...]:
     if not has_printed_capacity(machine):
         return ()
     par, bare = machine.parameters, machine.with_valves(2)
-    plants = [make_plant(bare.with_params({"machine.flow_reading": word})) for word in FLOW_READINGS]
+    plants = [make_plant(bare.with_flow_reading(word)) for word in FLOW_READINGS]
     speeds = [axis_speeds(plant).min(axis=1) for plant in plants]
     limits = machine.limits.velocity
     rows = [

@@ -122,7 +122,8 @@ def print_modes(machine: Machine) -> None:
     full = {m.axis: (f"{m.frequency:.2f}", f"{100 * m.damping:.2f}") for m in oil_column_modes(machine, undamped=False)}
     rows = [(m.axis, f"{m.frequency:.2f}", *full.get(m.axis, ("", ""))) for m in oil_column_modes(machine)]
     header = ("axis", "undamped [Hz]", "with sticking friction and leakage [Hz]", "damping [%]")
-    print_blocks(Table("Oil-column modes", header, rows))
+    bare = " of the bare table" if machine.specimen else ""
+    print_blocks(Table(f"Oil-column modes{bare}", header, rows))
 
 
 def print_motions(name: str | None = None) -> None:

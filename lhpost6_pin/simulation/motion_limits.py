@@ -112,5 +112,5 @@ def _axis_limits(plant: Plant) -> MotionLimits:
 def _by_other_reading(plant: Plant, target: Target) -> str:
     """The scale that fits by the other reading of Eq. 4-2, as a sentence."""
     (other,) = (word for word in FLOW_READINGS if word != plant.machine.flow_reading)
-    fits = fitting_scale(make_plant(plant.machine.with_params({"machine.flow_reading": other})), target)
+    fits = fitting_scale(make_plant(plant.machine.with_flow_reading(other)), target)
     return f'. With the other reading of Eq. 4-2 (machine.flow_reading = "{other}") the largest scale is {fits:g}'

@@ -27,6 +27,7 @@ PINOCCHIO = {
         "simulation.running",
     ),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
+    *("mechanics.interface_wrench", "mechanics.specimen_modes", "identification.decompose.interface"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }
 """Modules that may import pinocchio."""

@@ -7,11 +7,11 @@ import typer
 
 from .app import command, print_result, progress_bar, stderr
 from .live_view import LiveOptions, watched
+from .motion_options import MotionOptions
 from .options import (
     Cancel,
     ControllerName,
     Json,
-    MotionOptions,
     Out,
     SpecimenOptions,
     Valves,

@@ -12,6 +12,7 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import completing
 from .loop_check import checked_loop, interaction_of, loop_facts
+from .motion_options import MotionOptions
 from .rehearse import save_run
 
 __all__ = ["iterate", "replay", "sine", "tune"]
@@ -49,7 +50,7 @@ def tune(
 
 @command()
 def iterate(
-    motion: opt.MotionOptions,
+    motion: MotionOptions,
     machine: opt.SpecimenOptions,
     most: Annotated[int | None, typer.Option(min=1, help="Iterations after the first run.")] = None,
     gain: Annotated[float | None, typer.Option(min=0.0, max=1.0, help="Gain of the drive's update.")] = None,

@@ -14,6 +14,7 @@ from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
 from .live_view import LiveOptions, watched
 from .loop_check import checked_loop, interaction_of, loop_facts, retuned
+from .motion_options import MotionOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +29,7 @@ __all__ = ["campaign", "motions", "open_loop", "run", "save_run"]
 
 @command()
 def run(
-    motion: opt.MotionOptions,
+    motion: MotionOptions,
     steps: opt.StepOptions,
     machine: opt.SpecimenOptions,
     view: LiveOptions,

@@ -1,0 +1,104 @@
+"""Options that select a motion and its processing, and the target that follows."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..core.errors import MotionError
+from ..core.names import SAMPLE_RATE
+from .completion import complete_motion
+
+if TYPE_CHECKING:
+    from ..machine.machine import Machine
+    from ..motions import GroundMotion, Target
+
+__all__ = ["MotionOptions"]
+
+
+@dataclass(frozen=True)
+class MotionOptions:
+    """Options that select a motion and its processing."""
+
+    motion: Annotated[
+        list[str],
+        typer.Argument(
+            help="Name (see `lhpost6 motions`), file(s), or name and file(s).", autocompletion=complete_motion
+        ),
+    ]
+    scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0
+    axes: Annotated[
+        str | None, typer.Option(help="Axes, such as xyz, x, or x=y (the table's x moved by component y).")
+    ] = None
+    high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None
+    low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None
+    set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None
+    dt: Annotated[float | None, typer.Option(help="Time step of a motion file that does not say it [s].")] = None
+    unit: Annotated[str | None, typer.Option(help="Unit of a motion file that does not say it, such as g.")] = None
+    channels: Annotated[
+        str | None, typer.Option(help="Channels or columns of a motion file by axis, such as x=2,y=1,z=3.")
+    ] = None
+    rotate: Annotated[
+        float | None,
+        typer.Option(help=r"Azimuth that the table's x gets: turns a file's horizontal components \[deg]."),
+    ] = None
+
+    rotation_factor: Annotated[
+        float | None,
+        typer.Option(help="Factor of a file's rotations; the report's test SFU has 1000."),
+    ] = None
+
+    def target(self, table: "Machine", beyond: bool = False) -> "Target":
+        """Target of the motion at the controller's rate; raises OutOfRangeError beyond the limits, unless allowed."""
+        from ..mechanics.plant import make_plant
+        from ..motions import make_target
+        from ..simulation.motion_limits import check_motion_limits
+
+        target = make_target(
+            self._ground(),
+            scale=self.scale,
+            axes=self.axes or (None if table.motion == "free" else table.motion),
+            high_pass=self.high_pass,
+            low_pass=self.low_pass,
+            rate=float(SAMPLE_RATE),
+        )
+        if not beyond:
+            check_motion_limits(make_plant(table), target)
+        return target
+
+    def _ground(self) -> "GroundMotion":
+        """Motion by name, from one file or three component files, or by name from such files."""
+        from ..motions import find_motion, load_motion
+
+        options: dict[str, Any] = {}
+        for item in self.set_ or []:
+            key, equals, value = item.partition("=")
+            if not equals:
+                raise MotionError(f"--set {item}: write key=value")
+            options[key.strip()] = _number_or_text(value.strip())
+        about_file = {"time_step": self.dt, "units": self.unit, "channels": self.channels, "rotate": self.rotate}
+        about_file["rotation_factor"] = self.rotation_factor
+        about_file = {key: value for key, value in about_file.items() if value is not None}
+        first, *files = self.motion
+        if not _is_file(first) and files and not any(map(_is_file, files)):
+            raise MotionError(f"one motion at a time; got {', '.join(self.motion)}, none of which is a file")
+        if about_file and not (files or _is_file(first)):
+            raise MotionError(
+                f"{first}: --dt, --unit, --channels, --rotate and --rotation-factor are for motions from files"
+            )
+        options |= about_file
+        return load_motion(self.motion, **options) if _is_file(first) else find_motion(first, files, **options)
+
+
+def _is_file(name: str) -> bool:
+    return bool(Path(name).suffix) or Path(name).is_file()
+
+
+def _number_or_text(text: str) -> int | float | str:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

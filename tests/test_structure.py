@@ -17,7 +17,15 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
-    *("mechanics.coupled", "mechanics.interface", "mechanics.opensees", "simulation.coupling", "simulation.running"),
+    *(
+        "mechanics.coupled",
+        *("mechanics.coupled", "mechanics.coupled_maker", "mechanics.interface", "mechanics.opensees"),
+        *("simulation.coupling", "simulation.running"),
+        "mechanics.interface",
+        "mechanics.opensees",
+        "simulation.coupling",
+        "simulation.running",
+    ),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }

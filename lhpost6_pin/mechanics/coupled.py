@@ -20,18 +20,16 @@ same. A method `interface_mass(dt)` may state the whole matrix M_inf (6, 6), lin
 an acceleration of the base at once; without it a copy of the memory is probed (`simulation.coupling`).
 """
 
-import inspect
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
 
-from ..core.errors import ParameterError, SimulationError
-from ..core.user_code import call_user, make_attribute
+from ..core.errors import SimulationError
+from ..core.user_code import call_user
 from ..machine.machine import Machine
-from ..machine.user_specimen import UserSpecimen
 
-__all__ = ["BaseMotion", "CoupledSpecimen", "base_at_rest", "base_placement", "checked_wrench", "coupled_specimen"]
+__all__ = ["BaseMotion", "CoupledSpecimen", "base_at_rest", "base_placement", "checked_wrench"]
 __all__ += ["rigid_wrench", "start_coupled", "step_coupled"]
 
 
@@ -57,39 +55,6 @@ class CoupledSpecimen(Protocol):
 
     def step(self, memory: Any, base: BaseMotion, dt: float) -> pin.Force:
         """Wrench dt [s] after the last call, of the motion of the base at that instant; called in order."""
-
-
-def coupled_specimen(machine: Machine) -> CoupledSpecimen | None:
-    """Specimen of a machine that is coupled, made ready; None if it has none.
-
-    Raises ParameterError for an object that is no specimen, naming what it lacks.
-    """
-    described = machine.specimen
-    if not isinstance(described, UserSpecimen):
-        return None
-    maker: Any = described.maker
-    if inspect.isfunction(maker) and next(iter(inspect.signature(maker).parameters), "") == "ops":
-        from .opensees import OpenSeesSpecimen
-
-        return OpenSeesSpecimen(maker, described.name)
-    made = maker
-    if inspect.isclass(maker) or inspect.isfunction(maker):
-        made = make_attribute(described.source, maker, ParameterError)
-    for method in ("init", "step"):
-        if not callable(getattr(made, method, None)):
-            raise ParameterError(
-                f"{described.source} has no {method}(); a specimen has init(base, gravity) and step(memory, base, dt), "
-                "an OpenSees model is a function build(ops, base)"
-            )
-    if not isinstance(getattr(made, "inertia", None), pin.Inertia):
-        raise ParameterError(
-            f"{described.source} has no inertia; name the rigidly attached part, inertia = pin.Inertia(...), or none: "
-            "inertia = pin.Inertia.Zero()"
-        )
-    if not np.isfinite(made.inertia.toDynamicParameters()).all() or made.inertia.mass < 0.0:
-        raise ParameterError(f"{described.source}: inertia has a mass of {made.inertia.mass:g} kg, or is not finite")
-    found: CoupledSpecimen = made
-    return found
 
 
 def base_at_rest(machine: Machine) -> BaseMotion:

@@ -17,17 +17,10 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.leg_model", "mechanics.linearize"),
-    *("mechanics.instant", "mechanics.payload"),
-    *(
-        "mechanics.coupled",
-        "mechanics.coupled_specimen",
-        "mechanics.interface",
-        "mechanics.opensees",
-        "simulation.coupling",
-        "simulation.running",
-    ),
+    *("mechanics.instant", "mechanics.payload", "mechanics.interface_wrench", "mechanics.specimen_modes"),
+    *("mechanics.coupled", "mechanics.coupled_maker", "mechanics.interface", "mechanics.opensees"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
-    *("mechanics.interface_wrench", "mechanics.specimen_modes", "identification.decompose.interface"),
+    *("simulation.coupling", "simulation.running", "identification.decompose.interface"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }
 """Modules that may import pinocchio."""

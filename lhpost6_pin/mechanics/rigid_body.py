@@ -22,7 +22,7 @@ from ..effects.modifiers import added_inertias
 from ..machine.machine import Machine
 from ..machine.user_specimen import UserSpecimen
 from .coupled import CoupledSpecimen, base_at_rest
-from .coupled_specimen import coupled_specimen
+from .coupled_maker import coupled_specimen
 from .specimen_mount import mount_specimen
 
 __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_body", "platen_inertia"]

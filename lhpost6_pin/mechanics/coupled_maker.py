@@ -1,4 +1,4 @@
-"""The coupled specimen of a machine, from the class, function or object that its description names."""
+"""The coupled specimen of a machine, made of a user's class, function or object, and checked."""
 
 import inspect
 from typing import Any

@@ -147,12 +147,12 @@ def main(
     title = "Constant vertical force, by lengths [m] of horizontal rods and barrels"
     print_blocks(Table(title, ("rod", "barrel", "Fz [kN]"), rows))
     alone, step = forward_dynamics(machine), steps(machine, seconds)
-    console.print("Forward dynamics alone [us]")
+    console.print("Forward dynamics alone [us]", markup=False)
     for name, value in alone.items():
-        console.print(f"  {value:9.3g}  {name}")
-    console.print("A step of 1/8192 s [us]")
+        console.print(f"  {value:9.3g}  {name}", markup=False)
+    console.print("A step of 1/8192 s [us]", markup=False)
     for name, value in step.items():
-        console.print(f"  {value:9.3g}  {name}")
+        console.print(f"  {value:9.3g}  {name}", markup=False)
     for engine in ENGINES:
         console.print(f"  {step[f'{engine}, full'] / step[f'{engine}, lumped']:9.3g}  {engine}, full over lumped")
     with write_whole(out / "moving_parts.json") as beside:

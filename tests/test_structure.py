@@ -17,6 +17,7 @@ ORDER += ["tuning", "interfaces", "identification", "discovery", "show", "cli"]
 PINOCCHIO = {
     *("mechanics.rigid_body", "mechanics.specimen_mount", "mechanics.kinematics", "mechanics.plant"),
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.linearize", "mechanics.instant"),
+    *("mechanics.interface_wrench", "mechanics.specimen_modes", "identification.decompose.interface"),
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),
 }

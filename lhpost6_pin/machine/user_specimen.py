@@ -33,9 +33,14 @@ class UserSpecimen(Specimen):
         return f"{self.file}:{self.attribute}" if self.file.suffix else self.attribute
 
     @property
-    def articulated(self) -> bool:
+    def is_urdf(self) -> bool:
         """No URDF."""
         return False
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The Python file, if any."""
+        return (self.file,) if self.file.suffix else ()
 
     @cached_property
     def contents(self) -> None:

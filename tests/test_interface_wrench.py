@@ -31,7 +31,7 @@ from lhpost6_pin.simulation.simulated_campaign import SensorErrors, as_sensed
 MACHINE = machine_named("lhpost6")
 G = MACHINE.platen.gravity
 PLACE = (1.0, 0.5, 0.2)
-BLOCK = """<robot name="block"><link name="block"><inertial><origin xyz="0 0 2.5"/><mass value="50000"/>
+BLOCK = """<robot name="block"><link name="block"><inertial><origin xyz="0 0 2.5"/><mass value="100000"/>
 <inertia ixx="150000" iyy="150000" izz="100000" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
 
 
@@ -71,7 +71,7 @@ def states(plant, count=8, seed=0):
 # ------------------------------------------------------------------------------------------------- identities
 def test_a_block_at_rest_exerts_its_weight_and_accelerated_its_inertia(block):
     plant = make_plant(MACHINE.with_specimen(block, PLACE))
-    mass, height, rest = 50000.0, 2.5, plant.zero_state()
+    mass, height, rest = 100000.0, 2.5, plant.zero_state()
     still = interface_force(plant, rest.q, rest.v, np.zeros(6))
     np.testing.assert_allclose(still.vector, [0, 0, -mass * G, 0, 0, 0], atol=1e-6)  # rounding of 5e5 N
     a = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # at rest and level, B accelerates as every point
@@ -162,16 +162,16 @@ def test_forces_of_a_noise_free_record_give_the_simulations_own_interface_wrench
 
 @pytest.mark.long
 def test_with_noise_base_shear_is_right_within_two_percent_and_its_interval_holds_the_truth(block):
-    """Calibration known: noise alone. 90 % of 1,000 samples at 33 Hz of six components, and three draws."""
+    """Calibration known: noise alone, of about 2 kN in base shear, whose RMS is some hundred. Two draws."""
     exact = {path: replace(q, sd=None) for path, q in MACHINE.parameters.quantities.items()}
     machine = replace(MACHINE, parameters=replace(MACHINE.parameters, quantities=exact)).with_specimen(block)
     sensors = replace(load_sensors(), gain_range={}, offset_range={}, delay_range={})
-    t, k = np.arange(10240)[:, None] / 2048, np.arange(10)
+    t, k = np.arange(8192)[:, None] / 2048, np.arange(10)
     wave = 0.25 * np.sin(2 * np.pi * (1.5 + 0.3 * k) * t + k) * np.minimum(1.0, 2 * t)
     run = driven(machine, wave * np.where(k < 4, 1.0, 0.05))
     record = record_of_run(run, {"test": "shaken", "title": "Shaken"})
     inside, error = [], []
-    for seed in range(3):
+    for seed in range(2):
         measured = as_sensed(record, sensors, SensorErrors({}, {}, {}), 512.0, np.random.default_rng(seed))
         assert "specimen_wrench" not in measured  # no sensor measures it
         found = decompose_record(machine, measured, sensors, align=False)

@@ -184,7 +184,7 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Change]:
     yield _of_force(skew * differentiate(whole.measured, found.dt, sensors.band.high))
     used = [name for name in ("actuator_displacement", "platen_displacement", "platen_acceleration") if name in record]
     gain = max(sensors.gain_sd(name) for name in used)
-    for axis in found.plant.axes:
+    for axis in found.plant.axes if gain else ():
         scaled = [x.copy() for x in found.test.motion]
         for x in scaled:
             x[:, axis] *= 1.0 + gain

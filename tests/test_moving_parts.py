@@ -10,7 +10,7 @@ from test_rigid_body import ABOVE, forces_at, random_states
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.names import ENGINES
-from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives, forward_dynamics
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import displacement_of, platen_pose_at, required_wrench_at
 from lhpost6_pin.mechanics.leg_bodies import leg_bodies
@@ -224,6 +224,19 @@ def test_compiled_forward_dynamics_are_pinocchios_and_inverse_dynamics_return_th
         close(dynamics(q, v, tau), a, 1e-12)
         needed = required_wrench(plant, PlantMotion(q[None], v[None], a[None]), rotation(pose[None, 3:]))[0]
         close(needed, tau, 1e-13)
+
+
+def test_modes_of_a_specimen_take_their_share_of_the_mass_of_bodies_as_of_their_lump():
+    plant, lumped = (make_plant(m.with_specimen("shear_frame")) for m in (FULL, machine_named("lhpost6")))
+    dynamics, lump, a = forward_dynamics(plant), forward_dynamics(lumped), np.zeros(6)
+    for _, q, v, z in random_states(plant, 12):
+        ws = forces_at(plant, q, v, z)
+        tau = ws.motion[TAU].copy()
+        bodies_acceleration(plant.tables, ws.frame, tau, np.zeros((9, 6)), a)
+        close(dynamics(q, v, tau), a, 1e-12)
+    q, still, push = plant.zero_state().q, np.zeros(6), np.array([1e5, -2e5, 3e5, 1e5, 2e5, -1e5])
+    moved = (own(q, still, push) - own(q, still, still) for own in (dynamics, lump))  # less the weight's
+    close(*moved, 1e-9)  # as the masses agree at the zero position
 
 
 def test_required_wrench_of_one_instant_by_rnea_is_that_of_whole_records():

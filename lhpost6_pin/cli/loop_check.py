@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-__all__ = ["checked_loop", "interaction_of", "loop_facts", "retuned"]
+LOOP_FACTS = ("loop", "loop_summary", "loop_remedy")
+"""Attributes of a record on its control loop; a remedy only where it is not stable."""
+
+__all__ = ["LOOP_FACTS", "checked_loop", "interaction_of", "loop_facts", "retuned"]
 
 
 def checked_loop(

@@ -13,7 +13,7 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
 from .live_view import LiveOptions, watched
-from .loop_check import checked_loop, interaction_of, loop_facts, retuned
+from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts, retuned
 from .motion_options import MotionOptions
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ def save_run(
         print_run(done, summary)
 
     def entries() -> dict[str, Any]:
-        loop = {key: record.attrs[key] for key in ("loop", "loop_summary", "loop_remedy") if key in record.attrs}
+        loop = {} if summary is None else {key: record.attrs.get(key) for key in LOOP_FACTS}
         return run_entries(done, summary) | loop | ({} if against is None else {"against_record": compared})
 
     print_result(json, entries, show, files)

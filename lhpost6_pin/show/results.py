@@ -175,8 +175,8 @@ def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
         }
         own = {name: values[k] for name, values in residual.items()}
         axes[AXES[k]] = forces | {"delay": agreement.actuators.delay[k], "residual": own}
-    entries = {"compared_up_to_hz": found.comparison.band.high, "axes": axes}
-    return entries if agreement.interface is None else {**entries, "interface": _interface_entries(agreement.interface)}
+    interface = None if agreement.interface is None else _interface_entries(agreement.interface)
+    return {"compared_up_to_hz": found.comparison.band.high, "axes": axes, "interface": interface}
 
 
 def _interface_entries(found: InterfaceWrench) -> Entries:

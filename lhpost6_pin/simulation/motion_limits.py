@@ -46,7 +46,7 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
         if "actuator velocity" not in error.exceeded:
             raise
         raise OutOfRangeError(
-            f"{error}{_by_other_reading(plant, target)}", error.largest_scale, error.exceeded
+            f"{error}{_by_other_reading(plant, target, error.largest_scale)}", error.largest_scale, error.exceeded
         ) from None
 
 
@@ -109,8 +109,10 @@ def _axis_limits(plant: Plant) -> MotionLimits:
     return MotionLimits(*stated, rise if math.isfinite(rise) else None)
 
 
-def _by_other_reading(plant: Plant, target: Target) -> str:
-    """The scale that fits by the other reading of Eq. 4-2, as a sentence."""
+def _by_other_reading(plant: Plant, target: Target, least: float | None) -> str:
+    """The scale that fits by the other reading of Eq. 4-2, as a sentence; empty if it is not above `least`."""
     (other,) = (word for word in FLOW_READINGS if word != plant.machine.flow_reading)
     fits = fitting_scale(make_plant(plant.machine.with_flow_reading(other)), target)
+    if least is not None and fits <= least:  # other limits govern
+        return ""
     return f'. With the other reading of Eq. 4-2 (machine.flow_reading = "{other}") the largest scale is {fits:g}'

@@ -7,7 +7,7 @@ import pytest
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import UnknownNameError
-from lhpost6_pin.core.files import shipped
+from lhpost6_pin.core.files import shipped, shipped_specimens
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.machine.library import families, find_family
 from lhpost6_pin.machine.machine import load_machine
@@ -18,7 +18,7 @@ LOOKED_UP = {
     "machine": (load_machine, list(shipped())),
     "controller": (load_controller, list(shipped("controllers"))),
     "sensors": (load_sensors, list(shipped("sensors"))),
-    "specimen": (find_specimen, list(shipped("specimens", ".urdf"))),
+    "specimen": (find_specimen, sorted(shipped_specimens())),
     "motion": (find_motion, [name for entry in list_motions() for name in (entry.name, *entry.aliases)]),
     "family": (find_family, list(families())),
     "parameter": (lambda path: load_machine().parameters[path], ["platen.mass", "hydraulics.supply_pressure"]),

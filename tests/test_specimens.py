@@ -250,7 +250,7 @@ def test_both_engines_agree(frame, scheme):
     machine = mounted(coupled(frame.specimen.contents))
     rate = {"euler": 32768}.get(scheme, 8192)
     one, two = (moved(machine, scheme=scheme, rate=rate, samples=256, engine=e) for e in ("pinocchio", "fused"))
-    assert np.abs(one.z[:, -6:]).max() > 1.0
+    assert np.abs(one.z[:, -6:]).max() > 0.5  # m sqrt(kg) and its rate: the modes move
     for name in ("q", "v", "z"):
         a, b = getattr(one, name), getattr(two, name)
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max())  # rounding over 1024 steps
@@ -277,22 +277,26 @@ def test_the_staggered_scheme_stays_of_second_order(frame, damper):
 
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0, 10.0])
 @pytest.mark.parametrize("rate", [2048, 8192])
-def test_the_coupling_is_stable_at_any_ratio_of_masses(ratio, rate):
-    """On the platen guided along x, which need not lift the specimen; 2 s of free vibration after a pulse."""
+@pytest.mark.parametrize("name", ["uniaxial", "lhpost6"])
+def test_the_coupling_is_stable_at_any_ratio_of_masses(name, ratio, rate):
+    """2 s of nearly free vibration after a pulse; the free platen has a supply that lifts ten of it."""
+    bare = machine_named(name)
+    if name == "lhpost6":
+        bare = bare.with_params({"hydraulics.supply_pressure": 60e6})
     contents = load_machine().with_specimen("shear_frame").specimen.contents
-    factor = ratio * 168.1e3 / contents.body.mass
-    modes = contents.modes._replace(
-        participation=np.sqrt(factor) * contents.modes.participation, damping=np.zeros((3, 3))
-    )
+    factor = ratio * bare.platen.mass[0] / contents.body.mass
+    part = np.sqrt(factor) * contents.modes.participation
+    modes = contents.modes._replace(participation=part, damping=np.zeros((3, 3)))
     body = RigidBody(factor * contents.body.mass, contents.body.centre, factor * contents.body.inertia)
-    machine = mounted(contents._replace(body=body, modes=modes), load_machine().with_params({"machine.motion": "x"}))
-    plant, rest = at_rest(machine)
+    plant, rest = at_rest(mounted(contents._replace(body=body, modes=modes), bare))
     spool = np.tile(rest.spool, (4096, 1))
-    spool[:200, :4] += 0.05 * np.sin(np.pi * np.arange(200) / 100)[:, None] * [1, 1, -1, -1]
+    pulse = 0.05 * np.sin(np.pi * np.arange(200) / 100)[:, None]
+    spool[:200, :4] += pulse * [1, 1, -1, -1][: min(4, plant.spools)]
     run = simulate(plant, OpenLoop(spool, rest.state), samples=4096, steps_per_second=rate, engine="fused")
     assert run.trouble is None
-    energy = modes_of_run(run).energy + 0.5 * run.v[:, 0] ** 2 * (plant.model.inertias[1].mass)
-    assert energy[200:].max() > 0.0
+    moving = modes_of_run(run)
+    energy = 0.5 * (moving.velocity**2 + modes.frequency**2 * moving.displacement**2).sum(axis=1)
+    assert energy[200:1200].max() > 0.0
     assert energy[3000:].max() < 1.05 * energy[200:1200].max()  # nothing is fed in; seals and leaks take a little
 
 

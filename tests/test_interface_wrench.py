@@ -189,7 +189,7 @@ def test_a_record_names_its_specimen_and_a_bare_machine_mounts_it(block, tmp_pat
     machine = MACHINE.with_specimen(block, PLACE, (0.0, 0.1, 0.0), locked=True)
     record = record_of_run(driven(machine, np.zeros((4, 10))), {"test": "still"})
     again = MACHINE.as_mounted(record.attrs, "the record")
-    assert again.specimen == replace(machine.specimen, urdf=block.resolve())
+    assert again.specimen == replace(machine.specimen, file=block.resolve())
     assert machine.as_mounted({"specimen": "none"}, "the record") is machine  # what is mounted stays
     gone = record.attrs | {"specimen_file": str(tmp_path / "gone.urdf")}
     with pytest.raises(RecordError, match=r"gone\.urdf, which is not there; mount it with --specimen"):

@@ -101,7 +101,7 @@ def test_parameters_have_units_and_must_be_finite(law: str):
 @over(CASES)
 def test_attributes_of_a_law_are_true(case: Case):
     law, module = case.attributes, None if case.attributes.modifies else module_of(case.law)
-    assert law.inlined == (case.law in {e.law for e in load_machine().effects})  # the report's
+    assert law.inlined == (case.law in {e.law for e in load_machine().effects if e.name != "bumper"})  # the report's
     assert law.takes_spool == (case.law == "hydraulic")
     if law.modifies or law.takes_spool:
         return

@@ -298,7 +298,7 @@ def test_without_a_leak_the_spools_rest_in_the_middle(machine):
 @pytest.mark.parametrize(("load", "name"), [({"z": 6e7}, "V1"), ({"x": -3e7}, "H1"), ({"z": -9e6}, "V1")])
 def test_a_load_beyond_the_supply_is_refused_by_the_actuators_name(machine, load, name):
     """60 MN is more than 20 MPa on six pistons; less than nothing they cannot pull."""
-    with pytest.raises(SimulationError, match=rf"{name} must give .* beyond its supply"):
+    with pytest.raises(SimulationError, match=rf"{name} must give .* (beyond its supply|unloads it)"):
         at_rest(loaded(machine, **load))[1]
 
 

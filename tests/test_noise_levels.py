@@ -21,6 +21,7 @@ from lhpost6_pin.data.rests import find_rests
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import Band, align, differentiate
 from lhpost6_pin.data.turned_signs import turned_signs
+from lhpost6_pin.machine.components import Floor
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
 
@@ -275,7 +276,8 @@ def test_scales_are_told_by_a_force_and_ratios_by_pressures():
     assert {few[quantity] for quantity in partly} == {"ratio"}
     assert told({*bare, "pressure_difference", "actuator_force"})["moving mass"] == "yes"
     assert told({*bare, "chamber_pressure_a", "chamber_pressure_b"})["moving mass"] == "ratio"
-    assert told({*bare, "floor_acceleration"})["specimen"] == "yes"
+    floored = replace(TABLE, floors=(Floor("RF", "x", 100.0),))  # a floor without its mass is no force
+    assert [told({*bare, "floor_acceleration"}, one)["specimen"] for one in (TABLE, floored)] == ["no", "yes"]
     cell = told({*bare, "actuator_force"})  # of a piston of equal areas, it is the pressure difference
     assert cell["moving mass"] == "yes" and cell["valve gain and null"] == cell["leakage"] == "ratio"
     single = TABLE.with_params({f"{TABLE.actuators[0].kind}.area_b": 0.7 * TABLE.actuators[0].area_a})

@@ -63,7 +63,9 @@ def _stated(file: Path, tree: dict[str, Any], keys: tuple[str, ...]) -> Iterator
 
 def _quantity(file: Path, keys: tuple[str, ...], entry: dict[str, Any]) -> Stated:
     value = entry.get("value", entry.get("typical"))
-    shown = value if isinstance(value, str) else number(tuple(value) if isinstance(value, list) else value)
+    if isinstance(value, list):  # of a matrix, row by row
+        value = tuple(x for row in value for x in (row if isinstance(row, list) else [row]))
+    shown = value if isinstance(value, str) else number(value)
     source = str(entry["source"])
     said = entry.get("evidence") or source.partition(":")[0].partition(" ")[0]
     deviation = f"{100 * entry['rel_sd']:g} %" if "rel_sd" in entry else ""

@@ -364,7 +364,7 @@ def test_a_drive_and_an_inverse_of_another_machine_are_refused(lhpost6, tmp_path
         ("units=5", "give a unit"),
         ("time_step=slow", "give a number of seconds"),
         ("name=3", "give a text"),
-        ("colour=red", "valid names: channels, name, rotate, time_step, units"),
+        ("colour=red", "valid names: channels, name, rotate, rotation_factor, time_step, units"),
     ],
 )
 def test_a_wrong_option_for_a_file_is_named(lhpost6, tmp_path, option, advice):

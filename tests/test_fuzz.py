@@ -14,7 +14,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Callable
-from contextlib import chdir, redirect_stderr, redirect_stdout
+from contextlib import chdir, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import NamedTuple
 from unittest import mock
@@ -36,7 +36,16 @@ from lhpost6_pin.core.errors import LhpostError
 from lhpost6_pin.data.importing import load_raw
 from lhpost6_pin.interfaces.link import ServedPlant, client
 from lhpost6_pin.interfaces.link.clock import SECOND
-from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, Welcome, decode, encode
+from lhpost6_pin.interfaces.link.protocol import (
+    MOTION,
+    Datagram,
+    Kind,
+    LinkMode,
+    VersionError,
+    Welcome,
+    decode,
+    encode,
+)
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import load_motion, make_target
@@ -369,7 +378,8 @@ def test_no_sequence_of_datagrams_upsets_a_served_plant(open_valves):
                     table.tick(now)
                 else:
                     for answer in table.receive(heard[len(heard) // 2] if part == "again" else part, "a", now):
-                        decode(answer)
+                        with suppress(VersionError):  # in the version of a client that is too old
+                            decode(answer)
             assert (np.abs(table.spool) <= 1.0).all()
             counts, answered = table.counts, sum(part not in ("tick", "late") for part in parts)
             dropped = counts["late"] + counts["duplicate"] + counts["short"] + counts["malformed"] + counts["foreign"]
@@ -397,7 +407,7 @@ def test_no_answer_of_a_server_upsets_a_client(answers, valves, more):
     about = Welcome(2048.0, "m", ("a", "b"), tuple(valves))
     right = [
         encode(Datagram(Kind.WELCOME, 0, actuators=2, valves=min(sum(valves), 255), welcome=about)),
-        encode(Datagram(Kind.SENSORS, 0, actuators=2 + more, numbers=np.zeros(10 + 2 * more))),
+        encode(Datagram(Kind.SENSORS, 0, actuators=2 + more, numbers=np.zeros(10 + 2 * more + MOTION))),
     ]
     right = [frame[:10] + b"\0\0" + frame[12:40] + bytes(4) + frame[44:] for frame in right]
     line = wire([*answers, *right])

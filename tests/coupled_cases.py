@@ -8,12 +8,13 @@ from scipy.linalg import eigh, expm
 
 from lhpost6_pin.core.arrays import Array
 from lhpost6_pin.core.names import SAMPLE_RATE
-from lhpost6_pin.mechanics.coupled import base_placement, rigid_wrench
+from lhpost6_pin.mechanics.coupled import rigid_wrench
 from lhpost6_pin.mechanics.derivatives import rates_at
 from lhpost6_pin.mechanics.equilibrium import Equilibrium
 from lhpost6_pin.mechanics.interface import apparent_mass, base_motion, mass_at_b
 from lhpost6_pin.mechanics.plant import Plant, State
 from lhpost6_pin.mechanics.schemes import TAU, V_SEEN, V
+from lhpost6_pin.mechanics.specimen_mount import base_placement
 from lhpost6_pin.mechanics.workspace import make_workspace
 from lhpost6_pin.simulation.simulate import OpenLoop
 

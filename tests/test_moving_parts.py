@@ -10,7 +10,7 @@ from test_rigid_body import ABOVE, forces_at, random_states
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.names import ENGINES
-from lhpost6_pin.mechanics.derivatives import evaluate_derivatives, forward_dynamics
+from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import displacement_of, platen_pose_at, required_wrench_at
 from lhpost6_pin.mechanics.leg_bodies import leg_bodies
@@ -228,7 +228,7 @@ def test_compiled_forward_dynamics_are_pinocchios_and_inverse_dynamics_return_th
 
 def test_modes_of_a_specimen_take_their_share_of_the_mass_of_bodies_as_of_their_lump():
     plant, lumped = (make_plant(m.with_specimen("shear_frame")) for m in (FULL, machine_named("lhpost6")))
-    dynamics, lump, a = forward_dynamics(plant), forward_dynamics(lumped), np.zeros(6)
+    dynamics, lump, a = make_dynamics(plant), make_dynamics(lumped), np.zeros(6)
     for _, q, v, z in random_states(plant, 12):
         ws = forces_at(plant, q, v, z)
         tau = ws.motion[TAU].copy()

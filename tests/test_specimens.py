@@ -146,7 +146,7 @@ def test_energy_over_the_interface_is_what_the_specimen_holds_and_dissipates(fin
     specimen = fine.plant.machine.specimen
     contents, modes = specimen.contents, modes_of_run(fine)
     twist, _, down = twists_of_run(fine)
-    to_base = base_twist(fine.plant.machine, specimen)
+    to_base = base_twist(fine.plant.machine)
     nu = twist @ to_base.T
     power = np.einsum("ij,ij->i", base_wrench(fine), nu)
     time = fine.time

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..identification.calibration.scale import Scale, ratios
-from ..identification.calibration.sensor_errors import RemovedDelay
 from ..machine.parameters import Parameters
 from .acceptance import form_share
 from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of, interval_reach, owns
@@ -97,8 +96,9 @@ def judge(
     reach = interval_reach(numbers)
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     known = {one.name for one in sensors}
-    late = (_of_delay(d, reach) for d in problem.delays if d.beyond(calibration.number("report.deviations")))
-    removed = tuple(one for one in late if one.name not in known)  # before the fit: no part of the verdict's word
+    late = [d for d in problem.delays if d.beyond(calibration.number("report.deviations"))]
+    behind = (SensorFault("delay", d.group, "", d.delay, "s", d.deviation, d.stated) for d in late)
+    removed = tuple(_of_fault(f, reach) for f in behind if f.name not in known)  # no part of the verdict's word
     rescaled = _rescaled(found)
     gone = {one.name for one in withdrawn}
     unproven = {one.name for one in withdrawn if one.why == "held_out"}
@@ -176,12 +176,6 @@ def _of_added(added: AddedEffect, estimates: Mapping[str, Estimate]) -> EffectFi
 def _of_fault(fault: SensorFault, reach: float) -> SensorFinding:
     low, high = (fault.value + side * reach * fault.deviation for side in (-1.0, 1.0))
     return SensorFinding(fault.name, fault.family, Estimate(fault.value, fault.unit, low, high), fault.stated)
-
-
-def _of_delay(late: RemovedDelay, reach: float) -> SensorFinding:
-    half = reach * late.deviation
-    found = Estimate(late.delay, "s", late.delay - half, late.delay + half)
-    return SensorFinding(f"delay {late.group}", "channel_delay", found, late.stated)
 
 
 def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:

@@ -16,13 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.cholesky import solve_positive
 from ..core.compiled import compiled
 from ..machine.strength import stated_strength
 from .gas_pressure import strut_pressures
 from .payload import lock_joints
 from .plant import Plant
 from .ports import evaluate_ports, platen_pose
-from .pose import PlatenMotion, leg_displacements, plant_motion, rotation, solve_positive
+from .pose import PlatenMotion, leg_displacements, plant_motion, rotation
 from .required_wrench import required_wrench
 
 __all__ = ["AxisCapacity", "ForceRange", "RequiredForces", "axis_capacity", "force_range", "required_forces"]
@@ -156,9 +157,9 @@ def _shares(q, wrench, pull, tables, n_ports, middle, half, share):  # type: ign
                 for i in range(count):
                     total += B[i, axes[a]] * half[i] * half[i] * B[i, axes[b]]
                 normal[a, b] = total
-        solution = solve_positive(normal, right)
+        solve_positive(normal, right)
         for i in range(count):
             total = 0.0
             for a in range(free):
-                total += half[i] * B[i, axes[a]] * solution[a]
+                total += half[i] * B[i, axes[a]] * right[a]
             share[k, i] = total

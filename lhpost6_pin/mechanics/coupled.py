@@ -28,8 +28,9 @@ import pinocchio as pin
 from ..core.errors import SimulationError
 from ..core.user_code import call_user
 from ..machine.machine import Machine
+from .specimen_mount import placement_of
 
-__all__ = ["BaseMotion", "CoupledSpecimen", "base_at_rest", "base_placement", "checked_wrench"]
+__all__ = ["BaseMotion", "CoupledSpecimen", "base_at_rest", "checked_wrench"]
 __all__ += ["rigid_wrench", "start_coupled", "step_coupled"]
 
 
@@ -59,15 +60,8 @@ class CoupledSpecimen(Protocol):
 
 def base_at_rest(machine: Machine) -> BaseMotion:
     """Base of a machine's specimen at rest in the zero-position."""
-    specimen = machine.specimen
-    assert specimen is not None
-    pose = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position, float))
-    return BaseMotion(pose, pin.Motion.Zero(), pin.Motion.Zero())
-
-
-def base_placement(machine: Machine) -> pin.SE3:
-    """Placement of the base of a machine's specimen in {b}, at B with the platen's axes."""
-    return pin.SE3(np.eye(3), -np.array(machine.platen.centre_of_gravity)) * base_at_rest(machine).pose
+    assert machine.specimen is not None
+    return BaseMotion(placement_of(machine.specimen), pin.Motion.Zero(), pin.Motion.Zero())
 
 
 def start_coupled(coupled: CoupledSpecimen, base: BaseMotion, gravity: float) -> tuple[Any, pin.Force]:

@@ -4,31 +4,14 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from .leg_model import Dynamics, make_dynamics
+from .leg_model import make_dynamics
 from .moving_parts import bodies_acceleration
 from .plant import Plant
-from .rigid_body import platen_inertia
 from .schemes import TAU, V_SEEN, A, V, rates_stage
 from .tables import unpack_tables
 from .workspace import Workspace, unpack_workspace
 
-__all__ = ["evaluate", "evaluate_derivatives", "forward_dynamics", "rates_at"]
-
-
-def forward_dynamics(plant: Plant) -> Dynamics:
-    """`make_dynamics` of a plant, with modes of a specimen on the mass that they reduce.
-
-    aba divides the torque by the mass M of platen and specimen as a rigid body; modes leave M - sum G G^T (`modes`),
-    both constant in platen axes: its acceleration is (M - sum G G^T)^-1 M times that of aba.
-    """
-    aba = make_dynamics(plant)
-    if not plant.modes.size or plant.machine.bodies == "full":  # whose projection takes the modes' share itself
-        return aba
-    _, full = platen_inertia(plant.model, plant.machine)
-    block = np.ix_(plant.axes, plant.axes)
-    taken = plant.modes["participation"].T @ plant.modes["participation"]
-    ratio = np.linalg.solve((full - taken)[block], full[block])
-    return lambda q, v, tau: ratio @ aba(q, v, tau)
+__all__ = ["evaluate", "evaluate_derivatives", "rates_at"]
 
 
 def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
@@ -38,7 +21,7 @@ def evaluate_derivatives(plant: Plant, ws: Workspace, spool: Array) -> int:
         if plant.machine.bodies == "full" and not plant.articulated:
             _accelerate_bodies(plant.tables.packed, ws.buffer)  # no Pinocchio model of the legs to build for one state
         else:
-            ws.motion[A] = forward_dynamics(plant)(ws.q, ws.motion[V], ws.motion[TAU])
+            ws.motion[A] = make_dynamics(plant)(ws.q, ws.motion[V], ws.motion[TAU])
     return status
 
 

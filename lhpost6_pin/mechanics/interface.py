@@ -11,13 +11,7 @@ from .rigid_body import platen_inertia
 from .schemes import A, V
 from .workspace import Workspace
 
-__all__ = ["apparent_mass", "base_motion", "mass_at_b", "motion_numbers", "motion_of_numbers", "top_placement"]
-__all__ += ["wrench_of"]
-
-
-def top_placement(plant: Plant) -> pin.SE3:
-    """Placement in {b} of C with the platen's axes: the base of wrenches from outside."""
-    return pin.SE3(np.eye(3), -np.array(plant.machine.platen.centre_of_gravity))
+__all__ = ["apparent_mass", "base_motion", "mass_at_b", "motion_numbers", "motion_of_numbers", "wrench_of"]
 
 
 def base_motion(plant: Plant, ws: Workspace, placement: pin.SE3) -> BaseMotion:

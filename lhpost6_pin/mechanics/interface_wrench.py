@@ -4,8 +4,8 @@
     force = interface_force(plant, q, v, a)                                        # pin.Force at one instant
 
 The interface is the point of the platen's top where the specimen's root is mounted, with the axes of the platen. The
-specimen is what the Pinocchio model has beyond the bare table's: with f_1 the force that RNEA transmits through the
-platen's joint, the specimen acts on the platen with f_1(bare table) - f_1(table with specimen). Its weight is included.
+specimen is what the Pinocchio model has beyond the bare table's: the force that RNEA of the model without the platen's
+own inertia transmits through the platen's joint is that of the platen on the specimen. Its weight is included.
 """
 
 from collections.abc import Callable
@@ -67,24 +67,26 @@ def specimen_wrenches(plant: Plant, q: Array, v: Array, a: Array) -> Array:
     out = np.zeros((len(q), 6))
     if plant.machine.specimen is None:
         return out
-    both = [(m, m.createData()) for m in (make_model(replace(plant.machine, specimen=None)), plant.model)]
+    model = _without_platen(plant)
+    data = model.createData()
     for k, state in enumerate(zip(q, v, a, strict=True)):
-        out[k] = _beyond(both, *state)
+        pin.rnea(model, data, *state)
+        out[k] = -data.f[1].vector
     return out
+
+
+def _without_platen(plant: Plant) -> Any:
+    """The plant's model with no inertia of the platen itself."""
+    model, own = plant.model.copy(), make_model(replace(plant.machine, specimen=None)).inertias[1]
+    left = model.inertias[1].toDynamicParameters() - own.toDynamicParameters()
+    model.inertias[1] = pin.Inertia.FromDynamicParameters(left) if left[0] > 0.0 else pin.Inertia.Zero()
+    return model
 
 
 def interface_force(plant: Plant, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> pin.Force:
     """Force of the specimen on the platen at one instant, at the interface in platen axes."""
     rows = (np.asarray(x, float)[None] for x in (q, v, a))
     return pin.Force(at_interface(plant, specimen_wrenches(plant, *rows))[0])
-
-
-def _beyond(both: list[tuple[Any, Any]], q: Array, v: Array, a: Array) -> Array:
-    forces = []
-    for model, data in both:
-        pin.rnea(model, data, q[: model.nq], v[: model.nv], a[: model.nv])
-        forces.append(data.f[1].vector)
-    return np.asarray(forces[0] - forces[1])
 
 
 def driven_specimen(plant: Plant, motion: PlantMotion, dt: float) -> PlantMotion:

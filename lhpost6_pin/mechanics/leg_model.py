@@ -23,6 +23,7 @@ from ..machine.machine import Machine
 from .leg_bodies import LegBody, leg_bodies
 from .leg_motion import follow_platen, leg_joints, solve_projected
 from .plant import Plant
+from .rigid_body import platen_inertia
 
 __all__ = ["Dynamics", "LegModel", "make_dynamics", "make_leg_model"]
 
@@ -115,18 +116,27 @@ def _axes_along(direction: Array) -> Array:
 
 
 def make_dynamics(plant: Plant) -> Dynamics:
-    """Forward dynamics of a plant on Pinocchio: ABA, with moving parts as bodies the projection of CRBA and RNEA."""
-    model, data = plant.model, plant.model.createData()
+    """Forward dynamics of a plant on Pinocchio: ABA, with moving parts as bodies the projection of CRBA and RNEA.
+
+    ABA divides the torque by the mass M of platen and specimen as a rigid body; modes leave M - sum G G^T (`modes`),
+    both constant in platen axes: its acceleration is (M - sum G G^T)^-1 M times that of ABA.
+    """
+    model, data, free = plant.model, plant.model.createData(), np.ix_(plant.axes, plant.axes)
+    modal = plant.tables.inertia[0]["modal"][free]
     if plant.machine.bodies == "lumped":
-        return partial(pin.aba, model, data)
+        aba = partial(pin.aba, model, data)
+        if not plant.modes.size:
+            return aba
+        mass = platen_inertia(model, plant.machine)[1][free]
+        ratio = np.linalg.solve(mass - modal, mass)
+        return lambda q, v, tau: ratio @ aba(q, v, tau)
     legs, packed = LegModel(plant), plant.tables.packed
-    crba, effects, free = pin.crba, pin.nonLinearEffects, plant.axes.size
-    modal = plant.tables.inertia[0]["modal"][np.ix_(plant.axes, plant.axes)]
+    crba, effects, n = pin.crba, pin.nonLinearEffects, plant.axes.size
 
     def acceleration(q: Array, v: Array, tau: Array) -> Array:
         mass, force = legs.forces(q, v)
         own, bias = np.ascontiguousarray(crba(model, data, q)), effects(model, data, q, v)
-        own[:free, :free] -= modal
+        own[:n, :n] -= modal
         return np.asarray(solve_projected(own, bias, mass, force, legs.buffer, packed, q, v, tau))
 
     return acceleration

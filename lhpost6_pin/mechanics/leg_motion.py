@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
+from ..core.cholesky import solve_positive
 from ..core.compiled import compiled, compiled_views
-from .moving_parts import solve_positive
 from .ports import platen_pose
 from .schemes import set_twist
 from .spatial import cross, from_body, to_body
@@ -151,5 +151,5 @@ def solve_projected(M, h, legs, force, buffer, packed, q, v, tau):
             for k in range(G.shape[0]):
                 more += G[k, axes[i]] * moved[k, axes[j]]
             M[i, j] += more
-    solve_positive(M, n, a)
+    solve_positive(M, a[:n])
     return a

@@ -13,10 +13,11 @@ dV/dt + V x* (extra V). All of it conserves energy. Pinocchio's CRBA and RNEA of
 
 import math
 
+from ..core.cholesky import solve_positive
 from ..core.compiled import compiled, compiled_inline
 from .spatial import cross, to_body
 
-__all__ = ["add_moving_parts", "bodies_acceleration", "leg_energies", "solve_positive"]
+__all__ = ["add_moving_parts", "bodies_acceleration", "leg_energies"]
 
 
 @compiled_inline
@@ -164,25 +165,6 @@ def _add_momentum_bias(frame, momentum, bias):
 
 
 @compiled
-def solve_positive(M, n, x):
-    """Solve M x = b for the leading n rows of a positive definite matrix: x holds b, M its Cholesky factor after."""
-    for j in range(n):
-        for i in range(j, n):
-            value = M[i, j]
-            for k in range(j):
-                value -= M[i, k] * M[j, k]
-            M[i, j] = math.sqrt(value) if i == j else value / M[j, j]
-    for i in range(n):
-        for k in range(i):
-            x[i] -= M[i, k] * x[k]
-        x[i] /= M[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= M[k, i] * x[k]
-        x[i] /= M[i, i]
-
-
-@compiled
 def bodies_acceleration(tables, frame, tau, work, a):
     """Forward dynamics of platen and moving parts: fill a (n_axes,) from tau at the pose and twist in frame.
 
@@ -206,7 +188,7 @@ def bodies_acceleration(tables, frame, tau, work, a):
         a[i] = tau[i] + weight[axes[i]] - bias[axes[i]]
         for j in range(n):
             M[i, j] = M[axes[i], axes[j]]
-    solve_positive(M, n, a)
+    solve_positive(M, a[:n])
 
 
 @compiled

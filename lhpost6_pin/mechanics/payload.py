@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from .coupled import base_placement
 from .plant import Plant
+from .specimen_mount import base_placement
 
 __all__ = ["lock_joints", "with_payload"]
 

@@ -15,14 +15,14 @@ from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
-from .coupled import CoupledSpecimen, base_at_rest, base_placement, rigid_wrench, start_coupled
+from .coupled import CoupledSpecimen, base_at_rest, rigid_wrench, start_coupled
 from .coupled_maker import coupled_specimen
 from .forward_dynamics import inertia_table
 from .joint_springs import spring_table
 from .modes import modal_states, modal_tables
 from .ports import body_table, leg_table
 from .rigid_body import free_axes, make_model
-from .specimen_mount import modal_participation
+from .specimen_mount import base_placement, modal_participation
 from .tables import Tables, pack_tables
 
 __all__ = ["Plant", "State", "make_plant"]

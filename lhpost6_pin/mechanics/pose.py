@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.cholesky import solve_positive
 from ..core.compiled import compiled, compiled_inline
 from ..core.errors import RecordError
 from .plant import Plant
@@ -36,7 +37,6 @@ __all__ = [
     "plant_motion",
     "platen_motion",
     "rotation",
-    "solve_positive",
 ]
 
 
@@ -193,26 +193,6 @@ def pose_acceleration(frame, body, axes, v, a, out):
 
 
 @compiled
-def solve_positive(matrix, right):
-    """Solution of a small positive definite system by Cholesky; not finite where it is singular."""
-    n = right.size
-    for i in range(n):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = np.sqrt(total) if i == j else total / matrix[j, j]
-        for k in range(i):
-            right[i] -= matrix[i, k] * right[k]
-        right[i] /= matrix[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            right[i] -= matrix[k, i] * right[k]
-        right[i] /= matrix[i, i]
-    return right
-
-
-@compiled
 def gauss_newton_step(displacement, s, K, axes, pose):
     """Improve pose (6,) in place by one step towards legs of `displacement` (n,), from their s and K there (Eq. 3-34).
 
@@ -227,11 +207,11 @@ def gauss_newton_step(displacement, s, K, axes, pose):
             right[a] += K[i, axes[a]] * miss
             for b in range(a + 1):  # `solve_positive` reads the lower triangle
                 normal[a, b] += K[i, axes[a]] * K[i, axes[b]]
-    step = solve_positive(normal, right)
+    solve_positive(normal, right)
     largest = 0.0
     for a in range(free):
-        pose[axes[a]] -= step[a]
-        largest = max(largest, abs(step[a]))
+        pose[axes[a]] -= right[a]
+        largest = max(largest, abs(right[a]))
     return largest
 
 

@@ -21,9 +21,9 @@ from ..core.errors import ParameterError
 from ..effects.modifiers import added_inertias
 from ..machine.machine import Machine
 from ..machine.user_specimen import UserSpecimen
-from .coupled import CoupledSpecimen, base_at_rest
+from .coupled import CoupledSpecimen
 from .coupled_maker import coupled_specimen
-from .specimen_mount import mount_specimen
+from .specimen_mount import base_placement, mount_specimen, top_placement
 
 __all__ = ["free_axes", "lumped_inertia", "make_model", "platen_body", "platen_inertia"]
 
@@ -53,13 +53,12 @@ def make_model(machine: Machine, coupled: CoupledSpecimen | None = None) -> Any:
     model.addJointFrame(index)
     body, beyond = platen_body(machine)
     model.appendBodyToJoint(index, _with_added(body, machine), pin.SE3.Identity())
-    top = pin.SE3(np.eye(3), -np.array(platen.centre_of_gravity))
-    model.addFrame(pin.Frame("platen_top", index, 0, top, pin.FrameType.OP_FRAME))
+    model.addFrame(pin.Frame("platen_top", index, 0, top_placement(machine), pin.FrameType.OP_FRAME))
     armature = np.diag(beyond) if machine.bodies == "lumped" else np.zeros(6)
     if isinstance(machine.specimen, UserSpecimen):
         coupled = coupled or coupled_specimen(machine)
         assert coupled is not None
-        model.appendBodyToJoint(index, coupled.inertia, top * base_at_rest(machine).pose)
+        model.appendBodyToJoint(index, coupled.inertia, base_placement(machine))
     elif machine.specimen is not None:
         model = mount_specimen(model, machine.specimen)
     extra = np.zeros(model.nv)

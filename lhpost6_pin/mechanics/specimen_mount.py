@@ -15,7 +15,12 @@ from ..machine.machine import Machine
 from ..machine.specimen import Specimen
 from ..machine.urdf_numbers import check_urdf
 
-__all__ = ["base_twist", "modal_participation", "mount_specimen", "placement_of"]
+__all__ = ["base_placement", "base_twist", "modal_participation", "mount_specimen", "placement_of", "top_placement"]
+
+
+def top_placement(machine: Machine) -> pin.SE3:
+    """Placement in {b} of C with the platen's axes: the platen's top frame."""
+    return pin.SE3(np.eye(3), -np.array(machine.platen.centre_of_gravity))
 
 
 def placement_of(specimen: Specimen) -> pin.SE3:
@@ -83,10 +88,18 @@ def modal_participation(machine: Machine) -> Array:
     specimen = machine.specimen
     if specimen is None or specimen.modes is None:
         return np.zeros((0, 6))
-    return specimen.modes.participation @ base_twist(machine, specimen)
+    return specimen.modes.participation @ base_twist(machine)
 
 
-def base_twist(machine: Machine, specimen: Specimen) -> Array:
-    """Matrix (6, 6) that takes the platen's twist at B in platen axes to that of a specimen's base in its own axes."""
-    top = pin.SE3(np.eye(3), -np.array(machine.platen.centre_of_gravity))
-    return np.asarray((top * placement_of(specimen)).toActionMatrixInverse())
+def base_placement(machine: Machine) -> pin.SE3:
+    """Placement of the base of a machine's specimen in {b}, at B with the platen's axes."""
+    assert machine.specimen is not None
+    return top_placement(machine) * placement_of(machine.specimen)
+
+
+def base_twist(machine: Machine) -> Array:
+    """Matrix (6, 6) that takes the platen's twist at B in platen axes to that of a specimen's base in its own axes.
+
+    Its transpose takes a wrench at the base in its axes to B.
+    """
+    return np.asarray(base_placement(machine).toActionMatrixInverse())

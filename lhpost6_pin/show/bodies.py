@@ -15,6 +15,7 @@ from ..machine.machine import Machine
 from ..machine.specimen_forms import SpecimenContents
 from ..machine.user_specimen import UserSpecimen
 from ..mechanics.pose import rotation
+from ..mechanics.specimen_mount import top_placement
 from .urdf import legs, urdf_text
 
 __all__ = [
@@ -66,7 +67,7 @@ def load_specimen_bodies(machine: Machine) -> Bodies | None:
         if joint not in drawn and inertia.mass > 0.0:
             shapes.append(_uniform_box(joint, inertia))
     place = pin.SE3(pin.rpy.rpyToMatrix(*specimen.rpy), np.array(specimen.position))
-    top = pin.SE3(np.eye(3), -np.array(machine.platen.centre_of_gravity))
+    top = top_placement(machine)
     return Bodies(model, shapes, top * place)
 
 

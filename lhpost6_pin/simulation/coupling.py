@@ -36,16 +36,16 @@ from ..mechanics.coupled import (
     BaseMotion,
     CoupledSpecimen,
     base_at_rest,
-    base_placement,
     rigid_wrench,
     start_coupled,
     step_coupled,
 )
-from ..mechanics.derivatives import evaluate, forward_dynamics
+from ..mechanics.derivatives import evaluate
 from ..mechanics.interface import apparent_mass, base_motion, mass_at_b
-from ..mechanics.leg_model import Dynamics
+from ..mechanics.leg_model import Dynamics, make_dynamics
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import TAU, A, V
+from ..mechanics.specimen_mount import base_placement
 from ..mechanics.workspace import Workspace
 from .engine_pinocchio import make_stepper
 
@@ -198,7 +198,7 @@ class Coupling:
         axes = plant.axes
         table = apparent_mass(plant)[np.ix_(axes, axes)]
         share = np.linalg.solve(table + self._added[np.ix_(axes, axes)], table)
-        accelerate = forward_dynamics(plant)
+        accelerate = make_dynamics(plant)
         self._forward: Dynamics = accelerate
         if self._added.any():
             self._forward = lambda q, v, tau: share @ accelerate(q, v, tau)

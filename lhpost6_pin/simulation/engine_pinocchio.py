@@ -12,8 +12,8 @@ import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from ..mechanics.derivatives import forward_dynamics, rates_at
-from ..mechanics.leg_model import Dynamics
+from ..mechanics.derivatives import rates_at
+from ..mechanics.leg_model import Dynamics, make_dynamics
 from ..mechanics.plant import Plant
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, staggered_stage
 from ..mechanics.tables import unpack_tables
@@ -28,10 +28,10 @@ Stepper = Callable[[Workspace, Array], int]
 def make_stepper(plant: Plant, scheme: str, dt: float, forward: Dynamics | None = None) -> Stepper:
     """Stepper of a scheme for steps of dt [s]; requires `evaluate_derivatives` on the workspace beforehand.
 
-    forward: accelerations of q, v and torque, in place of the plant's `forward_dynamics`.
+    forward: accelerations of q, v and torque, in place of the plant's `make_dynamics`.
     """
     kinds = {"semi_implicit": _semi_implicit, "euler": _euler, "rk4": _rk4}
-    return kinds[scheme](plant, dt, forward or forward_dynamics(plant))
+    return kinds[scheme](plant, dt, forward or make_dynamics(plant))
 
 
 @compiled

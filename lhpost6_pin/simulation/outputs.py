@@ -18,7 +18,7 @@ from ..mechanics.interface_wrench import INTERFACE_AXES, interface_lever
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
 from .simulate import Run
-from .specimen_response import point_response, wrench_on_platen
+from .specimen_response import interface_wrench, point_response
 
 __all__ = ["record_of_run"]
 
@@ -90,7 +90,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         at = np.round(interface_lever(plant) - plant.body[0]["rho_c"], 12)
         about["interface"] = f"at {at[0]:g}, {at[1]:g}, {at[2]:g} m from C"
         labels["interface_axis"] = INTERFACE_AXES
-        channels["specimen_wrench"] = (("time", "interface_axis"), wrench_on_platen(run), about)
+        channels["specimen_wrench"] = (("time", "interface_axis"), interface_wrench(run), about)
     valves = [a.valves for a in machine.actuators if a.name in machine.double_acting]
     facts: dict[str, Any] = {
         "kind": "simulated",

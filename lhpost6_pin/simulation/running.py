@@ -20,9 +20,10 @@ from ..core.names import SAMPLE_RATE, SCHEMES
 from ..mechanics.coupled import BaseMotion, checked_wrench
 from ..mechanics.derivatives import evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium
-from ..mechanics.interface import base_motion, top_placement
+from ..mechanics.interface import base_motion
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import V, steps_a_sample
+from ..mechanics.specimen_mount import top_placement
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import make_workspace
 from .coupling import Continued, CouplingOptions, CouplingResult, WithOutside, make_coupling
@@ -60,7 +61,7 @@ class RunningPlant:
         self._evaluate = self._coupled.evaluate if self._coupled else partial(evaluate_derivatives, plant)
         self._advance = WithOutside(plant, scheme, 1.0 / steps_per_second, self._coupled)
         self._outside: Continued | None = None
-        self._order, self._base, self._since = wrench_order, top_placement(plant), 0
+        self._order, self._base, self._since = wrench_order, top_placement(plant.machine), 0
         self._ws = make_workspace(plant, rest.state)
         self._window = np.zeros((steps, plant.spools))
         self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))

@@ -1,25 +1,22 @@
 """Response of a specimen in a run: its modes and points, springs in its joints, and the wrench at its base."""
 
-from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..machine.specimen_forms import influence_of
-from ..mechanics.interface_wrench import driven_specimen, specimen_wrenches
+from ..mechanics.interface_wrench import at_interface, driven_specimen, specimen_wrenches
 from ..mechanics.modal_march import march_modes
 from ..mechanics.modes import ModalMotion, modal_motion
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlantMotion, platen_motion, rotation
-from ..mechanics.rigid_body import make_model
 from ..mechanics.specimen_mount import base_twist
 from .coupling import CouplingResult
 
-__all__ = ["base_wrench", "driven_wrenches", "modes_of_run", "point_response", "spring_energy", "twists_of_run"]
-__all__ += ["wrench_on_platen"]
+__all__ = ["base_wrench", "driven_wrenches", "interface_wrench", "modes_of_run", "point_response", "spring_energy"]
+__all__ += ["twists_of_run"]
 
 
 class History(Protocol):
@@ -82,7 +79,7 @@ def point_response(run: History) -> dict[str, Array]:
     if specimen is None or specimen.contents is None or not specimen.contents.points:
         return {}
     twist, rate, _ = twists_of_run(run)
-    to_base = base_twist(plant.machine, specimen)
+    to_base = base_twist(plant.machine)
     base, moved = rate @ to_base.T, twist @ to_base.T
     base[:, :3] += np.cross(moved[:, 3:], moved[:, :3])
     carried = base @ influence_of(specimen.contents.points).T
@@ -99,33 +96,18 @@ def point_response(run: History) -> dict[str, Array]:
 def base_wrench(run: History) -> Array:
     """Wrench (n, 6) [N, N m] of the platen on the specimen at its base, in base axes, linear first.
 
-    Base shear, axial force and overturning moment, weight included: the specimen's inertia and
-    weight by pin.rnea of the model without the platen, less the reaction of its modes; of a coupled specimen what it
-    exchanged.
-    Raises SimulationError for a bare table.
+    Base shear, axial force and overturning moment, weight included (`_at_b` reversed). Raises SimulationError for a
+    bare table.
     """
-    plant, specimen = run.plant, run.plant.machine.specimen
-    if specimen is None:
+    machine = run.plant.machine
+    if machine.specimen is None:
         raise SimulationError("a bare table carries no specimen; mount one (--specimen)")
-    if plant.coupled is not None:
-        exchanged: CouplingResult = run.coupling  # type: ignore[attr-defined]
-        return -exchanged.wrench
-    model = _without_platen(plant)
-    data, found = model.createData(), np.zeros((len(run.q), 6))
-    for k, (q, v, a) in enumerate(zip(run.q, run.v, run.a, strict=True)):
-        pin.rnea(model, data, q, v, a)
-        found[k] = data.f[1].vector
-    if plant.modes.size:
-        found -= modes_of_run(run).reaction
-    return found @ np.linalg.inv(base_twist(plant.machine, specimen))
+    return -_at_b(run) @ np.linalg.inv(base_twist(machine))
 
 
-def wrench_on_platen(run: History) -> Array:
-    """Wrench (n, 6) [N, N m] of the specimen on the platen at its base, in platen axes: `base_wrench` reversed."""
-    specimen = run.plant.machine.specimen
-    turn = np.eye(3) if specimen is None else pin.rpy.rpyToMatrix(*specimen.rpy)
-    own = base_wrench(run)
-    return -np.hstack([own[:, :3] @ turn.T, own[:, 3:] @ turn.T])
+def interface_wrench(run: History) -> Array:
+    """Wrench (n, 6) [N, N m] of a run's specimen on the platen at the interface, in platen axes."""
+    return at_interface(run.plant, _at_b(run))
 
 
 def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float) -> Array:
@@ -136,12 +118,7 @@ def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float) -> Array:
     """
     if plant.coupled is not None:
         raise SimulationError("a specimen that is a program runs with the table only, not along a recorded motion")
-    moved = driven_specimen(plant, motion, dt)
-    found = specimen_wrenches(plant, *moved)
-    if plant.modes.size:
-        states = _States(plant, *moved, march_modes(plant, motion, dt))
-        found += modes_of_run(states).reaction
-    return found
+    return _at_b(_States(plant, *driven_specimen(plant, motion, dt), march_modes(plant, motion, dt)))
 
 
 class _States(NamedTuple):
@@ -152,9 +129,11 @@ class _States(NamedTuple):
     z: Array
 
 
-def _without_platen(plant: Plant) -> Any:
-    """The plant's model with no inertia of the platen itself."""
-    model, bare = plant.model.copy(), make_model(replace(plant.machine, specimen=None))
-    left = model.inertias[1].toDynamicParameters() - bare.inertias[1].toDynamicParameters()
-    model.inertias[1] = pin.Inertia.FromDynamicParameters(left) if left[0] > 0.0 else pin.Inertia.Zero()
-    return model
+def _at_b(run: History) -> Array:
+    """Wrench (n, 6) of a specimen on the platen at B in platen axes; of a coupled specimen what it exchanged."""
+    plant = run.plant
+    if plant.coupled is not None:
+        exchanged: CouplingResult = run.coupling  # type: ignore[attr-defined]
+        return exchanged.wrench @ base_twist(plant.machine)
+    found = specimen_wrenches(plant, run.q, run.v, run.a)
+    return found + modes_of_run(run).reaction if plant.modes.size else found

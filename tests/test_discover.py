@@ -22,7 +22,7 @@ from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
-from lhpost6_pin.discovery.checkpoint import make_checkpoint
+from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import amplitude_of
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
@@ -543,6 +543,21 @@ def test_a_search_of_anything_else_does_not_go_on_from_there(machine, sensors, t
     }
     changed = [asked, *({**asked, name: other} for name, other in others.items())]
     assert len({make_checkpoint(tmp_path, *inputs.values()).path for inputs in changed}) == 6
+
+
+def test_another_state_of_the_package_does_not_go_on_from_there(machine, tmp_path, monkeypatch):
+    """Its machine may lack an attribute that the code reads since: a search of small_table ended in a traceback."""
+    before = make_checkpoint(tmp_path, machine).path
+    assert make_checkpoint(tmp_path, machine).path == before
+    monkeypatch.setattr("lhpost6_pin.discovery.checkpoint._sources", lambda package: "as edited")
+    assert make_checkpoint(tmp_path, machine).path != before
+    source = tmp_path / "module.py"
+    digests = set()
+    for text in ("a = 1", "a = 2"):
+        source.write_text(text)
+        _sources.cache_clear()
+        digests.add(_sources(tmp_path))
+    assert len(digests) == 2
 
 
 def test_tests_that_are_not_there_cannot_be_held_out(machine, sensors, rubbing):

@@ -3,12 +3,12 @@
 import hashlib
 import logging
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import joblib
 
-from .. import __version__
 from ..core.files import write_whole
 from ..identification.calibration.problem import Problem
 from ..machine.machine import Machine
@@ -58,9 +58,19 @@ class Checkpoint:
 def make_checkpoint(folder: Path | None, machine: Machine, *inputs: object) -> Checkpoint:
     """A checkpoint in a folder for a search with a machine and other inputs, named by the hash of their `repr`.
 
-    An effect made by hand cannot be hashed: a machine with one gets a checkpoint without a path.
+    Another state of the package does not find it, as its objects may differ from those pickled. An effect made by hand
+    cannot be hashed: a machine with one gets a checkpoint without a path.
     """
     if folder is None or machine.own_effects:
         return Checkpoint(None)
-    known = repr((__version__, machine_toml(machine), machine.specimen, *inputs))
+    known = repr((_sources(Path(__file__).parents[1]), machine_toml(machine), machine.specimen, *inputs))
     return Checkpoint(folder / f".unfinished-{hashlib.sha256(known.encode()).hexdigest()[:16]}.joblib")
+
+
+@cache
+def _sources(package: Path) -> str:
+    """Digest of the modules of a package."""
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()

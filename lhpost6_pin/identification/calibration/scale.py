@@ -120,9 +120,8 @@ def scale_summary(scale: Scale | None) -> str:
     stated = f"{scale.value:.4g} {scale.unit}"
     stated += f" +- {100 * scale.deviation:.2g} %" if scale.deviation else ""
     return (
-        f"Only ratios to {scale.name} can be told: pressures alone measure the force, and masses, friction, flow and "
-        f"leakage scale with the piston area. {scale.name} is held as stated ({stated}); if it is wrong, so are they, "
-        "by the same factor."
+        f"Only ratios to {scale.name} can be told, as pressures alone measure the force: it is held as stated "
+        f"({stated}), and masses, friction, flow and leakage are wrong by the same factor if it is."
     )
 
 

@@ -113,17 +113,18 @@ def _refine(path, fine, dt, count):
         u = j / count
         basis[j] = u * u * (3.0 - 2.0 * u), u * (1.0 - u) ** 2 * dt, u * u * (u - 1.0) * dt
         rates[j] = 6.0 * u * (1.0 - u) / dt, (1.0 - u) * (1.0 - 3.0 * u), u * (3.0 * u - 2.0)
+    slips = basis[1:] - basis[:-1]
     fine.s[0], fine.rate[0] = path.s[0], path.rate[0]
-    for i in range(path.s.shape[0] - 1):
-        for j in range(1, count + 1):
-            k = i * count + j
-            for p in range(path.s.shape[1]):
-                first, last = path.rate[i, p], path.rate[i + 1, p]
-                gone = path.s[i + 1, p] - path.s[i, p]
-                fine.s[k, p] = path.s[i, p] + basis[j, 0] * gone + basis[j, 1] * first + basis[j, 2] * last
-                fine.rate[k, p] = rates[j, 0] * gone + rates[j, 1] * first + rates[j, 2] * last
-                b = basis[j] - basis[j - 1]
-                fine.slip[k, p] = b[0] * path.slip[i + 1, p] + b[1] * first + b[2] * last
+    for p in range(path.s.shape[1]):
+        for i in range(path.s.shape[0] - 1):
+            at, slip, first, last = path.s[i, p], path.slip[i + 1, p], path.rate[i, p], path.rate[i + 1, p]
+            gone = path.s[i + 1, p] - at
+            for j in range(1, count + 1):
+                k = i * count + j
+                b, r, d = basis[j], rates[j], slips[j - 1]
+                fine.s[k, p] = at + b[0] * gone + b[1] * first + b[2] * last
+                fine.rate[k, p] = r[0] * gone + r[1] * first + r[2] * last
+                fine.slip[k, p] = d[0] * slip + d[1] * first + d[2] * last
 
 
 def thinned(z: Array, count: int) -> Array:

@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from .simulate import RATE
 
@@ -88,11 +89,13 @@ def at_rest(table: Table, runs: int) -> Array:
     return y
 
 
+@njit(cache=True)
 def root(drop: Array) -> Array:
     """Signed square root of a pressure drop."""
     return np.copysign(np.sqrt(np.abs(drop)), drop)
 
 
+@njit(cache=True)
 def valve_flows(table: Table, spool: Array, a: Array, b: Array) -> tuple[Array, Array]:
     """Flows from the valve into chambers A and B [m3/s] at their pressures a, b [Pa]."""
     x = spool + table.null
@@ -103,6 +106,7 @@ def valve_flows(table: Table, spool: Array, a: Array, b: Array) -> tuple[Array, 
     return opened * root(drop_a), -opened * root(drop_b)
 
 
+@njit(cache=True)
 def slip(table: Table, v: Array, s: Array) -> Array:
     """Rate of a bristle's bend [1/s]."""
     faster = v / table.stribeck_speed
@@ -110,9 +114,10 @@ def slip(table: Table, v: Array, s: Array) -> Array:
     return v / table.span * np.copysign(np.abs(left) ** table.exponent, left)
 
 
+@njit(cache=True)
 def rates(table: Table, y: Array, command: Array) -> Array:
     """Rates of all states (6, runs) at a command that has arrived at the valve."""
-    x, v, a, b, s, spool = y
+    x, v, a, b, s, spool = y[X], y[V], y[PA], y[PB], y[BRISTLE], y[SPOOL]
     flow_a, flow_b = valve_flows(table, spool, a, b)
     bend = slip(table, v, s)
     drag = table.friction * (s + table.span * table.bristle_damping * bend) + table.viscous * v
@@ -135,22 +140,32 @@ def march(table: Table, y: Array, samples: int, law: Callable[[int, Array], Arra
     valve after the delay; before that arrives the first one.
     """
     runs, h = y.shape[1], 1.0 / (RATE * substeps)
-    late = np.round(np.broadcast_to(table.delay, runs) / h).astype(int)
-    column = np.arange(runs)
+    table = Table(*(np.broadcast_to(number, runs).astype(float) for number in table))
+    late = np.round(table.delay / h).astype(int)
     found = Run(np.empty((samples, 6, runs)), np.empty((samples, runs)), np.empty((samples, runs)))
     y = np.array(y)
     for k in range(samples):
         found.y[k], found.command[k] = y, law(k, y)
-        for step in range(substeps):
-            arrived = found.command[np.maximum((k * substeps + step - late) // substeps, 0), column]
-            first = rates(table, y, arrived)
-            if step == 0:
-                found.acceleration[k] = first[V]
-            second = rates(table, y + 0.5 * h * first, arrived)
-            third = rates(table, y + 0.5 * h * second, arrived)
-            fourth = rates(table, y + h * third, arrived)
-            y = y + h / 6.0 * (first + 2.0 * (second + third) + fourth)
+        found.acceleration[k] = _advance(table, y, found.command, late, k * substeps, substeps)
     return found
+
+
+@njit(cache=True)
+def _advance(table: Table, y: Array, command: Array, late: Array, begun: int, substeps: int) -> Array:
+    """Advance states y (6, runs) in place over one sample; the acceleration (runs,) at its start."""
+    h, arrived = 1.0 / (RATE * substeps), np.empty(y.shape[1])
+    acceleration = np.empty(y.shape[1])
+    for step in range(substeps):
+        for run in range(len(arrived)):
+            arrived[run] = command[max((begun + step - late[run]) // substeps, 0), run]
+        first = rates(table, y, arrived)
+        if step == 0:
+            acceleration[:] = first[V]
+        second = rates(table, y + 0.5 * h * first, arrived)
+        third = rates(table, y + 0.5 * h * second, arrived)
+        fourth = rates(table, y + h * third, arrived)
+        y += h / 6.0 * (first + 2.0 * (second + third) + fourth)
+    return acceleration
 
 
 def control_loop(control: Control, reference: Array) -> Callable[[int, Array], Array]:

@@ -2,12 +2,17 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
+
+import typer
+
+from lhpost6_pin.cli import app
 
 ROOT = Path(__file__).parent.parent
 PAGES = ROOT / "scripts" / "docs" / "pages"
@@ -39,6 +44,15 @@ def run_snippet(snippet: Snippet, folder: Path) -> "subprocess.CompletedProcess[
     python = snippet.language == "python"
     command = [sys.executable, "-c", snippet.text] if python else ["bash", "-c", f"set -e -o pipefail\n{snippet.text}"]
     return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False, timeout=3600)
+
+
+def check_commands(text: str) -> int:
+    """Raise a UsageError for a command or option of `lhpost6` in a script of bash that does not exist; their number."""
+    group = typer.main.get_command(app)
+    lines = re.findall(r"(?:^|&& |\|\| )lhpost6 ([^|>&;\n]+)", text.replace("\\\n", " "), re.MULTILINE)
+    for name, *words in map(shlex.split, lines):
+        group.get_command(typer.Context(group), name).make_context(name, words)
+    return len(lines)
 
 
 class Links(HTMLParser):

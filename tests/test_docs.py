@@ -5,7 +5,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from doc_pages import PAGES, ROOT, Links, run_snippet, snippets
+from doc_pages import PAGES, ROOT, Links, check_commands, run_snippet, snippets
 from test_scripts import script
 from test_structure import ORDER
 
@@ -19,6 +19,7 @@ pytestmark = pytest.mark.long
 
 BY_HAND = sorted(PAGES.rglob("*.md"))
 RUN = ("bash", "python")
+WITH_SNIPPETS = [page for page in BY_HAND if any(s.language in RUN for s in snippets(page))]
 SHOWN = ("text", "console")
 """Languages of snippets that are shown and not run."""
 
@@ -229,12 +230,17 @@ def run_page(page: Path, folder: Path, *, slow: bool) -> None:
         assert ended.returncode == 0, said
 
 
-@pytest.mark.parametrize("page", [p for p in BY_HAND if any(s.language in RUN for s in snippets(p))], ids=name)
-def test_the_snippets_of_a_page_run_in_order(page, tmp_path):
+@pytest.mark.parametrize("page", WITH_SNIPPETS, ids=name)
+def test_commands_on_a_page_have_options_that_exist(page):
+    check_commands("".join(s.text for s in snippets(page) if s.language == "bash"))
+
+
+@pytest.mark.parametrize("page", [PAGES / "start.md", PAGES / "tutorials" / "own_table.md"], ids=name)
+def test_the_snippets_of_a_first_page_run_in_order(page, tmp_path):
     run_page(page, tmp_path, slow=False)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [p for p in BY_HAND if any(s.slow for s in snippets(p))], ids=name)
-def test_the_long_snippets_of_a_page_run_too(page, tmp_path):
+@pytest.mark.parametrize("page", WITH_SNIPPETS, ids=name)
+def test_the_snippets_of_a_page_run_in_order(page, tmp_path):
     run_page(page, tmp_path, slow=True)

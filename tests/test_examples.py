@@ -45,6 +45,7 @@ def test_an_example_that_cannot_find_what_it_is_given_says_so_in_a_line(path):
     assert re.fullmatch(r"error: .*\babsent\b.*\n", ended.stderr)
 
 
+@pytest.mark.slow
 def test_1_a_motion_is_rehearsed(tmp_path):
     said = run(1, "sine", "--scale", "0.2", "--out", tmp_path)
     assert [f for f in check_record(tmp_path / "record.nc") if f.severity == "error"] == []
@@ -85,6 +86,7 @@ def test_4_iterating_makes_the_table_follow_more_closely(tmp_path):
     assert load_drive(tmp_path / "drive.nc").attrs["machine"] == "uniaxial"
 
 
+@pytest.mark.slow
 def test_5_lqg_is_compared_with_the_469d(tmp_path):
     pytest.importorskip("control")
     said = run(5, "sine", "--scale", "0.2", "--axes", "x", "--out", tmp_path)
@@ -107,7 +109,7 @@ def test_6_uncertain_numbers_give_an_interval(tmp_path):
     assert all(float(row["largest spool [%]"]) < 100 for row in rows)
 
 
-@pytest.mark.slow  # the demonstration and the battery hide and find effects in every run of the checks
+@pytest.mark.slow  # the battery hides and finds effects in every run of the checks
 def test_7_a_hidden_effect_is_found(tmp_path):
     said = run(7, "bearing_thrust_direction", "--out", tmp_path)
     assert find_family("bearing_thrust_direction").title in said
@@ -121,6 +123,7 @@ def test_7_a_hidden_effect_is_found(tmp_path):
     assert added.name.startswith("bearing_thrust_direction")
 
 
+@pytest.mark.slow
 def test_the_demonstration_finds_what_it_hides(lhpost6, tmp_path):
     ended = lhpost6("demo", "--no-open", "--out", tmp_path)
     assert ended.code == 0, ended

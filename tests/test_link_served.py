@@ -196,7 +196,9 @@ def test_four_missed_frames_are_bridged_and_the_fifth_begins_the_hold(client, re
     assert client.table.counts["missed_frames"] == MISSED_FRAMES
 
 
-@pytest.mark.parametrize("share", [0.55, 0.625, 0.7])
+@pytest.mark.parametrize(
+    "share", [pytest.param(0.55, marks=pytest.mark.slow), 0.625, pytest.param(0.7, marks=pytest.mark.slow)]
+)
 def test_a_table_in_strong_motion_stays_within_its_strokes_and_comes_to_rest_when_commands_stop(plant, rest, share):
     """Commands stop in the last full cycle: near its middle, on the way out, and at the end of the stroke."""
     client = Client(plant, rest, LinkMode.REAL_TIME)

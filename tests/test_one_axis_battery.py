@@ -267,6 +267,7 @@ def test_a_test_that_would_cavitate_is_made_smaller():
         assert run.y[:, (PA, PB)].min() > one_axis_cases.numbers()["limit"]["least_pressure"]
 
 
+@pytest.mark.slow
 def test_overlap_is_found_though_a_refit_without_it_ends_far_off(tmp_path):
     """About that refit no small addition of overlap helps, and nothing was named; about the stated numbers it does."""
     case = one_axis_cases.draw_case("null", np.random.SeedSequence(1).spawn(1)[0], "brief")

@@ -10,7 +10,7 @@ import pytest
 from doc_pages import PAGES, run_snippet, snippets
 from page_cases import Reader
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow  # the battery searches one-axis tables in every run of the checks
 
 PAGE = PAGES / "tutorials" / "own_table.md"
 MOST_COMMANDS, LONGEST = 8, 600.0  # [s] of machine time: issue 22

@@ -42,6 +42,7 @@ def test_every_script_explains_its_options(name, monkeypatch, capsys):
     assert not ended.value.code and "--out" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_benchmarks_run_and_keep_their_figures(tmp_path):
     ended = script("bench.py", "--quick", "--out", tmp_path)
     assert ended.returncode == 0, ended.stderr
@@ -64,6 +65,7 @@ def test_the_audit_balances_energy_and_repeats_bit_by_bit(tmp_path):
     assert float(report) < 6.0 and float(view) < 6.0  # [MB], of 40 s
 
 
+@pytest.mark.slow
 def test_the_convergence_study_runs_and_keeps_its_errors(tmp_path):
     ended = script("convergence.py", "--seconds", "0.5", "--out", tmp_path)
     assert ended.returncode == 0, ended.stderr

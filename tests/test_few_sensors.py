@@ -17,7 +17,7 @@ from lhpost6_pin.discovery import withdrawal
 from lhpost6_pin.discovery.balances import gain_on
 from lhpost6_pin.discovery.candidates import list_candidates, with_background
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.estimates import Estimate
+from lhpost6_pin.discovery.estimates import Estimate, interval_reach, sums_of
 from lhpost6_pin.discovery.withdrawal import Withdrawn
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
 from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
@@ -204,6 +204,37 @@ def test_where_spools_are_not_measured_their_lag_is_fitted_and_never_a_candidate
     listed = {c.family.name for group in list_candidates(table, blind) for c in group}
     assert not listed & {"spool_lag", "transport_delay"}
     assert {"spool_lag", "transport_delay"} <= {c.family.name for group in list_candidates(table) for c in group}
+
+
+def test_delay_and_lag_have_an_interval_as_a_sum_where_the_spool_is_not_measured(table):
+    """Each alone had one of a per cent, half a millisecond off: a fit cannot tell them apart, whatever it predicts."""
+    blind = {"platen_displacement", "pressure_difference", "valve_command"}
+    path = f"{table.actuators[0].kind}.valve_delay"
+    uncertain = {path: replace(table.parameters[path], sd=2e-3)}
+    quantities = {**table.parameters.quantities, **uncertain}
+    table = replace(table, parameters=replace(table.parameters, quantities=quantities))
+    machine, background = with_background(table, 1.5, blind)
+    lag = next(p for p in background if p.name == "spool_lag_A1.time")
+    delay = next(p for p in machine_parameters(machine) if p.name == path)
+    x, step = np.array([lag.coordinate(2e-3), 0.1]), 1e-6
+    slopes = np.array([p.slope(c) for p, c in zip((lag, delay), x, strict=True)])
+    differences = [(p.at(c + step) - p.at(c - step)) / (2 * step) for p, c in zip((lag, delay), x, strict=True)]
+    assert slopes == pytest.approx(differences, rel=1e-8)  # central, of coordinates near one
+    sd, alike = 3e-4, 0.999  # [s] of each, and their correlation, negative
+    covariance = np.outer(sd / slopes, sd / slopes) * np.array([[1.0, -alike], [-alike, 1.0]])
+
+    def sums(channels: set[str]) -> dict:
+        test = SimpleNamespace(channels=channels)
+        problem = SimpleNamespace(parameters=(lag, delay), machine=machine, tests=[test])
+        solution = SimpleNamespace(x=x)
+        return sums_of(SimpleNamespace(problem=problem, solution=solution, numbers=discovery_numbers()[0]), covariance)
+
+    ((names, total),) = sums(blind).items()
+    assert names == (delay.name, lag.name) and total.unit == "s"
+    assert total.value == pytest.approx(delay.at(0.1) + 2e-3)
+    half = interval_reach(discovery_numbers()[0]) * sd * np.sqrt(2.0 * (1.0 - alike))
+    assert (total.low, total.high) == pytest.approx((total.value - half, total.value + half))
+    assert sums({*blind, "spool_position"}) == {}
 
 
 def test_a_machine_that_has_an_effect_already_gets_no_second_one_of_its_name(table):

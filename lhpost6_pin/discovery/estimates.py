@@ -10,10 +10,14 @@ from ..core.arrays import Array
 from ..identification.calibration import FreeParameter
 from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
+from ..machine.library import find_family
 from ..machine.parameters import Parameters
 from .search_state import AddedEffect, Search
 
-__all__ = ["Estimate", "amplitude_of", "at_bounds", "deviations", "estimates_of", "interval_reach", "owns"]
+__all__ = [
+    *("Estimate", "amplitude_of", "at_bounds", "covariance_of", "deviations", "estimates_of", "interval_reach"),
+    *("owns", "sums_of"),
+]
 
 AT_BOUND = 1e-3
 """Of an unknown's prior deviation: nearer to a bound it counts as at it."""
@@ -50,8 +54,8 @@ def at_bounds(found: Search) -> tuple[str, ...]:
     return tuple(name for name, end in zip(problem.names, ends, strict=True) if end)
 
 
-def deviations(found: Search) -> Array:
-    """Standard deviations (p,) of the unknowns with their floors; the priors of effects' own parameters are flat."""
+def covariance_of(found: Search) -> Array:
+    """Covariance (p, p) of the unknowns with their floors; the priors of effects' own parameters are flat."""
     problem = found.problem
     floor = found.calibration.number("fit.floor") * problem.stated
     for i, parameter in enumerate(problem.parameters):
@@ -59,8 +63,12 @@ def deviations(found: Search) -> Array:
             if parameter.name.startswith(f"{one.candidate.name}."):
                 stated = parameter.value if parameter.form == "shift" else 1.0
                 floor[i] = found.numbers.number("lengths.form") * stated if one.from_lengths else 0.0
-    covariance = np.linalg.inv(found.solution.normal.posterior(problem.prior))
-    return np.asarray(np.sqrt(np.diag(covariance) + floor**2))
+    return np.asarray(np.linalg.inv(found.solution.normal.posterior(problem.prior)) + np.diag(floor**2))
+
+
+def deviations(found: Search) -> Array:
+    """Standard deviations (p,) of the unknowns, `covariance_of`."""
+    return np.asarray(np.sqrt(np.diag(covariance_of(found))))
 
 
 def interval_reach(numbers: Parameters) -> float:
@@ -79,3 +87,30 @@ def estimates_of(found: Search, sd: Array) -> dict[str, Estimate]:
             values = [one.at(value) for value in values]
         out[one.name] = Estimate(values[0], one.unit, *sorted(values[1:]))
     return out
+
+
+def sums_of(found: Search, covariance: Array) -> dict[tuple[str, str], Estimate]:
+    """Sums of two unknowns of which the tests tell no more, by their names, with intervals.
+
+    That of a number of a component and an effect of the background in its path, where the channel between them is not
+    measured (`Family.sum_with`). A single one of them follows from what a fit cannot tell: its interval is none.
+    """
+    problem = found.problem
+    place = {p.name: i for i, p in enumerate(problem.parameters)}
+    channels, machine = problem.tests[0].channels, problem.machine
+    sums = {}
+    for name, entry in machine.parameters.effects.items():
+        family = find_family(entry.family)
+        if not family.sum_with or family.background_without in channels:
+            continue
+        second, kinds = f"{name}.{family.shapes[0].name}", {a.name: a.kind for a in machine.actuators}
+        owners = dict.fromkeys(owner for c in entry.components for owner in (c, kinds[c]))
+        for first in (f"{owner}.{family.sum_with}" for owner in owners):
+            if {first, second} <= set(place):
+                pair = [place[first], place[second]]
+                both, x = [problem.parameters[i] for i in pair], found.solution.x[pair].tolist()
+                slope = np.array([one.slope(at) for one, at in zip(both, x, strict=True)])
+                value = sum(one.at(at) for one, at in zip(both, x, strict=True))
+                half = interval_reach(found.numbers) * float(np.sqrt(slope @ covariance[np.ix_(pair, pair)] @ slope))
+                sums[first, second] = Estimate(value, both[0].unit, value - half, value + half)
+    return sums

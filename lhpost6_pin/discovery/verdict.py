@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from ..identification.calibration.scale import Scale, ratios
 from ..machine.parameters import Parameters
 from .acceptance import form_share
-from .estimates import Estimate, amplitude_of, at_bounds, deviations, estimates_of, interval_reach, owns
+from .estimates import Estimate, amplitude_of, at_bounds, covariance_of, estimates_of, interval_reach, owns, sums_of
 from .localise import Spot, worst_spots
 from .residual_function import ResidualFunction
 from .search_state import AddedEffect, Search
@@ -68,6 +68,7 @@ class Verdict:
     bounded: tuple[str, ...] = ()  # unknowns at a bound, which are no estimates
     scale: Scale | None = None  # that nothing measured fixes
     ratios: Mapping[str, Estimate] = field(default_factory=dict)  # to that scale, of what was estimated
+    sums: Mapping[tuple[str, str], Estimate] = field(default_factory=dict)  # of unknowns that have no interval alone
 
 
 def judge(
@@ -85,7 +86,8 @@ def judge(
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
     own = tuple(f"{one.candidate.name}." for one in found.added)
-    sd = deviations(found)
+    covariance = covariance_of(found)
+    sd = np.sqrt(np.diag(covariance))
     estimates = estimates_of(found, sd)
     released = tuple(
         SensorFinding(u.name, one.candidate.family.named, estimates[u.name], float(np.sqrt(3.0) * u.sd))
@@ -134,6 +136,7 @@ def judge(
         *(word, effects, changed, (*sensors, *removed), function, hidden, nearest, spots, withdrawn, bounded),
         scale=problem.scale,
         ratios={name: Estimate(*ratio) for name, ratio in scaled.items()},
+        sums={names: total for names, total in sums_of(found, covariance).items() if set(names) & set(changed)},
     )
 
 

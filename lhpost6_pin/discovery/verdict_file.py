@@ -65,6 +65,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
             for one in verdict.effects
         ],
         "parameters_changed": {name: _interval(value) for name, value in verdict.changed.items()},
+        "sums": [{"of": list(names), **_interval(total)} for names, total in verdict.sums.items()],
         "scale": _scale(found),
         "sensor_findings": [
             {"name": s.name, "family": s.family, **_interval(s.estimate), "stated_range": s.stated}

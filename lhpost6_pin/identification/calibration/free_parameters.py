@@ -88,6 +88,12 @@ class FreeParameter:
             return self.value + coordinate
         return self.value * (1.0 + coordinate if self.form == "factor" else math.exp(coordinate))
 
+    def slope(self, coordinate: float) -> float:
+        """Derivative of the value by the coordinate, there."""
+        if self.form == "shift":
+            return 1.0
+        return self.value * (1.0 if self.form == "factor" else math.exp(coordinate))
+
     def within(self, low: float, high: float) -> "FreeParameter":
         """The same parameter with its values between low and high."""
         bounds = (-math.inf if self.form == "log" and v <= 0.0 else self.coordinate(v) for v in (low, high))

@@ -48,6 +48,7 @@ class Family:
     grouping: str  # "kind": a search takes all of a kind together and each alone; "all": all of them at once
     named: str  # the family that it is a form of; usually itself
     background_without: str  # channel without which it is refitted in every search and never named; empty: none
+    sum_with: str  # number of a component of which, without that channel, only the sum with the amplitude is known
     # "named"; "compared": with the machine's own friction, by held-out error, before a search; "background": refitted
     # in every search and never named; "unnamed": never a candidate
     search: str
@@ -140,6 +141,7 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         grouping=table.get("grouping", "kind"),
         named=table.get("named", name),
         background_without=table.get("background_without", ""),
+        sum_with=table.get("sum_with", ""),
         search=table.get("search", "named"),
         confusable=table.get("confusable", False),
         law=table.get("law", ""),

@@ -8,7 +8,7 @@ from ...discovery import Discovery, save_verdict
 from ...discovery.balances import Balance
 from ...discovery.estimates import Estimate
 from ...discovery.held_out import Proof
-from ...discovery.verdict import EffectFinding, SensorFinding, Word
+from ...discovery.verdict import EffectFinding, SensorFinding, Verdict, Word
 from ...discovery.verdict_file import advice, summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
@@ -77,7 +77,7 @@ def discovery_tables(found: Discovery) -> list[Table]:
     verdict = found.verdict
     changed = []
     if verdict.changed:
-        changed.append(_estimates("Recalibrated parameters", "Parameter", verdict.changed, verdict.bounded))
+        changed.append(_changed_table(verdict))
     if verdict.scale and verdict.ratios:
         changed.append(_estimates(f"Ratios to {verdict.scale.name}", "Number", verdict.ratios))
     sensors = [_sensor_table(verdict.sensors)] if verdict.sensors else []
@@ -116,11 +116,20 @@ def _effect_table(one: EffectFinding) -> Table:
     )
 
 
-def _estimates(caption: str, what: str, estimates: Mapping[str, Estimate], bounded: Sequence[str] = ()) -> Table:
-    rows = [
-        (n, f"{e.value:.5g}", "at its bound" if n in bounded else f"{e.low:.5g} to {e.high:.5g}", e.unit)
-        for n, e in estimates.items()
-    ]
+def _changed_table(verdict: Verdict) -> Table:
+    """Parameters that differ, and the sums of those that are known as a sum alone."""
+    alone = {name: "only the sum is known" for names in verdict.sums for name in names}
+    alone |= dict.fromkeys(verdict.bounded, "at its bound")
+    sums = {" + ".join(names): total for names, total in verdict.sums.items()}
+    return _estimates("Recalibrated parameters", "Parameter", {**verdict.changed, **sums}, alone)
+
+
+def _estimates(
+    caption: str, what: str, estimates: Mapping[str, Estimate], why: Mapping[str, str] | None = None
+) -> Table:
+    """Estimates with their intervals, or `why` they have none."""
+    none = why or {}
+    rows = [(n, f"{e.value:.5g}", none.get(n, f"{e.low:.5g} to {e.high:.5g}"), e.unit) for n, e in estimates.items()]
     return Table(caption, (what, "Value", "90 % interval", "Unit"), rows)
 
 
@@ -246,9 +255,7 @@ def _considered(found: Discovery) -> list[Block]:
 def _parameter_blocks(found: Discovery) -> list[Block]:
     changed, sensors = found.verdict.changed, found.verdict.sensors
     return [
-        _estimates("Recalibrated parameters", "Parameter", changed, found.verdict.bounded)
-        if changed
-        else "No parameter differs.",
+        _changed_table(found.verdict) if changed else "No parameter differs.",
         _sensor_table(sensors) if sensors else "All sensors are within the ranges of the sensors file.",
     ]
 

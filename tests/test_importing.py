@@ -779,13 +779,34 @@ def test_kinds_of_channels_that_a_layout_has_are_matched_by_their_words():
 
 
 def test_a_command_in_volts_is_a_share_of_the_full_one_that_the_machine_states():
-    for name, unit, gain in (("Voltage command (V)", None, 0.1), ("Valve cmd", "V", 0.1), ("cmd [V]", "V", 0.1)):
-        found, remarks = guess_map([columns_called([name], [unit])], ONE, ("x",), {"A1": 10.0})
+    for name, unit in (("Voltage command (V)", None), ("Valve cmd", "V"), ("cmd [V]", "V"), ("Cmd(V)", None)):
+        found, remarks = guess_map([columns_called([name], unit and [unit])], ONE, ("x",), {"A1": 10.0})
         source = found.channels["valve_command[A1]"]
-        assert (source.column, source.unit, source.gain) == (name, "1", gain)
+        assert (source.column, source.unit, source.gain) == (name, "1", 0.1)
         assert not any("valve_command[A1]" in remark for remark in remarks)
     _, remarks = guess_map([columns_called(["cmd [mA]"], ["mA"])], ONE, ("x",), {"A1": 10.0})
     assert remarks[0].startswith('"valve_command[A1]" = ')
+    _, remarks = guess_map([columns_called(["Ventil"], ["V"])], ONE, ("x",), {"A1": 10.0})
+    assert remarks[0].endswith("; by its unit: valve_command[A1]")  # a word of another language
+
+
+def test_a_table_in_another_language_has_a_time_and_one_without_is_told_how_to_give_it(tmp_path):
+    """Semicolons, decimal commas, a head of three lines, units in a line of their own, as German loggers write them."""
+    rows = [f"{k / 256:.6f};{0.01 * k:.3f};{2.0 - 0.5 * k:.2f}".replace(".", ",") for k in range(20)]
+    head = "Versuch: Rauschen\nDatum: 12.03.2024\nRate: 256 Hz\n\n"
+    clock = ("Zeit", "[s]"), ("Dauer der Messung", "[ms]"), ("Nr", "[-]")
+    for (name, unit), factor in zip(clock, (1.0, 1e-3, None), strict=True):
+        path = put(tmp_path, "r.csv", head + f"{name};Weg Tisch;Soll Weg\n{unit};[mm];[mm]\n" + "\n".join(rows) + "\n")
+        (read,) = load_raw(path)
+        channels, remarks = guess_map([read], ONE, ("x",))
+        found = {key: source.column for key, source in channels.channels.items()}
+        assert found == {"platen_displacement[x]": "Weg Tisch", "reference_displacement[x]": "Soll Weg"}
+        assert read.values[3, -2:].tolist() == [0.03, 0.5]
+        if factor is None:
+            assert read.time is None and remarks[-1] == "add file_rate, in Hz, to [test]: r.csv has no time"
+        else:
+            np.testing.assert_allclose(read.time, factor * np.arange(20) / 256, atol=1e-6 * factor)  # as written
+            assert not any("file_rate" in remark for remark in remarks)
 
 
 def test_a_map_is_written_even_where_no_column_is_recognised_and_says_what_they_could_be(tmp_path):

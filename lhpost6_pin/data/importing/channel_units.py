@@ -7,7 +7,11 @@ from ...core.units import parse_unit, quantity_unit
 
 __all__ = ["si_factor", "time_unit", "unit_in_name", "without_unit"]
 
-_TIME = re.compile(r"(?:(?:elapsed|test|running)[\s_]*)?(?:time|t)(?:[\s_]*(?P<unit>.+))?", re.I)
+_TIME = re.compile(
+    r"(?:(?:elapsed|test|running)[\s_]*)?(?:time|zeit|temps|t)(?:[\s_]*(?P<unit>.+))?|secs?|seconds", re.I
+)
+_VOLTAGE = ("V", "mV", "mA")
+"""Units of what a converter measures: known in brackets, converted only by a gain of the map."""
 _BRACKETED = re.compile(r"(?P<name>.*?)(?P<gap>[\s_]*)(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
 
 
@@ -24,12 +28,12 @@ def si_factor(unit: str, wanted: str) -> float:
 def unit_in_name(name: str) -> str | None:
     """Unit in a column's name: `x [mm]`, `Ax (g)`, `accel_x_m_s2`; None if there is none.
 
-    Text in square brackets after a blank is always a unit, known or not; `(A)` or `_b` only if it is one.
+    Text in square brackets after a blank is always a unit, known or not; `(A)` or `_b` only if it is one, as `(V)` is.
     """
     if match := _BRACKETED.fullmatch(name):
         text = (match["square"] if match["round"] is None else match["round"]).strip()
         certain = match["round"] is None and match["gap"]
-        return text if text and (certain or quantity_unit(text)) else None
+        return text if text and (certain or text in _VOLTAGE or quantity_unit(text)) else None
     words = name.split("_")
     ends = ("_".join(words[k:]) for k in range(1, len(words)))
     return next((end for end in ends if not end.isdigit() and quantity_unit(end)), None)

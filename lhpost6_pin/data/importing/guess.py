@@ -79,7 +79,7 @@ def guess_map(
         source = _source(raws, raw, name, number, unit)
         where = f"column {number} of {_file_name(raw)}"
         if channel and channel.startswith(_SHARE) and quantity_unit(unit) != "1":
-            if (gain := _share(channel, unit or name, machine)) and channel not in found:
+            if (gain := _share(channel, unit, machine)) and channel not in found:
                 found[channel] = replace(source, unit="1", gain=gain)
                 continue
             line = source_line(channel, replace(source, unit="1"))
@@ -103,6 +103,7 @@ def guess_map(
     if unknown:
         remarks.append(f"{_PLACEHOLDER} is one of: {_short(free)}")
     remarks += _without_masses(found, stated)
+    remarks += [f"add file_rate, in Hz, to [test]: {_file_name(raw)} has no time" for raw in raws if raw.time is None]
     facts = {key: value for raw in reversed(raws) for key, value in raw.facts.items()}
     ordered = {name: found[name] for name in machine.known if name in found}
     return Guess(ChannelMap("guessed map", _test(facts), ordered), tuple(remarks))
@@ -131,21 +132,22 @@ def _is_still(label: str | None, machine: _Machine) -> bool:
     return label in AXES and label not in machine.axes
 
 
-def _share(channel: str, text: str, machine: _Machine) -> float | None:
-    """Share of full command that one volt of a valve's command is; None in another unit, or where that is not stated.
-
-    `text` is its unit, or the column's name with the unit in brackets at the end.
-    """
-    volts = re.split(r"[\[(]", text.strip(" )]"))[-1].strip().casefold() in ("v", "volt", "volts")
+def _share(channel: str, unit: str | None, machine: _Machine) -> float | None:
+    """Share of full command that a volt of a valve command is; None in another unit, or where that is not stated."""
     full = machine.full.get(channel.rpartition("[")[2].rstrip("]"))
-    return float(f"{1.0 / full:.6g}") if full and volts else None
+    return float(f"{1.0 / full:.6g}") if full and _is_voltage(unit) else None
 
 
 def _possible(source: Source, free: Sequence[str]) -> str:
     """Channels that a column of this unit could be."""
     si = quantity_unit(source.unit)
-    fitting = [name for name in free if channel_unit(name) == si]
+    volts = _is_voltage(source.unit)
+    fitting = [name for name in free if (name.startswith(_SHARE) if volts else channel_unit(name) == si)]
     return f"; by its unit: {_short(fitting)}" if fitting else ""
+
+
+def _is_voltage(unit: str | None) -> bool:
+    return (unit or "").strip().casefold() in ("v", "volt", "volts")
 
 
 def _short(names: Sequence[str]) -> str:

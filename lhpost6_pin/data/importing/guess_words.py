@@ -42,7 +42,7 @@ _BY_UNIT = {
 _DIFFERENCE = ("dp", "deltap", "dpress", "pl")
 _DIFFERENT = ("delta", "diff", "differential", "difference", "load")
 """Words that make a pressure the difference across a piston."""
-_WANTED = ("ref", "reference", "cmd", "command", "target", "desired", "demand", "setpoint")
+_WANTED = ("ref", "reference", "cmd", "command", "target", "desired", "demand", "setpoint", "soll")
 _OTHER = ("err", "error", "delta", "diff", "dp", "dof")
 _FLOOR = re.compile(r"(?P<number>\d{1,2})(?:f|fl|flr|st|nd|rd|th)|f(?:l|lr)?(?P<after>\d{1,2})|(?P<roof>rf|roof)")
 _FLOOR_NAMES = ("floor", "fl", "story", "storey", "level")

@@ -150,9 +150,13 @@ def _raw_of_columns(
     clocks = [k for k, name in enumerate(names) if time_unit(name, units[k])]
     if len(clocks) > 1:
         raise RecordError(f"{source}: {shown([names[k] for k in clocks])} are all named as time; rename all but one")
+    if not clocks:  # named in a language of its own
+        own = [k for k, unit in enumerate(units) if unit and quantity_unit(unit) == "s"]
+        clocks = [k for k in own[:1] if len(values) > 1 and np.all(np.diff(values[:, k]) > 0)]
     time = None
     if clocks:
         with np.errstate(over="ignore"):  # times without end are refused with their sample
-            time = values[:, clocks[0]] * si_factor(time_unit(names[clocks[0]], units[clocks[0]]) or "s", "s")
+            unit = time_unit(names[clocks[0]], units[clocks[0]]) or units[clocks[0]] or "s"
+            time = values[:, clocks[0]] * si_factor(unit, "s")
     rest = [k for k in range(len(names)) if k not in clocks]
     return make_raw(source, form, [names[k] for k in rest], [units[k] for k in rest], values[:, rest], time, facts)

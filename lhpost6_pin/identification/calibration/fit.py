@@ -125,14 +125,16 @@ def solve(
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps, a rejected step shortened to a quarter.
 
-    Steps are half as long after each that does not lower the objective.
+    Steps are half as long after each that does not lower the objective, and twice as long, up to the full one, after
+    each to the lowest so far. The search ends where steps are short, or where two of them do not change the objective.
 
     The correction for noise in the derivatives is evaluated in the second step, in a `frugal` search in the first.
     Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
     already evaluated. A frugal search evaluates derivatives by nearly linear unknowns only at `start`, all others while
     steps gain much and nothing is `known`; a `settled` one only those that `known` lacks, and those `near` (p,) them.
-    With few unknowns no search is frugal.
+    It ends where a step gains little. With few unknowns no search is frugal, though a settled one ends so.
     """
+    brief = frugal and (settled or len(start) > numbers.number("fit.few"))
     frugal = frugal and len(start) > numbers.number("fit.few")
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
@@ -142,32 +144,37 @@ def solve(
     again = bent if frugal and not settled else fresh | near | (not frugal)
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: NoiseBias | None = None
-    normal: NormalEquations | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
-    least, damped, converged, replicas = np.inf, 1.0, False, len(problem.again)
+    least, damped, quiet, converged, replicas = np.inf, 1.0, 0, False, len(problem.again)
+    lowest, flat = np.inf, numbers.number("fit.flat")
     parts = split(progress, rounds + replicas)
     for done in range(1, rounds + 1):
         part = parts[0 if done == 1 else done - 1 + replicas]
-        if normal is None:
+        if held is None:
             normal = first or NormalEquations(problem, x, part, known, None if settled else fresh | again)
             before = misfit(problem, normal.residual)
         else:
+            base = OperatingPoint(problem, x)
+            if objective(problem, problem.residual(base), x) > least + OVERSHOT:
+                step = 0.25 * step
+                x = at + step
+                continue
             renewed = not frugal or (
                 (settled or known is None)
                 and gain > numbers.number("fit.renew")
                 and done <= int(numbers.number("fit.renewals"))
             )
-            normal = NormalEquations(problem, x, part, normal, again if renewed else np.zeros_like(again))
-        if done == (1 if frugal else 2):  # close to the solution, and kept afterwards
+            normal = NormalEquations(problem, x, part, held, again if renewed else np.zeros_like(again), base)
+        if bias is None and done >= (1 if frugal else 2):  # close to the solution, and kept afterwards
             bias = NoiseBias(normal, x, parts[1 : 1 + replicas], known)
         if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
         value = objective(problem, normal.residual, x)
-        if held is not None and value > least + OVERSHOT:
-            step, normal = 0.25 * step, held
-            x = at + step
-            continue
-        damped *= 0.5 if value > least else 1.0  # else steps may go to and fro where the objective is flat
+        quiet = quiet + 1 if abs(value - least) < flat else 0
+        if value < lowest - flat:
+            damped, lowest = min(1.0, 2.0 * damped), value
+        elif value > least:
+            damped *= 0.5  # else steps may go to and fro where the objective is flat
         least, held, at = value, normal, x
         posterior = normal.posterior(problem.prior)
         step = bounded_step(normal, posterior, x, problem, numbers)
@@ -177,7 +184,7 @@ def solve(
         still = np.max(np.abs(step) / sd) < numbers.number("fit.converged")
         step = damped * step
         x = x + step
-        if done > 1 and (still or (frugal and gain < numbers.number("fit.still"))):
+        if quiet == 2 or (done > 1 and (still or (brief and gain < numbers.number("fit.still")))):
             converged = True
             break
     assert held is not None

@@ -25,12 +25,13 @@ class NormalEquations:
         report: Progress,
         known: "NormalEquations | None" = None,
         again: Mask | None = None,
+        base: OperatingPoint | None = None,
     ) -> None:
-        """Evaluate residuals and their derivatives at x (p,).
+        """Evaluate residuals and their derivatives at x (p,), or at the operating point `base` that is there.
 
         Derivatives by unknowns of `known` are reused, except those to evaluate `again` (p,).
         """
-        self.problem, base = problem, OperatingPoint(problem, x)
+        self.problem, base = problem, base or OperatingPoint(problem, x)
         self.residual = problem.residual(base)
         shared, fresh = _shared(problem, known, again)
         before = [] if known is None else known.slope

@@ -125,8 +125,8 @@ def solve(
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps, a rejected step shortened to a quarter.
 
-    Steps are half as long after each that does not lower the objective, and twice as long, up to the full one, after
-    each to the lowest so far. The search ends where steps are short, or where two of them do not change the objective.
+    Steps are half as long after each that does not lower the objective. The search ends where steps are short, or where
+    two of them do not change the objective.
 
     The correction for noise in the derivatives is evaluated in the second step, in a `frugal` search in the first.
     Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
@@ -146,7 +146,7 @@ def solve(
     bias: NoiseBias | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
     least, damped, quiet, converged, replicas = np.inf, 1.0, 0, False, len(problem.again)
-    lowest, flat = np.inf, numbers.number("fit.flat")
+    flat = numbers.number("fit.flat")
     parts = split(progress, rounds + replicas)
     for done in range(1, rounds + 1):
         part = parts[0 if done == 1 else done - 1 + replicas]
@@ -171,10 +171,7 @@ def solve(
             normal = normal.less(bias)
         value = objective(problem, normal.residual, x)
         quiet = quiet + 1 if abs(value - least) < flat else 0
-        if value < lowest - flat:
-            damped, lowest = min(1.0, 2.0 * damped), value
-        elif value > least:
-            damped *= 0.5  # else steps may go to and fro where the objective is flat
+        damped *= 0.5 if value > least else 1.0  # else steps may go to and fro where the objective is flat
         least, held, at = value, normal, x
         posterior = normal.posterior(problem.prior)
         step = bounded_step(normal, posterior, x, problem, numbers)

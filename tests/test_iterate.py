@@ -1,5 +1,7 @@
 """Online iteration on a few seconds of an earthquake: the error falls, the drive can be replayed, runs repeat."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from run_cases import with_tuning_numbers
@@ -73,6 +75,20 @@ def test_a_run_that_leaves_its_stroke_names_the_iteration(table):
     far = make_target(find_motion("sine", axis="z", amplitude=0.2, period=2.0, cycles=1), pad=1.0)
     with pytest.raises(SimulationError, match=r"iteration 0 stopped at \d\.\d+ s: V\d left its stroke"):
         iterate(load_machine(), far, load_controller("lhpost6"), table=table, most=1)
+
+
+def test_a_chamber_that_runs_empty_ends_the_iteration(table, strong, monkeypatch):
+    """As it does a run: what follows is not physical."""
+
+    def emptied(plant, *loop, **options):
+        run = simulate(plant, *loop, **options)
+        z = run.z.copy()
+        z[100:, plant.state_index("actuators_3_way", "V2", "pressure_a")] = -1e4
+        return replace(run, z=z)
+
+    monkeypatch.setattr(module, "simulate", emptied)
+    with pytest.raises(SimulationError, match=r"iteration 0 became unphysical at \d.\d+ s: chamber A of V2 fell below"):
+        iterate(load_machine(), strong, load_controller("lhpost6"), table=table, most=1)
 
 
 @pytest.mark.parametrize("gain", [0.0, -0.5, 1.5, np.nan])

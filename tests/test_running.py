@@ -3,6 +3,7 @@
 import time
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from commands import SHORT
 from machine_cases import PENDULUM, machine_named
@@ -55,6 +56,24 @@ def test_a_run_sample_by_sample_is_that_of_simulate_to_the_last_bit(plant, rest,
     assert np.array_equal(states, np.hstack([run.q, run.v, run.z]))
     assert np.allclose(spools, run.spool, rtol=0.0, atol=1e-15)  # a mean, rounded
     assert (table.sample, table.time, table.clipped) == (N, N / SAMPLE_RATE, run.clipped)
+
+
+def test_a_plant_that_is_lifted_off_its_bearings_says_so_once_and_goes_on(plant, rest, caplog):
+    """A wrench that takes the weight and more: vertical actuators cannot pull."""
+    table, lift = RunningPlant(plant, rest), pin.Force(np.array([0.0, 0.0, 2e7, 0.0, 0.0, 0.0]))
+    places = [plant.state_index("actuators_3_way", f"V{k}", "pressure_a") for k in range(1, 7)]
+    seen, empty = [], []
+    for _ in range(60):
+        table.advance(rest.spool, lift)
+        seen.append(table.trouble)
+        empty.append(table.state.z[places].min() < 0.0)
+    assert seen[0] == "" and table.trouble.startswith("became unphysical at 0.0")
+    assert "chamber A of V" in table.trouble and "would lose contact with the platen" in table.trouble
+    (warning,) = caplog.records
+    assert table.trouble in warning.message
+    first = empty.index(True)
+    assert [bool(text) for text in seen] == [False] * first + [True] * (60 - first)
+    assert f"at {(first + 1) / SAMPLE_RATE:.4f} s" in table.trouble and len(set(seen)) == 2
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

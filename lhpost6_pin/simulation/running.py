@@ -7,6 +7,7 @@
 The compiled stages and their order are those of `simulate` with the Pinocchio engine: results are equal bit by bit.
 """
 
+import logging
 from functools import partial
 
 import numpy as np
@@ -29,14 +30,18 @@ from ..mechanics.workspace import make_workspace
 from .coupling import Continued, CouplingOptions, CouplingResult, WithOutside, make_coupling
 from .simulate import diagnosis
 from .snapshot import Snapshot, take_snapshot
+from .trouble import EmptyChambers
 
 __all__ = ["RunningPlant"]
+
+log = logging.getLogger(__name__)
 
 
 class RunningPlant:
     """A plant, initially at rest in the zero-position, that takes one command per sample.
 
-    Attributes: plant; sample, number of commands taken; clipped, number of spool values beyond full stroke.
+    Attributes: plant; sample, number of commands taken; clipped, number of spool values beyond full stroke. What makes
+    the motion unphysical is logged as a warning once, and kept in `trouble`.
     """
 
     def __init__(
@@ -56,6 +61,7 @@ class RunningPlant:
         steps = steps_a_sample(scheme, steps_per_second)
         self.plant, self.scheme, self.steps_per_second = plant, scheme, steps_per_second
         self.sample = self.clipped = 0
+        self._empty = EmptyChambers(plant)
         coupled = make_coupling(plant, scheme, steps_per_second, coupling)
         self._coupled = coupled.without_history() if coupled else None
         self._evaluate = self._coupled.evaluate if self._coupled else partial(evaluate_derivatives, plant)
@@ -102,6 +108,11 @@ class RunningPlant:
         return base_motion(self.plant, self._ws, self._base)
 
     @property
+    def trouble(self) -> str:
+        """From when and why the motion is not physical; empty where it is."""
+        return self._empty.trouble
+
+    @property
     def coupling(self) -> CouplingResult | None:
         """What a coupled specimen exchanged so far; its rows are those of the last sample."""
         return self._coupled.result() if self._coupled else None
@@ -137,6 +148,8 @@ class RunningPlant:
             raise SimulationError(self._coupled.trouble)
         if status:
             raise SimulationError(diagnosis(self.plant, status, self.time, self.scheme, self.steps_per_second))
+        if self._empty.look(self._ws.z, self.time):
+            log.warning("the motion %s", self.trouble)
 
     def _take(self, wrench: pin.Force | None) -> None:
         """Take a wrench from outside at the start of a sample."""

@@ -1,14 +1,18 @@
 """What in a finished run is not physical, or near its end: empty chambers, lost contact, strokes at their ends."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
+from ..core.arrays import Array
+from ..machine.components import Actuator
+from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..mechanics.strokes import stroke_ends
 from .simulate import Run
 
-__all__ = ["run_doubts", "with_pressure_trouble"]
+__all__ = ["EmptyChambers", "run_doubts", "with_pressure_trouble"]
 
 REMEDY = (
     "what follows is not physical: scale the motion down, move the specimen towards the centre, or add the effect "
@@ -25,13 +29,32 @@ def with_pressure_trouble(run: Run) -> Run:
     if run.trouble is not None:
         return run
     found = [(at, name, chamber) for name, chamber, at, _, voids in _lowest(run, 0.0) if not voids]
-    if not found:
-        return run
-    at, name, chamber = min(found)
-    actuator = next(a for a in run.plant.machine.actuators if a.name == name)
+    return replace(run, trouble=_said(run.plant, *min(found))) if found else run
+
+
+class EmptyChambers:
+    """The same of a plant that runs sample by sample: its `trouble`, empty until a pressure falls below zero."""
+
+    def __init__(self, plant: Plant) -> None:
+        """Watch the chambers of a plant whose actuators lack the effect `cavitation`."""
+        self.plant, self.trouble = plant, ""
+        self._chambers = [(a.name, chamber, place) for a, chamber, place, voids in _chambers(plant) if not voids]
+        self._places = np.array([place for _, _, place in self._chambers], int)
+
+    def look(self, z: Array, time: float) -> bool:
+        """Whether hidden states z (n_states,) at a time [s] are the first with an empty chamber."""
+        if self.trouble or not (empty := z[self._places] < 0.0).any():
+            return False
+        name, chamber, _ = self._chambers[int(empty.argmax())]
+        self.trouble = _said(self.plant, time, name, chamber)
+        return True
+
+
+def _said(plant: Plant, at: float, name: str, chamber: str) -> str:
+    actuator = next(a for a in plant.machine.actuators if a.name == name)
     contact = f", and {name} would lose contact with the platen" if actuator.mount == "bearing" else ""
     what = f"became unphysical at {at:.4f} s: chamber {chamber} of {name} fell below zero pressure{contact}"
-    return replace(run, trouble=f"{what}; {REMEDY}")
+    return f"{what}; {REMEDY}"
 
 
 def run_doubts(run: Run) -> list[str]:
@@ -53,14 +76,19 @@ def run_doubts(run: Run) -> list[str]:
 
 def _lowest(run: Run, level: float) -> list[tuple[str, str, float, float, bool]]:
     """Chambers that fell below a level: actuator, chamber, first time [s], least pressure [Pa], cavitation modelled."""
-    plant, found = run.plant, []
-    for actuator, row, voids in zip(
-        plant.machine.actuators, plant.rows[plant.tables.actuators], plant.actuators.voids, strict=True
-    ):
-        for i, chamber in enumerate("AB" if actuator.area_b is not None else "A"):
-            pressure = run.z[:, row["state"] + i]
-            below = pressure < level
-            if below.any():
-                first, least = float(run.time[int(below.argmax())]), float(np.nanmin(pressure))
-                found.append((actuator.name, chamber, first, least, bool(voids)))
+    found = []
+    for actuator, chamber, place, voids in _chambers(run.plant):
+        pressure = run.z[:, place]
+        below = pressure < level
+        if below.any():
+            first, least = float(run.time[int(below.argmax())]), float(np.nanmin(pressure))
+            found.append((actuator.name, chamber, first, least, voids))
     return found
+
+
+def _chambers(plant: Plant) -> Iterator[tuple[Actuator, str, int, bool]]:
+    """Chambers: actuator, A or B, place of the pressure among hidden states, and whether cavitation is modelled."""
+    rows = plant.rows[plant.tables.actuators]
+    for actuator, row, voids in zip(plant.machine.actuators, rows, plant.actuators.voids, strict=True):
+        for i, chamber in enumerate("AB" if actuator.area_b is not None else "A"):
+            yield actuator, chamber, int(row["state"]) + i, bool(voids)

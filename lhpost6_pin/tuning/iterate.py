@@ -27,6 +27,7 @@ from ..machine.machine import Machine
 from ..mechanics.pose import PlatenMotion, platen_motion
 from ..motions import Target
 from ..simulation.simulate import ClosedLoop, Run, fastest_engine, simulate
+from ..simulation.trouble import with_pressure_trouble
 from .identify import identify, noise_target, section, tuning_numbers
 
 __all__ = ["Iterated", "Iteration", "TableInverse", "identify_inverse", "iterate"]
@@ -122,7 +123,9 @@ def iterate(
     reason = f"limit of {most} iterations reached"
     for k in range(most + 1):
         report((k + 1) / (most + 2))
-        run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
+        run = with_pressure_trouble(
+            simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
+        )
         if run.trouble:
             raise SimulationError(f"iteration {k} {run.trouble}")
         motion = platen_motion(plant, run.q, run.v, run.a)

@@ -133,6 +133,9 @@ class ShakeTable(Fmi2Slave):
         except SimulationError as error:
             self._stop(str(error))
             return False
+        if self._table.trouble and not self.trouble:
+            self.trouble = self._table.trouble
+            self.log(self.trouble, Fmi2Status.warning)
         self._values = _measure(self._table)
         return True
 
@@ -206,7 +209,7 @@ class ShakeTable(Fmi2Slave):
         state = {"variability": Fmi2Variability.discrete, "initial": Fmi2Initial.calculated}
         about = "0 running, 1 stopped: outputs stay as they were before the step that went wrong"
         self.register_variable(Integer("status", causality=Fmi2Causality.output, description=about, **state))
-        about = "why the plant stopped; empty while it runs"
+        about = "why the plant stopped, or from when its motion is not physical; empty before"
         self.register_variable(String("trouble", causality=Fmi2Causality.local, description=about, **state))
 
     def _real(self, name: str, unit: str, about: str, causality: Fmi2Causality, **others: Any) -> None:

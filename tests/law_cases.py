@@ -196,6 +196,7 @@ _NUMBERS: dict[str, tuple[float, ...]] = {
     "back_pressure": (3e7, 0.03),
     "valve_delay": (1e-3,),
     "valve_lag": (2e-3,),
+    "one_way_ports": (1.0,),
     "thrust_direction": (0.3,),
     "more_inertia": tuple(1e3 * k for k in range(1, 11)),
 }

@@ -81,6 +81,7 @@ def view_hydraulic(numbers):
         numbers[30],
         numbers[31],
         numbers[32],
+        numbers[33],
     )
 
 

@@ -74,6 +74,7 @@ class Hydraulic(NamedTuple):
     supply_inertance: Annotated[float, "Pa s2/m3"] = 0.0
     supply_frequency: Annotated[float, "Hz"] = 0.0
     supply_damping: Annotated[float, "1"] = 0.0
+    one_way: Annotated[float, "1"] = 0.0  # above zero: no flow back through ports P and T
 
 
 LAW = Law(
@@ -107,17 +108,32 @@ def _opened(p, modified, spool):
 def _null_flows(p, spool, pressure, high, low):
     if p.null_leakage == 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    return null_leak(spool + p.null_bias, pressure, p.null_leakage, p.null_width, high, low, p.root_regularisation)
+    into, out, slope_in, slope_out = null_leak(
+        spool + p.null_bias, pressure, p.null_leakage, p.null_width, high, low, p.root_regularisation
+    )
+    if p.one_way > 0.0:
+        into, slope_in = (into, slope_in) if into > 0.0 else (0.0, 0.0)
+        out, slope_out = (out, slope_out) if out > 0.0 else (0.0, 0.0)
+    return into, out, slope_in, slope_out
+
+
+@compiled_inline
+def _port_flow(p, modified, opened, k_supply, k_return, high, low, pressure):
+    """`orifice.port_flow`; with one-way ports, none into P (supply) or out of T (return)."""
+    flow, slope = port_flow(opened, k_supply, k_return, high, low, pressure, p.root_regularisation)
+    if modified and p.one_way > 0.0 and flow * opened < 0.0:
+        flow = slope = 0.0
+    return flow, slope
 
 
 @compiled_inline
 def valve_flows(p, modified, spool, pressure_a, pressure_b, high, low):
     """Flows from the valve into chambers A and B [m3/s] and their slopes with the chambers' pressures [m3/s/Pa]."""
     opened = _opened(p, modified, spool)
-    flow_a, slope_a = port_flow(opened, p.flow_pa, p.flow_at, high, low, pressure_a, p.root_regularisation)
+    flow_a, slope_a = _port_flow(p, modified, opened, p.flow_pa, p.flow_at, high, low, pressure_a)
     flow_b = slope_b = 0.0
     if p.area_b > 0.0:
-        flow_b, slope_b = port_flow(-opened, p.flow_pb, p.flow_bt, high, low, pressure_b, p.root_regularisation)
+        flow_b, slope_b = _port_flow(p, modified, -opened, p.flow_pb, p.flow_bt, high, low, pressure_b)
     if modified:
         into, out, slope_in, slope_out = _null_flows(p, spool, pressure_a, high, low)
         flow_a += into - out
@@ -137,7 +153,7 @@ def exchanged_flows(p, spool, pressure_a, pressure_b, high, low):
     """
     opened = _opened(p, True, spool)
     drawn, returned, slope_drawn, slope_returned = _null_flows(p, spool, pressure_a, high, low)
-    flow, slope = port_flow(opened, p.flow_pa, p.flow_at, high, low, pressure_a, p.root_regularisation)
+    flow, slope = _port_flow(p, True, opened, p.flow_pa, p.flow_at, high, low, pressure_a)
     if opened >= 0.0:
         drawn, slope_drawn = drawn + flow, slope_drawn - slope
     else:
@@ -146,7 +162,7 @@ def exchanged_flows(p, spool, pressure_a, pressure_b, high, low):
         into, out, slope_in, slope_out = _null_flows(p, spool, pressure_b, high, low)
         drawn, returned = drawn + into, returned + out
         slope_drawn, slope_returned = slope_drawn + slope_in, slope_returned + slope_out
-        flow, slope = port_flow(-opened, p.flow_pb, p.flow_bt, high, low, pressure_b, p.root_regularisation)
+        flow, slope = _port_flow(p, True, -opened, p.flow_pb, p.flow_bt, high, low, pressure_b)
         if opened <= 0.0:
             drawn, slope_drawn = drawn + flow, slope_drawn - slope
         else:

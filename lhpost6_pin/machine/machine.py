@@ -22,7 +22,7 @@ from .recorded_specimen import recorded_mounting
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
-from .structure import BODIES, ESTIMATES, FLOW_READINGS, MOTIONS, Structure
+from .structure import BODIES, ESTIMATES, FLOW_READINGS, MOTIONS, VALVE_PORTS, Structure
 from .user_specimen import load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
@@ -208,6 +208,7 @@ def build_machine(
         "thrust": _word(parameters, "machine.thrust", ("report", "normal")),
         "bodies": _word(parameters, "machine.bodies", BODIES, BODIES[0]),
         "flow_reading": _word(parameters, "machine.flow_reading", FLOW_READINGS, FLOW_READINGS[0]),
+        "valve_ports": _word(parameters, "machine.valve_ports", VALVE_PORTS, VALVE_PORTS[0]),
     }
     components = [path.split(".")[0] for path in words if path.count(".") == 1 and path.endswith(".kind")]
     kinds = {str(words[f"{c}.kind"]) for c in components}

@@ -26,6 +26,9 @@ def standard_effects(structure: Structure) -> tuple[Effect, ...]:
                     tuple(i for i, _ in fed),
                 )
             )
+    if structure.valve_ports == "one_way":
+        names = tuple(a.name for a in actuators)
+        found.append(Effect("one_way_ports", "one_way_ports", names, ((1.0,),) * len(names), "Section 4.1.2"))
     if struts:
         gas = tuple((s.pressure, s.area, s.gas_length, s.polytropic_index) for s in struts)
         found.append(Effect("hold_down", "nitrogen_strut", tuple(s.name for s in struts), gas, "Eq. 4-8"))

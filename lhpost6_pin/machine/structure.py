@@ -6,7 +6,7 @@ from ..core.names import AXES
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
-__all__ = ["BODIES", "ESTIMATES", "FLOW_READINGS", "MOTIONS", "Structure"]
+__all__ = ["BODIES", "ESTIMATES", "FLOW_READINGS", "MOTIONS", "VALVE_PORTS", "Structure"]
 
 MOTIONS = ("free", "x", "y", "z", "xy", "xz", "yz", "xyz")
 """Freedom of a platen: six degrees of freedom, or displacements along guides, which hold it against turning."""
@@ -19,6 +19,9 @@ ESTIMATES = ("first", "second")
 
 FLOW_READINGS = ("printed", "full_stroke")
 """Readings of Eq. 4-2: `flow` is the factor as printed, or the flow at full stroke of the spool."""
+
+VALVE_PORTS = ("both_ways", "one_way")
+"""Ports P and T of servovalves: Eq. 4-2 with either sign of the pressure drop, or no flow back (Section 4.1.2)."""
 
 EQUAL_AREAS = 0.01
 """Relative difference of a piston's areas up to which its rod counts as double."""
@@ -34,6 +37,7 @@ class Structure:
     thrust: str
     bodies: str  # moving parts of the legs: "lumped" to the platen, or "full", as bodies of their own
     flow_reading: str  # what `flow` means in Eq. 4-2: one of `FLOW_READINGS`
+    valve_ports: str  # ports P and T of the servovalves: one of `VALVE_PORTS`
     controller: str  # shipped name of its settings; empty: none
     sensors: str  # shipped name of its sensors file; empty: none
     platen: Platen

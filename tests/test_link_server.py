@@ -357,6 +357,7 @@ def test_what_cannot_be_done_is_said_and_ends_with_two(lhpost6, port):
     assert refused(lhpost6("link", *SHORT, "--port", port, "--valves", 2), "choose --valves alike")
 
 
+@pytest.mark.slow
 def test_the_round_trip_script_measures_and_keeps_its_figures(tmp_path):
     ended = script("link_round_trip.py", "--seconds", "0.2", "--out", tmp_path)
     assert ended.returncode == 0, ended.stderr

@@ -54,6 +54,7 @@ def test_the_benchmarks_run_and_keep_their_figures(tmp_path):
     assert any("solve_ivp" in what for what in named) and any("plain" in what for what in named)
 
 
+@pytest.mark.slow
 def test_the_audit_balances_energy_and_repeats_bit_by_bit(tmp_path):
     ended = script("audit.py", "--seconds", "6", "--out", tmp_path / "audit.md")
     assert ended.returncode == 0, ended.stderr

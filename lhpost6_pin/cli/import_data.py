@@ -56,9 +56,10 @@ def import_(
 def _again(files: Sequence[Path], each: bool, machine: opt.MachineOptions) -> str:
     """Command that imports the same files, up to its map."""
     words = ["lhpost6", "import", *map(str, files), *(["--each"] if each else [])]
-    for flag, value in (("--machine", machine.machine), ("--override", machine.override)):
+    given = {key: getattr(machine, key) for key in ("machine", "override", "accelerometers")}
+    for key, value in given.items():
         if value not in (None, opt.MachineOptions().machine):
-            words += [flag, str(value)]
+            words += [f"--{key}", str(value)]
     return shlex.join(words)
 
 

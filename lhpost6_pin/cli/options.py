@@ -104,15 +104,28 @@ class MachineOptions:
         ),
     ] = None
 
+    accelerometers: Annotated[
+        str | None,
+        typer.Option(
+            help="Sensors file, or shipped name, that states accelerometers on the platen; the acceleration feedback "
+            "is then computed from them. Default: those of the machine file, else the platen's own acceleration.",
+            autocompletion=completing(lambda: shipped("sensors")),
+        ),
+    ] = None
+
     def load(self) -> "Machine":
         """Machine by shipped name or file, with the numbers of an override file and the options given."""
+        from ..data.sensors import load_sensors
         from ..machine.machine import load_machine
 
         table = load_machine(self.machine, None if self.inertia else self.override)
         if self.inertia is not None:
             table = table.with_inertia(self.inertia)
             table = table if self.override is None else table.with_params(self.override)
-        return table if self.bodies is None else table.with_bodies(self.bodies)
+        table = table if self.bodies is None else table.with_bodies(self.bodies)
+        if self.accelerometers is None:
+            return table
+        return table.with_accelerometers(load_sensors(self.accelerometers).parameters)
 
 
 @dataclass(frozen=True)
@@ -191,6 +204,7 @@ class SpecimenOptions(MountOptions, MachineOptions):
         given = {
             "--machine": self.machine if self.machine != "lhpost6" else None,
             "--override": self.override,
+            "--accelerometers": self.accelerometers,
             "--specimen": self.specimen,
             "--specimen-at": self.specimen_at,
         }

@@ -7,7 +7,8 @@ The velocity command of each degree of freedom is (report, Chapter 5)
 
 xr, vr, ar, jr are outputs of the reference generator, xf, vf, af of the feedback generator (`filters`). Inputs of the
 feedback generator are the displacement xs, computed from those of the actuators by forward kinematics (one Gauss-Newton
-step per sample), and the acceleration as of the platen. f is the actuators' force on that degree of freedom, HP a
+step per sample), and the acceleration as of the platen, its own or computed from accelerometers
+(`mechanics.accelerometers`). f is the actuators' force on that degree of freedom, HP a
 first-order high-pass, N five notches. The actuator velocities follow by the kinematic Jacobian (Eq. 3-33) at the xs of
 the preceding sample. In the null space of the motion an added velocity reduces internal forces. The spool command is
 the inverse of the valve's flow curve (Eq. 4-2) at the actuator velocity over its unloaded velocity; an opening at rest
@@ -25,6 +26,7 @@ from ..core.arrays import Array
 from ..core.compiled import compiled, compiled_inline, compiled_views
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
+from ..mechanics.accelerometers import composed_acceleration
 from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
 from ..mechanics.schemes import A, S, V
 from ..mechanics.tables import unpack_tables
@@ -101,7 +103,7 @@ class Feedback(NamedTuple):
     """Sensors at one sample. A run reuses the same arrays for every sample: copy what must be kept."""
 
     displacement: Array  # (n_actuators,) from the zero-position [m]
-    acceleration: Array  # (6,) of C in {s} and Euler angles [m/s2, rad/s2]
+    acceleration: Array  # (6,) of C in {s} and Euler angles, as accelerometers give it if there are any [m/s2, rad/s2]
     force: Array  # (n_actuators,) [N]
 
 
@@ -292,7 +294,11 @@ def sense(tables, ws, feedback):
     for i in range(tables.actuators.size):
         feedback.displacement[i] = ws.port[S, i]
         feedback.force[i] = ws.force[tables.actuators[i], 0]
-    pose_acceleration(ws.frame, tables.body, tables.axes, ws.motion[V], ws.motion[A], feedback.acceleration)
+    v, a = ws.motion[V], ws.motion[A]
+    pose_acceleration(ws.frame, tables.body, tables.axes, v, a, feedback.acceleration)
+    if tables.accelerometers.size > 0:
+        gravity = tables.inertia[0].gravity
+        composed_acceleration(tables.accelerometers, ws.frame, tables.axes, v, a, gravity, feedback.acceleration)
 
 
 @compiled

@@ -166,6 +166,12 @@ LAYOUT: Mapping[str, Channel] = {
         errors=(),  # a delay is the valve's
         residuals=("flow",),
     ),
+    "point_acceleration": Channel(
+        dims=("time", "accelerometer"),
+        units="m/s2",
+        long_name="acceleration less gravity of a point of the platen along a direction, zero at rest",
+        group="platen_acceleration",
+    ),
     "floor_acceleration": Channel(
         dims=("time", "floor"),
         units="m/s2",

@@ -256,7 +256,11 @@ def _offset(machine: Machine, one: ChannelNoise, source: str, numbers: Parameter
     if channel.units == "Pa" or one.channel == "actuator_force":
         area = max(a.area_a for a in machine.actuators) if channel.units == "N" else 1.0
         return Quantity(float(f"{share * area:.4g}"), channel.units, "assumed", numbers["assumed.offset"].source)
-    still = one.channel in MOTION or one.channel in ("actuator_displacement", "floor_acceleration")
+    still = one.channel in MOTION or one.channel in (
+        "actuator_displacement",
+        "point_acceleration",
+        "floor_acceleration",
+    )
     size = np.abs(one.offset) + one.offset_spread
     if not still or not np.isfinite(size).all() or not size.any():
         return None

@@ -14,6 +14,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..machine.parameters import Parameters
+from .accelerometers import WEIGHTS
 from .channels import LAYOUT, columns_of
 from .conditioning import resolution
 from .records import sample_interval
@@ -82,7 +83,8 @@ class _Pool:
 def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = None) -> NoiseLevels:
     """Noise of every measured channel of a campaign, and of valve commands, which are recorded as voltages.
 
-    Channels that carry no noise at all are omitted.
+    A platen acceleration that was computed from accelerometers is none. Channels that carry no
+    noise at all are omitted.
     """
     numbers = numbers or rest_numbers()
     rests = find_rests(records, numbers)
@@ -125,7 +127,8 @@ def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = Non
 
 def _channels(record: xr.Dataset, pools: dict[str, _Pool]) -> Iterator[tuple[str, _Pool]]:
     for name, channel in LAYOUT.items():
-        if name in record and (channel.role != "command" or name == "valve_command"):
+        computed = name in record and WEIGHTS in record[name].attrs  # from other channels
+        if name in record and not computed and (channel.role != "command" or name == "valve_command"):
             yield name, pools.setdefault(name, _Pool())
 
 

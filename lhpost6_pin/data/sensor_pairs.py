@@ -15,7 +15,8 @@ from ..core.arrays import Array
 from ..core.names import AXES
 from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
-from ..mechanics.pose import forward_kinematics, kinematic_jacobian, leg_displacements
+from ..mechanics.pose import PlatenMotion, forward_kinematics, kinematic_jacobian, leg_displacements
+from .accelerometers import accelerometer_signals, rows_of
 from .alignment import due_spools, hydraulic_force
 from .channels import LAYOUT, channel_name, columns_of
 from .conditioning import resolution
@@ -115,7 +116,7 @@ class _View:
 def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[SensorComparison]:
     """All comparisons for which a record has the channels."""
     view = _View(plant, record, sensors)
-    for compare in (_forces, _lengths, _parity, _rates, _struts, _supply, _spools, _redundant):
+    for compare in (_forces, _lengths, _parity, _rates, _accelerometers, _struts, _supply, _spools, _redundant):
         yield from compare(view)
 
 
@@ -275,6 +276,32 @@ def _rates(view: _View) -> Iterator[SensorComparison]:
             errors += [gain_m * due[:, k] for k in across]
             check = f"{name.split('_')[1]} against displacement"
             yield view.compared(check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
+
+
+def _accelerometers(view: _View) -> Iterator[SensorComparison]:
+    """Each accelerometer against what it should read, gravity by tilt included, in the motion of platen_displacement.
+
+    Other directions of the platen's motion are its cross-talk; as much as its gain uncertainty is allowed.
+    """
+    name, base = "point_acceleration", "platen_displacement"
+    if not view.has(base, name):
+        return
+    plant, rows = view.plant, rows_of(view.record)
+    measured = view.signal(view.values(name))
+    motion = PlatenMotion(*view.signals(view.values(base), 0, 1, 2))
+    due = accelerometer_signals(plant, motion, rows)
+    rate = differentiate(due, view.step * view.dt)
+    sees = np.hstack([rows[:, 3:], np.cross(rows[:, :3], rows[:, 3:])]) ** 2  # of the platen's acceleration
+    noise = [view.variance(base, order) @ sees.T for order in (2, 3)]
+    variance = np.broadcast_to(view.variance(name), len(rows))
+    (gain_m, offset_m, delay_m), (gain_x, _, delay_x) = map(view.sd, (name, base))
+    across = gain_m * np.abs(motion.acceleration[:, :3]).max(axis=1)
+    for i in range(len(rows)):
+        terms = _gain_terms(due[:, i], rate[:, i], (noise[0][i], noise[1][i]))
+        errors = [gain_m * due[:, i], gain_x * due[:, i], delay_m * rate[:, i], delay_x * rate[:, i]]
+        errors += [offset_m * np.ones(len(due)), across]
+        channel = channel_name(view.record[name], i)
+        yield view.compared("accelerometer against displacement", channel, measured[:, i], variance[i], terms, errors)
 
 
 def _struts(view: _View) -> Iterator[SensorComparison]:

@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike
 from ..core.arrays import Array
 from ..core.errors import ParameterError, UnknownNameError, instead_of
 from ..core.files import find_shipped
+from ..machine.accelerometers import ACCELEROMETER, accelerometers_of
 from ..machine.parameters import Parameters, load_parameters
+from .accelerometers import WEIGHTS
 from .channels import LAYOUT, columns_of, same_unit, sensor_groups
 from .conditioning import resolution
 from .records import sample_interval
@@ -91,10 +93,13 @@ def make_sensors(given: Parameters, stem: str = "sensors") -> SensorSet:
     """Sensors of the quantities of a file, called `stem` where they state none; raises ParameterError."""
     units = {name: channel.units for name, channel in LAYOUT.items()}
     delays, gains = dict.fromkeys(sensor_groups(), "s"), dict.fromkeys(LAYOUT, "1")
+    accelerometers_of(given)  # raises for one that is not complete
     known = {"sampling": SAMPLING, "noise": units, "gain_range": gains, "offset_range": units, "delay_range": delays}
     found: dict[str, dict[str, Array]] = {section: {} for section in known}
     for key, quantity in given.items():
         section, _, name = key.partition(".")
+        if key.startswith(ACCELEROMETER):
+            continue
         if name not in (valid := known.get(section, {})):
             remedy = instead_of(name, list(valid)) if valid else instead_of(section, list(known))
             raise ParameterError(f"{given.origin}: {key} is unknown; {remedy}")
@@ -131,7 +136,8 @@ def spectrum(sensors: SensorSet, record: xr.Dataset, channel: str, f: ArrayLike)
     """Noise spectrum (n, columns) of a channel in this record: its sensor's, and that of its digital resolution."""
     values = columns_of(record[channel])
     step = resolution(values)
-    stated = sensors.noise_spectrum(channel, f) + step**2 / 6 * sample_interval(record)
+    sensor, gain = _source(sensors, record[channel])
+    stated = sensors.noise_spectrum(sensor, f) * gain**2 + step**2 / 6 * sample_interval(record)
     return np.broadcast_to(stated, (len(stated), values.shape[1]))
 
 
@@ -141,6 +147,14 @@ def recorded_spectrum(sensors: SensorSet, channel: str, f: ArrayLike, rate: floa
     folds = range(int(np.ceil(sensors.rate / 2 / rate)) + 1)
     places = [f + k * rate for k in folds] + [k * rate - f for k in folds[1:]]
     return np.asarray(np.sum([sensors.noise_spectrum(channel, place) for place in places], axis=0))
+
+
+def _source(sensors: SensorSet, variable: xr.DataArray) -> tuple[str, Array]:
+    """Channel whose sensors a variable comes from, and its noise (1,) or (6,) over theirs."""
+    gain = variable.attrs.get(WEIGHTS)
+    if gain is None or "point_acceleration" not in sensors.noise:
+        return str(variable.name), np.ones(1)
+    return "point_acceleration", np.asarray(gain, float)
 
 
 # -------------------------------------------------------------------------------------------- simulation
@@ -153,8 +167,8 @@ def add_noise(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) 
     channels = {}
     for name in sensors.noise:
         if name in record:
-            values = columns_of(record[name])
-            noisy = values + _draw(sensors, name, values.shape, 1 / sample_interval(record), rng)
+            values, (sensor, gain) = columns_of(record[name]), _source(sensors, record[name])
+            noisy = values + gain * _draw(sensors, sensor, values.shape, 1 / sample_interval(record), rng)
             step = np.ptp(noisy) / (2**sensors.bits - 1)
             noisy = step * np.round(noisy / step) if step > 0 else noisy
             channels[name] = record[name].copy(data=noisy.reshape(record[name].shape))

@@ -136,6 +136,19 @@ class Floor:
 
 
 @dataclass(frozen=True)
+class Accelerometer:
+    """An accelerometer on the platen: where it is and its sensitive direction, both in platen axes.
+
+    It reads acceleration less gravity along its direction, and is zero at rest in the zero-position: gravity comes in
+    by tilt.
+    """
+
+    name: str
+    point: Vec3 = quantity_field("m", length=3)  # from C
+    direction: Vec3 = quantity_field("1", length=3)  # of any length
+
+
+@dataclass(frozen=True)
 class Limits:
     """Stated limits of the machine (Table 2.2), axis order x y z roll pitch yaw."""
 

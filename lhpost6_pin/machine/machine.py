@@ -14,6 +14,7 @@ from ..core.errors import ParameterError, RecordError, UnknownNameError
 from ..core.user_code import is_python
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
+from .accelerometers import ACCELEROMETER, accelerometers_of
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
 from .library import effect_entry, make_named_effect, size_of
 from .machine_checks import check_actuator, check_machine, check_names
@@ -113,6 +114,20 @@ class Machine(Structure):
         if reading not in FLOW_READINGS:
             raise UnknownNameError("reading of the valve flow", reading, FLOW_READINGS)
         return self._with_word("flow_reading", reading)
+
+    def with_accelerometers(self, stated: Parameters) -> "Machine":
+        """Return a copy with the accelerometers that a file of sensors states, in place of its own.
+
+        Raises ParameterError if the file states none.
+        """
+        found = {path: quantity for path, quantity in stated.items() if path.startswith(ACCELEROMETER)}
+        if not found:
+            raise ParameterError(
+                f"{stated.origin}: states no accelerometers; add sections [accelerometer.NAME] with point and direction"
+            )
+        kept = {path: q for path, q in self.parameters.items() if not path.startswith(ACCELEROMETER)}
+        parameters = replace(self.parameters, quantities={**kept, **found})
+        return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
 
     def _with_word(self, key: str, word: str) -> "Machine":
         parameters = replace(self.parameters, words={**self.parameters.words, f"machine.{key}": word})
@@ -249,6 +264,7 @@ def build_machine(
             build_section(Floor, parameters, (name,), name=name, along=_word(parameters, f"{name}.along", tuple("xyz")))
             for name in floors
         ),
+        accelerometers=accelerometers_of(parameters),
         limits=build_section(Limits, parameters, ("limits",)),
         parameters=parameters,
         size=size,

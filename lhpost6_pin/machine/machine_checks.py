@@ -4,7 +4,7 @@ from dataclasses import fields
 
 from ..core.errors import ParameterError, instead_of
 from ..core.names import AXES
-from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
+from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 from .structure import Structure
 
@@ -38,6 +38,9 @@ def check_names(parameters: Parameters, components: list[str], kinds: set[str], 
     }
     for path in (*parameters, *parameters.words):
         section, _, key = path.partition(".")
+        if section == "accelerometer":
+            section, _, key = path.rpartition(".")
+            known[section] = {f.name for f in fields(Accelerometer) if f.metadata}
         if section in _COMPARISONS and path in parameters.quantities:
             continue
         if section not in known:

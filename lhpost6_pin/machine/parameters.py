@@ -27,8 +27,11 @@ __all__ = [
     "unusable",
 ]
 
-_GROUPS = ("kind", "component", "floor", "estimates")
+_GROUPS = ("kind", "component", "floor", "accelerometer", "estimates")
 """Sections that hold named sub-sections; the sub-section's name is the path's first part."""
+
+_PREFIXED = ("accelerometer", "estimates")
+"""Those whose sub-sections keep the group's name in front of theirs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +241,7 @@ def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping
                 raise ParameterError(f"{file}: {name}.{sub} must be a section [{name}.{sub}]")
             if not sub.replace("_", "").isalnum():
                 raise ParameterError(f"{file}: {name}.{sub}: use letters, digits and underscores for a name")
-            yield (f"{name}.{sub}" if name == "estimates" else sub), inner
+            yield (f"{name}.{sub}" if name in _PREFIXED else sub), inner
 
 
 def _of_kind(parameters: Parameters, key: str) -> str:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from ..core.names import AXES
-from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut
+from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Platen, Strut
 from .parameters import Parameters
 
 __all__ = ["BODIES", "ESTIMATES", "FLOW_READINGS", "MOTIONS", "VALVE_PORTS", "Structure"]
@@ -45,6 +45,7 @@ class Structure:
     actuators: tuple[Actuator, ...]
     struts: tuple[Strut, ...]
     floors: tuple[Floor, ...]
+    accelerometers: tuple[Accelerometer, ...]  # that the acceleration feedback comes from; none: the platen's own
     limits: Limits
     parameters: Parameters
     size: tuple[int, ...] | None = field(default=None, compare=False)
@@ -89,5 +90,7 @@ class Structure:
     @property
     def labels(self) -> dict[str, tuple[str, ...]]:
         """Names along the dimensions of its records."""
-        floors = {"floor": tuple(f.name for f in self.floors)} if self.floors else {}
-        return {"actuator": self.actuator_names, "horizontal": self.double_acting, "strut": self.strut_names, **floors}
+        more: dict[str, tuple[Floor | Accelerometer, ...]]
+        more = {"floor": self.floors, "accelerometer": self.accelerometers}
+        found = {dim: tuple(part.name for part in parts) for dim, parts in more.items() if parts}
+        return {"actuator": self.actuator_names, "horizontal": self.double_acting, "strut": self.strut_names, **found}

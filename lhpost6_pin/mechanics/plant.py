@@ -15,6 +15,7 @@ from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
 from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from .accelerometers import accelerometer_table
 from .coupled import CoupledSpecimen, base_at_rest, rigid_wrench, start_coupled
 from .coupled_maker import coupled_specimen
 from .forward_dynamics import inertia_table
@@ -61,8 +62,9 @@ class Plant:
         """All tables as compiled code reads them."""
         inertia = inertia_table(self.model, self.machine, self.axes, self.modes)
         damping, actuators = np.array(self.model.damping), actuator_rows(self.rows)
-        rest = damping, actuators, self.command_path, inertia, self.springs, self.modes, self.coupling, self.supply
-        return pack_tables(self.axes, self.legs, self.body, self.rows, *rest)
+        sensing = accelerometer_table(self.machine)
+        rest = damping, actuators, self.command_path, inertia, self.springs, self.modes, self.coupling, sensing
+        return pack_tables(self.axes, self.legs, self.body, self.rows, *rest, self.supply)
 
     @cached_property
     def actuators(self) -> Any:

@@ -36,6 +36,7 @@ class Tables(NamedTuple):
     springs: NDArray[np.void]  # joint_springs.SPRING, those of a specimen's joints
     modes: NDArray[np.void]  # modes.MODE, those of a specimen
     coupling: Array  # (n_modes * n_modes,) damping between modes [1/s], or empty
+    accelerometers: Array  # `accelerometers.accelerometer_table`, or empty
     supply: Supply
 
 
@@ -61,7 +62,7 @@ def pack_tables(
 def unpack_tables(packed):
     """Tables from `Tables.packed`."""
     at = packed[: _PARTS + 1].view(np.int64)
-    values = packed[at[11] : at[12]]
+    values = packed[at[12] : at[13]]
     supply = Supply(values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8])
     return Tables(
         packed,
@@ -76,5 +77,6 @@ def unpack_tables(packed):
         packed[at[8] : at[9]].view(SPRING),
         packed[at[9] : at[10]].view(MODE),
         packed[at[10] : at[11]],
+        packed[at[11] : at[12]],
         supply,
     )

@@ -7,12 +7,14 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
+from ..data.accelerometers import accelerometer_channel, accelerometer_signals
 from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
 from ..machine.recorded_specimen import specimen_facts
 from ..machine.structure import BODIES
+from ..mechanics.accelerometers import accelerometer_rows
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.interface_wrench import INTERFACE_AXES, interface_lever
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
@@ -71,6 +73,9 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
             channels[f"reference_{name}"] = (like.dims, values, about)
     channels |= {name: channels[c.same_as] for name, c in LAYOUT.items() if c.same_as in channels}
     channels |= _hidden_states(run)
+    if machine.accelerometers:
+        at = accelerometer_rows(machine.accelerometers)
+        channels["point_acceleration"] = accelerometer_channel(at, accelerometer_signals(plant, motion, at))
     if response := point_response(run):
         points = machine.specimen.contents.points if machine.specimen and machine.specimen.contents else ()
         labels["specimen_point"] = tuple(point.name for point in points)

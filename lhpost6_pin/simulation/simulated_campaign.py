@@ -17,6 +17,7 @@ from ..core.errors import SimulationError, UnknownNameError
 from ..core.files import models_folder
 from ..core.names import SAMPLE_RATE
 from ..core.progress import Progress
+from ..data.accelerometers import with_platen_acceleration
 from ..data.campaign import Campaign
 from ..data.channels import LAYOUT, sensor_groups
 from ..data.sensors import SensorSet, add_noise
@@ -84,9 +85,12 @@ def simulate_campaign(
             "motion": str(numbers.words[f"{test}.motion"]),
         }
         record = record_of_run(run, facts, motion)
+        if machine.accelerometers:  # they are what is measured
+            record = record.drop_vars("platen_acceleration")
         if drawn is None:
             drawn = draw_errors(record, sensors, rng) if errors else SensorErrors({}, {}, {})
-        records.append(as_sensed(record, sensors, drawn, numbers.number("recording.rate"), rng))
+        record = as_sensed(record, sensors, drawn, numbers.number("recording.rate"), rng)
+        records.append(with_platen_acceleration(plant, record) if machine.accelerometers else record)
         if progress is not None:
             progress((i + 1) / len(chosen))
     return Campaign(name, tuple(records))

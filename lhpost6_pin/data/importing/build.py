@@ -8,9 +8,13 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
-from ...core.errors import RecordError
+from ...core.errors import ParameterError, RecordError
 from ...core.names import AXES
+from ...machine.components import Accelerometer
 from ...machine.machine import Machine
+from ...mechanics.accelerometers import accelerometer_rows
+from ...mechanics.plant import make_plant
+from ..accelerometers import accelerometer_channel, with_platen_acceleration
 from ..channels import LAYOUT, channel_unit
 from ..records import make_record
 from .channel_map import ChannelMap, channels_of, check_map, find_column, still_channels, with_labels
@@ -64,16 +68,44 @@ def make_imported_record(
     for name, (variable, _) in known.items():
         if name in columns:
             together.setdefault(variable, []).append(columns[name])
-    variables = {v: np.column_stack(c) if len(LAYOUT[v].dims) > 1 else c[0] for v, c in together.items()}
+    variables: dict[str, Any] = {
+        v: np.column_stack(c) if len(LAYOUT[v].dims) > 1 else c[0] for v, c in together.items()
+    }
     attrs = _attrs(raws, channels, used)
     if filled:
         attrs["filled"] = "interpolated samples: " + "; ".join(filled)
     if constant:
         attrs["constant"] = "not measured, stated in the map: " + ", ".join(constant)
+    if "point_acceleration" in variables:
+        rows = accelerometer_rows(_accelerometers(channels, labels["accelerometer"], machine))
+        variables["point_acceleration"] = accelerometer_channel(rows, variables["point_acceleration"])
     try:
-        return make_record(time, variables, labels, attrs)
-    except RecordError as error:
+        record = make_record(time, variables, labels, attrs)
+        if "point_acceleration" not in variables or "platen_acceleration" in variables or machine is None:
+            return record
+        return with_platen_acceleration(make_plant(machine), record)
+    except (RecordError, ParameterError) as error:
         raise RecordError(f"{channels.origin}: {error}") from None
+
+
+def _accelerometers(channels: ChannelMap, names: Sequence[str], machine: Machine | None) -> list[Accelerometer]:
+    """Accelerometers with the points and directions of the map, else of the machine; raises RecordError."""
+    known = {one.name: one for one in machine.accelerometers} if machine else {}
+    found = []
+    for name in names:
+        key = f"point_acceleration[{name}]"
+        source = channels.channels[key]
+        if source.point is not None and source.direction is not None:
+            at, along = (tuple(values) for values in (source.point, source.direction))
+            found.append(Accelerometer(name, (at[0], at[1], at[2]), (along[0], along[1], along[2])))
+        elif name in known:
+            found.append(known[name])
+        else:
+            raise RecordError(
+                f"{_key(channels, key)}: where is it? add point = [x, y, z] in metres from C and direction, in platen "
+                "axes, or name a sensors file that states it with --accelerometers"
+            )
+    return found
 
 
 def described_sources(raws: Sequence[RawTest], channels: ChannelMap) -> dict[str, str]:

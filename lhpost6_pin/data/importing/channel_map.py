@@ -7,6 +7,7 @@ valves_per_horizontal_actuator = 1
 [channel]
 "platen_displacement[x]" = { column = "Long Displ fbk", unit = "in" }
 "actuator_force[H1]" = { column = "H1 Force", unit = "kip", sign = -1, gain = 1.002, offset = 3.5 }
+"point_acceleration[AX1]" = { column = "A1", unit = "g", point = [0.0, 3.5, -0.5], direction = [1.0, 0.0, 0.0] }
 """
 
 import fnmatch
@@ -48,6 +49,8 @@ class Source:
     offset: float = 0.0
     file: str | None = None
     constant: float | None = None  # in `unit`, instead of a column
+    point: tuple[float, ...] | None = None  # of an accelerometer, from C in platen axes [m]
+    direction: tuple[float, ...] | None = None  # of its sensitivity, in platen axes
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,9 @@ def _typed(cls: type[Any], table: Mapping[str, Any], where: str) -> Any:
         if spec.name not in table:
             continue
         value, kinds = table[spec.name], get_args(spec.type) or (spec.type,)
+        if spec.name in ("point", "direction"):
+            values[spec.name] = _three(value, f"{where}: {spec.name}")
+            continue
         if isinstance(value, int) and not isinstance(value, bool) and int not in kinds:
             value = float(value) if float in kinds else value
         endless = isinstance(value, float) and not math.isfinite(value)
@@ -159,6 +165,14 @@ def _typed(cls: type[Any], table: Mapping[str, Any], where: str) -> Any:
     return cls(**values)
 
 
+def _three(value: Any, where: str) -> tuple[float, ...]:
+    numbers = value if isinstance(value, list) else []
+    good = [isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in numbers]
+    if len(good) != 3 or not all(good):
+        raise RecordError(f"{where} = {value!r} must be three finite numbers, such as [1.0, 0.0, 0.0]")
+    return tuple(map(float, numbers))
+
+
 def _check_source(source: Source, where: str) -> None:
     if (source.column is None) == (source.constant is None):
         raise RecordError(f"{where}: give a column, or else a constant")
@@ -166,6 +180,13 @@ def _check_source(source: Source, where: str) -> None:
         raise RecordError(f"{where}: a constant needs a unit")
     if source.sign not in (-1, 1):
         raise RecordError(f"{where}: sign = {source.sign} must be 1 or -1")
+    places = source.point, source.direction
+    if any(places) and None in places:
+        raise RecordError(f"{where}: an accelerometer needs both point [m] and direction, from C in platen axes")
+    if source.direction is not None and not any(source.direction):
+        raise RecordError(f"{where}: direction is zero; write one such as [1.0, 0.0, 0.0]")
+    if any(places) and not where.partition("[channel] ")[2].startswith("point_acceleration["):
+        raise RecordError(f"{where}: point and direction are for point_acceleration[NAME] only")
     if source.gain == 0:
         raise RecordError(f"{where}: gain = 0 leaves nothing; give constant = 0 for a channel that is known to be zero")
 

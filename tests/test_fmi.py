@@ -17,7 +17,7 @@ from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.interfaces.fmi import export_fmu
 from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file, save_machine_file
 from lhpost6_pin.machine.machine import Machine, load_machine
-from lhpost6_pin.mechanics.interface import motion_numbers, wrench_of
+from lhpost6_pin.mechanics.coupled import motion_numbers, wrench_of
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.simulation.running import RunningPlant

@@ -10,7 +10,7 @@ from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.interfaces.link.clock import Histogram
 from lhpost6_pin.interfaces.link.protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode
 from lhpost6_pin.interfaces.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
-from lhpost6_pin.mechanics.interface import motion_numbers, wrench_of
+from lhpost6_pin.mechanics.coupled import motion_numbers, wrench_of
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.running import RunningPlant
 

@@ -19,6 +19,7 @@ PINOCCHIO = {
     *("mechanics.equilibrium", "mechanics.derivatives", "mechanics.leg_model", "mechanics.linearize"),
     *("mechanics.instant", "mechanics.payload", "mechanics.interface_wrench", "mechanics.specimen_modes"),
     *("mechanics.coupled", "mechanics.coupled_maker", "mechanics.interface", "mechanics.opensees"),
+    "mechanics.remote_specimen",
     *("simulation.engine_pinocchio", "simulation.ledger", "simulation.energy", "simulation.specimen_response"),
     *("simulation.coupling", "simulation.running", "identification.decompose.interface"),
     *("show.bodies", "show.viewer.scene", "show.viewer.live"),

@@ -31,7 +31,7 @@ JOBS: Mapping[str, tuple[str, ...]] = {
     "Control": ("tune", "iterate", "replay", "sine"),
     "Measured data": ("import", "check", "export", "decompose", "validate", "calibrate"),
     "Discover": ("discover", "demo"),
-    "Connect": ("serve", "link", "export-fmu"),
+    "Connect": ("serve", "link", "serve-specimen", "export-fmu"),
     "Look": ("view", "info", "capacity", "new-machine", "doctor"),
 }
 """Commands by job, in the order of `--help`, of the command reference and of the README."""

@@ -5,12 +5,14 @@ from typing import Annotated
 
 import typer
 
+from ..core.errors import ParameterError
 from .app import command, print_result, progress_bar, stderr
 from .live_view import LiveOptions, watched
 from .motion_options import MotionOptions
 from .options import (
     Cancel,
     ControllerName,
+    ExchangeOptions,
     Json,
     Out,
     SpecimenOptions,
@@ -19,7 +21,7 @@ from .options import (
     folder_for,
 )
 
-__all__ = ["export_fmu", "link", "serve"]
+__all__ = ["export_fmu", "link", "serve", "serve_specimen"]
 
 
 @command("export-fmu")
@@ -40,6 +42,7 @@ def export_fmu(
 def serve(
     machine: SpecimenOptions,
     view: LiveOptions,
+    exchange: ExchangeOptions,
     mode: Annotated[str, typer.Option(help="lock-step, real-time, or free (as fast as possible).")] = "lock-step",
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
@@ -58,7 +61,7 @@ def serve(
     table = machine.load(valves)
     with open_socket(host, port) as sock:
         plant = make_plant(table)
-        served = ServedPlant(plant, find_equilibrium(plant), chosen)
+        served = ServedPlant(plant, find_equilibrium(plant), chosen, exchange.coupling(table))
         address, at = sock.getsockname()
         title = f"{table.name} at {address}:{at}"
         typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends", err=json)
@@ -68,6 +71,33 @@ def serve(
     times |= {"answer of the client": served.answer_time}
     title, counts = f"{table.name}, {mode}", served.counts
     print_result(json, lambda: link_entries(counts, times), lambda: print_link(title, counts, times))
+
+
+@command("serve-specimen")
+def serve_specimen(
+    specimen: Annotated[str, typer.Argument(help="FILE.py:NAME, a class or an OpenSees model.")],
+    host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46947,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Duration [s]; default: until Ctrl-C.")] = None,
+    json: Json = False,
+) -> None:
+    """Serve a specimen over UDP to a table in another process or on another computer (`--specimen udp:HOST:PORT`)."""
+    from ..core.user_code import is_python
+    from ..interfaces.link import ServedSpecimen, open_socket
+    from ..interfaces.link import serve_specimen as serve_it
+    from ..machine.user_specimen import load_user_specimen
+    from ..mechanics.coupled_maker import made_specimen
+
+    if not is_python(specimen):
+        raise ParameterError(f"{specimen}: is no FILE.py:NAME; mount any other form at the table, with --specimen")
+    described = load_user_specimen(specimen)
+    with open_socket(host, port) as sock:
+        served = ServedSpecimen(made_specimen(described))
+        address, at = sock.getsockname()
+        typer.echo(f"{described.name} listens at {address}:{at}: --specimen udp:{address}:{at}; Ctrl-C ends", err=json)
+        serve_it(sock, served, seconds=seconds)
+    counts = {"rests": served.rests, "steps": served.steps}
+    print_result(json, lambda: counts, lambda: typer.echo(f"{served.rests} starts, {served.steps} steps"))
 
 
 @command()

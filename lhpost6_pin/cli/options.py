@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import ParameterError, RecordError
+from ..core.errors import ParameterError, RecordError, UnknownNameError
 from ..core.files import shipped, shipped_specimens
 from ..core.names import ENGINES, SCHEMES
 from .completion import completing
@@ -19,11 +19,15 @@ if TYPE_CHECKING:
     from ..control import ControllerSettings
     from ..control.plug import UserController
     from ..machine.machine import Machine
+    from ..simulation.coupling import CouplingOptions
 
 log = logging.getLogger(__name__)
 
+EXCHANGES = ("sample", "step")
+"""How often a specimen that is a program exchanges motion and wrench."""
+
 __all__ = ["Beyond", "CampaignFolder", "Cancel", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
-__all__ += ["MountOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName"]
+__all__ += ["ExchangeOptions", "MountOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName"]
 __all__ += ["SpecimenOptions", "StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring"]
 __all__ += ["record_name"]
 
@@ -136,7 +140,7 @@ class MountOptions:
         str | None,
         typer.Option(
             help="Specimen on the platen: shipped name; a URDF; a rigid body with modes or matrices in .toml, .npz or "
-            ".mat; or FILE.py:NAME, a class or an OpenSees model.",
+            ".mat; FILE.py:NAME, a class or an OpenSees model; or udp:HOST:PORT (`lhpost6 serve-specimen`).",
             autocompletion=completing(shipped_specimens),
         ),
     ] = None
@@ -213,7 +217,41 @@ class SpecimenOptions(MountOptions, MachineOptions):
 
 
 @dataclass(frozen=True)
-class StepOptions:
+class ExchangeOptions:
+    """Options of the exchange with a specimen that is a program."""
+
+    exchange: Annotated[
+        str,
+        typer.Option(
+            help="A specimen that is a program exchanges motion and wrench once a controller sample, or at every model "
+            "step.",
+            autocompletion=completing(lambda: EXCHANGES),
+        ),
+    ] = "sample"
+    held: Annotated[
+        bool, typer.Option("--held", help="Hold its wrench between exchanges, instead of continuing it linearly.")
+    ] = False
+    no_impedance: Annotated[
+        bool, typer.Option("--no-impedance", help="Keep its interface mass off the platen's side.")
+    ] = False
+
+    def coupling(self, table: "Machine") -> "CouplingOptions | None":
+        """How the table's specimen is coupled; None as usual. Raises ParameterError where there is none to couple."""
+        from ..machine.user_specimen import UserSpecimen
+        from ..simulation.coupling import CouplingOptions
+
+        if self.exchange not in EXCHANGES:
+            raise UnknownNameError("exchange with a specimen", self.exchange, EXCHANGES)
+        chosen = CouplingOptions(self.exchange == "step", not self.no_impedance, 0 if self.held else 1)
+        if chosen == CouplingOptions():
+            return None
+        if not isinstance(table.specimen, UserSpecimen):
+            raise ParameterError("--exchange, --held, --no-impedance concern a specimen that is a program; mount one")
+        return chosen
+
+
+@dataclass(frozen=True)
+class StepOptions(ExchangeOptions):
     """Options of the integration."""
 
     scheme: Annotated[
@@ -237,7 +275,7 @@ class StepOptions:
 
         options: dict[str, Any] = {"scheme": self.scheme, "steps_per_second": self.rate, "engine": self.engine}
         check_options(make_plant(table), plugged=own_controller, **options)
-        return options
+        return options | {"coupling": self.coupling(table)}
 
 
 def find_settings(name: str | None, table: "Machine") -> "ControllerSettings":

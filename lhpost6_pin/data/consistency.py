@@ -26,7 +26,8 @@ from ..mechanics.plant import Plant
 from .alignment import align_record, group_delays
 from .channels import channel_unit
 from .records import require
-from .sensor_pairs import BAND, Regressor, SensorComparison, comparisons
+from .sensor_pairs import comparisons
+from .sensor_view import BAND, Regressor, SensorComparison
 from .sensors import SensorSet
 
 __all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]

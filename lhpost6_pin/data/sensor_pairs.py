@@ -3,9 +3,9 @@
 `comparisons` turns a record into regressions y = X theta + noise, filtered by one band, for `consistency` to solve.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -18,104 +18,19 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, forward_kinematics, kinematic_jacobian, leg_displacements
 from .accelerometers import accelerometer_signals, rows_of
 from .alignment import due_spools, hydraulic_force
-from .channels import LAYOUT, channel_name, columns_of
-from .conditioning import resolution
-from .records import sample_interval
-from .sensors import SensorSet, spectrum
+from .channels import LAYOUT, channel_name
+from .sensor_view import BAND, RecordView, Regressor, SensorComparison
+from .sensors import SensorSet
 from .signals import Band, differentiate
 
-__all__ = ["SensorComparison", "Regressor", "comparisons", "loose_lengths"]
+__all__ = ["comparisons", "loose_lengths"]
 
-
-BAND = Band(high=20.0)  # Hz: where motion exceeds noise
-TRIM = 0.1  # s: cut off at both ends, where filters settle
 FAST = 0.3  # of the sampling rate: above it a command is fast
-
-
-class Regressor(NamedTuple):
-    """One column of X: name and expected value of its coefficient, which `delay` turns into a delay."""
-
-    quantity: str
-    unit: str
-    expected: float
-    column: Array  # (n,)
-    variance: float = 0.0  # of its noise
-    delay: float | None = None  # already removed [s]; the coefficient is the remaining one, times minus the gain
-    beside: bool = False  # the others remain identifiable where noise hides it
-
-    @property
-    def due(self) -> float:
-        """Nominal value of its coefficient."""
-        return self.expected if self.delay is None else 0.0
-
-
-class SensorComparison(NamedTuple):
-    """One y and its X in one record."""
-
-    check: str
-    channel: str
-    y: Array  # (n,)
-    variance: float  # of its noise
-    terms: tuple[Regressor, ...]
-    errors: Array  # (n, k), one standard deviation each
-    independent: float  # number of independent samples
-
-
-class _View:
-    """A record filtered, trimmed and thinned for comparison, with its remaining noise."""
-
-    def __init__(self, plant: Plant, record: xr.Dataset, sensors: SensorSet) -> None:
-        self.plant, self.record, self.sensors = plant, record, sensors
-        time = record["time"].values
-        self.dt = sample_interval(record)
-        self.step = max(1, int(1 / (8 * BAND.high * self.dt)))
-        self.trim = round(TRIM / (self.step * self.dt))
-        self.independent = 2 * BAND.high * (len(time) * self.dt - 2 * TRIM)
-        self.f = np.linspace(0.0, min(0.5 / self.dt, 4 * BAND.high), 1025)
-
-    def has(self, *names: str) -> bool:
-        """Whether the record has these channels."""
-        return all(name in self.record for name in names)
-
-    def values(self, name: str) -> Array:
-        """Columns (n, k) of a channel at the record's rate."""
-        return columns_of(self.record[name])
-
-    def signals(self, x: Array, *orders: int) -> list[Array]:
-        """Derivatives of these orders of x (n, k) in the band, thinned and trimmed."""
-        x = BAND.apply(x, self.dt)[:: self.step]  # no aliasing at 8 times the band
-        derivatives = [x]
-        for _ in range(max(orders)):
-            derivatives.append(differentiate(derivatives[-1], self.step * self.dt))
-        return [derivatives[k][self.trim : len(x) - self.trim] for k in orders]
-
-    def signal(self, x: Array) -> Array:
-        """Columns x (n, k) in the band, thinned and trimmed."""
-        return self.signals(x, 0)[0]
-
-    def variance(self, name: str, order: int = 0) -> Array:
-        """Noise variance (k,) of that derivative of a channel."""
-        shape = (BAND.gain(self.f) * (2 * np.pi * self.f) ** order) ** 2
-        power = spectrum(self.sensors, self.record, name, self.f) * shape[:, None]
-        return np.asarray(np.trapezoid(power, self.f, axis=0))
-
-    def sd(self, name: str) -> tuple[float, float, float]:
-        """Calibration of a channel, one standard deviation: gain [1], offset [unit] with resolution, delay [s]."""
-        s, step = self.sensors, resolution(self.values(name)) if self.has(name) else 0.0
-        offset = float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0)))
-        return s.gain_sd(name), offset, s.delay_sd(LAYOUT[name].group or name)
-
-    def compared(
-        self, check: str, channel: str, y: Array, variance: float, terms: Sequence[Regressor], errors: Sequence[Array]
-    ) -> SensorComparison:
-        """A comparison of one column y (n,) of a channel."""
-        columns = np.stack(errors, axis=1)
-        return SensorComparison(check, channel, y, float(variance), tuple(terms), columns, self.independent)
 
 
 def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterator[SensorComparison]:
     """All comparisons for which a record has the channels."""
-    view = _View(plant, record, sensors)
+    view = RecordView(plant, record, sensors)
     for compare in (_forces, _lengths, _parity, _rates, _accelerometers, _struts, _supply, _spools, _redundant):
         yield from compare(view)
 
@@ -127,7 +42,7 @@ def loose_lengths(
 
     The side, -1 to 1, follows from the force, measured or of pressures; `closing` [N] of it closes most of the play.
     """
-    view = _View(plant, record, sensors)
+    view = RecordView(plant, record, sensors)
     measured = view.has("actuator_force")
     if not (measured or view.has("chamber_pressure_a", "chamber_pressure_b")):
         return
@@ -153,7 +68,7 @@ def _offset_term(n: int, expected: float = 0.0) -> Regressor:
     return Regressor("offset", "", expected, np.ones(n))
 
 
-def _forces(view: _View) -> Iterator[SensorComparison]:
+def _forces(view: RecordView) -> Iterator[SensorComparison]:
     """actuator_force = P_A A_1 - P_B A_2."""
     if not view.has("actuator_force", "chamber_pressure_a"):
         return
@@ -188,7 +103,7 @@ def _forces(view: _View) -> Iterator[SensorComparison]:
         yield view.compared("force against pressures", channel, force[:, i], variance, terms, errors)
 
 
-def _geometry(view: _View, pose: Array) -> list[Array]:
+def _geometry(view: RecordView, pose: Array) -> list[Array]:
     """Changes of the actuators' elongations (n, actuators) by one standard deviation of each coordinate."""
     plant, parameters = view.plant, view.plant.machine.parameters
 
@@ -208,7 +123,7 @@ def _geometry(view: _View, pose: Array) -> list[Array]:
     return changes
 
 
-def _lengths(view: _View) -> Iterator[SensorComparison]:
+def _lengths(view: RecordView) -> Iterator[SensorComparison]:
     """actuator_displacement against that of the measured platen pose; it may drift by its noise within a record."""
     if not view.has("actuator_displacement", "platen_displacement"):
         return
@@ -233,7 +148,7 @@ def _lengths(view: _View) -> Iterator[SensorComparison]:
         yield view.compared(check, channel, measured[:, i], variance[i], terms, errors)
 
 
-def _parity(view: _View) -> Iterator[SensorComparison]:
+def _parity(view: RecordView) -> Iterator[SensorComparison]:
     """Combinations of the actuators' lengths that are zero at any pose: one for each actuator in excess of the axes."""
     plant = view.plant
     if not view.has("actuator_displacement"):
@@ -254,7 +169,7 @@ def _parity(view: _View) -> Iterator[SensorComparison]:
         yield view.compared("kinematic parity", channel, y, combination**2 @ variance, [], signals)
 
 
-def _rates(view: _View) -> Iterator[SensorComparison]:
+def _rates(view: RecordView) -> Iterator[SensorComparison]:
     """platen_velocity and platen_acceleration against derivatives of platen_displacement.
 
     An accelerometer may have cross-talk; as much as its gain uncertainty is allowed.
@@ -278,7 +193,7 @@ def _rates(view: _View) -> Iterator[SensorComparison]:
             yield view.compared(check, f"{name}[{AXES[j]}]", measured[:, j], variance[j], terms, errors)
 
 
-def _accelerometers(view: _View) -> Iterator[SensorComparison]:
+def _accelerometers(view: RecordView) -> Iterator[SensorComparison]:
     """Each accelerometer against what it should read, gravity by tilt included, in the motion of platen_displacement.
 
     Other directions of the platen's motion are its cross-talk; as much as its gain uncertainty is allowed.
@@ -304,7 +219,7 @@ def _accelerometers(view: _View) -> Iterator[SensorComparison]:
         yield view.compared("accelerometer against displacement", channel, measured[:, i], variance[i], terms, errors)
 
 
-def _struts(view: _View) -> Iterator[SensorComparison]:
+def _struts(view: RecordView) -> Iterator[SensorComparison]:
     """strut_pressure against P_0 (1 + dL / L_c0)^-n of the platen's pose; the offset is that level, P_0."""
     plant, machine = view.plant, view.plant.machine
     if not view.has("strut_pressure") or not view.has("platen_displacement"):
@@ -326,14 +241,14 @@ def _struts(view: _View) -> Iterator[SensorComparison]:
         yield view.compared("strut pressure against gas law", channel, measured[:, k], variance[k], terms, errors)
 
 
-def _relative_sd(view: _View, component: Any, key: str) -> float:
+def _relative_sd(view: RecordView, component: Any, key: str) -> float:
     parameters = view.plant.machine.parameters
     path = f"{component.name}.{key}" if f"{component.name}.{key}" in parameters else f"{component.kind}.{key}"
     sd = parameters[path].sd
     return float(sd) / parameters.number(path) if isinstance(sd, float) else 0.0
 
 
-def _supply(view: _View) -> Iterator[SensorComparison]:
+def _supply(view: RecordView) -> Iterator[SensorComparison]:
     """supply_pressure against the nominal one."""
     if view.has("supply_pressure"):
         name, nominal = "supply_pressure", view.plant.machine.hydraulics.supply_pressure
@@ -342,7 +257,7 @@ def _supply(view: _View) -> Iterator[SensorComparison]:
         yield view.compared("supply pressure against nominal", name, y, view.variance(name)[0], terms, errors)
 
 
-def _spools(view: _View) -> Iterator[SensorComparison]:
+def _spools(view: RecordView) -> Iterator[SensorComparison]:
     """spool_position against the command, late by the valve's delay.
 
     Commands are recorded without a low-pass filter: their fast part bounds the aliasing.
@@ -362,7 +277,7 @@ def _spools(view: _View) -> Iterator[SensorComparison]:
         yield view.compared("spool against command", channel, measured[:, i], variance[i], terms, errors)
 
 
-def _redundant(view: _View) -> Iterator[SensorComparison]:
+def _redundant(view: RecordView) -> Iterator[SensorComparison]:
     """A redundant channel against the one of the same quantity."""
     for name, base in ((n, c.same_as) for n, c in LAYOUT.items() if c.same_as and view.has(n, c.same_as)):
         measured, (due, rate) = view.signal(view.values(name)), view.signals(view.values(base), 0, 1)

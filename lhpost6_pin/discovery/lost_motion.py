@@ -15,7 +15,8 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.progress import Progress, split
 from ..data.consistency import scaled_inverse
-from ..data.sensor_pairs import SensorComparison, loose_lengths
+from ..data.sensor_pairs import loose_lengths
+from ..data.sensor_view import SensorComparison
 from ..data.sensors import SensorSet
 from ..machine.library import find_family, in_size_of
 from ..machine.parameters import Parameters

@@ -24,7 +24,7 @@ from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
 from .structure import BODIES, ESTIMATES, FLOW_READINGS, MOTIONS, VALVE_PORTS, Structure
-from .user_specimen import load_user_specimen
+from .user_specimen import REMOTE, load_user_specimen
 
 __all__ = ["Machine", "build_machine", "load_machine"]
 
@@ -180,14 +180,15 @@ class Machine(Structure):
         """Return a copy with a specimen bolted to the platen: a shipped name (``pendulum``), or a file.
 
         A file is a URDF, or states a rigid body with modes or matrices (.toml, .npz, .mat; `specimen_file`).
-        ``FILE.py:NAME``, or an object in Python, is a specimen of your own (`mechanics.coupled`).
+        ``FILE.py:NAME``, or an object in Python, is a specimen of your own (`mechanics.coupled`), ``udp:HOST:PORT`` one
+        in another process (`mechanics.remote_specimen`).
         position [m] and rpy [rad] place its root or base in the platen's top-face frame (axes of the platen, origin C).
         locked: one rigid body. Free joints join the Pinocchio model; modes run in both engines.
         """
         named = isinstance(name_or_path, str | Path)
-        if not named or is_python(str(name_or_path)):
+        if not named or is_python(str(name_or_path)) or str(name_or_path).startswith(REMOTE):
             if locked:
-                raise ParameterError(f"{name_or_path}: a specimen in Python has no joints or modes to lock (--locked)")
+                raise ParameterError(f"{name_or_path}: a program has no joints or modes to lock (--locked)")
             source = str(name_or_path) if named else name_or_path
             return replace(self, specimen=load_user_specimen(source, position, rpy))
         return replace(self, specimen=Specimen(find_specimen(name_or_path), position, rpy, locked))

@@ -1,4 +1,4 @@
-"""A specimen in Python on the platen: a class of your own, or a function that builds an OpenSees model."""
+"""A specimen that is a program: a class of your own, a function that builds an OpenSees model, or another process."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,16 +10,19 @@ from ..core.files import models_folder
 from ..core.user_code import load_attribute
 from .specimen import Specimen
 
-__all__ = ["UserSpecimen", "load_user_specimen"]
+__all__ = ["REMOTE", "UserSpecimen", "load_user_specimen"]
 
 Vec3 = tuple[float, float, float]
+
+REMOTE = "udp:"
+"""What the address of a specimen in another process begins with (`mechanics.remote_specimen`)."""
 
 
 @dataclass(frozen=True)
 class UserSpecimen(Specimen):
     """Specimen description; `mechanics.coupled` says what `maker` must be. It is no part of the plant's equations."""
 
-    maker: Any = field(default=None, compare=False)  # class, function, or the object itself
+    maker: Any = field(default=None, compare=False)  # class, function, the object itself, or an address
     attribute: str = "build"  # its name in the file
 
     @property
@@ -49,11 +52,13 @@ class UserSpecimen(Specimen):
 
 
 def load_user_specimen(source: Any, position: Vec3 = (0.0, 0.0, 0.0), rpy: Vec3 = (0.0, 0.0, 0.0)) -> UserSpecimen:
-    """Specimen from ``FILE.py:NAME``, or of an object in Python; ``FILE.py`` alone names its `build`.
+    """Specimen from ``FILE.py:NAME``, ``udp:HOST:PORT``, or an object in Python; ``FILE.py`` alone names its `build`.
 
     A file that is not found by its path is looked for among the shipped specimens. Raises ParameterError naming the
     file and what is wrong with it.
     """
+    if isinstance(source, str) and source.startswith(REMOTE):
+        return UserSpecimen(Path(), position, rpy, maker=source, attribute=source)
     if not isinstance(source, str):
         return UserSpecimen(Path(), position, rpy, maker=source, attribute=type(source).__name__)
     file, colon, attribute = source.rpartition(":")

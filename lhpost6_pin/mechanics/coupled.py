@@ -17,21 +17,25 @@ pulled upwards by the platen pulls it down. The base point and its axes are plac
 The part of the specimen that is rigidly attached to its base, `inertia` (`pin.Inertia` at the base point, base axes;
 `pin.Inertia.Zero()` if there is none), belongs to the platen in the plant's equations; the wrench contains it all the
 same. A method `interface_mass(dt)` may state the whole matrix M_inf (6, 6), linear first, with which the wrench follows
-an acceleration of the base at once; without it a copy of the memory is probed (`simulation.coupling`).
+an acceleration of the base at once; without it, or where it returns None, the specimen is probed beforehand
+(`simulation.coupling`).
 """
 
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
+from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.user_code import call_user
 from ..machine.machine import Machine
 from .specimen_mount import placement_of
 
 __all__ = ["BaseMotion", "CoupledSpecimen", "base_at_rest", "checked_wrench"]
-__all__ += ["rigid_wrench", "start_coupled", "step_coupled"]
+__all__ += ["motion_numbers", "motion_of_numbers", "rigid_wrench", "start_coupled", "step_coupled"]
+__all__ += ["wrench_of"]
 
 
 class BaseMotion(NamedTuple):
@@ -44,6 +48,24 @@ class BaseMotion(NamedTuple):
     pose: pin.SE3
     twist: pin.Motion
     acceleration: pin.Motion
+
+
+def motion_numbers(base: BaseMotion) -> Array:
+    """Motion of a base (18,): position [m], Euler angles [rad], twist, acceleration, as links and FMUs hand it on."""
+    pose = base.pose
+    parts = pose.translation, pin.rpy.matrixToRpy(pose.rotation), base.twist.vector, base.acceleration.vector
+    return np.concatenate(parts)
+
+
+def motion_of_numbers(numbers: Array) -> BaseMotion:
+    """Motion of a base from the numbers of `motion_numbers`."""
+    pose = pin.SE3(pin.rpy.rpyToMatrix(*numbers[3:6]), numbers[:3])
+    return BaseMotion(pose, pin.Motion(numbers[6:12]), pin.Motion(numbers[12:18]))
+
+
+def wrench_of(numbers: ArrayLike) -> pin.Force:
+    """Wrench of six numbers, force first, or itself."""
+    return numbers if isinstance(numbers, pin.Force) else pin.Force(np.array(numbers, float))
 
 
 class CoupledSpecimen(Protocol):

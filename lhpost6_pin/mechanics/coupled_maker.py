@@ -12,19 +12,24 @@ from ..machine.machine import Machine
 from ..machine.user_specimen import UserSpecimen
 from .coupled import CoupledSpecimen
 from .opensees import OpenSeesSpecimen
+from .remote_specimen import RemoteSpecimen
 
-__all__ = ["coupled_specimen"]
+__all__ = ["coupled_specimen", "made_specimen"]
 
 
 def coupled_specimen(machine: Machine) -> CoupledSpecimen | None:
-    """Specimen of a machine that is coupled, made ready; None if it has none.
+    """Specimen of a machine that is coupled, made ready; None if it has none. Raises as `made_specimen` does."""
+    return made_specimen(machine.specimen) if isinstance(machine.specimen, UserSpecimen) else None
 
-    Raises ParameterError for an object that is no specimen, naming what it lacks.
+
+def made_specimen(described: UserSpecimen) -> CoupledSpecimen:
+    """The specimen that a description makes, or asks for in another process.
+
+    Raises ParameterError for an object that is no specimen, naming what it lacks, or where no other process answers.
     """
-    described = machine.specimen
-    if not isinstance(described, UserSpecimen):
-        return None
     maker: Any = described.maker
+    if isinstance(maker, str):
+        return RemoteSpecimen(maker)
     if inspect.isfunction(maker) and next(iter(inspect.signature(maker).parameters), "") == "ops":
         return OpenSeesSpecimen(maker, described.name)
     made = maker

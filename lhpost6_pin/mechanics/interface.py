@@ -2,7 +2,6 @@
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
 from .coupled import BaseMotion
@@ -11,7 +10,7 @@ from .rigid_body import platen_inertia
 from .schemes import A, V
 from .workspace import Workspace
 
-__all__ = ["apparent_mass", "base_motion", "mass_at_b", "motion_numbers", "motion_of_numbers", "wrench_of"]
+__all__ = ["apparent_mass", "base_motion", "mass_at_b"]
 
 
 def base_motion(plant: Plant, ws: Workspace, placement: pin.SE3) -> BaseMotion:
@@ -28,24 +27,6 @@ def base_motion(plant: Plant, ws: Workspace, placement: pin.SE3) -> BaseMotion:
     spatial = placement.actInv(pin.Motion(v[1]))
     classical = pin.Motion(spatial.linear + np.cross(twist.angular, twist.linear), spatial.angular)
     return BaseMotion(pose * placement, twist, classical)
-
-
-def motion_numbers(base: BaseMotion) -> Array:
-    """Motion of a base (18,): position [m], Euler angles [rad], twist, acceleration, as links and FMUs hand it on."""
-    pose = base.pose
-    parts = pose.translation, pin.rpy.matrixToRpy(pose.rotation), base.twist.vector, base.acceleration.vector
-    return np.concatenate(parts)
-
-
-def motion_of_numbers(numbers: Array) -> BaseMotion:
-    """Motion of a base from the numbers of `motion_numbers`."""
-    pose = pin.SE3(pin.rpy.rpyToMatrix(*numbers[3:6]), numbers[:3])
-    return BaseMotion(pose, pin.Motion(numbers[6:12]), pin.Motion(numbers[12:18]))
-
-
-def wrench_of(numbers: ArrayLike) -> pin.Force:
-    """Wrench of six numbers, force first, or itself."""
-    return numbers if isinstance(numbers, pin.Force) else pin.Force(np.array(numbers, float))
 
 
 def mass_at_b(placement: pin.SE3, mass: Array) -> Array:

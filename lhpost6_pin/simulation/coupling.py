@@ -166,8 +166,9 @@ def stability_of(plant: Plant, dt: float, options: CouplingOptions) -> tuple[Sta
 def _interface_mass(coupled: CoupledSpecimen, base: BaseMotion, gravity: float, dt: float) -> Array:
     """M_inf (6, 6) at the base: what the specimen states, or the columns of six pulses from rest."""
     name = type(coupled).__name__
-    if callable(state := getattr(coupled, "interface_mass", None)):
-        stated = np.asarray(state(dt), float)
+    state = getattr(coupled, "interface_mass", None)
+    if callable(state) and (given := state(dt)) is not None:
+        stated = np.asarray(given, float)
         if stated.shape != (6, 6) or not np.isfinite(stated).all():
             raise SimulationError(f"{name}.interface_mass must return a finite matrix (6, 6), linear first")
         return stated

@@ -24,8 +24,8 @@ from lhpost6_pin.core.names import AXES, SAMPLE_RATE, SCHEMES
 from lhpost6_pin.data.channels import LAYOUT, MOTION, channel_unit
 from lhpost6_pin.interfaces.fmi.machine_file import load_machine_file
 from lhpost6_pin.machine.machine import Machine
+from lhpost6_pin.mechanics.coupled import motion_numbers, wrench_of
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
-from lhpost6_pin.mechanics.interface import motion_numbers, wrench_of
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.simulation.ledger import WRENCH_AXES

@@ -1,11 +1,12 @@
-"""The link: the plant as a UDP server, and a client that commands it."""
+"""The link: the plant as a UDP server, a client that commands it, and a specimen served to it."""
 
 from .client import LinkClient, Reading
 from .protocol import Datagram, Kind, LinkMode, PlantState, decode, encode, find_mode
 from .remote import LinkRun, record_of_link_run, run_over_link
 from .served import ServedPlant
 from .server import HOST, PORT, Timing, open_socket, serve
+from .specimen_server import SPECIMEN_PORT, ServedSpecimen, serve_specimen
 
 __all__ = ["HOST", "PORT", "Datagram", "Kind", "LinkClient", "LinkMode", "LinkRun", "PlantState", "Reading"]
 __all__ += ["ServedPlant", "Timing", "decode", "encode", "find_mode", "open_socket", "record_of_link_run"]
-__all__ += ["run_over_link", "serve"]
+__all__ += ["SPECIMEN_PORT", "ServedSpecimen", "run_over_link", "serve", "serve_specimen"]

@@ -24,8 +24,7 @@ from ...control.plug import Feedback
 from ...control.valves import valve_names
 from ...core.arrays import Array
 from ...core.errors import LinkError
-from ...mechanics.coupled import BaseMotion
-from ...mechanics.interface import motion_of_numbers, wrench_of
+from ...mechanics.coupled import BaseMotion, motion_of_numbers, wrench_of
 from .clock import SECOND, Histogram, now
 from .protocol import COUNTS, MOTION, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
 from .server import HOST, PORT

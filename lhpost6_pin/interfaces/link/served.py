@@ -17,9 +17,10 @@ from ...control.valves import per_actuator, valve_counts
 from ...core.arrays import Array
 from ...core.errors import LinkError, SimulationError
 from ...core.names import SAMPLE_RATE
+from ...mechanics.coupled import motion_numbers, wrench_of
 from ...mechanics.equilibrium import Equilibrium
-from ...mechanics.interface import motion_numbers, wrench_of
 from ...mechanics.plant import Plant
+from ...simulation.coupling import CouplingOptions
 from ...simulation.running import RunningPlant
 from ...simulation.snapshot import EVERY, Watch
 from .clock import SECOND, Histogram
@@ -63,9 +64,11 @@ class ServedPlant:
     sending of sensors to the coming of the command that answers them; watcher, shown the plant as it moves.
     """
 
-    def __init__(self, plant: Plant, rest: Equilibrium, mode: LinkMode) -> None:
+    def __init__(
+        self, plant: Plant, rest: Equilibrium, mode: LinkMode, coupling: CouplingOptions | None = None
+    ) -> None:
         """Put the plant at rest and run its first samples, so that all is compiled before a client comes."""
-        self.plant, self.mode, self._rest = plant, mode, rest
+        self.plant, self.mode, self._rest, self._coupling = plant, mode, rest, coupling
         self.counts, self.answer_time = dict.fromkeys(COUNTS, 0), Histogram()
         self.watcher: Watch | None = None
         self._owner: Hashable = None  # current or last client
@@ -81,7 +84,7 @@ class ServedPlant:
 
     def _begin(self) -> None:
         """A plant at rest that waits for its first command."""
-        self._table = RunningPlant(self.plant, self._rest)
+        self._table = RunningPlant(self.plant, self._rest, coupling=self._coupling)
         self.state, self.sample, self._sensed = PlantState.WAITING, 0, _numbers(self._table)
         self._newest = self._acted = self._acted_stamp = self._newest_stamp = self._missed = 0
         self._fresh, self._asked = False, self._rest.spool

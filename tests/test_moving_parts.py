@@ -390,3 +390,12 @@ def test_plants_require_alike_only_with_the_same_legs():
     longer = make_plant(FULL.with_params(horizontal__barrel_length=3.0))
     assert require_alike(PLANT, make_plant(FULL)) and not require_alike(PLANT, longer)
     assert not require_alike(PLANT, make_plant(machine_named("lhpost6")))
+
+
+@pytest.mark.long
+def test_a_record_of_bodies_is_not_analysed_as_lumped_without_a_warning(lhpost6):
+    sine = ("run", "sine", "--set", "amplitude=0.01", "--set", "cycles=1", "--record-rate", 512, "--engine", "fused")
+    assert lhpost6(*sine, "--bodies", "full", "--out", "full").code == 0
+    said = lhpost6("decompose", "full/record.nc").err
+    assert "bodies = full" in " ".join(said.split())
+    assert "bodies =" not in lhpost6("decompose", "full/record.nc", "--bodies", "full").err

@@ -176,8 +176,15 @@ class MountOptions:
     def onto_for(self, table: "Machine", records: Sequence["xr.Dataset"]) -> "Machine":
         """As `onto`; without --specimen the machine with the specimen that all records state, as far as they do.
 
-        Raises RecordError for records with different specimens, or a stated one whose file is not there.
+        Simulated records of a table whose moving parts are described otherwise are a warning. Raises RecordError for
+        records with different specimens, or a stated one whose file is not there.
         """
+        for bodies in sorted({_bodies(r) for r in records if r.attrs.get("kind") == "simulated"} - {table.bodies}):
+            log.warning(
+                "records were made with moving parts of the legs as bodies = %s; %s has bodies = %s, whose inertia "
+                "differs: --bodies %s, or that word in the machine file, makes them alike",
+                bodies, table.name, table.bodies, bodies,
+            )  # fmt: skip
         if self.specimen is not None or not records:
             return self.onto(table)
         stated = {_specimen_words(record.attrs): record for record in records}
@@ -319,6 +326,11 @@ def measuring(campaign: Path, machine: str) -> str:
 def record_name(path: Path, attrs: Any) -> str:
     """Name of a record for its results: that of the file, of the test for a file named record.nc."""
     return path.stem if path.stem != "record" else str(attrs.get("test", "record")).replace("/", "_")
+
+
+def _bodies(record: "xr.Dataset") -> str:
+    """How the table of a simulated record describes the moving parts of its legs."""
+    return str(record.attrs.get("moving_parts", "bodies = lumped")).removeprefix("bodies = ")
 
 
 def _specimen_words(attrs: Any) -> str:

@@ -67,11 +67,12 @@ def prove(
     progress: Progress,
 ) -> Proof:
     """Validate the three models on held-out records; `machine` is the one delivered."""
-    models = [(machine, list(records))]
+    models = [(found.problem.mounted(machine), list(records))]
     for solution in (found.refit, found.solution):
         problem = solution.normal.problem
         errors = solution.x[len(problem.parameters) :]
-        models.append((fitted_machine(solution), [corrected_record(r, problem.unknowns, errors) for r in records]))
+        fitted = problem.mounted(fitted_machine(solution))
+        models.append((fitted, [corrected_record(r, problem.unknowns, errors) for r in records]))
     done = []
     for i, (model, some) in enumerate(models):
         done.append(validate(model, Campaign("held out", tuple(some)), sensors=sensors, phases=phases, jobs=jobs))

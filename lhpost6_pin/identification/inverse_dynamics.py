@@ -151,7 +151,7 @@ def inverse_dynamics(
     if floor_acceleration is not None:
         carried[BASE_SHEAR] = -floor_wrench(plant, np.asarray(floor_acceleration, float))
     if mounted is not None:
-        carried[SPECIMEN] = driven_wrenches(mounted, seen, dt)
+        carried[SPECIMEN] = driven_wrenches(mounted, seen, dt, model_step=model_step)
     for load in carried.values():
         required[:, plant.axes] -= load[:, plant.axes]
     loaded = with_loads(plant, ports, required, z, measured[0])

@@ -78,6 +78,7 @@ class MeasuredTest:
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
     weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
     substeps: int = 1  # in which friction is marched between samples
+    carried: Array | None = None  # (n, 6) at B in platen axes: wrench of a moving specimen beyond that of a rigid one
 
     @property
     def samples(self) -> int:

@@ -26,7 +26,7 @@ from ..effects.registry import PORTS, actuator_rows, law_of, shapes_of, states_o
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
-from ..mechanics.pose import plant_motion
+from ..mechanics.pose import PlantMotion, plant_motion
 from ..mechanics.required_wrench import floor_wrench, require_alike, required_wrench
 from .friction_march import march_finely
 from .inverse_dynamics import with_loads
@@ -69,11 +69,12 @@ def follow(
 ) -> Path:
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
-    Raises SimulationError for a specimen that moves in modes. What does not differ from the `known` path of the same
-    motion with another plant is reused. start (n_states,) are the friction states at the start, if not zero.
+    Raises SimulationError for a specimen that moves on joints or in modes. What does not differ from the `known` path
+    of the same motion with another plant is reused. start (n_states,) are the friction states at the start, if not
+    zero.
     """
-    if plant.modes.size:
-        raise SimulationError("residuals take a platen with a rigid specimen at most; lock its modes (--locked)")
+    if plant.flexible:
+        raise SimulationError("residuals take a rigid specimen at most; what a moving one exerts beyond is `carried`")
     there: dict[tuple[object, ...], Array] = {}  # states by what they depend on
     rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
     if known is None or _geometry(known[0]) != _geometry(plant):
@@ -81,11 +82,11 @@ def follow(
         along = ports = ports_along(plant, moved)
         if test.path is not None:
             along = ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
-        required = required_wrench(plant, moved, ports.turn)
+        required = _required(plant, test, moved, ports.turn)
     else:
         ports, along, required, old = known[1]
         if not require_alike(known[0], plant):
-            required = required_wrench(plant, plant_motion(plant, test.motion), ports.turn)
+            required = _required(plant, test, plant_motion(plant, test.motion), ports.turn)
         before = [(_marched(row), states_of(row)) for row in _moving(known[0])]
         if len(plant.states) == old.shape[1] and before == [(key, place) for key, place, _ in rows]:
             return Path(ports, along, required, old)
@@ -102,6 +103,14 @@ def follow(
     for key, place, _ in rows:
         z[:, place] = there[key]
     return Path(ports, along, required, z)
+
+
+def _required(plant: Plant, test: MeasuredTest, moved: PlantMotion, turn: Array) -> Array:
+    """Wrench (n, 6) that the motion requires, less that of a specimen beyond a rigid one, on the free axes."""
+    required = required_wrench(plant, moved, turn)
+    if test.carried is not None:
+        required[:, plant.axes] -= test.carried[:, plant.axes]
+    return required
 
 
 def _moving(plant: Plant) -> Array:

@@ -8,7 +8,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..machine.specimen_forms import influence_of
 from ..mechanics.interface_wrench import at_interface, driven_specimen, specimen_wrenches
-from ..mechanics.modal_march import march_modes
+from ..mechanics.modal_march import fine_steps, march_modes
 from ..mechanics.modes import ModalMotion, modal_motion
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlantMotion, platen_motion, rotation
@@ -110,15 +110,17 @@ def interface_wrench(run: History) -> Array:
     return at_interface(run.plant, _at_b(run))
 
 
-def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float) -> Array:
+def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float, *, model_step: bool = False) -> Array:
     """Wrenches (n, 6) [N, N m] of a specimen on the platen at B in platen axes, along a prescribed motion of it.
 
-    Its joints and modes respond from rest (`driven_specimen`, `march_modes`). Raises SimulationError for a specimen
+    Its joints and modes respond from rest (`driven_specimen`, `march_modes`); with `model_step` modes take one step a
+    sample, as in a run whose steps are these samples. Raises SimulationError for a specimen
     that is a program.
     """
     if plant.coupled is not None:
         raise SimulationError("a specimen that is a program runs with the table only, not along a recorded motion")
-    return _at_b(_States(plant, *driven_specimen(plant, motion, dt), march_modes(plant, motion, dt)))
+    modes = march_modes(plant, motion, dt, substeps=1 if model_step else fine_steps(plant, dt))
+    return _at_b(_States(plant, *driven_specimen(plant, motion, dt), modes))
 
 
 class _States(NamedTuple):

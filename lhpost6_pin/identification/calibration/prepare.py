@@ -1,11 +1,13 @@
 """Preparation of a campaign for a fit: checked, aligned, fused, with noisier copies of every test."""
 
+import logging
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from ...core.errors import RecordError, SimulationError
+from ...core.errors import RecordError
 from ...data.channels import calibrated_channels, channel_name, columns_of
 from ...data.layout_faults import layout_faults
 from ...data.observable import observable
@@ -13,12 +15,16 @@ from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
+from ...mechanics.pose import plant_motion
+from ...simulation.specimen_response import driven_wrenches
 from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
 from .sensor_errors import RemovedDelay
 from .usable_tests import too_short
 
 __all__ = ["policy_of", "prepare_problem"]
+
+log = logging.getLogger(__name__)
 
 
 def prepare_problem(
@@ -44,6 +50,15 @@ def prepare_problem(
     _refuse(machine, records, comparison)
     _refuse_free_of_noise(machine, records, sensors)
     machine = machine.as_tested(records[0].attrs, "the first test")
+    mounted, specimen = make_plant(machine), None
+    if mounted.flexible:
+        specimen = machine.specimen
+        assert specimen is not None
+        machine = replace(machine, specimen=replace(specimen, locked=True))
+        log.warning(
+            "%s moves on joints or in modes: its wrench along the measured motion is taken from its description, as if "
+            "that were exact", specimen.name,
+        )  # fmt: skip
     plant = make_plant(machine)
     policy = policy_of(numbers)
     records, delays = align_records(plant, records, policy)
@@ -53,15 +68,23 @@ def prepare_problem(
     )
     rng = np.random.default_rng(seed)
 
-    def drawn(policy: Policy) -> list[MeasuredTest]:
-        return [prepare_test(plant, add_noise(r, sensors, rng), sensors, policy) for r in records]
+    def prepared(record: xr.Dataset, policy: Policy) -> MeasuredTest:
+        test = prepare_test(plant, record, sensors, policy)
+        if specimen is None:
+            return test
+        moved = plant_motion(plant, test.motion)
+        sways = driven_wrenches(mounted, moved, test.dt) - driven_wrenches(plant, moved, test.dt)
+        return replace(test, carried=sways)
 
-    tests = [prepare_test(plant, r, sensors, policy) for r in records]
+    def drawn(policy: Policy) -> list[MeasuredTest]:
+        return [prepared(add_noise(r, sensors, rng), policy) for r in records]
+
+    tests = [prepared(r, policy) for r in records]
     noisy = [test for _ in range(int(n("fit.draws"))) for test in drawn(policy._replace(shares=False))]
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
     return Problem(
         *(machine, tests, noisy, sensors, comparison),
-        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed,
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed, specimen=specimen,
     )  # fmt: skip
 
 
@@ -75,10 +98,6 @@ def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: Residua
     """Raise the errors that `calibrate` lists, naming the test."""
     if not records:
         raise RecordError("the campaign has no records")
-    if make_plant(machine).flexible:
-        raise SimulationError(
-            "calibration takes a platen with a rigid specimen at most; lock its joints or modes (--locked)"
-        )
     names = [str(record.attrs.get("test", f"record {i}")) for i, record in enumerate(records, start=1)]
     for test, record in zip(names, records, strict=True):
         if faults := layout_faults(record, machine.labels):

@@ -16,6 +16,7 @@ from ...core.arrays import Array, Complex, Mask
 from ...data.sensors import SensorSet
 from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
+from ...machine.specimen import Specimen
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
 from ..friction_march import made_fine
@@ -67,15 +68,17 @@ class Problem:
         others: Sequence[Machine] = (),
         preload: float = 0.0,
         delays: tuple[RemovedDelay, ...] = (),
+        specimen: Specimen | None = None,
     ) -> None:
         """Prepare the problem; all tests have the same channels.
 
         noisy are draws of the tests in order, any number of times, each with more noise, from which the whitener is
         made; `again` are further ones, for the correction of derivatives. Noise also includes differences of residuals
         between equally plausible machines (`others`), and friction's state at the start of a test, of which a share
-        `preload` is unknown. `delays` were removed from the tests. Raises RecordError if they are too short together.
+        `preload` is unknown. `delays` were removed from the tests. A `specimen` that moves is locked on the machine:
+        what it exerts beyond that is `carried` in the tests. Raises RecordError if they are too short together.
         """
-        self.delays, plant = delays, make_plant(machine)
+        self.delays, self.specimen, plant = delays, specimen, make_plant(machine)
         self.axes = plant.axes  # free twist components of the platen
         tests = tuple(made_fine(plant, test) for test in tests)
 
@@ -139,6 +142,10 @@ class Problem:
     def with_machine(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
         """The same tests and noise with another machine, or other parameters."""
         return self._with()._set(machine, parameters)
+
+    def mounted(self, machine: Machine) -> Machine:
+        """A machine with the specimen that moves, if there is one, in place of the locked one: for simulations."""
+        return machine if self.specimen is None else replace(machine, specimen=self.specimen)
 
     def with_free(self, name: str, share: float | None) -> "Problem":
         """The same with an unknown's prior deviation `share` times the stated one; None: as stated."""

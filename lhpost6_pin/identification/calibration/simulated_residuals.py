@@ -16,9 +16,9 @@ from ...core.arrays import Array, Complex
 from ...core.names import SAMPLE_RATE
 from ...data.signals import resample_band_limited
 from ...machine.parameters import Parameters
-from ...mechanics.plant import Plant, State
+from ...mechanics.plant import Plant, State, make_plant
 from ...mechanics.pose import platen_motion
-from ...simulation.simulate import OpenLoop, Run, simulate
+from ...simulation.simulate import OpenLoop, Run, fastest_engine, simulate
 from ..prepare import MeasuredTest
 from .normal_equations import squares
 from .problem import Problem
@@ -54,13 +54,18 @@ def by_simulation(
         return None
     prior, step = problem.prior[:count], problem.comparison.step * problem.prior[:count]
     drives = [_drive(corrected(t, problem.unknowns, x[count:])) for t in problem.tests]
-    plant = problem.plant_at(x)
+
+    def plant_at(x: Array) -> Plant:
+        bare = problem.plant_at(x)
+        return bare if problem.specimen is None else make_plant(problem.mounted(bare.machine))
+
+    plant = plant_at(x)
     jobs = [(plant, [drive]) for drive in drives]
     jobs += [(plant, [_noisier(drives[i % tests], problem.tests[i % tests], t)]) for i, t in enumerate(noisy)]
     for i, h in enumerate(step):
         turned = x.copy()
         turned[i] += h
-        jobs.append((problem.plant_at(turned), drives))
+        jobs.append((plant_at(turned), drives))
 
     def errors(plant: Plant, some: Sequence[_RecordedTest]) -> list[Complex] | None:
         """Bins of measured less simulated outputs of each drive; None if a run failed."""
@@ -135,7 +140,7 @@ def _outputs(plant: Plant, drive: _RecordedTest) -> Array | None:
     z = zero.z.copy()
     z[states] = drive.measured[0, 6:]
     loop = OpenLoop(drive.spool, State(zero.q, zero.v, z))
-    run: Run = simulate(plant, loop, samples=len(drive.spool) // STEPS, engine="fused")
+    run: Run = simulate(plant, loop, samples=len(drive.spool) // STEPS, engine=fastest_engine(plant))
     if run.trouble:
         return None
     found = np.hstack([platen_motion(plant, run.q, run.v, run.a).velocity, run.z[:, states]])

@@ -11,9 +11,11 @@ from machine_cases import plant_named
 from lhpost6_pin.core.errors import OutOfRangeError, SimulationError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.machine.machine import build_machine, load_machine
+from lhpost6_pin.machine.strength import stated_strength
 from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, required_forces
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import platen_pose_at, required_wrench_at, wrench_at
+from lhpost6_pin.mechanics.motion_demands import make_motion_check
 from lhpost6_pin.mechanics.payload import lock_joints, with_payload
 from lhpost6_pin.mechanics.performance import table_performance
 from lhpost6_pin.mechanics.plant import make_plant
@@ -209,3 +211,27 @@ def test_a_chamber_below_zero_is_trouble_and_below_the_return_pressure_a_remark(
     assert "cavitation" in trouble
     exempt = make_plant(load_machine().with_effect("cavitation", ("V6",)))
     assert with_pressure_trouble(replace(run, z=empty, plant=exempt)).trouble is None
+
+
+def test_a_tall_specimen_is_judged_by_the_moments_that_the_reaction_mass_bears():
+    machine = load_machine()
+    plant = make_plant(machine)
+    # of the bare table they are Table 2.2's accelerations by construction
+    strength = stated_strength(machine.parameters)
+    for k, most in enumerate(strength.reaction_moment):
+        assert most / machine.platen.inertia[k] == pytest.approx(machine.limits.acceleration[3 + k], rel=1e-6)
+    tall = make_plant(machine.with_specimen("tall_column"))
+    motion = np.zeros((3, 2, 6))
+    motion[2, 1, 0] = 5.0  # m/s2 along x
+
+    def demand(one):
+        found = make_motion_check(one)(*motion)
+        return next(d for d in found if d.quantity == "reaction mass moment")
+
+    bare, loaded = demand(plant), demand(tall)
+    assert bare.share[1, 1] < 1e-6
+    # the column's inertia force acts at its centre of gravity above B; it is the same force that accelerates it
+    inertia = tall.model.inertias[1]
+    assert loaded.share[1, 1] == pytest.approx(
+        abs(5.0 * inertia.mass * inertia.lever[2]) / strength.reaction_moment[1], rel=0.05
+    )

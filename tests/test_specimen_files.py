@@ -213,6 +213,20 @@ def test_every_form_is_drawn_on_the_platen(name):
         assert 0.0 <= placed.translation[0] <= 2.0 and placed.translation[2] > 0.0  # above B, about its base
 
 
+def test_floors_of_a_modal_specimen_sway_as_its_points_do():
+    machine = load_machine().with_specimen("shear_frame", (1.0, 0.0, 0.0), (0.0, 0.0, np.pi / 2))
+    bodies, points = load_specimen_bodies(machine), machine.specimen.contents.points
+    still, moved = (
+        specimen_poses(bodies, {p.name: np.array([s * k]) for k, p in enumerate(points, 1)}, 1)[0] for s in (0.0, 0.01)
+    )
+    for k, point in enumerate(points, 1):
+        assert point.direction == "x"
+        joint = bodies.model.getJointId(point.name)
+        # along x of the base, which is y of the platen
+        np.testing.assert_allclose(moved[joint, :3] - still[joint, :3], [0.0, 0.01 * k, 0.0], atol=1e-12)
+        assert [shape.parentJoint for shape in bodies.shapes].count(joint) == 1
+
+
 # ---------------------------------------------------------------------------------------- what is refused
 def changed(text, old, new):
     assert old in text

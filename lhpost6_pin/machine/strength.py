@@ -12,6 +12,7 @@ class Strength(NamedTuple):
     """Strengths and limits of parts (Table 2.2, notes); infinity, or zero of a pressure, where none is stated."""
 
     reaction_mass: tuple[float, float] = (math.inf, math.inf)  # along X and Y, note 2 [N]
+    reaction_moment: tuple[float, ...] = (math.inf, math.inf, math.inf)  # about X, Y and Z at B, note 2 [N m]
     platen_up: float = math.inf  # vertical actuators less hold-down, note 6 [N]
     rise: float = math.inf  # acceleration upwards that the platen bears, note 3 [m/s2]
     least_pressure: float = 0.0  # in the chamber of a vertical actuator, note 4 [Pa]
@@ -30,8 +31,12 @@ def stated_strength(parameters: Parameters) -> Strength:
     x, y, up = *none.reaction_mass, none.platen_up
     if "table_2_2.force_strength" in parameters:
         x, y, up = parameters.vector("table_2_2.force_strength")
+    moment = none.reaction_moment
+    if "table_2_2.moment_strength" in parameters:
+        moment = parameters.vector("table_2_2.moment_strength")
     return Strength(
         reaction_mass=(x, y),
+        reaction_moment=moment,
         platen_up=up,
         rise=number("acceleration_platen_up", none.rise),
         least_pressure=number("chamber_pressure_down", none.least_pressure),

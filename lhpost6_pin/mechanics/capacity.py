@@ -182,6 +182,10 @@ def _accelerations(plant: Plant) -> list[Capacity]:
             how = "moment of the actuators beyond rest, shared as least norm, over inertia about B"
             value = float(min(rise[k], fall[k]) / mass[k, k])
             rows.append(Capacity(f"peak acceleration {AXES[k]}", value, None, "rad/s2", how))
+            if np.isfinite(moment := strength.reaction_moment[k - 3]):
+                how = f"strength of the reaction mass, {moment / 1e6:.3g} MN m, over inertia about B"
+                name = f"peak acceleration {AXES[k]}, reaction mass"
+                rows.append(Capacity(name, float(moment / mass[k, k]), None, "rad/s2", how))
     return rows
 
 

@@ -146,10 +146,15 @@ def add_modal_wrench(modes, coupling, gravity, frame, z, work):
 def _add_product(matrix, vector, factor, out):
     """Add factor times a symmetric matrix (n * n,) times a vector to out (n,), column by column."""
     n = vector.size
-    for j in range(n):
-        by = factor * vector[j]
+    for j in range(0, n - 1, 2):  # two columns at a time: half the reads and writes of `out`
+        one, two = matrix[j * n : (j + 1) * n], matrix[(j + 1) * n : (j + 2) * n]
+        by, beside = factor * vector[j], factor * vector[j + 1]
         for i in range(n):
-            out[i] += matrix[j * n + i] * by
+            out[i] += one[i] * by + two[i] * beside
+    if n % 2:
+        last, by = matrix[(n - 1) * n :], factor * vector[n - 1]
+        for i in range(n):
+            out[i] += last[i] * by
 
 
 @compiled

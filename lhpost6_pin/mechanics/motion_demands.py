@@ -60,9 +60,9 @@ def make_motion_check(plant: Plant) -> MotionCheck:
                 these = [name for name, own in zip(names, some, strict=True) if own]
                 found.append(Demand(quantity, these, pull[:, some], of, force[:, some], "N"))
         in_space = np.einsum("nij,nj->ni", needed.turn, needed.wrench[:, :3])
-        found += _on_parts(plant, strength, displacement, in_space)
-        extra = wrench_at_bearings(plant, needed.wrench - rest.wrench)
-        return [*found, *_along_axes(plant, extra, along)]
+        more = needed.wrench - rest.wrench
+        found += _on_parts(plant, strength, displacement, in_space, more[:, 3:])
+        return [*found, *_along_axes(plant, wrench_at_bearings(plant, more), along)]
 
     return check
 
@@ -85,13 +85,19 @@ def _refuse_unheld(plant: Plant, share: Array) -> None:
     )
 
 
-def _on_parts(plant: Plant, strength: Strength, displacement: Array, force: Array) -> list[Demand]:
-    """Demands on strengths that are stated; force (n, 3) in {s}, required of the actuators less the struts' [N]."""
+def _on_parts(plant: Plant, strength: Strength, displacement: Array, force: Array, moment: Array) -> list[Demand]:
+    """Demands on strengths that are stated.
+
+    force (n, 3) in {s}, required of the actuators less the struts' [N]; moment (n, 3) at B in platen axes, beyond rest.
+    """
     found = []
     if np.isfinite(strength.reaction_mass).all():
         level = force[:, :2]
         share = np.abs(level) / strength.reaction_mass
         found.append(Demand("reaction mass strength", ("x", "y"), share, "of its strength", level, "N"))
+    if plant.machine.motion == "free" and np.isfinite(strength.reaction_moment).all():
+        share = np.abs(moment) / strength.reaction_moment
+        found.append(Demand("reaction mass moment", AXES[3:], share, "of its strength", moment, "N m"))
     if np.isfinite(strength.platen_up):
         up = np.maximum(force[:, 2:], 0.0)
         found.append(Demand("platen strength", ("z up",), up / strength.platen_up, "of its strength", up, "N"))

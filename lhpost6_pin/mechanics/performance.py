@@ -93,6 +93,9 @@ def _force_bounds(plant: Plant) -> dict[int, list[Bound]]:
         bounds = [_first_actuator(plant, rest.share[0], per @ wrench)]
         if k < 2 and np.isfinite(strength.reaction_mass[k]):
             bounds.append(Bound(strength.reaction_mass[k] / float(abs(wrench[k])), "strength of the reaction mass"))
+        if k > 2 and np.isfinite(strength.reaction_moment[k - 3]):
+            most = strength.reaction_moment[k - 3] / float(abs(wrench[k]))
+            bounds.append(Bound(most, "strength of the reaction mass"))
         if k == 2 and np.isfinite(strength.platen_up):
             margin = strength.platen_up - float(rest.wrench[0, 2])
             bounds.append(Bound(max(margin, 0.0) / float(wrench[2]), "strength of the platen"))

@@ -49,7 +49,8 @@ def load_specimen_bodies(machine: Machine) -> Bodies | None:
     """Read the specimen's URDF with Pinocchio, or draw the floors of any other form; None without, or for Python.
 
     A body is drawn by its boxes, cylinders and spheres; one without any of these as the uniform box that has its mass
-    and inertia. A specimen of modes is a slab at each of its points on a mast, or the box of its mass.
+    and inertia. A specimen of modes is a slab at each of its points' places, which moves as they do (its joints have
+    their names), on a mast; or the box of its mass.
     """
     specimen = machine.specimen
     if specimen is None or isinstance(specimen, UserSpecimen):
@@ -61,7 +62,7 @@ def load_specimen_bodies(machine: Machine) -> Bodies | None:
         except (ValueError, RuntimeError):  # a mesh that cannot be read
             shapes = []
     else:
-        model, shapes = pin.Model(), _floors(specimen.contents)
+        model, shapes = _floors(specimen.contents)
     drawn = {shape.parentJoint for shape in shapes}
     for joint, inertia in enumerate(model.inertias):
         if joint not in drawn and inertia.mass > 0.0:
@@ -77,20 +78,40 @@ def _shapes(model: Any, text: str) -> list[Any]:
     return [one for one in objects if hasattr(one.geometry, "halfSide") or hasattr(one.geometry, "radius")]
 
 
-def _floors(contents: SpecimenContents) -> list[Any]:
-    """Slab at every place of a specimen's points, and a mast; the uniform box of its mass without points."""
-    body = contents.body
+def _floors(contents: SpecimenContents) -> tuple[Any, list[Any]]:
+    """Model and shapes of a slab at every place of a specimen's points, each point a joint of its slab; and a mast.
+
+    The uniform box of the specimen's mass without points.
+    """
+    body, model = contents.body, pin.Model()
     whole = _uniform_box(0, pin.Inertia(body.mass, np.array(body.centre), body.inertia))
     places = list(dict.fromkeys(point.at for point in contents.points))
     if not places:
-        return [whole]
+        return model, [whole]
     edges = 2.0 * whole.geometry.halfSide
     x, y = (float(np.abs(whole.placement.rotation[k]) @ edges) for k in range(2))
     top = max(max(place[2] for place in places), 0.1)
     thick, mast = 0.05 * top, 0.1 * min(x, y)
-    boxes = [(np.array(place), pin.coal.Box(x, y, thick)) for place in places]
-    boxes.append((np.array([*np.mean(places, axis=0)[:2], 0.5 * top]), pin.coal.Box(mast, mast, top)))
-    return [pin.GeometryObject(f"floor_{k}", 0, pin.SE3(np.eye(3), at), box) for k, (at, box) in enumerate(boxes)]
+    at = pin.SE3(np.eye(3), np.array([*np.mean(places, axis=0)[:2], 0.5 * top]))
+    shapes = [pin.GeometryObject("mast", 0, at, pin.coal.Box(mast, mast, top))]
+    for k, place in enumerate(places):
+        joint, where = 0, pin.SE3(np.eye(3), np.array(place))
+        for point in (point for point in contents.points if point.at == place):
+            joint = model.addJoint(joint, _JOINTS[point.direction](), where, point.name)
+            where = pin.SE3.Identity()
+        shapes.append(pin.GeometryObject(f"floor_{k}", joint, pin.SE3.Identity(), pin.coal.Box(x, y, thick)))
+    return model, shapes
+
+
+_JOINTS: Mapping[str, Any] = {
+    "x": pin.JointModelPX,
+    "y": pin.JointModelPY,
+    "z": pin.JointModelPZ,
+    "rx": pin.JointModelRX,
+    "ry": pin.JointModelRY,
+    "rz": pin.JointModelRZ,
+}
+"""Joint of a coordinate of `specimen_forms.DIRECTIONS`."""
 
 
 def _uniform_box(joint: int, inertia: Any) -> Any:
@@ -169,7 +190,8 @@ def body_name(model: Any, joint: int) -> str:
 def specimen_poses(bodies: Bodies, positions: Mapping[str, Array], samples: int) -> Array:
     """Return poses (n, n_joints, 7) of a specimen's bodies in the platen's {b}: position [m] and quaternion x y z w.
 
-    positions (n,) [m or rad] are those of a record's `specimen_joint_position`, by joint; what is missing stands still.
+    positions (n,) [m or rad] are those of a record's `specimen_joint_position`, or of points `specimen_displacement`,
+    by name; what is missing stands still.
     """
     model = bodies.model
     q = np.tile(pin.neutral(model), (samples, 1))

@@ -31,6 +31,7 @@ TOLERANCE = 1e-3  # relative excess of a sampled peak over its limit that still 
 SHOWN = {"actuator stroke": "displacement", "actuator velocity": "velocity"}
 SHOWN |= {"actuator unloading": "force", "reaction mass strength": "force", "platen strength": "force"}
 SHOWN |= {"piston tilt": "rotation", "axis force": "force", "payload": "force", "axis overturning moment": "moment"}
+SHOWN |= {"reaction mass moment": "moment"}
 SHOWN |= {"axis yaw moment": "moment"}
 SHOWN |= {"push": "force", "pull": "force", "force": "force", "spool": "ratio"}
 

@@ -71,7 +71,7 @@ class Frames:
     ghosts: tuple[Ghost, ...]  # sampled and enlarged alike
     force: Array | None  # (n, n_legs) that push the platen away from the leg's base [N]; NaN where unknown
     look: Look
-    joints: Mapping[str, Array] = field(default_factory=dict)  # (n,) of the specimen's free joints [m, rad], enlarged
+    joints: Mapping[str, Array] = field(default_factory=dict)  # (n,) of a specimen's joints, points [m, rad], enlarged
 
 
 def make_frames(
@@ -163,14 +163,17 @@ def _motion(machine: Machine, record: xr.Dataset) -> Array:
 
 
 def _joints(record: xr.Dataset, frames: Frames) -> dict[str, Array]:
-    if "specimen_joint_position" not in record:
-        return {}
-    joints = record["specimen_joint_position"]
-    if joints.dims != ("time", "specimen_joint") or joints.dtype.kind != "f" or not np.isfinite(joints.values).all():
-        raise RecordError("specimen_joint_position must be finite numbers by time and joint; correct or omit it")
-    drawn = _columns(frames.time, record["time"].values, joints.values)
-    names = map(str, record["specimen_joint"].values)
-    return dict(zip(names, frames.look.amplify * drawn.T, strict=True))
+    """Motion of a specimen's joints or points by name."""
+    found: dict[str, Array] = {}
+    for name, dim in (("specimen_joint_position", "specimen_joint"), ("specimen_displacement", "specimen_point")):
+        if name not in record:
+            continue
+        moved = record[name]
+        if moved.dims != ("time", dim) or moved.dtype.kind != "f" or not np.isfinite(moved.values).all():
+            raise RecordError(f"{name} must be finite numbers by time and {dim}; correct or omit it")
+        drawn = _columns(frames.time, record["time"].values, moved.values)
+        found |= dict(zip(map(str, record[dim].values), frames.look.amplify * drawn.T, strict=True))
+    return found
 
 
 def _forces(machine: Machine, record: xr.Dataset) -> Array | None:

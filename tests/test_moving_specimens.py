@@ -11,7 +11,7 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.calibration import calibration_numbers
-from lhpost6_pin.identification.calibration.prepare import prepare_problem
+from lhpost6_pin.identification.calibration.prepare import as_simulated, prepare_problem
 from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow
 from lhpost6_pin.machine.machine import load_machine
@@ -94,7 +94,7 @@ def test_a_table_with_a_specimen_that_moves_is_calibrated_with_it_locked_and_its
     with caplog.at_level(logging.WARNING):
         problem = prepare_problem(machine, records, sensors, numbers, kinds=("wrench",), jobs=1)
     assert "shear_frame moves on joints or in modes" in caplog.text
-    assert problem.machine.specimen.locked and problem.mounted(problem.machine).specimen == machine.specimen
+    assert problem.machine.specimen.locked and as_simulated(problem, problem.machine).specimen == machine.specimen
     assert problem.tests[0].carried is not None
 
     plant = problem.plant_at(np.zeros(len(problem.prior)))

@@ -16,6 +16,7 @@ import xarray as xr
 from ..core.progress import Progress
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
+from ..identification.calibration.prepare import as_simulated
 from ..identification.calibration.sensor_errors import corrected_record
 from ..identification.validation import PHASES, Phase, validate
 from ..machine.machine import Machine
@@ -67,11 +68,11 @@ def prove(
     progress: Progress,
 ) -> Proof:
     """Validate the three models on held-out records; `machine` is the one delivered."""
-    models = [(found.problem.mounted(machine), list(records))]
+    models = [(as_simulated(found.problem, machine), list(records))]
     for solution in (found.refit, found.solution):
         problem = solution.normal.problem
         errors = solution.x[len(problem.parameters) :]
-        fitted = problem.mounted(fitted_machine(solution))
+        fitted = as_simulated(problem, fitted_machine(solution))
         models.append((fitted, [corrected_record(r, problem.unknowns, errors) for r in records]))
     done = []
     for i, (model, some) in enumerate(models):

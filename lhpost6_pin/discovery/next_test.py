@@ -5,7 +5,7 @@ expected margin is the log-likelihood by which the machine with the other effect
 that effect refitted, to first order.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,9 +18,8 @@ from ..core.errors import SimulationError
 from ..data.sensors import SensorSet
 from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.normal_equations import NormalEquations
-from ..identification.calibration.prepare import prepare_problem
+from ..identification.calibration.prepare import as_simulated, prepare_problem
 from ..identification.residuals import RESIDUALS
-from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..simulation.simulated_campaign import load_procedure, simulate_campaign, tests_of
 from .search_state import FittedCandidate, Search
@@ -47,11 +46,16 @@ def next_tests(found: Search, settings: ControllerSettings, sensors: SensorSet) 
     measured = {*found.problem.tests[0].share, *found.problem.tests[0].channels}
     for added in found.added:
         for rival in added.rivals:
-            given = settings, sensors, found.calibration, found.numbers, measured, found.problem.mounted
-            trial = partial(_trial, added.contest[0], rival, *given)
+            one, other = (_simulated(found, each) for each in (added.contest[0], rival))
+            given = settings, sensors, found.calibration, found.numbers, measured
+            trial = partial(_trial, one, other, *given)
             trials = Parallel(n_jobs=found.problem.jobs, prefer="threads")(delayed(trial)(test) for test in tests)
             ranked += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
     return tuple(ranked)
+
+
+def _simulated(found: Search, one: FittedCandidate) -> FittedCandidate:
+    return replace(one, machine=as_simulated(found.problem, one.machine))
 
 
 def _trial(
@@ -62,20 +66,17 @@ def _trial(
     calibration: Parameters,
     numbers: Parameters,
     measured: Collection[str],
-    mounted: Callable[[Machine], Machine],
     test: str,
 ) -> NextTest:
     """Simulate a test on the machine with the one effect, and fit it with the other, by the channels `measured`."""
     names = one.candidate.family.named, rival.candidate.family.named
     quiet = replace(sensors, noise={})
     try:
-        run = simulate_campaign(
-            mounted(one.machine), settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU
-        )
+        run = simulate_campaign(one.machine, settings, quiet, seed=0, errors=False, tests=(test,), procedure=MENU)
     except SimulationError:
         return NextTest(test, names, float("nan"), informative=False)
     records = [_as_measured(record, measured) for record in run.records]
-    problem = prepare_problem(mounted(rival.machine), records, sensors, calibration, kinds=RESIDUALS, jobs=1)
+    problem = prepare_problem(rival.machine, records, sensors, calibration, kinds=RESIDUALS, jobs=1)
     problem = problem.with_machine(problem.machine, (*problem.parameters, *_own_parameters(rival, numbers)))
     margin = _margin(NormalEquations(problem, np.zeros(len(problem.prior)), lambda share: None))
     return NextTest(test, names, margin, informative=margin >= numbers.number("accept.apart"))

@@ -22,7 +22,7 @@ from .problem import KINDS, Problem, ResidualBands
 from .sensor_errors import RemovedDelay
 from .usable_tests import too_short
 
-__all__ = ["policy_of", "prepare_problem"]
+__all__ = ["as_simulated", "policy_of", "prepare_problem"]
 
 log = logging.getLogger(__name__)
 
@@ -82,10 +82,17 @@ def prepare_problem(
     tests = [prepared(r, policy) for r in records]
     noisy = [test for _ in range(int(n("fit.draws"))) for test in drawn(policy._replace(shares=False))]
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
-    return Problem(
+    problem = Problem(
         *(machine, tests, noisy, sensors, comparison),
-        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed, specimen=specimen,
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed,
     )  # fmt: skip
+    problem.specimen = specimen
+    return problem
+
+
+def as_simulated(problem: Problem, machine: Machine) -> Machine:
+    """A machine of a problem with the specimen that moves, if there is one, in place of the locked one."""
+    return machine if problem.specimen is None else replace(machine, specimen=problem.specimen)
 
 
 def policy_of(numbers: Parameters) -> Policy:

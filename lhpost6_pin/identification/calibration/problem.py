@@ -1,6 +1,6 @@
 """The least-squares problem of a campaign: residuals of all tests and their derivatives by every unknown, whitened.
 
-Unknowns x (p,) are the machine's parameters, then the sensors' errors; zero at the nominal machine and perfect sensors.
+Unknowns x (p,): the machine's parameters, then the sensors' errors; zero at nominal machine and perfect sensors.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,6 +54,8 @@ class EvaluationGroup(NamedTuple):
 class Problem:
     """Tests and their noisier copies, unknowns with their priors, and the whitener of the sensors' noise."""
 
+    specimen: Specimen | None = None  # that moves: locked on the machine, its sway is `carried` in the tests
+
     def __init__(
         self,
         machine: Machine,
@@ -68,17 +70,15 @@ class Problem:
         others: Sequence[Machine] = (),
         preload: float = 0.0,
         delays: tuple[RemovedDelay, ...] = (),
-        specimen: Specimen | None = None,
     ) -> None:
         """Prepare the problem; all tests have the same channels.
 
         noisy are draws of the tests in order, any number of times, each with more noise, from which the whitener is
         made; `again` are further ones, for the correction of derivatives. Noise also includes differences of residuals
         between equally plausible machines (`others`), and friction's state at the start of a test, of which a share
-        `preload` is unknown. `delays` were removed from the tests. A `specimen` that moves is locked on the machine:
-        what it exerts beyond that is `carried` in the tests. Raises RecordError if they are too short together.
+        `preload` is unknown. `delays` were removed from the tests. Raises RecordError if they are too short together.
         """
-        self.delays, self.specimen, plant = delays, specimen, make_plant(machine)
+        self.delays, plant = delays, make_plant(machine)
         self.axes = plant.axes  # free twist components of the platen
         tests = tuple(made_fine(plant, test) for test in tests)
 
@@ -87,9 +87,8 @@ class Problem:
             each = zip(some, cycle(tests), strict=False)
             return tuple(replace(t, weight=own.weight, substeps=own.substeps) for t, own in each)
 
-        noisy = weighed(noisy)
         self.tests, self.comparison, self.jobs, self.kinds = tests, comparison, jobs, kinds
-        self.noisy, self.again = noisy, tuple(map(weighed, again))
+        self.noisy, self.again = weighed(noisy), tuple(map(weighed, again))
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
@@ -142,10 +141,6 @@ class Problem:
     def with_machine(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
         """The same tests and noise with another machine, or other parameters."""
         return self._with()._set(machine, parameters)
-
-    def mounted(self, machine: Machine) -> Machine:
-        """A machine with the specimen that moves, if there is one, in place of the locked one: for simulations."""
-        return machine if self.specimen is None else replace(machine, specimen=self.specimen)
 
     def with_free(self, name: str, share: float | None) -> "Problem":
         """The same with an unknown's prior deviation `share` times the stated one; None: as stated."""

@@ -21,6 +21,7 @@ from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, fastest_engine, simulate
 from ..prepare import MeasuredTest
 from .normal_equations import squares
+from .prepare import as_simulated
 from .problem import Problem
 from .result import Subset
 from .sensor_errors import corrected
@@ -57,7 +58,7 @@ def by_simulation(
 
     def plant_at(x: Array) -> Plant:
         bare = problem.plant_at(x)
-        return bare if problem.specimen is None else make_plant(problem.mounted(bare.machine))
+        return bare if problem.specimen is None else make_plant(as_simulated(problem, bare.machine))
 
     plant = plant_at(x)
     jobs = [(plant, [drive]) for drive in drives]

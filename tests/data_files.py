@@ -15,6 +15,7 @@ LABELS = {
     "horizontal": ("H1", "H2", "H3", "H4"),
     "strut": ("S1", "S2", "S3"),
     "floor": ["1F", "RF"],
+    "accelerometer": ["AX1", "AZ1"],
 }
 
 

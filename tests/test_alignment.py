@@ -19,7 +19,7 @@ def skewed(plant, seed: int):
     """Noisy record with the skews above."""
     record, _ = measured(plant, seed)
     for group, tau in SKEWS.items():
-        for name in sensor_groups()[group]:
+        for name in set(sensor_groups()[group]) & set(record.data_vars):
             record = record.assign({name: record[name].copy(data=align(record[name].values, -tau, DT))})
     return add_noise(record, load_sensors(), np.random.default_rng(seed))
 

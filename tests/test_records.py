@@ -48,7 +48,12 @@ def test_there_is_a_step_from_every_older_layout_to_the_next_and_a_record_of_eac
 def test_a_record_of_every_layout_so_far_is_read(path):
     """Kept from when the layout was new; `full_record(8)` has the numbers that are in it."""
     record = load_record(path, LABELS)
-    later = {"pressure_difference", "valve_command", "floor_acceleration", "point_acceleration"}  # came after layout 1 was new
+    later = {
+        "pressure_difference",
+        "valve_command",
+        "floor_acceleration",
+        "point_acceleration",
+    }  # came after layout 1 was new
     later |= {"spool_command_b", "spool_position_b", *(n for n in LAYOUT if n.startswith("drive_"))}
     assert record.attrs["layout_version"] == LAYOUT_VERSION and set(LAYOUT) - later <= set(record)
     np.testing.assert_array_equal(record["strut_pressure"], full_record(8)["strut_pressure"])

@@ -119,7 +119,6 @@ class MachineOptions:
 
     def load(self) -> "Machine":
         """Machine by shipped name or file, with the numbers of an override file and the options given."""
-        from ..data.sensors import load_sensors
         from ..machine.machine import load_machine
 
         table = load_machine(self.machine, None if self.inertia else self.override)
@@ -129,6 +128,8 @@ class MachineOptions:
         table = table if self.bodies is None else table.with_bodies(self.bodies)
         if self.accelerometers is None:
             return table
+        from ..data.sensors import load_sensors  # of these commands few need it
+
         return table.with_accelerometers(load_sensors(self.accelerometers).parameters)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.names import AXES
+from ..mechanics.accelerometers import sensitivities
 from ..mechanics.gas_pressure import strut_pressures
 from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, forward_kinematics, kinematic_jacobian, leg_displacements
@@ -206,8 +207,7 @@ def _accelerometers(view: RecordView) -> Iterator[SensorComparison]:
     motion = PlatenMotion(*view.signals(view.values(base), 0, 1, 2))
     due = accelerometer_signals(plant, motion, rows)
     rate = differentiate(due, view.step * view.dt)
-    sees = np.hstack([rows[:, 3:], np.cross(rows[:, :3], rows[:, 3:])]) ** 2  # of the platen's acceleration
-    noise = [view.variance(base, order) @ sees.T for order in (2, 3)]
+    noise = [view.variance(base, order) @ sensitivities(rows).T ** 2 for order in (2, 3)]
     variance = np.broadcast_to(view.variance(name), len(rows))
     (gain_m, offset_m, delay_m), (gain_x, _, delay_x) = map(view.sd, (name, base))
     across = gain_m * np.abs(motion.acceleration[:, :3]).max(axis=1)

@@ -68,7 +68,7 @@ class Machine(Structure):
             parameters = override_parameters(parameters, changes)
         if keywords:
             parameters = override_parameters(parameters, {k.replace("__", "."): v for k, v in keywords.items()})
-        return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
+        return self._rebuilt(parameters)
 
     def with_effect(
         self, effect: Effect | str, components: Sequence[str] = (), *, name: str = "", **values: float
@@ -127,11 +127,15 @@ class Machine(Structure):
             )
         kept = {path: q for path, q in self.parameters.items() if not path.startswith(ACCELEROMETER)}
         parameters = replace(self.parameters, quantities={**kept, **found})
+        return self._rebuilt(parameters)
+
+    def _rebuilt(self, parameters: Parameters) -> "Machine":
+        """The machine of other parameters, with all else that this one has."""
         return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
 
     def _with_word(self, key: str, word: str) -> "Machine":
         parameters = replace(self.parameters, words={**self.parameters.words, f"machine.{key}": word})
-        return build_machine(parameters, self.own_effects, self.specimen, size_of(self))
+        return self._rebuilt(parameters)
 
     def with_inertia(self, estimate: str) -> "Machine":
         """Return a copy with mass and moments of inertia of an estimate of the file, "first" or "second" (Table 4.1).

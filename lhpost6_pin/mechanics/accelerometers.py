@@ -22,6 +22,7 @@ from ..machine.machine import Machine
 from .spatial import cross, to_body
 
 __all__ = ["accelerometer_rows", "accelerometer_table", "acceleration_weights", "composed_acceleration", "reading"]
+__all__ += ["sensitivities"]
 
 _BLIND = 1e-6  # below it accelerometers do not see a motion
 _PART = 0.3  # of a motion that none of them sees: axes with more are named
@@ -33,13 +34,18 @@ def accelerometer_rows(accelerometers: Sequence[Accelerometer]) -> Array:
     return np.array(rows, float).reshape(-1, 6)
 
 
+def sensitivities(rows: Array) -> Array:
+    """Change (n, 6) of the readings per acceleration of C and per angular acceleration, zero-position."""
+    return np.hstack([rows[:, 3:], np.cross(rows[:, :3], rows[:, 3:])])
+
+
 def acceleration_weights(rows: Array, machine: Machine) -> Array:
     """Weights (6, n) of accelerometers in the platen's acceleration, zero in axes in which it cannot move.
 
     Raises ParameterError naming the axes that they do not determine.
     """
     axes = list(machine.axes)
-    seen = np.hstack([rows[:, 3:], np.cross(rows[:, :3], rows[:, 3:])])[:, axes]
+    seen = sensitivities(rows)[:, axes]
     size = np.maximum(np.linalg.norm(seen, axis=0), _BLIND)
     _, values, turned = np.linalg.svd(seen / size, full_matrices=True)
     unseen = turned[np.count_nonzero(values > _BLIND) :]  # motions that no accelerometer sees

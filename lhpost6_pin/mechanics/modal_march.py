@@ -40,14 +40,15 @@ def fine_steps(plant: Plant, dt: float) -> int:
 @compiled
 def _march(q, tables, ws, dt, substeps, z):
     axes, step, at = tables.axes, np.zeros(tables.axes.size), np.zeros(q.shape[1])
+    gravity = tables.inertia[0].gravity
     for k in range(1, q.shape[0]):
         difference(q[k - 1], q[k], axes, step)
+        twist = step / dt
         z[k] = z[k - 1]
         for i in range(substeps):
             at[:] = q[k]
             if i < substeps - 1:
                 integrate(q[k - 1], (i + 1) / substeps * step, axes, at)
             platen_pose(at, axes, tables.body, ws.frame)
-            set_twist(step / dt, axes, ws.frame)
-            gravity = tables.inertia[0].gravity
+            set_twist(twist, axes, ws.frame)
             advance_modes(tables.modes, tables.coupling, gravity, ws.frame, dt / substeps, z[k], ws.modal)

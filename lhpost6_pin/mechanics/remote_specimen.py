@@ -43,7 +43,6 @@ import select
 import socket
 import struct
 import time
-import zlib
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -51,6 +50,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..core.arrays import Array
+from ..core.checksum import crc_of, with_crc
 from ..core.errors import ParameterError, SimulationError
 from ..machine.user_specimen import REMOTE
 from .coupled import BaseMotion, motion_numbers
@@ -62,7 +62,6 @@ MOTION, WRENCH, INERTIA, MASS = 18, 6, 10, 36
 """Numbers of a motion, a wrench, an inertia and a mass matrix."""
 
 _HEADER = struct.Struct("<4sBBHIII")
-_CRC = struct.Struct("<I")
 _CRC_AT, _STATES_MASS = 16, 1
 _LARGEST = 2048  # bytes of a datagram that are read
 _PATIENCE, _TRIES = 0.5, 20  # [s] until a request is sent again, and how often: a step of a large model takes long
@@ -103,9 +102,7 @@ def encode_message(message: Message) -> bytes:
     payload = message.text.encode()[: _LARGEST - _HEADER.size] if failed else numbers.tobytes()
     flags = _STATES_MASS if numbers.size == INERTIA + MASS else 0
     head = _HEADER.pack(MAGIC, VERSION, message.kind, flags, message.session, message.sequence, 0)
-    datagram = bytearray(head + payload)
-    _CRC.pack_into(datagram, _CRC_AT, zlib.crc32(datagram))
-    return bytes(datagram)
+    return with_crc(head + payload, _CRC_AT)
 
 
 def decode_message(datagram: bytes) -> Message:
@@ -115,9 +112,7 @@ def decode_message(datagram: bytes) -> Message:
     magic, version, kind, flags, session, sequence, crc = _HEADER.unpack_from(datagram)
     if (magic, version) != (MAGIC, VERSION):
         raise ValueError(f"begins with {magic!r}, version {version}; {MAGIC!r}, version {VERSION}, is needed")
-    blank = bytearray(datagram)
-    _CRC.pack_into(blank, _CRC_AT, 0)
-    if crc != zlib.crc32(blank):
+    if crc != crc_of(datagram, _CRC_AT):
         raise ValueError("the CRC-32 does not fit: the datagram was corrupted")
     if kind not in list(MessageKind):
         raise ValueError(f"kind {kind} does not exist")

@@ -114,8 +114,7 @@ def driven_wrenches(plant: Plant, motion: PlantMotion, dt: float, *, model_step:
     """Wrenches (n, 6) [N, N m] of a specimen on the platen at B in platen axes, along a prescribed motion of it.
 
     Its joints and modes respond from rest (`driven_specimen`, `march_modes`); with `model_step` modes take one step a
-    sample, as in a run whose steps are these samples. Raises SimulationError for a specimen
-    that is a program.
+    sample, as in a run whose steps are these samples. Raises SimulationError for a specimen that is a program.
     """
     if plant.coupled is not None:
         raise SimulationError("a specimen that is a program runs with the table only, not along a recorded motion")

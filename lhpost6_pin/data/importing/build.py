@@ -96,8 +96,7 @@ def _accelerometers(channels: ChannelMap, names: Sequence[str], machine: Machine
         key = f"point_acceleration[{name}]"
         source = channels.channels[key]
         if source.point is not None and source.direction is not None:
-            at, along = (tuple(values) for values in (source.point, source.direction))
-            found.append(Accelerometer(name, (at[0], at[1], at[2]), (along[0], along[1], along[2])))
+            found.append(Accelerometer(name, source.point, source.direction))
         elif name in known:
             found.append(known[name])
         else:

@@ -22,6 +22,7 @@ from typing import Any, get_args
 from ...core.errors import RecordError, instead_of, meant
 from ...core.files import read_toml, reason_of, write_whole
 from ...core.names import AXES
+from ...machine.components import Vec3
 from ..channels import LAYOUT, channel_unit
 from ..layout_faults import FASTEST, SLOWEST
 from .raw import RawTest, shown
@@ -49,8 +50,8 @@ class Source:
     offset: float = 0.0
     file: str | None = None
     constant: float | None = None  # in `unit`, instead of a column
-    point: tuple[float, ...] | None = None  # of an accelerometer, from C in platen axes [m]
-    direction: tuple[float, ...] | None = None  # of its sensitivity, in platen axes
+    point: Vec3 | None = None  # of an accelerometer, from C in platen axes [m]
+    direction: Vec3 | None = None  # of its sensitivity, in platen axes
 
 
 @dataclass(frozen=True)
@@ -165,12 +166,13 @@ def _typed(cls: type[Any], table: Mapping[str, Any], where: str) -> Any:
     return cls(**values)
 
 
-def _three(value: Any, where: str) -> tuple[float, ...]:
+def _three(value: Any, where: str) -> Vec3:
     numbers = value if isinstance(value, list) else []
     good = [isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in numbers]
     if len(good) != 3 or not all(good):
         raise RecordError(f"{where} = {value!r} must be three finite numbers, such as [1.0, 0.0, 0.0]")
-    return tuple(map(float, numbers))
+    x, y, z = map(float, numbers)
+    return x, y, z
 
 
 def _check_source(source: Source, where: str) -> None:

@@ -20,6 +20,7 @@ from ...mechanics.plant import Plant, State, make_plant
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, fastest_engine, simulate
 from ..prepare import MeasuredTest
+from .free_parameters import with_parameters
 from .normal_equations import squares
 from .prepare import as_simulated
 from .problem import Problem
@@ -57,8 +58,8 @@ def by_simulation(
     drives = [_drive(corrected(t, problem.unknowns, x[count:])) for t in problem.tests]
 
     def plant_at(x: Array) -> Plant:
-        bare = problem.plant_at(x)
-        return bare if problem.specimen is None else make_plant(as_simulated(problem, bare.machine))
+        machine = with_parameters(problem.machine, problem.parameters, x[:count])
+        return make_plant(as_simulated(problem, machine))
 
     plant = plant_at(x)
     jobs = [(plant, [drive]) for drive in drives]

@@ -5,8 +5,8 @@ from .protocol import Datagram, Kind, LinkMode, PlantState, decode, encode, find
 from .remote import LinkRun, record_of_link_run, run_over_link
 from .served import ServedPlant
 from .server import HOST, PORT, Timing, open_socket, serve
-from .specimen_server import SPECIMEN_PORT, ServedSpecimen, serve_specimen
+from .specimen_server import ServedSpecimen, serve_specimen
 
 __all__ = ["HOST", "PORT", "Datagram", "Kind", "LinkClient", "LinkMode", "LinkRun", "PlantState", "Reading"]
 __all__ += ["ServedPlant", "Timing", "decode", "encode", "find_mode", "open_socket", "record_of_link_run"]
-__all__ += ["SPECIMEN_PORT", "ServedSpecimen", "run_over_link", "serve", "serve_specimen"]
+__all__ += ["ServedSpecimen", "run_over_link", "serve", "serve_specimen"]

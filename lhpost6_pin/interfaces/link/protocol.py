@@ -70,13 +70,13 @@ machine without actuators whose name is the version that is needed.
 
 import math
 import struct
-import zlib
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.checksum import crc_of, with_crc
 from ...core.errors import LinkError, UnknownNameError
 
 __all__ = [
@@ -116,7 +116,6 @@ COUNTS = {
 _HEADER = struct.Struct("<4s6BH3I2Q2I")
 _WELCOME = struct.Struct("<d32s")
 _ACTUATOR = struct.Struct("<15sB")
-_CRC = struct.Struct("<I")
 _CRC_AT, _HAS_CRC, _HAS_WRENCH, _WRAP = 40, 1, 2, 1 << 32
 _WRENCH = 6
 
@@ -234,9 +233,7 @@ def refusal(session: int) -> list[bytes]:
 def _packed(version: int, frame: Datagram, flags: int, payload: bytes) -> bytes:
     head = (frame.kind, frame.mode, frame.state, frame.actuators, frame.valves, flags, frame.session)
     numbers = (frame.sequence % _WRAP, frame.acknowledged % _WRAP, frame.stamp, frame.echo)
-    datagram = bytearray(_HEADER.pack(MAGIC, version, *head, *numbers, 0, 0) + payload)
-    _CRC.pack_into(datagram, _CRC_AT, zlib.crc32(datagram))
-    return bytes(datagram)
+    return with_crc(_HEADER.pack(MAGIC, version, *head, *numbers, 0, 0) + payload, _CRC_AT)
 
 
 def decode(datagram: bytes) -> Datagram:
@@ -256,9 +253,7 @@ def decode(datagram: bytes) -> Datagram:
         raise ShortDatagramError(f"{len(datagram)} bytes of a frame of {size}")
     if len(datagram) > size:
         raise LinkError(f"{len(datagram)} bytes are too many for a frame of {size}")
-    blank = bytearray(datagram)
-    _CRC.pack_into(blank, _CRC_AT, 0)
-    if crc != (zlib.crc32(blank) if flags & _HAS_CRC else 0):
+    if crc != (crc_of(datagram, _CRC_AT) if flags & _HAS_CRC else 0):
         raise LinkError("the CRC-32 does not fit: the frame was corrupted")
     counts = actuators, valves, sequence, acknowledged, stamp, echo
     head = Kind(kind), session, LinkMode(mode), PlantState(state), *counts

@@ -5,6 +5,7 @@ import math
 import select
 import socket
 import threading
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from .clock import SECOND, Histogram, now, undisturbed
 from .protocol import LinkMode
 from .served import ServedPlant
 
-__all__ = ["HOST", "PORT", "Timing", "open_socket", "serve"]
+__all__ = ["HOST", "PORT", "Timing", "answer_one", "open_socket", "serve"]
 
 log = logging.getLogger(__name__)
 
@@ -105,14 +106,19 @@ def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
 
 
 def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
-    """Receive one datagram within a time [s]; False if there was none."""
+    """Receive one datagram for the plant within a time [s]; False if there was none."""
+    return answer_one(sock, timeout, lambda datagram, sender: served.receive(datagram, sender, now()))
+
+
+def answer_one(sock: socket.socket, timeout: float, answers: Callable[[bytes, Any], Iterable[bytes]]) -> bool:
+    """Receive one datagram within a time [s] and send its sender the answers to it; False if there was none."""
     if not select.select([sock], [], [], timeout)[0]:
         return False
     try:
         datagram, sender = sock.recvfrom(_LARGEST)
     except OSError:  # some systems report here that an earlier answer could not be delivered
         return True
-    for answer in served.receive(datagram, sender, now()):
+    for answer in answers(datagram, sender):
         _send(sock, answer, sender)
     return True
 

@@ -1,7 +1,6 @@
 """A specimen in Python, served to a plant in another process (`mechanics.remote_specimen`)."""
 
 import logging
-import select
 import socket
 import threading
 import time
@@ -13,16 +12,13 @@ from ...core.arrays import Array
 from ...core.errors import LhpostError
 from ...mechanics.coupled import CoupledSpecimen, motion_of_numbers, start_coupled, step_coupled
 from ...mechanics.remote_specimen import Message, MessageKind, decode_message, encode_message
+from .server import answer_one
 
-__all__ = ["SPECIMEN_PORT", "ServedSpecimen", "serve_specimen"]
+__all__ = ["ServedSpecimen", "serve_specimen"]
 
 log = logging.getLogger(__name__)
 
-SPECIMEN_PORT = 46947
-"""Default UDP port of a specimen."""
-
 _IDLE = 0.1  # [s] longest wait before looking at the stop event
-_LARGEST = 2048  # bytes of a datagram that are read
 
 
 class ServedSpecimen:
@@ -86,13 +82,6 @@ def serve_specimen(
     end = None if seconds is None else time.monotonic() + seconds
     try:
         while not stop.is_set() and (end is None or time.monotonic() < end):
-            if not select.select([sock], [], [], _IDLE)[0]:
-                continue
-            try:
-                datagram, sender = sock.recvfrom(_LARGEST)
-                if (answer := served.receive(datagram)) is not None:
-                    sock.sendto(answer, sender)
-            except OSError as error:  # an earlier answer could not be delivered: a lost datagram like any other
-                log.debug("datagram lost: %s", error)
+            answer_one(sock, _IDLE, lambda datagram, _: filter(None, [served.receive(datagram)]))
     except KeyboardInterrupt:
         log.info("interrupted")

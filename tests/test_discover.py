@@ -40,6 +40,7 @@ from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table
 from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration.bin_rows import BinRows, dense_rows, row_by_column
 from lhpost6_pin.identification.calibration.normal_equations import bounds_of
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
@@ -68,7 +69,12 @@ def background(slopes: np.ndarray, rest: np.ndarray, place: np.ndarray, bound: n
     """Background of slopes (tests, rows, p), residuals (tests, rows), places and bounds (p,) of its unknowns."""
     matrix, side = np.einsum("tni,tnj->tij", slopes, slopes), np.einsum("tni,tn->ti", slopes, rest)
     held = np.zeros(len(place)) if bound is None else bound
-    return Background(list(slopes), list(rest), [], matrix, side, place, held)
+    return Background([rows_of(x) for x in slopes], [r[None] for r in rest], [], matrix, side, place, held)
+
+
+def rows_of(slopes: np.ndarray) -> BinRows:
+    """Rows (rows, p) of one column of the residuals."""
+    return BinRows(slopes.shape[1], [(np.arange(slopes.shape[1]), slopes.T)])
 
 
 def block_in(slopes: np.ndarray, columns: np.ndarray, rest: np.ndarray) -> Block:
@@ -172,7 +178,7 @@ def test_a_gain_is_what_a_refit_with_the_candidate_gains():
 def test_setting_an_unknown_free_gains_what_its_prior_costs():
     """One unknown, one test: without its prior x = -g / h, with it -(g + x0) / (h + 1)."""
     h, g, x0 = 3.0, 40.0, 0.5
-    root = [np.full((1, 1), np.sqrt(h))], [np.zeros(1)], []
+    root = [rows_of(np.full((1, 1), np.sqrt(h)))], [np.zeros((1, 1))], []
     alone = Background(*root, np.full((1, 1, 1), h), np.full((1, 1), g), np.full(1, x0), np.zeros(1))
     free = np.full(1, np.inf)
     one = score(alone, block_of(alone, 0), -free, free, np.full(1, 1e6))
@@ -184,7 +190,8 @@ def test_setting_an_unknown_free_gains_what_its_prior_costs():
 def test_what_is_at_its_bound_does_not_explain_what_a_candidate_does():
     """Two columns alike, that of the background held: the candidate gains all, and the background goes back."""
     h, g = 3.0, 40.0
-    own = [np.full((1, 1), np.sqrt(h))], [np.zeros(1)], [], np.full((1, 1, 1), h), np.full((1, 1), g), np.full(1, -3.5)
+    rows = rows_of(np.full((1, 1), np.sqrt(h)))
+    own = [rows], [np.zeros((1, 1))], [], np.full((1, 1, 1), h), np.full((1, 1), g), np.full(1, -3.5)
     free = np.full(1, np.inf)
     held, moving = (Background(*own, np.full(1, x)) for x in (1.0, 0.0))
     one, other = (score(b, block_of(b, 0), -free, free, np.full(1, 1e6)) for b in (held, moving))
@@ -214,11 +221,12 @@ def test_noise_in_a_candidate_s_column_is_taken_off_its_equations():
     def seen() -> tuple[Block, Block]:
         """Equations as measured, and corrected by two replicas, which are what was measured with more noise."""
         (s, k, r), more = (x + y for x, y in zip((slope, column, rest), noise(), strict=True)), [noise(), noise()]
-        changes = [([real(a)], [real(d)]) for a, _, d in more]
+        changes = [([dense_rows(a)], [row_by_column(d, root)]) for a, _, d in more]
         nothing = np.zeros((1, p, p)), np.zeros((1, p)), np.zeros(p), np.zeros(p)
-        known = Background([real(s)], [real(r)], [root], *nothing, changes)
-        block = make_block(known, [k])
-        return block, less_noise(known, block, [k], [[k + b] for _, b, _ in more])
+        known = Background([dense_rows(s)], [row_by_column(r, root)], [root], *nothing, changes)
+        measured = [dense_rows(k)]
+        block = make_block(known, measured)
+        return block, less_noise(known, block, measured, [[dense_rows(k + b)] for _, b, _ in more])
 
     plain, mended = [], []
     for _ in range(draws):
@@ -231,11 +239,13 @@ def test_noise_in_a_candidate_s_column_is_taken_off_its_equations():
 
 
 def test_a_column_of_nothing_but_noise_keeps_half_of_its_square():
-    nothing = np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1), [([np.zeros((6, 1))], [np.zeros(6)])]
-    known = Background([np.zeros((6, 1))], [np.zeros(6)], [np.ones((3, 1))], *nothing)
-    column = np.ones((3, 1, 1), complex)
-    block = make_block(known, [column])
-    assert less_noise(known, block, [column], [[3.0 * column]]).own[0, 0, 0] == 0.5 * block.own[0, 0, 0]
+    none, rest = rows_of(np.zeros((6, 1))), np.zeros((1, 6))
+    nothing = np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1), [([none], [rest])]
+    known = Background([none], [rest], [np.ones((3, 1))], *nothing)
+    bins = np.ones((3, 1, 1), complex)
+    column = [dense_rows(bins)]
+    block = make_block(known, column)
+    assert less_noise(known, block, column, [[dense_rows(3.0 * bins)]]).own[0, 0, 0] == 0.5 * block.own[0, 0, 0]
 
 
 def scored(family: str, components: tuple[str, ...], gain: float) -> Scored:
@@ -275,13 +285,13 @@ def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     problem, base, background = search.problem, linear.base, linear.background
     hidden = [candidate("stray_spring", "platen.x"), candidate("asymmetric_friction", "V1")]
     size = [np.array([2e6]), np.array([2e4])]
-    laid = [np.zeros(len(rest)) for rest in background.residual]
+    laid = [np.zeros_like(rest) for rest in background.residual]
     for one, amplitude in zip(hidden, size, strict=True):
         columns, (part,) = columns_of(problem, base, [one])
-        for t, (c, root) in enumerate(zip(columns, background.root, strict=True)):
-            laid[t] -= real_bins(c, root) @ part @ amplitude
+        for t, more in enumerate(background.explained(columns, part @ amplitude)):
+            laid[t] -= more
     rest = [r + more for r, more in zip(background.residual, laid, strict=True)]
-    side = background.side + np.array([s.T @ more for s, more in zip(background.slope, laid, strict=True)])
+    side = background.side + np.array([s.dot(more) for s, more in zip(background.slope, laid, strict=True)])
     more = replace(background, residual=rest, side=side)
     candidates = [candidate("valve_deadband", "H1"), *hidden]
     pairs = score_pairs(search, Linearisation(base, more, ()), candidates)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array, Complex
+from ..identification.calibration.bin_rows import squares_of
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
 from ..machine.library import Family
 from ..machine.parameters import Parameters
@@ -38,10 +39,10 @@ class Reweighting:
         self.problem, self.background = found.refit.normal.problem, background
         self.first = squares_by_column(found.refit.normal.residual)
         self.doubt, self.much = found.numbers.number("accept.doubt"), found.numbers.number("accept.gain")
-        self.before = self._terms(background.still[1], [np.zeros(len(r)) for r in background.residual])
+        self.before = self._terms(background.still[1], [np.zeros_like(r) for r in background.residual])
 
     def _terms(self, change: Array, explained: Sequence[Array]) -> tuple[Array, Array, float]:
-        """Terms of the objective for a change (p,) of the background and an explained part (n,) of every test.
+        """Terms of the objective for a change (p,) of the background and an explained part (c, 2 m) of every test.
 
         Negative log-likelihood and squares (2, c); log-likelihood beyond noise, of means and of variation (2, c); and
         the prior's.
@@ -49,15 +50,14 @@ class Reweighting:
         b, whole, beyond = self.background, np.zeros((2, self.first.size)), np.zeros((2, self.first.size))
         tests = zip(b.slope, b.residual, b.root, explained, self.problem.frequency, strict=True)
         for slope, residual, root, more, f in tests:
-            left = (residual + slope @ change + more) ** 2
-            squares = 0.5 * (left[: root.size] + left[root.size :]).reshape(root.shape) * root**2
+            squares = squares_of(residual + slope.times(change) + more) * root**2
             means, counts = mean_squares(self.problem.whitener, squares, f)
             whole += negative_log_likelihood(means, counts), squares.sum(axis=0)
             beyond += _beyond_noise(means, counts, f, self.doubt)
         return whole, beyond, 0.5 * float(np.sum((b.place + change) ** 2))
 
     def lowered(self, explained: Sequence[Array], one: Score) -> Lowered:
-        """How a candidate lowers the residual, explained (n,) of every test."""
+        """How a candidate lowers the residual, explained (c, 2 m) of every test."""
         (before, doubted, prior), (after, remaining, then) = self.before, self._terms(one.change, explained)
         fall, squares = before - after
         falls = fall > 0.5 * self.much

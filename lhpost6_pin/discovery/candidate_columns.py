@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.arrays import Array, Complex
 from ..effects.registry import LAWS
+from ..identification.calibration.bin_rows import BinRows, dense_rows, side_by_side
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
 from ..identification.prepare import actuator_forces
@@ -19,14 +20,14 @@ from ..identification.residuals import RESIDUALS, follow
 from ..machine.machine import Machine
 from ..mechanics.plant import make_plant
 from .candidates import Candidate
+from .scores import Columns
 
-__all__ = ["Columns", "columns_of", "side_by_side"]
-
-Columns = list[Complex]
-"""Whitened bins (m, c, k) of every test."""
+__all__ = ["beside", "columns_of"]
 
 
-def columns_of(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> tuple[Columns, list[Array]]:
+def columns_of(
+    problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]
+) -> tuple[list[BinRows], list[Array]]:
     """Columns of candidates that differ in components only; and each candidate's combination (k, q) of them."""
     first = candidates[0]
     effect = first.on(base.plant.machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1]
@@ -38,19 +39,19 @@ def columns_of(problem: Problem, base: OperatingPoint, candidates: Sequence[Cand
     elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].modifies == "oil":
         columns = _by_oil(problem, base, first.at(tuple(alone)))
     else:
-        columns = side_by_side([_by_difference(problem, base, c) for c in candidates])
+        columns = beside([_by_difference(problem, base, c) for c in candidates])
         ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
         whole = np.eye(ends[-1])
         return columns, [whole[:, a:b] for a, b in pairwise(ends)]
     return columns, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
 
 
-def side_by_side(parts: Sequence[Columns]) -> Columns:
-    """Columns (m, c, k) of every test side by side."""
-    return [np.concatenate(bins, axis=-1) for bins in zip(*parts, strict=True)]
+def beside(parts: Sequence[Columns]) -> list[BinRows]:
+    """Columns of every test side by side."""
+    return [side_by_side(rows) for rows in zip(*parts, strict=True)]
 
 
-def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Columns:
+def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[BinRows]:
     kinds = tuple(k for k in candidate.family.shows_in if k in RESIDUALS)
     typical = [s.typical for s in candidate.amplitudes]
     parts = []
@@ -61,7 +62,7 @@ def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate)
     return _whitened(problem, [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)])
 
 
-def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
+def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[BinRows]:
     """Wrench of each candidate's force, all in one machine; it reduces the required actuator wrench."""
     size = candidates[0].amplitudes[0].typical
     machine: Machine = base.plant.machine
@@ -70,18 +71,18 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         machine = candidate.on(machine, (size,))
     plant = make_plant(machine)
     rows = plant.rows[plant.rows["effect"] >= known]
-    found: Columns = []
+    found: list[BinRows] = []
     for test, there in zip(base.tests, base.paths, strict=True):
         path = follow(plant, test, (base.plant, there))
         force = actuator_forces(plant.machine, test.channels)
         z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
         own = [wrench[:, rows["effect"] == known + i].sum(axis=1) for i in range(len(candidates))]
-        found.append(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size))
+        found.append(dense_rows(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size)))
     return found
 
 
-def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Columns:
+def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[BinRows]:
     """Flows of all actuators of a candidate at once, one by one."""
     size = candidate.amplitudes[0].typical
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), ("flow",))
@@ -90,5 +91,6 @@ def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> Col
     return _whitened(problem, [c[..., None] * rows / size for c in changes])
 
 
-def _whitened(problem: Problem, bins: Sequence[Complex]) -> Columns:
-    return [problem.whitener.apply(t, b, f) for t, (b, f) in enumerate(zip(bins, problem.frequency, strict=True))]
+def _whitened(problem: Problem, bins: Sequence[Complex]) -> list[BinRows]:
+    pairs = enumerate(zip(bins, problem.frequency, strict=True))
+    return [dense_rows(problem.whitener.apply(t, b, f)) for t, (b, f) in pairs]

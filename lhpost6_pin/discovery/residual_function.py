@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from ..core.arrays import Array, Complex
+from ..identification.calibration.bin_rows import dense_rows
 from ..identification.inverse_dynamics import leg_wrenches
 from ..laws.lines import filter_shares
 from ..laws.tabulated import NODES
@@ -104,8 +105,9 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
         unit = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, np.ones_like(moved[0]))
         tests.append((test, moved, unit))  # elongations and rates (n, legs), wrenches (n, legs, 6) of unit forces
 
-    def fitted(names: tuple[str, ...], columns: Sequence[Complex]) -> ResidualFunction:
+    def fitted(names: tuple[str, ...], bins: Sequence[Complex]) -> ResidualFunction:
         """The function whose values have these columns (m, c, k) of each test."""
+        columns = [dense_rows(own) for own in bins]
         one = score(background, make_block(background, columns), -free, free, spread)
         less = weigh.lowered(background.explained(columns, one.amplitude), one)
         return ResidualFunction(names, state, memory, nodes, one.amplitude, one.sd, *less[:2], one.held_out)

@@ -13,12 +13,13 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear
 
-from ..core.arrays import Array, Complex, Mask
-from ..identification.calibration.whitened_residuals import real_bins
+from ..core.arrays import Array, Mask
+from ..identification.calibration.bin_rows import BinRows, over
 
-__all__ = ["Background", "Block", "Score", "block_of", "less_noise", "make_block", "score"]
+__all__ = ["Background", "Block", "Columns", "Score", "block_of", "less_noise", "make_block", "score"]
 
-Columns = Sequence[Complex]
+Columns = Sequence[BinRows]
+"""Derivatives by k amplitudes of every test."""
 
 WORTH = 0.5
 """Log-likelihood below which further steps are skipped."""
@@ -41,17 +42,17 @@ class Block:
 class Background:
     """Normal equations of all that is refitted in every comparison, by test; x in units of the priors.
 
-    Bins are real: real parts, then imaginary parts, times the root of two over that of the remaining power.
+    Rows are over the roots of the remaining power.
     """
 
-    slope: Sequence[Array]  # (n, p) of every test
-    residual: Sequence[Array]  # (n,)
+    slope: Sequence[BinRows]  # of every test
+    residual: Sequence[Array]  # (c, 2 m)
     root: Sequence[Array]  # (m, c) roots of power
     matrix: Array  # (t, p, p)
     side: Array  # (t, p)
     place: Array  # (p,) of the solution, in units of the priors
     inward: Array  # (p,) direction in which an unknown at its bound may move, +1 or -1; else zero
-    noise: Sequence[tuple[Sequence[Array], Sequence[Array]]] = ()  # by replica, test: changes of slope, of rest
+    noise: Sequence[tuple[Sequence[BinRows], Sequence[Array]]] = ()  # by replica, test: changes of slope, of rest
 
     @property
     def free(self) -> Array:
@@ -83,18 +84,18 @@ class Background:
         return gains, profiles[0].change(best[0])
 
     def explained(self, columns: Columns, amplitude: Array) -> list[Array]:
-        """Real bins (n,) of every test that columns (m, c, k) explain with amplitudes (k,)."""
-        return [real_bins(c, root) @ amplitude for c, root in zip(columns, self.root, strict=True)]
+        """Row (c, 2 m) of every test that columns explain with amplitudes (k,)."""
+        return [c.times(amplitude) * over(root) for c, root in zip(columns, self.root, strict=True)]
 
 
-def make_block(background: Background, columns: Sequence[Complex]) -> Block:
-    """Block of columns (m, c, k) by test."""
+def make_block(background: Background, columns: Columns) -> Block:
+    """Block of columns by test."""
     cross, own, side = [], [], []
     for slope, rest, root, column in zip(background.slope, background.residual, background.root, columns, strict=True):
-        c = real_bins(column, root)
-        cross.append(slope.T @ c)
-        own.append(c.T @ c)
-        side.append(c.T @ rest)
+        c = column.weighed(root)
+        cross.append(slope.products(c))
+        own.append(c.squares())
+        side.append(c.dot(rest))
     return Block(np.array(cross), np.array(own), np.array(side))
 
 
@@ -104,21 +105,21 @@ def block_of(background: Background, place: int) -> Block:
     return Block(cross, cross[:, place : place + 1], background.side[:, place : place + 1])
 
 
-def less_noise(background: Background, block: Block, columns: Sequence[Complex], noisy: Sequence[Columns]) -> Block:
+def less_noise(background: Background, block: Block, columns: Columns, noisy: Sequence[Columns]) -> Block:
     """The block corrected for noise, from the columns of the replicas.
 
     The correction is limited to half of a column's square.
     """
     cross, own, side = block.cross.copy(), block.own.copy(), block.side.copy()
     for t, (column, root) in enumerate(zip(columns, background.root, strict=True)):
-        changes = [real_bins(seen[t] - column, root) for seen in noisy]
-        added = sum(c.T @ c for c in changes) / len(noisy)
+        changes = [seen[t].less(column).weighed(root) for seen in noisy]
+        added = sum(c.squares() for c in changes) / len(noisy)
         most = np.max(np.diag(added) / np.maximum(np.diag(own[t]), 1e-300))
         share = min(1.0, 0.5 / max(most, 1e-300)) / len(noisy)
         own[t] -= share * len(noisy) * added
         for change, (slopes, rests) in zip(changes, background.noise, strict=True):
-            cross[t] -= share * slopes[t].T @ change
-            side[t] -= share * change.T @ rests[t]
+            cross[t] -= share * slopes[t].products(change)
+            side[t] -= share * change.dot(rests[t])
     return Block(cross, own, side)
 
 

@@ -16,9 +16,9 @@ from ..core.arrays import Array
 from ..core.progress import Progress
 from ..identification.calibration.problem import OperatingPoint, Problem
 from .acceptance import Lowered, Reweighting, gate, refusal
-from .candidate_columns import Columns, columns_of, side_by_side
+from .candidate_columns import beside, columns_of
 from .candidates import Candidate, list_candidates, list_releases
-from .scores import Block, Score, block_of, less_noise, make_block, score
+from .scores import Block, Columns, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
 
 __all__ = ["CandidatePair", "found_there", "screen", "score_pairs"]
@@ -59,8 +59,8 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     def of_batch(groups: Sequence[Sequence[Candidate]]) -> list[Scored]:
         """Several groups with one pass through the background, which dominates the cost."""
         each = [columns_of(problem, base, group) for group in groups]
-        block = make_block(background, side_by_side([columns for columns, _ in each]))
-        ends = np.cumsum([0, *(columns[0].shape[-1] for columns, _ in each)])
+        block = make_block(background, beside([columns for columns, _ in each]))
+        ends = np.cumsum([0, *(columns[0].count for columns, _ in each)])
         own = [block.select(part) for part in np.split(np.eye(ends[-1]), ends[1:-1], axis=1)]
         return [
             one
@@ -73,7 +73,8 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     for candidate in list_releases(problem):
         place = problem.names.index(candidate.release)
         one = score(background, block_of(background, place), -free, free, spread)
-        explained = [slope[:, place] * one.amplitude for slope in background.slope] if one.gain >= look else []
+        along = one.amplitude * (np.arange(len(problem.names)) == place)
+        explained = [slope.times(along) for slope in background.slope] if one.gain >= look else []
         scored.append(judged(candidate, one, explained))
     with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
         batches = [groups[i : i + BATCH] for i in range(0, len(groups), BATCH)]
@@ -140,7 +141,7 @@ def score_pairs(found: Search, linear: Linearisation, candidates: Sequence[Candi
     pairs = []
     for i, j in combinations(range(len(candidates)), 2):
         k, one = scored(i, j)
-        less = weigh.lowered(background.explained([c[..., k] for c in columns], one.amplitude), one)
+        less = weigh.lowered(background.explained(columns, whole[:, k] @ one.amplitude), one)
         families = candidates[i].family, candidates[j].family
         why = refusal(families, one, less, numbers)
         if any(one.gain - alone[m] < gate(f, numbers) for f, m in zip(families, (j, i), strict=True)):
@@ -151,9 +152,9 @@ def score_pairs(found: Search, linear: Linearisation, candidates: Sequence[Candi
 
 
 def _all_columns(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
-    """Columns (m, c, k) of every test, those of all candidates' amplitudes."""
+    """Columns of every test, those of all candidates' amplitudes."""
     each = []
     for candidate in candidates:
         columns, (part,) = columns_of(problem, base, [candidate])
-        each.append([c @ part for c in columns])
-    return side_by_side(each)
+        each.append([c.select(part) for c in columns])
+    return beside(each)

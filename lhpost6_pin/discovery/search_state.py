@@ -8,11 +8,11 @@ import numpy as np
 
 from ..core.arrays import Array, Complex
 from ..core.progress import Progress
+from ..identification.calibration.bin_rows import BinRows, row_by_column
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
 from ..identification.calibration.normal_equations import bounds_of, positive
 from ..identification.calibration.problem import OperatingPoint, Problem
-from ..identification.calibration.whitened_residuals import real_bins, real_rows
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
@@ -152,21 +152,21 @@ def linearise(solution: Solution, calibration: Parameters, *, replicas: bool = F
     normal, x = solution.normal, solution.at
     problem, prior, root = normal.problem, normal.problem.prior, [np.sqrt(power) for power in normal.power]
 
-    def slopes(every: Sequence[Sequence[Complex]]) -> list[Array]:
-        """Real rows (n, p) of every test's derivatives (m, c), in units of the priors."""
-        return [(real_rows(own, w) * prior[:, None]).T for own, w in zip(every, root, strict=True)]
+    def slopes(every: Sequence[BinRows]) -> list[BinRows]:
+        """Rows of every test's derivatives, in units of the priors."""
+        return [rows.weighed(w).scaled(prior) for rows, w in zip(every, root, strict=True)]
 
     def rests(every: Sequence[Complex]) -> list[Array]:
-        return [real_bins(r, w) for r, w in zip(every, root, strict=True)]
+        return [row_by_column(r, w) for r, w in zip(every, root, strict=True)]
 
     equations = [normal.of([t]) for t in range(len(root))]
     matrix = np.array([positive(h * np.outer(prior, prior), np.ones(len(prior))) for h, _ in equations])
     side = np.array([g * prior for _, g in equations])
     bias = normal.bias
-    noise = [] if bias is None else list(zip(map(slopes, bias.slope), map(rests, bias.residual), strict=True))
+    noise = [] if bias is None else list(zip(map(slopes, bias.rows), map(rests, bias.residual), strict=True))
     low, high = bounds_of(problem, calibration)
     near = 1e-3 * prior
     inward = (x <= low + near).astype(float) - (x >= high - near)
-    background = Background(slopes(normal.slope), rests(normal.residual), root, matrix, side, x / prior, inward, noise)
+    background = Background(slopes(normal.rows), rests(normal.residual), root, matrix, side, x / prior, inward, noise)
     more = tuple((r, OperatingPoint(r, x)) for r in problem.replicas) if replicas else ()
     return Linearisation(OperatingPoint(problem, x), background, more)

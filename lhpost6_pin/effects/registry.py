@@ -80,9 +80,12 @@ def law_of(row: np.void) -> Law:
 
 def states_of(row: np.void) -> slice:
     """Hidden states of a row that has some."""
-    law, p = law_of(row), parameters_of(row)
-    absent = sum(getattr(p, parameter) <= 0.0 for _, parameter in law.state_needs)
-    return slice(int(row["state"]), int(row["state"]) + len(law.states) - absent)
+    law, first = law_of(row), int(row["state"])
+    absent = 0
+    if law.state_needs:
+        p = parameters_of(row)
+        absent = sum(getattr(p, parameter) <= 0.0 for _, parameter in law.state_needs)
+    return slice(first, first + len(law.states) - absent)
 
 
 def parameters_of(row: np.void) -> Any:

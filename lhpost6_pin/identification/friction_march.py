@@ -13,10 +13,10 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from ..effects.registry import law_of, states_of
+from ..effects.registry import law_of
 from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
-from ..mechanics.plant import Plant
+from ..mechanics.plant import MovingRow, Plant
 from ..mechanics.port_path import PortPath
 from .inverse_dynamics import march_states
 from .prepare import MeasuredTest
@@ -37,18 +37,20 @@ FINE, SMALLEST, MOST = 0.02, 0.1, 16
 
 
 def march_finely(
-    plant: Plant, path: PortPath, test: MeasuredTest, rows: Sequence[np.void], start: Array | None = None
-) -> Iterator[tuple[np.void, Array]]:
-    """Rows with their hidden states (n, k) along a path of a test's n samples, from `start` (n_states,) or zero."""
-    steps = [test.substeps if law_of(row).friction_memory else 1 for row in rows]
+    plant: Plant, path: PortPath, test: MeasuredTest, rows: Sequence[MovingRow], start: Array | None = None
+) -> Iterator[tuple[tuple[object, ...], Array]]:
+    """Keys of rows with their states (n, k) along a path of a test's n samples, from `start` (n_states,) or zero."""
+    steps = [test.substeps if law_of(one.row).friction_memory else 1 for one in rows]
     for count in sorted(set(steps)):
-        some = [row for row, own in zip(rows, steps, strict=True) if own == count]
+        some = [one for one, own in zip(rows, steps, strict=True) if own == count]
         way = path if count == 1 else refined(path, test.dt, count)
-        marched = march_states(plant, way, test.dt / count, start, rows=np.array(some, plant.rows.dtype))
+        marched = march_states(
+            plant, way, test.dt / count, start, rows=np.array([one.row for one in some], plant.rows.dtype)
+        )
         if count > 1:
             marched = thinned(marched, count)
-        for row in some:
-            yield row, marched[:, states_of(row)]
+        for one in some:
+            yield one.key, marched[:, one.states]
 
 
 def made_fine(plant: Plant, test: MeasuredTest) -> MeasuredTest:

@@ -27,12 +27,16 @@ from ..simulation.ledger import add_at_c, add_row_at_c
 __all__ = ["MeasuredOil", "oil_residuals", "part_pressures", "row_wrenches", "wrench_residual"]
 
 
-def wrench_residual(plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array) -> Array:
+def wrench_residual(
+    plant: Plant, ports: PortPath, required: Array, z: Array, measured: Array, rows: NDArray[np.void] | None = None
+) -> Array:
     """Required wrench (n, 6) at C in {c} less that of the plant's laws and of measured forces [N, N m].
 
-    required is that of `required_wrench`, z (n, n_states) hidden states, measured (n, n_actuators) forces [N].
+    required is that of `required_wrench`, z (n, n_states) hidden states, measured (n, n_actuators) forces [N]; the laws
+    are those of some `rows` of the plant alone, if given.
     """
-    rows = plant.rows[plant.rows["spool"] < 0]
+    if rows is None:
+        rows = plant.rows[plant.rows["spool"] < 0]
     out = np.zeros((len(z), 6))
     _residual(rows, plant.tables, ports, required, z, np.ascontiguousarray(measured), out)
     return out
@@ -144,9 +148,10 @@ def _follow_supply(k, rows, oil, supply, z, last):
     last (4,) keeps the supply's flows for the next sample.
     """
     for i in range(rows.size):
-        z[rows[i].state] = oil.pressure[k, oil.chamber[i, 0]]
-        if oil.chamber[i, 1] >= 0:
-            z[rows[i].state + 1] = oil.pressure[k, oil.chamber[i, 1]]
+        a, b = oil.chamber[rows[i].spool]
+        z[rows[i].state] = oil.pressure[k, a]
+        if b >= 0:
+            z[rows[i].state + 1] = oil.pressure[k, b]
     if varies(supply):
         if k == 0:
             steady_supply(rows, oil.spool[k], supply, z)

@@ -19,12 +19,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.arrays import Array
+from ..core.arrays import Array, Mask
 from ..core.errors import SimulationError
 from ..data.alignment import due_spools
-from ..effects.registry import PORTS, actuator_rows, law_of, shapes_of, states_of
+from ..effects.registry import actuator_rows, law_of
 from ..mechanics.gas_pressure import gas_ratio, strut_pressures
-from ..mechanics.plant import Plant
+from ..mechanics.plant import MovingRow, Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import PlantMotion, plant_motion
 from ..mechanics.required_wrench import floor_wrench, require_alike, required_wrench
@@ -76,8 +76,7 @@ def follow(
     if plant.flexible:
         raise SimulationError("residuals take a rigid specimen at most; what a moving one exerts beyond is `carried`")
     there: dict[tuple[object, ...], Array] = {}  # states by what they depend on
-    rows = [(_marched(row), states_of(row), row) for row in _moving(plant)]
-    if known is None or _geometry(known[0]) != _geometry(plant):
+    if known is None or known[0].geometry != plant.geometry:
         moved = plant_motion(plant, test.motion)
         along = ports = ports_along(plant, moved)
         if test.path is not None:
@@ -87,21 +86,20 @@ def follow(
         ports, along, required, old = known[1]
         if not require_alike(known[0], plant):
             required = _required(plant, test, plant_motion(plant, test.motion), ports.turn)
-        before = [(_marched(row), states_of(row)) for row in _moving(known[0])]
-        if len(plant.states) == old.shape[1] and before == [(key, place) for key, place, _ in rows]:
+        before = [one[:2] for one in known[0].moving]
+        if len(plant.states) == old.shape[1] and before == [one[:2] for one in plant.moving]:
             return Path(ports, along, required, old)
         there = {key: old[:, place] for key, place in before}
-    fresh = {key: row for key, _, row in rows if key not in there}
+    fresh = {one.key: one for one in plant.moving if one.key not in there}
     # oscillators and heat average noise, and need the raw motion
-    parts: tuple[list[np.void], list[np.void]] = [], []
-    for row in fresh.values():
-        parts[test.path is not None and law_of(row).follows_motion].append(row)
+    parts: tuple[list[MovingRow], list[MovingRow]] = [], []
+    for one in fresh.values():
+        parts[test.path is not None and law_of(one.row).follows_motion].append(one)
     for some, way in zip(parts, (along, ports), strict=True):
-        for row, states in march_finely(plant, way, test, some, start):
-            there[_marched(row)] = states
+        there.update(march_finely(plant, way, test, some, start))
     z = np.zeros((test.samples, len(plant.states)))
-    for key, place, _ in rows:
-        z[:, place] = there[key]
+    for one in plant.moving:
+        z[:, one.states] = there[one.key]
     return Path(ports, along, required, z)
 
 
@@ -111,22 +109,6 @@ def _required(plant: Plant, test: MeasuredTest, moved: PlantMotion, turn: Array)
     if test.carried is not None:
         required[:, plant.axes] -= test.carried[:, plant.axes]
     return required
-
-
-def _moving(plant: Plant) -> Array:
-    """Rows with hidden states that the motion alone drives."""
-    return np.asarray(plant.rows[(plant.rows["state"] >= 0) & (plant.rows["spool"] < 0)])
-
-
-def _marched(row: np.void) -> tuple[object, ...]:
-    """What hidden states of a row depend on."""
-    return int(row["law"]), *(int(row[port]) for port in PORTS), shapes_of(row).tobytes()
-
-
-def _geometry(plant: Plant) -> bytes:
-    """Key of a plant's ports: all that their motion and force columns depend on."""
-    body = np.append(plant.body["rho_c"], plant.body["plane"]).tobytes()
-    return body + plant.legs.tobytes() + " ".join(plant.ports).encode()
 
 
 def evaluate_residuals(
@@ -183,8 +165,13 @@ class OilBalance(NamedTuple):
     chamber: NDArray[np.int64]  # (n_actuators, 2) columns, -1 without chamber B
 
 
-def oil_balance(plant: Plant, test: MeasuredTest, path: Path, *, flows: bool = True) -> OilBalance | None:
-    """Balance of a test's oil; without `flows` the supply's alone. None where pressures or spools are not measured."""
+def oil_balance(
+    plant: Plant, test: MeasuredTest, path: Path, *, flows: bool = True, some: Mask | None = None
+) -> OilBalance | None:
+    """Balance of a test's oil; without `flows` the supply's alone. None where pressures or spools are not measured.
+
+    some (n_actuators,) are the actuators whose balance is wanted, if the supply is constant; by default all.
+    """
     pressure = chamber_pressures(plant.machine, test.channels)
     rate = chamber_pressures(plant.machine, test.rates, rates=True)
     spool = _spools(plant, test)
@@ -197,6 +184,8 @@ def oil_balance(plant: Plant, test: MeasuredTest, path: Path, *, flows: bool = T
     flow, valve = np.zeros((2, test.samples, int(chamber.max()) + 1 if flows else 0))
     drooped, oil = np.zeros(test.samples), MeasuredOil(chamber, pressure, rate, spool, test.dt)
     rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
+    if some is not None:
+        rows = rows[some]
     if "chamber_pressure_a" not in test.channels:
         hydraulics = plant.machine.hydraulics
         room = 0.5 * (hydraulics.supply_pressure - hydraulics.return_pressure)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..effects.modifiers import command_path, supply_of
-from ..effects.registry import PORTS, actuator_rows, columns_of
+from ..effects.registry import PORTS, actuator_rows, columns_of, shapes_of, states_of
 from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
@@ -26,7 +26,7 @@ from .rigid_body import free_axes, make_model
 from .specimen_mount import base_placement, modal_participation
 from .tables import Tables, pack_tables
 
-__all__ = ["Plant", "State", "make_plant"]
+__all__ = ["MovingRow", "Plant", "State", "make_plant"]
 
 
 class State(NamedTuple):
@@ -35,6 +35,14 @@ class State(NamedTuple):
     q: Array
     v: Array
     z: Array
+
+
+class MovingRow(NamedTuple):
+    """A row of the effect table whose hidden states the motion drives."""
+
+    key: tuple[object, ...]  # all that its states depend on beside the motion
+    states: slice
+    row: np.void
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,20 @@ class Plant:
     def actuators(self) -> Any:
         """Parameters of the actuators by name (`laws.hydraulic.Hydraulic`), each (n_actuators,)."""
         return columns_of(self.rows[actuator_rows(self.rows)])
+
+    @cached_property
+    def moving(self) -> tuple["MovingRow", ...]:
+        """Rows with hidden states that the motion alone drives."""
+        rows = self.rows[(self.rows["state"] >= 0) & (self.rows["spool"] < 0)]
+        pairs = zip(rows, shapes_of(rows), strict=True)
+        keys = [(int(row["law"]), *(int(row[port]) for port in PORTS), shape.tobytes()) for row, shape in pairs]
+        return tuple(MovingRow(key, states_of(row), row) for key, row in zip(keys, rows, strict=True))
+
+    @cached_property
+    def geometry(self) -> bytes:
+        """Key of its ports: all that their motion and force columns depend on."""
+        body = np.append(self.body["rho_c"], self.body["plane"]).tobytes()
+        return body + self.legs.tobytes() + " ".join(self.ports).encode()
 
     @property
     def spools(self) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...machine.parameters import Parameters
+from .bin_rows import BinRows, SparseBins, bin_rows, row_by_column
 from .problem import OperatingPoint, Problem, Slopes
 from .whitened_residuals import excess, real_bins, real_rows
 
@@ -35,7 +36,7 @@ class NormalEquations:
         self.residual = problem.residual(base)
         shared, fresh = _shared(problem, known, again)
         before = [] if known is None else known.slope
-        self.slope: list[list[Complex]]  # (m, c) by test and unknown
+        self.slope: list[list[SparseBins]]  # by test and unknown
         self.slope = _together(problem.slopes(base, fresh, report), before, shared)
         self.power = [np.ones(r.shape) for r in self.residual]
         self.bias: NoiseBias | None = None
@@ -46,6 +47,8 @@ class NormalEquations:
         other.problem = self.problem.only(places)
         for name in ("residual", "slope", "power"):
             setattr(other, name, [getattr(self, name)[i] for i in places])
+        for known in ("whole", "rows"):
+            other.__dict__.pop(known, None)
         return other
 
     def scaled(self, problem: Problem, scale: Array) -> "NormalEquations":
@@ -54,8 +57,9 @@ class NormalEquations:
         other = copy(self)
         other.problem = problem
         other.residual = [r * s for r, s in zip(self.residual, times, strict=True)]
-        other.slope = [[j * s for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
-        other.__dict__.pop("whole", None)
+        other.slope = [[j.times(s) for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
+        for known in ("whole", "rows"):
+            other.__dict__.pop(known, None)
         return other if self.bias is None else other.less(self.bias.scaled(times))
 
     def less(self, bias: "NoiseBias") -> "NormalEquations":
@@ -64,16 +68,20 @@ class NormalEquations:
         self.power = excess(self.problem.whitener, self.residual, self.problem.frequency)
         return self
 
-    def of(self, tests: Sequence[int], columns: slice | Mask = slice(None)) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of some tests and columns."""
+    @cached_property
+    def rows(self) -> list[BinRows]:
+        """Rows of the derivatives of every test."""
+        return [bin_rows(slopes, r.shape[1]) for slopes, r in zip(self.slope, self.residual, strict=True)]
+
+    def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of some tests and columns (c,), by default all."""
         count = len(self.slope[0])
         matrix, right = np.zeros((count, count)), np.zeros(count)
         for t in tests:
-            power = self.power[t][:, columns]
-            more, side = squares([j[:, columns] for j in self.slope[t]], self.residual[t][:, columns], power)
+            more, side = _squares(self.rows[t], self.residual[t], self.power[t], columns)
             matrix, right = matrix + more, right + side
             if self.bias is not None:
-                more, side = self.bias.of(t, columns, power)
+                more, side = self.bias.of(t, columns, self.power[t])
                 matrix, right = matrix - more, right - side
         return matrix, right
 
@@ -104,12 +112,13 @@ class NoiseBias:
         """
         shared, fresh = _shared(normal.problem, known)
         self.residual: list[list[Complex]] = []  # by replica and test
-        self.slope: list[list[list[Complex]]] = []
+        self.slope: list[list[list[SparseBins]]] = []
         for i, (replica, report) in enumerate(zip(normal.problem.replicas, reports, strict=True)):
             base = OperatingPoint(replica, x)
             self.residual.append([r - r0 for r, r0 in zip(replica.residual(base), normal.residual, strict=True)])
             noisy = zip(replica.slopes(base, fresh, report), normal.slope, strict=True)
-            changes = [{k: j - clean[k] for k, j in slopes.items()} for slopes, clean in noisy]
+            count = normal.residual[0].shape[1]
+            changes = [{k: j.less(clean[k], count) for k, j in slopes.items()} for slopes, clean in noisy]
             before = [] if known is None or known.bias is None else known.bias.slope[i]
             self.slope.append(_together(changes, before, shared))
 
@@ -118,14 +127,21 @@ class NoiseBias:
         other = copy(self)
         other.residual = [[r * s for r, s in zip(rest, times, strict=True)] for rest in self.residual]
         other.slope = [
-            [[j * s for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
+            [[j.times(s) for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
         ]
+        other.__dict__.pop("rows", None)
         return other
 
-    def of(self, test: int, columns: slice | Mask, power: Array) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of one test and some columns, over the power of the residual."""
+    @cached_property
+    def rows(self) -> list[list[BinRows]]:
+        """Rows of the changes of derivatives, by replica and test."""
         pairs = zip(self.slope, self.residual, strict=True)
-        added = [squares([j[:, columns] for j in s[test]], r[test][:, columns], power) for s, r in pairs]
+        return [[bin_rows(s, r.shape[1]) for s, r in zip(slope, rest, strict=True)] for slope, rest in pairs]
+
+    def of(self, test: int, columns: Mask | None, power: Array) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power (m, c) of the residual."""
+        pairs = zip(self.rows, self.residual, strict=True)
+        added = [_squares(rows[test], rest[test], power, columns) for rows, rest in pairs]
         matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
         return matrix, right
 
@@ -142,14 +158,24 @@ def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None 
 
 
 def _together(
-    fresh: Sequence[Slopes], known: Sequence[Sequence[Complex]], shared: dict[int, int]
-) -> list[list[Complex]]:
+    fresh: Sequence[Slopes], known: Sequence[Sequence[SparseBins]], shared: dict[int, int]
+) -> list[list[SparseBins]]:
     """Derivatives of every test by all unknowns, in order: fresh, or from those known."""
     found = []
     for t, slopes in enumerate(fresh):
         both = slopes | {i: known[t][k] for i, k in shared.items()}
         found.append([both[i] for i in sorted(both)])
     return found
+
+
+def _squares(rows: BinRows, rest: Complex, power: Array, columns: Mask | None) -> tuple[Array, Array]:
+    """Normal matrix (p, p) and right side (p,) of a test's rows over a power (m, c), of some columns (c,) or all."""
+    root = np.sqrt(power)
+    row = row_by_column(rest, root)
+    weighed = rows.weighed(root)
+    if columns is not None:
+        weighed, row = weighed.of_columns(columns), row[columns]
+    return weighed.squares(), weighed.dot(row)
 
 
 def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> tuple[Array, Array]:

@@ -21,7 +21,9 @@ from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import leg_displacements
 from ..friction_march import made_fine
 from ..prepare import MeasuredTest
+from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
+from .bin_rows import SparseBins, sparse_bins
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
@@ -29,8 +31,8 @@ from .whitened_residuals import make_whitener, mean_squares, spectrum_of
 
 __all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
 
-Slopes = dict[int, Complex]
-"""Derivatives (m, c) of a test's whitened bins, by the unknown's place in x."""
+Slopes = dict[int, SparseBins]
+"""Derivatives of a test's whitened bins, by the unknown's place in x."""
 
 KINDS = ("wrench", "flow", "gas", "force")
 """Kinds of residuals that are compared by default."""
@@ -233,7 +235,7 @@ class Problem:
 
     def _difference(
         self, base: "OperatingPoint", group: EvaluationGroup, free: Mask
-    ) -> list[tuple[int, list[Complex]]]:
+    ) -> list[tuple[int, list[SparseBins]]]:
         """Derivatives of every test's whitened bins, by place in x."""
         x, count = base.x, len(self.parameters)
         step = np.where(x + self.step > self.highest, -self.step, self.step)
@@ -250,7 +252,7 @@ class Problem:
                 if place >= 0:
                     rows = self.rows("gas", place) if group.residuals == ("gas",) else self.rows_of_actuator(place)
                 slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
-                out.append((i, [self._whitened(t, slope) for t, slope in enumerate(slopes)]))
+                out.append((i, [sparse_bins(self._whitened(t, slope)) for t, slope in enumerate(slopes)]))
         return out
 
     def change(
@@ -267,8 +269,12 @@ class Problem:
             path = None
             if test.motion is base.tests[k].motion:
                 path = follow(plant, test, (base.plant, base.paths[k]))
-            after = evaluate_residuals(plant, test, kinds, path=path)
-            changes.append(self.bins(_less(after, base.residuals[k]), test)[0])
+            if path is None:
+                change = _less(evaluate_residuals(plant, test, kinds), base.residuals[k])
+            else:
+                before = Evaluated(base.plant, base.tests[k], base.paths[k], base.residuals[k])
+                change = change_of(before, plant, test, path, kinds)
+            changes.append(self.bins(change, test)[0])
         return changes
 
     def plant_at(self, x: Array) -> Plant:

@@ -1,0 +1,180 @@
+"""Real rows of derivatives over the bins of a test, kept by column of the residuals.
+
+Most unknowns show in few columns: those of a valve in its own flows, those of friction in the wrench. Products of rows
+are summed column by column over the unknowns that show there, an eighth of the work of full matrices.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.arrays import Array, Complex, Mask
+
+__all__ = [
+    "BinRows",
+    "SparseBins",
+    "bin_rows",
+    "dense_rows",
+    "over",
+    "row_by_column",
+    "side_by_side",
+    "sparse_bins",
+    "squares_of",
+]
+
+
+class SparseBins(NamedTuple):
+    """Bins of one quantity in the columns of the residuals in which it is not zero."""
+
+    columns: NDArray[np.intp]  # (k,)
+    bins: Complex  # (k, m)
+
+    def times(self, scale: Array) -> "SparseBins":
+        """Its bins scaled (m, c)."""
+        return self._replace(bins=self.bins * scale.T[self.columns])
+
+    def less(self, other: "SparseBins", count: int) -> "SparseBins":
+        """Difference to another one, of `count` columns in all."""
+        both = np.zeros((count, self.bins.shape[1]), np.complex128)
+        both[self.columns] = self.bins
+        both[other.columns] -= other.bins
+        columns = np.union1d(self.columns, other.columns)
+        return SparseBins(columns, both[columns])
+
+
+def sparse_bins(bins: Complex) -> SparseBins:
+    """The columns of bins (m, c) that are not zero."""
+    columns = np.flatnonzero(bins.any(axis=0))
+    return SparseBins(columns, np.ascontiguousarray(bins.T[columns]))
+
+
+@dataclass(frozen=True)
+class BinRows:
+    """Rows of p quantities, in each of c columns those of the quantities that are not zero there.
+
+    Values of a column are real (n,): real parts of its bins, then imaginary parts, times the root of two.
+    """
+
+    count: int  # p
+    parts: Sequence[tuple[NDArray[np.intp], Array]]  # by column: quantities (a,), and their rows (a, n)
+
+    def weighed(self, root: Array) -> "BinRows":
+        """The same over the roots of a power (m, c)."""
+        return BinRows(self.count, [(own, rows * w) for (own, rows), w in zip(self.parts, over(root), strict=True)])
+
+    def scaled(self, scale: Array) -> "BinRows":
+        """The same with every quantity scaled (p,)."""
+        return BinRows(self.count, [(own, rows * scale[own, None]) for own, rows in self.parts])
+
+    def of_columns(self, columns: Mask) -> "BinRows":
+        """The same of some columns (c,)."""
+        return BinRows(self.count, [part for part, used in zip(self.parts, columns, strict=True) if used])
+
+    def squares(self) -> Array:
+        """Products (p, p) of all rows with each other."""
+        out = np.zeros((self.count, self.count))
+        for own, rows in self.parts:
+            out[np.ix_(own, own)] += rows @ rows.T
+        return out
+
+    def products(self, other: "BinRows") -> Array:
+        """Products (p, q) with other rows of the same columns."""
+        out = np.zeros((self.count, other.count))
+        for (own, rows), (others, more) in zip(self.parts, other.parts, strict=True):
+            if len(own) and len(others):
+                out[np.ix_(own, others)] += rows @ more.T
+        return out
+
+    def dot(self, rest: Array) -> Array:
+        """Products (p,) with one row, by column (c, n)."""
+        out = np.zeros(self.count)
+        for (own, rows), values in zip(self.parts, rest, strict=True):
+            out[own] += rows @ values
+        return out
+
+    def times(self, x: Array) -> Array:
+        """Sum (c, n) of all rows times x (p,), by column."""
+        return np.array([x[own] @ rows for own, rows in self.parts])
+
+    def select(self, parts: Array) -> "BinRows":
+        """Rows of quantities that are sums of these, parts (p, q)."""
+        return BinRows(parts.shape[1], [_combined(own, rows, parts) for own, rows in self.parts])
+
+    def less(self, other: "BinRows") -> "BinRows":
+        """Differences to as many other rows."""
+        return BinRows(self.count, [_less(*both) for both in zip(self.parts, other.parts, strict=True)])
+
+
+def _combined(own: NDArray[np.intp], rows: Array, parts: Array) -> tuple[NDArray[np.intp], Array]:
+    used = np.flatnonzero(parts[own].any(axis=0))
+    return used, parts[np.ix_(own, used)].T @ rows
+
+
+def _less(one: tuple[NDArray[np.intp], Array], other: tuple[NDArray[np.intp], Array]) -> tuple[NDArray[np.intp], Array]:
+    (own, rows), (others, less) = one, other
+    both = np.union1d(own, others)
+    out = np.zeros((len(both), rows.shape[1]))
+    out[np.searchsorted(both, own)] = rows
+    out[np.searchsorted(both, others)] -= less
+    return both, out
+
+
+def bin_rows(quantities: Sequence[SparseBins], columns: int) -> BinRows:
+    """Rows of several quantities."""
+    members: list[list[int]] = [[] for _ in range(columns)]
+    values: list[list[Complex]] = [[] for _ in range(columns)]
+    for i, (own, bins) in enumerate(quantities):
+        for k, column in enumerate(own.tolist()):
+            members[column].append(i)
+            values[column].append(bins[k])
+    width = quantities[0].bins.shape[1] if quantities else 0
+    pairs = zip(members, values, strict=True)
+    return BinRows(len(quantities), [(np.array(own, np.intp), _part(bins, width)) for own, bins in pairs])
+
+
+def _part(bins: Sequence[Complex] | Complex, width: int) -> Array:
+    """Real rows (a, 2 m) of bins (m,) each."""
+    rows = np.empty((len(bins), 2 * width))
+    for row, one in zip(rows, bins, strict=True):
+        row[:width], row[width:] = one.real, one.imag
+    rows *= np.sqrt(2.0)
+    return rows
+
+
+def dense_rows(bins: Complex) -> BinRows:
+    """Rows of the quantities of bins (m, c, p)."""
+    columns = range(bins.shape[1])
+    used = [np.flatnonzero(bins[:, c].any(axis=0)) for c in columns]
+    return BinRows(
+        bins.shape[2], [(own, _part(bins[:, c, own].T, len(bins))) for c, own in zip(columns, used, strict=True)]
+    )
+
+
+def side_by_side(several: Sequence[BinRows]) -> BinRows:
+    """Rows of several lots of quantities of the same columns."""
+    first = np.cumsum([0, *(one.count for one in several)])
+    parts = []
+    for column in zip(*(one.parts for one in several), strict=True):
+        own = np.concatenate([places + before for (places, _), before in zip(column, first, strict=False)])
+        parts.append((own, np.concatenate([rows for _, rows in column])))
+    return BinRows(int(first[-1]), parts)
+
+
+def row_by_column(bins: Complex, root: Array) -> Array:
+    """One row (c, 2 m) of bins (m, c) over the roots of a power (m, c)."""
+    scaled = (bins * (np.sqrt(2.0) / root)).T
+    return np.hstack([scaled.real, scaled.imag])
+
+
+def squares_of(rows: Array) -> Array:
+    """Squares (m, c) of the bins of one row (c, 2 m)."""
+    m = rows.shape[1] // 2
+    return np.asarray(0.5 * (rows[:, :m] ** 2 + rows[:, m:] ** 2).T)
+
+
+def over(root: Array) -> Array:
+    """Weights (c, 2 m), of real and of imaginary parts, over the roots of a power (m, c)."""
+    return np.tile(1.0 / root.T, 2)

@@ -72,8 +72,9 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
     plant = make_plant(machine)
     rows = plant.rows[plant.rows["effect"] >= known]
     found: list[BinRows] = []
-    for test, there in zip(base.tests, base.paths, strict=True):
-        path = follow(plant, test, (base.plant, there))
+    before, paths = base.with_ports_of(plant)
+    for test, there in zip(base.tests, paths, strict=True):
+        path = follow(plant, test, (before, there))
         force = actuator_forces(plant.machine, test.channels)
         z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)

@@ -134,18 +134,19 @@ class Score:
     change: Array  # (p,) of the background with it, in units of the priors
 
 
-def score(background: Background, block: Block, low: Array, high: Array, spread: Array) -> Score:
+def score(background: Background, block: Block, low: Array, high: Array, spread: Array, least: float = WORTH) -> Score:
     """Score a candidate whose amplitudes (q,) are within low and high, with normal priors of deviations `spread`.
 
     Cross-validation on a test is the candidate's gain in the log-probability of that test given the others, marginal
     over the background and the amplitudes: the gain of all tests less that of the others, less half the logarithm by
     which the test narrows the amplitudes. An effect excited in one test alone loses little there, a contradiction much.
+    It is left at zero for a gain below `least`.
     """
     whole, still = _Profile(background, block, spread, -1), background.still[0]
     theta = whole.best(low, high)
     gain = whole.gain(theta) - float(still[0])
     held_out = []
-    for t in range(len(block.own) if gain > WORTH else 0):
+    for t in range(len(block.own) if gain >= least else 0):
         others = _Profile(background, block, spread, t)
         narrowed = 0.5 * (whole.information - others.information)
         without = others.gain(others.best(low, high)) - float(still[1 + t])

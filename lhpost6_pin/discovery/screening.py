@@ -21,7 +21,7 @@ from .candidates import Candidate, list_candidates, list_releases
 from .scores import Block, Columns, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
 
-__all__ = ["CandidatePair", "found_there", "screen", "score_pairs"]
+__all__ = ["CandidatePair", "found_there", "is_confused", "screen", "score_pairs"]
 
 
 BATCH = 8
@@ -45,7 +45,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     def of_group(group: Sequence[Candidate], columns: Columns, parts: Sequence[Array], block: Block) -> list[Scored]:
         def scores(block: Block) -> list[Score]:
             pairs = zip(group, parts, strict=True)
-            return [score(background, block.select(q), *c.bounds, c.spread(numbers)) for c, q in pairs]
+            return [score(background, block.select(q), *c.bounds, c.spread(numbers), look) for c, q in pairs]
 
         ones = scores(block)
         if max(one.gain for one in ones) >= look:
@@ -101,13 +101,23 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
 
 def found_there(found: Search, candidate: Candidate) -> float:
     """Largest gain of an effect added on the same components that shows in the same residuals or is often confused."""
-    one, gain = candidate.family, 0.0
+    shows, gain = set(candidate.family.shows_in), 0.0
     for added in found.added:
-        other = added.candidate.family
-        confused = one.named in other.confused_with or other.named in one.confused_with
-        if added.candidate.components == candidate.components and (confused or set(one.shows_in) & set(other.shows_in)):
+        alike = _confused(added.candidate, candidate) or shows & set(added.candidate.family.shows_in)
+        if added.candidate.components == candidate.components and alike:
             gain = max(gain, added.gain)
     return gain
+
+
+def is_confused(found: Search, candidate: Candidate) -> bool:
+    """Whether an effect added on one of the same components is often confused with a candidate, or is of its family."""
+    there = set(candidate.components)
+    return any(_confused(added.candidate, candidate) and there & {*added.candidate.components} for added in found.added)
+
+
+def _confused(one: Candidate, other: Candidate) -> bool:
+    first, second = one.family, other.family
+    return first.named == second.named or first.named in second.confused_with or second.named in first.confused_with
 
 
 class CandidatePair(NamedTuple):

@@ -18,7 +18,7 @@ from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained, squares_by_column
 from .candidates import Candidate
-from .screening import found_there, score_pairs, screen
+from .screening import found_there, is_confused, score_pairs, screen
 from .search_state import (
     AddedEffect,
     FittedCandidate,
@@ -67,8 +67,10 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
             break
         found = more
         keep(found)
-    if (fewer := _pruned(found)) is not found:
-        found, linear = fewer, linearise(fewer.solution, found.calibration)
+    fewer = _pruned(found)
+    if fewer.solution is not found.solution:
+        linear = linearise(fewer.solution, found.calibration)
+    found = fewer
     progress(1.0)
     return found, linear
 
@@ -98,15 +100,18 @@ def _pruned(found: Search) -> Search:
 
     Others added since explain the same, or one only led the fit to parameters that do as well without it.
     """
+    fewer: dict[str, Search] = {}
     for one in found.added:
-        less = without_effect(found, one.candidate)
+        fewer[one.candidate.name] = less = without_effect(found, one.candidate)
         if less.objective - found.objective + one.from_lengths < gate(one.candidate.family, found.numbers):
             return _pruned(_refined(less, lambda share: None))
-    return found
+    return replace(found, without=fewer)
 
 
 def without_effect(found: Search, candidate: Candidate) -> Search:
     """The search without one of its effects, everything else refitted."""
+    if candidate.name in found.without:
+        return found.without[candidate.name]
     problem = found.problem
     if candidate.release:
         less = problem.with_free(candidate.release, None)
@@ -176,17 +181,24 @@ def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | 
     """The search with a leading candidate, if its joint fit explains enough of the residual beyond noise.
 
     Or gains far more than its threshold: held-out tests then decide (`withdrawal`). Not so of a family
-    confusable with another form of friction, of which a large residual has always some to gain.
+    confusable with another form of friction, of which a large residual has always some to gain. Beside a far stronger
+    effect on the same components, whose form may leave as much, it must explain a good part of what that leaves, with
+    the same amplitude in all tests.
     """
     n = found.numbers.number
     more = _best_of(found, [one, *_in_its_place(found, one)], progress)
     if more is None:
         return None
     best = more.added[-1]
+    share = share_explained(found, more)
     if best.gain < n("accept.again") * found_there(found, best.candidate):
-        return None
+        own = next(o for o in found.rounds[-1].scored if o.candidate == best.candidate)
+        consistent = (
+            own.score.held_out.min() > 0.0 and own.score.held_out.sum() >= n("accept.consistent") * own.score.gain
+        )
+        return more if consistent and share >= n("accept.most") and not is_confused(found, best.candidate) else None
     far = n("accept.lead") * gate(best.candidate.family, found.numbers)
-    closes = share_explained(found, more) >= n("accept.closure")
+    closes = share >= n("accept.closure")
     return more if closes or (best.gain >= far and not best.candidate.family.confusable) else None
 
 
@@ -221,7 +233,9 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
 def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:
     """The search with the best of these candidates, all fitted jointly; None if none gains `least`, or its gate."""
     numbers, parts = found.numbers, split(between(progress, 0.0, 0.7), len(rivals))
-    fitted = [_fit_jointly(found, rival, part) for rival, part in zip(rivals, parts, strict=True)]
+    fitted: list[Search] = []
+    for rival, part in zip(rivals, parts, strict=True):
+        fitted.append(_fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
     before, *left = (one.objective for one in (found, *fitted))
     gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
     passed = [i for i, required in enumerate(gates) if before - left[i] >= required]
@@ -250,11 +264,12 @@ def _refined(found: Search, progress: Progress) -> Search:
     return found.solved(found.problem, found.solution.x, progress)
 
 
-def _fit_jointly(found: Search, one: Scored, progress: Progress) -> Search:
+def _fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | None = None) -> Search:
     """The search with a candidate fitted jointly with all parameters, from its linear estimate.
 
     Where the residual stays large, it is fitted from the stated parameters, too, since a missing effect may have biased
-    them out of reach; and from other shapes that explain nearly as much.
+    them out of reach; and from other shapes that explain nearly as much. Not so where the `best` rival so far leaves
+    little, and this one is far behind it.
     """
     n = found.numbers.number
     same = [s for s in found.rounds[-1].scored if s.candidate.of_one_form(one.candidate) and s is not one]
@@ -265,6 +280,10 @@ def _fit_jointly(found: Search, one: Scored, progress: Progress) -> Search:
         fits.append(_fit_from(found, start, part, afresh=afresh))
         if fits[-1].power < n("accept.settled"):
             break
+        if best is not None and best.power < n("accept.settled"):
+            far = n("accept.far") * (found.objective - best.objective)
+            if fits[-1].objective - best.objective > far:
+                break
     return min(fits, key=lambda fit: fit.objective)
 
 

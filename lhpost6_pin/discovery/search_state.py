@@ -1,7 +1,7 @@
 """State of a search: candidates with scores, rounds of screening, effects added, the joint solution, linearised."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -95,6 +95,7 @@ class Search:
     calibration: Parameters  # of `calibration.toml`, with the entries that `discovery.toml` replaces
     added: tuple[AddedEffect, ...] = ()
     rounds: tuple[Round, ...] = ()
+    without: Mapping[str, "Search"] = field(default_factory=dict)  # by effect, where it was refitted without one
 
     def solved(self, problem: Problem, start: Array, progress: Progress, **options: Any) -> "Search":
         """The search with another problem solved from `start` (p,), by `options` of `solve`.
@@ -103,7 +104,7 @@ class Search:
         """
         known = self.solution.normal
         solution = solve(problem, self.calibration, start, progress, known, frugal=True, **options)
-        return replace(self, problem=problem, solution=solution)
+        return replace(self, problem=problem, solution=solution, without={})
 
     def with_effect(self, effect: AddedEffect) -> "Search":
         """The search with one more effect in its list."""

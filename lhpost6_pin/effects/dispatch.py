@@ -28,6 +28,7 @@ from ..laws import (
     oscillator,
     smooth_ball,
     spring,
+    spring_damper,
     stribeck,
     stribeck_lag,
     viscous,
@@ -108,10 +109,12 @@ def force_called(row, s, sd, z):
         )
         return first, second, 0.0
     if row.law == 22:
-        return stribeck.force(views.view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
+        return spring_damper.force(views.view_spring_damper(row.numbers), s[row.port], sd[row.port]), 0.0, 0.0
     if row.law == 23:
-        return stribeck_lag.force(views.view_stribeck_lag(row.numbers), z[row.state]), 0.0, 0.0
+        return stribeck.force(views.view_stribeck(row.numbers), sd[row.port], z[row.state]), 0.0, 0.0
     if row.law == 24:
+        return stribeck_lag.force(views.view_stribeck_lag(row.numbers), z[row.state]), 0.0, 0.0
+    if row.law == 25:
         return warm_up.force(views.view_warm_up(row.numbers), z[row.state], z[row.state + 1]), 0.0, 0.0
     return 0.0, 0.0, 0.0
 
@@ -218,11 +221,11 @@ def advance_called(row, s, ds, dt, z):
             z[row.state],
             z[row.state + 1],
         )
-    elif row.law == 22:
-        z[row.state] = stribeck.advance(views.view_stribeck(row.numbers), ds[row.port], z[row.state])
     elif row.law == 23:
-        z[row.state] = stribeck_lag.advance(views.view_stribeck_lag(row.numbers), ds[row.port], dt, z[row.state])
+        z[row.state] = stribeck.advance(views.view_stribeck(row.numbers), ds[row.port], z[row.state])
     elif row.law == 24:
+        z[row.state] = stribeck_lag.advance(views.view_stribeck_lag(row.numbers), ds[row.port], dt, z[row.state])
+    elif row.law == 25:
         z[row.state], z[row.state + 1] = warm_up.advance(
             views.view_warm_up(row.numbers), ds[row.port], dt, z[row.state], z[row.state + 1]
         )
@@ -288,11 +291,11 @@ def rates(row, s, sd, z, zd):
             z[row.state],
             z[row.state + 1],
         )
-    elif row.law == 22:
-        zd[row.state] = stribeck.rates(views.view_stribeck(row.numbers), sd[row.port], z[row.state])
     elif row.law == 23:
-        zd[row.state] = stribeck_lag.rates(views.view_stribeck_lag(row.numbers), sd[row.port], z[row.state])
+        zd[row.state] = stribeck.rates(views.view_stribeck(row.numbers), sd[row.port], z[row.state])
     elif row.law == 24:
+        zd[row.state] = stribeck_lag.rates(views.view_stribeck_lag(row.numbers), sd[row.port], z[row.state])
+    elif row.law == 25:
         zd[row.state], zd[row.state + 1] = warm_up.rates(
             views.view_warm_up(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
         )

@@ -23,6 +23,7 @@ from ..laws import (
     oscillator,
     smooth_ball,
     spring,
+    spring_damper,
     stribeck,
     stribeck_lag,
     viscous,
@@ -197,6 +198,12 @@ def view_smooth_ball(numbers):
 def view_spring(numbers):
     """Parameters of `spring`."""
     return spring.Spring(numbers[0], numbers[1])
+
+
+@compiled_inline
+def view_spring_damper(numbers):
+    """Parameters of `spring_damper`."""
+    return spring_damper.SpringDamper(numbers[0], numbers[1])
 
 
 @compiled_inline

@@ -46,6 +46,8 @@ def change_of(
             found["wrench"] = wrench
         if "flow" in fully and (flow := _flow(before, plant, test, path)) is not None:
             found["flow"] = flow
+    if "servo" in fully and (servo := _servo(before, plant, test)) is not None:
+        found["servo"] = servo
     fully -= {kind for kind, change in found.items() if change.shape[1]}
     if fully:
         after = evaluate_residuals(plant, test, tuple(fully), path=path)
@@ -73,6 +75,14 @@ def _wrench(before: Evaluated, plant: Plant, test: MeasuredTest, path: Path) -> 
         nothing = np.zeros_like(required), before.path.z, np.zeros_like(force), old[less]
         out -= wrench_residual(before.plant, before.path.ports, *nothing)
     return out
+
+
+def _servo(before: Evaluated, plant: Plant, test: MeasuredTest) -> Array | None:
+    """Change of the servo residual (n, n_actuators); None where commands or their way to the spools differ."""
+    commands = test.channels["spool_command"], before.test.channels["spool_command"]
+    if commands[0] is not commands[1] or not np.array_equal(plant.command_path, before.plant.command_path):
+        return None
+    return test.channels["spool_position"] - before.test.channels["spool_position"]
 
 
 def _differing(own: NDArray[np.void], z: Array, old: NDArray[np.void], was: Array) -> tuple[Mask, Mask]:

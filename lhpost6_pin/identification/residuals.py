@@ -33,7 +33,17 @@ from .inverse_dynamics import with_loads
 from .prepare import MeasuredTest, actuator_forces, chamber_pressures, oil_forces
 from .residual_kernels import MeasuredOil, oil_residuals, part_pressures, wrench_residual
 
-__all__ = ["RESIDUALS", "OilBalance", "Path", "Residuals", "evaluate_residuals", "follow", "kinds_shown", "oil_balance"]
+__all__ = [
+    "RESIDUALS",
+    "OilBalance",
+    "Path",
+    "Residuals",
+    "evaluate_residuals",
+    "follow",
+    "kinds_shown",
+    "oil_balance",
+    "with_ports",
+]
 
 
 RESIDUALS = ("wrench", "flow", "gas", "force", "servo", "supply")
@@ -76,11 +86,10 @@ def follow(
     if plant.flexible:
         raise SimulationError("residuals take a rigid specimen at most; what a moving one exerts beyond is `carried`")
     there: dict[tuple[object, ...], Array] = {}  # states by what they depend on
+    same, old = 0, np.zeros((test.samples, 0))
     if known is None or known[0].geometry != plant.geometry:
         moved = plant_motion(plant, test.motion)
-        along = ports = ports_along(plant, moved)
-        if test.path is not None:
-            along = ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
+        ports, along = _ports(plant, test, moved)
         required = _required(plant, test, moved, ports.turn)
     else:
         ports, along, required, old = known[1]
@@ -90,6 +99,7 @@ def follow(
         if len(plant.states) == old.shape[1] and before == [one[:2] for one in plant.moving]:
             return Path(ports, along, required, old)
         there = {key: old[:, place] for key, place in before}
+        same = len(before) if before == [one[:2] for one in plant.moving[: len(before)]] else 0
     fresh = {one.key: one for one in plant.moving if one.key not in there}
     # oscillators and heat average noise, and need the raw motion
     parts: tuple[list[MovingRow], list[MovingRow]] = [], []
@@ -98,9 +108,25 @@ def follow(
     for some, way in zip(parts, (along, ports), strict=True):
         there.update(march_finely(plant, way, test, some, start))
     z = np.zeros((test.samples, len(plant.states)))
-    for one in plant.moving:
+    if same and old.shape[1] <= z.shape[1]:
+        z[:, : old.shape[1]] = old
+    for one in plant.moving[same:]:
         z[:, one.states] = there[one.key]
     return Path(ports, along, required, z)
+
+
+def with_ports(plant: Plant, test: MeasuredTest, path: Path) -> Path:
+    """A path of a test with the ports of a plant that differs in them alone."""
+    ports, along = _ports(plant, test, plant_motion(plant, test.motion))
+    return path._replace(ports=ports, along=along)
+
+
+def _ports(plant: Plant, test: MeasuredTest, moved: PlantMotion) -> tuple[PortPath, PortPath]:
+    """Ports along a test's motion, and along that which friction follows."""
+    ports = ports_along(plant, moved)
+    if test.path is None:
+        return ports, ports
+    return ports, ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
 
 
 def _required(plant: Plant, test: MeasuredTest, moved: PlantMotion, turn: Array) -> Array:

@@ -14,14 +14,14 @@ from ..effects.registry import PORTS, actuator_rows, columns_of, shapes_of, stat
 from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
-from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, port_names
+from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, place_of, port_names
 from .accelerometers import accelerometer_table
 from .coupled import CoupledSpecimen, base_at_rest, rigid_wrench, start_coupled
 from .coupled_maker import coupled_specimen
 from .forward_dynamics import inertia_table
 from .joint_springs import spring_table
 from .modes import modal_states, modal_tables
-from .ports import body_table, leg_table
+from .ports import body_table, leg_table, place_table
 from .rigid_body import free_axes, make_model
 from .specimen_mount import base_placement, modal_participation
 from .tables import Tables, pack_tables
@@ -71,7 +71,8 @@ class Plant:
         inertia = inertia_table(self.model, self.machine, self.axes, self.modes)
         damping, actuators = np.array(self.model.damping), actuator_rows(self.rows)
         sensing = accelerometer_table(self.machine)
-        rest = damping, actuators, self.command_path, inertia, self.springs, self.modes, self.coupling, sensing
+        places = place_table(self.machine, self.ports)
+        rest = damping, actuators, self.command_path, inertia, self.springs, self.modes, self.coupling, sensing, places
         return pack_tables(self.axes, self.legs, self.body, self.rows, *rest, self.supply)
 
     @cached_property
@@ -137,12 +138,13 @@ class Plant:
 
 def make_plant(machine: Machine) -> Plant:
     """Build tables and model of a machine; raises ParameterError or UnknownNameError."""
-    ports = port_names(machine.actuators, machine.struts)
     effects = (*machine.effects, *machine.modifiers)
+    places = [port for effect in effects for port in effect.ports if place_of(port) is not None]
+    ports = (*port_names(machine.actuators, machine.struts), *dict.fromkeys(places))
     rows = effect_table(effects, ports)
     used = max(rows[port].max() for port in PORTS) if len(rows) else len(ports)
     swivels = sum(port.endswith(SWIVEL_TURNS) for port in ports)
-    for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)):
+    for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)) if not places else ():
         if used < end:
             ports = ports[:end]  # no effect acts on the others: nothing to evaluate there
     states = state_names(effects)

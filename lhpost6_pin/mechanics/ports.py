@@ -12,6 +12,7 @@ One compiled function evaluates all ports of a pose. It is written in body axes,
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +20,19 @@ from numpy.typing import NDArray
 from ..core.compiled import compiled, compiled_inline
 from ..effects.modifiers import thrust_shares
 from ..machine.machine import Machine
-from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS
+from ..machine.port_names import PLATEN_PORTS, SWIVEL_TURNS, place_of
 from .leg_bodies import leg_bodies
 from .spatial import from_body, matrix_to_rpy, quaternion_to_matrix, to_body
 
 __all__ = [
     "BODY",
     "LEG",
+    "PLACE",
     "body_table",
     "evaluate_ports",
     "leg_table",
+    "place_ports",
+    "place_table",
     "platen_pose",
 ]
 
@@ -68,6 +72,16 @@ BODY = np.dtype(
 """Table (one row) of the platen."""
 
 
+PLACE = np.dtype(
+    [
+        ("rho", np.float64, 3),  # the place from B, body axes [m]
+        ("along", np.float64, 3),  # unit vector in {s}
+        ("zero", np.float64),  # its coordinate along it in the control zero-position [m]
+    ]
+)
+"""Table row of a port at a place of the platen, along a direction fixed in space."""
+
+
 def leg_table(machine: Machine) -> NDArray[np.void]:
     """Table of actuators, then struts, as `evaluate_ports` reads it; raises UnknownNameError for an effect's leg."""
     centre = np.array(machine.platen.centre_of_gravity)
@@ -96,6 +110,15 @@ def leg_table(machine: Machine) -> NDArray[np.void]:
     turned = thrust_shares(machine.modifiers, [c.name for c in machine.components])
     legs["normal_thrust"] += np.multiply(-1.0 if machine.thrust == "normal" else 1.0, turned)
     return legs
+
+
+def place_table(machine: Machine, ports: Sequence[str]) -> NDArray[np.void]:
+    """Table of the ports at places of the platen among those named, in order."""
+    found = [at for port in ports if (at := place_of(port)) is not None]
+    places, centre = np.zeros(len(found), PLACE), np.array(machine.platen.centre_of_gravity)
+    for row, (place, along) in zip(places, found, strict=True):
+        row["rho"], row["along"], row["zero"] = np.array(place) - centre, along, np.dot(place, along)
+    return places
 
 
 def body_table(machine: Machine) -> NDArray[np.void]:
@@ -186,6 +209,20 @@ def _swivel_ports(frame, legs, s, J, B):
         for n in range(k, k + 5):
             for j in range(6):
                 B[n, j] = J[n, j]
+
+
+@compiled
+def place_ports(frame, places, s, J, B):
+    """Fill the ports at places of the platen, the last ones of the arrays: J = B^T, s the displacement along each."""
+    for i in range(places.size):
+        place, k = places[i], s.size - places.size + i
+        gx, gy, gz = from_body(frame, place.rho)
+        nx, ny, nz = place.along[0], place.along[1], place.along[2]
+        s[k] = nx * (frame[3, 0] + gx) + ny * (frame[3, 1] + gy) + nz * (frame[3, 2] + gz) - place.zero
+        fx, fy, fz = to_body(frame, (nx, ny, nz))
+        _row(J, k, fx, fy, fz, place.rho[0], place.rho[1], place.rho[2])
+        for j in range(6):
+            B[k, j] = J[k, j]
 
 
 @compiled_inline
@@ -292,5 +329,5 @@ def evaluate_ports(frame, legs, body, s, J, B):
         for j in range(6):
             J[k, j] = B[k, j]
     s[first + 3], s[first + 4], s[first + 5] = matrix_to_rpy(frame)
-    if s.size > first + 6:
+    if s.size > first + 6:  # with room for those at places, too, if there are any
         _swivel_ports(frame, legs, s, J, B)

@@ -22,7 +22,7 @@ from ..core.errors import SimulationError, UnknownNameError
 from ..core.names import SAMPLE_RATE, SCHEMES
 from ..effects.evaluate import advance_states, apply_forces, state_rates, wrench_on_platen
 from .modes import add_modal_wrench, advance_modes, modal_rates
-from .ports import evaluate_ports, platen_pose
+from .ports import evaluate_ports, place_ports, platen_pose
 
 __all__ = ["DS", "FORCE", "SD", "A", "DQ", "S", "SPRING", "TAU", "V", "V_MID", "V_SEEN"]
 __all__ += ["dexp_inverse", "kick", "open_step", "rates_stage", "set_twist", "staggered_stage", "steps_a_sample"]
@@ -112,6 +112,8 @@ def pose_stage(q, tables, ws):
         at = q[spring.q] if spring.turns == 0 else math.atan2(q[spring.q + 1], q[spring.q])
         ws.motion[SPRING, spring.v] = spring.stiffness * (spring.rest - at)
     evaluate_ports(ws.frame, tables.legs, tables.body, ws.port[S], ws.JB[0], ws.JB[1])
+    if tables.places.size > 0:
+        place_ports(ws.frame, tables.places, ws.port[S], ws.JB[0], ws.JB[1])
     return leg_out_of_stroke(tables.legs, ws.port[S])
 
 

@@ -16,7 +16,7 @@ from ..laws.supply import Supply
 from .forward_dynamics import INERTIA
 from .joint_springs import SPRING
 from .modes import MODE
-from .ports import BODY, LEG
+from .ports import BODY, LEG, PLACE
 
 __all__ = ["Tables", "pack_tables", "unpack_tables"]
 
@@ -37,6 +37,7 @@ class Tables(NamedTuple):
     modes: NDArray[np.void]  # modes.MODE, those of a specimen
     coupling: Array  # (n_modes * n_modes,) damping between modes [1/s], or empty
     accelerometers: Array  # `accelerometers.accelerometer_table`, or empty
+    places: NDArray[np.void]  # ports.PLACE, those on which effects act
     supply: Supply
 
 
@@ -62,7 +63,7 @@ def pack_tables(
 def unpack_tables(packed):
     """Tables from `Tables.packed`."""
     at = packed[: _PARTS + 1].view(np.int64)
-    values = packed[at[12] : at[13]]
+    values = packed[at[13] : at[14]]
     supply = Supply(values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8])
     return Tables(
         packed,
@@ -78,5 +79,6 @@ def unpack_tables(packed):
         packed[at[9] : at[10]].view(MODE),
         packed[at[10] : at[11]],
         packed[at[11] : at[12]],
+        packed[at[12] : at[13]].view(PLACE),
         supply,
     )

@@ -6,6 +6,7 @@ are summed column by column over the unknowns that show there, an eighth of the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ...core.arrays import Array, Complex, Mask
 
 __all__ = [
+    "BandSquares",
     "BinRows",
     "SparseBins",
     "bin_rows",
@@ -69,16 +71,39 @@ class BinRows:
         """The same with every quantity scaled (p,)."""
         return BinRows(self.count, [(own, rows * scale[own, None]) for own, rows in self.parts])
 
-    def of_columns(self, columns: Mask) -> "BinRows":
-        """The same of some columns (c,)."""
-        return BinRows(self.count, [part for part, used in zip(self.parts, columns, strict=True) if used])
-
     def squares(self) -> Array:
         """Products (p, p) of all rows with each other."""
         out = np.zeros((self.count, self.count))
         for own, rows in self.parts:
             out[np.ix_(own, own)] += rows @ rows.T
         return out
+
+    def squares_by_band(
+        self, first: NDArray[np.intp], known: "BandSquares | None" = None, place: NDArray[np.intp] | None = None
+    ) -> "BandSquares":
+        """The same of the bins of every band, which begin at `first` (b,).
+
+        Products of quantities whose rows are those of `known`, at `place` (p,) there, are reused; -1: another row.
+        """
+        m = self.parts[0][1].shape[1] // 2
+        bands, parts = [*pairwise([*first.tolist(), m])], []
+        for c, (own, rows) in enumerate(self.parts):
+            each, fresh = np.empty((len(bands), len(own), len(own))), np.ones(len(own), bool)
+            if known is not None and place is not None:
+                others, products = known.parts[c]
+                old = np.flatnonzero(place[own] >= 0)
+                at = np.searchsorted(others, place[own[old]])
+                each[:, old[:, None], old] = products[:, at[:, None], at]
+                fresh[old] = False
+            for out, (low, high) in zip(each, bands if fresh.any() else (), strict=False):
+                real, imaginary = rows[:, low:high], rows[:, m + low : m + high]
+                if fresh.all():
+                    np.add(real @ real.T, imaginary @ imaginary.T, out=out)
+                else:
+                    out[fresh] = real[fresh] @ real.T + imaginary[fresh] @ imaginary.T
+                    out[:, fresh] = out[fresh].T
+            parts.append((own, each))
+        return BandSquares(self.count, parts)
 
     def products(self, other: "BinRows") -> Array:
         """Products (p, q) with other rows of the same columns."""
@@ -106,6 +131,22 @@ class BinRows:
     def less(self, other: "BinRows") -> "BinRows":
         """Differences to as many other rows."""
         return BinRows(self.count, [_less(*both) for both in zip(self.parts, other.parts, strict=True)])
+
+
+@dataclass(frozen=True)
+class BandSquares:
+    """Products of rows with each other by column and band: to be weighed again at little cost."""
+
+    count: int  # p
+    parts: Sequence[tuple[NDArray[np.intp], Array]]  # by column: quantities (a,), products (b, a, a)
+
+    def over(self, power: Array, columns: Mask | None = None) -> Array:
+        """Products (p, p) over a power (b, c), of some columns (c,) or all."""
+        out = np.zeros((self.count, self.count))
+        for c, (own, each) in enumerate(self.parts):
+            if len(own) and (columns is None or columns[c]):
+                out[np.ix_(own, own)] += np.tensordot(1.0 / power[:, c], each, 1)
+        return out
 
 
 def _combined(own: NDArray[np.intp], rows: Array, parts: Array) -> tuple[NDArray[np.intp], Array]:

@@ -1,15 +1,16 @@
 """Normal equations of a calibration: summed over tests and columns, corrected for noise, solved within bounds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...machine.parameters import Parameters
-from .bin_rows import BinRows, SparseBins, bin_rows, row_by_column
+from .bin_rows import BandSquares, BinRows, SparseBins, bin_rows, row_by_column
 from .problem import OperatingPoint, Problem, Slopes
 from .whitened_residuals import excess, real_bins, real_rows
 
@@ -40,6 +41,8 @@ class NormalEquations:
         self.slope = _together(problem.slopes(base, fresh, report), before, shared)
         self.power = [np.ones(r.shape) for r in self.residual]
         self.bias: NoiseBias | None = None
+        self._place = _places(shared, len(problem.names))
+        self._known: list[BandSquares] | None = None if known is None else vars(known).get("squares")
 
     def only(self, places: Sequence[int]) -> "NormalEquations":
         """The same of some of the tests, not corrected."""
@@ -47,8 +50,9 @@ class NormalEquations:
         other.problem = self.problem.only(places)
         for name in ("residual", "slope", "power"):
             setattr(other, name, [getattr(self, name)[i] for i in places])
-        for known in ("whole", "rows"):
+        for known in ("whole", "rows", "squares"):
             other.__dict__.pop(known, None)
+        other._known = None
         return other
 
     def scaled(self, problem: Problem, scale: Array) -> "NormalEquations":
@@ -58,8 +62,9 @@ class NormalEquations:
         other.problem = problem
         other.residual = [r * s for r, s in zip(self.residual, times, strict=True)]
         other.slope = [[j.times(s) for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
-        for known in ("whole", "rows"):
+        for known in ("whole", "rows", "squares"):
             other.__dict__.pop(known, None)
+        other._known = None
         return other if self.bias is None else other.less(self.bias.scaled(times))
 
     def less(self, bias: "NoiseBias") -> "NormalEquations":
@@ -73,16 +78,30 @@ class NormalEquations:
         """Rows of the derivatives of every test."""
         return [bin_rows(slopes, r.shape[1]) for slopes, r in zip(self.slope, self.residual, strict=True)]
 
+    @cached_property
+    def squares(self) -> list[BandSquares]:
+        """Their products of every test."""
+        known, self._known = self._known, None
+        olds: Sequence[BandSquares | None] = known or [None] * len(self.rows)
+        pairs = enumerate(zip(self.rows, olds, strict=True))
+        return [rows.squares_by_band(self.first(t), old, self._place) for t, (rows, old) in pairs]
+
+    def first(self, test: int) -> NDArray[np.intp]:
+        """First bin of every band of a test."""
+        return np.unique(self.problem.whitener.band(self.problem.frequency[test]), return_index=True)[1]
+
     def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of some tests and columns (c,), by default all."""
         count = len(self.slope[0])
         matrix, right = np.zeros((count, count)), np.zeros(count)
         for t in tests:
-            more, side = _squares(self.rows[t], self.residual[t], self.power[t], columns)
-            matrix, right = matrix + more, right + side
+            power, first = self.power[t], self.first(t)
+            matrix += self.squares[t].over(power[first], columns)
+            right += _dot(self.rows[t], self.residual[t], power, columns)
             if self.bias is not None:
-                more, side = self.bias.of(t, columns, self.power[t])
-                matrix, right = matrix - more, right - side
+                more, side = self.bias.of(t, first, columns, power)
+                matrix -= more
+                right -= side
         return matrix, right
 
     @cached_property
@@ -112,6 +131,9 @@ class NoiseBias:
         """
         shared, fresh = _shared(normal.problem, known)
         self.residual: list[list[Complex]] = []  # by replica and test
+        self.squares: dict[tuple[int, int], BandSquares] = {}  # by replica and test, where they were wanted
+        self._place = _places(shared, len(normal.problem.names))
+        self._known = {} if known is None or known.bias is None else known.bias.squares
         self.slope: list[list[list[SparseBins]]] = []
         for i, (replica, report) in enumerate(zip(normal.problem.replicas, reports, strict=True)):
             base = OperatingPoint(replica, x)
@@ -130,6 +152,7 @@ class NoiseBias:
             [[j.times(s) for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
         ]
         other.__dict__.pop("rows", None)
+        other.squares, other._known = {}, {}
         return other
 
     @cached_property
@@ -138,12 +161,18 @@ class NoiseBias:
         pairs = zip(self.slope, self.residual, strict=True)
         return [[bin_rows(s, r.shape[1]) for s, r in zip(slope, rest, strict=True)] for slope, rest in pairs]
 
-    def of(self, test: int, columns: Mask | None, power: Array) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of one test and some columns, over the power (m, c) of the residual."""
-        pairs = zip(self.rows, self.residual, strict=True)
-        added = [_squares(rows[test], rest[test], power, columns) for rows, rest in pairs]
-        matrix, right = (np.mean(x, axis=0) for x in zip(*added, strict=True))
-        return matrix, right
+    def of(self, test: int, first: NDArray[np.intp], columns: Mask | None, power: Array) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power (m, c) of the residual.
+
+        first (b,) are the first bins of its bands.
+        """
+        for i, rows in enumerate(self.rows):
+            if (i, test) not in self.squares:
+                self.squares[i, test] = rows[test].squares_by_band(first, self._known.get((i, test)), self._place)
+        count, pairs = len(self.rows), zip(self.rows, self.residual, strict=True)
+        matrix = sum(self.squares[i, test].over(power[first], columns) for i in range(count)) / count
+        right = sum(_dot(rows[test], rest[test], power, columns) for rows, rest in pairs) / count
+        return np.asarray(matrix), np.asarray(right)
 
 
 def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:
@@ -157,6 +186,13 @@ def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None 
     return {i: place[name] for i, name in enumerate(names) if name in place and not fresh[i]}, fresh
 
 
+def _places(shared: Mapping[int, int], count: int) -> NDArray[np.intp]:
+    """Places (p,) of unknowns in what was known; -1 of those evaluated anew."""
+    out = np.full(count, -1)
+    out[list(shared)] = list(shared.values())
+    return out
+
+
 def _together(
     fresh: Sequence[Slopes], known: Sequence[Sequence[SparseBins]], shared: dict[int, int]
 ) -> list[list[SparseBins]]:
@@ -168,14 +204,10 @@ def _together(
     return found
 
 
-def _squares(rows: BinRows, rest: Complex, power: Array, columns: Mask | None) -> tuple[Array, Array]:
-    """Normal matrix (p, p) and right side (p,) of a test's rows over a power (m, c), of some columns (c,) or all."""
-    root = np.sqrt(power)
-    row = row_by_column(rest, root)
-    weighed = rows.weighed(root)
-    if columns is not None:
-        weighed, row = weighed.of_columns(columns), row[columns]
-    return weighed.squares(), weighed.dot(row)
+def _dot(rows: BinRows, rest: Complex, power: Array, columns: Mask | None) -> Array:
+    """Right side (p,) of a test's rows over a power (m, c), of some columns (c,) or all."""
+    row = row_by_column(rest, power)
+    return rows.dot(row if columns is None else row * columns[:, None])
 
 
 def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> tuple[Array, Array]:

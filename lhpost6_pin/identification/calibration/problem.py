@@ -22,7 +22,7 @@ from ...mechanics.pose import leg_displacements
 from ..friction_march import made_fine
 from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
-from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
+from ..residuals import RESIDUALS, Path, Residuals, evaluate_residuals, follow, kinds_shown, with_ports
 from .bin_rows import SparseBins, sparse_bins
 from .free_parameters import FreeParameter, machine_parameters, with_parameters
 from .scale import find_scale, without_held
@@ -36,6 +36,10 @@ Slopes = dict[int, SparseBins]
 
 KINDS = ("wrench", "flow", "gas", "force")
 """Kinds of residuals that are compared by default."""
+
+
+KEPT = 6
+"""Sets of ports along which a test's path is kept."""
 
 
 class ResidualBands(NamedTuple):
@@ -265,15 +269,14 @@ class Problem:
         """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
         kinds = tuple(k for k in kinds_shown(residuals, self.tests[0].channels) if k in self.kinds)
         changes = []
+        known, paths = base.with_ports_of(plant)
         for k, test in enumerate(tests or base.tests):
-            path = None
             if test.motion is base.tests[k].motion:
-                path = follow(plant, test, (base.plant, base.paths[k]))
-            if path is None:
-                change = _less(evaluate_residuals(plant, test, kinds), base.residuals[k])
-            else:
-                before = Evaluated(base.plant, base.tests[k], base.paths[k], base.residuals[k])
+                path = follow(plant, test, (known, paths[k]))
+                before = Evaluated(known, base.tests[k], paths[k], base.residuals[k])
                 change = change_of(before, plant, test, path, kinds)
+            else:
+                change = _less(evaluate_residuals(plant, test, kinds), base.residuals[k])
             changes.append(self.bins(change, test)[0])
         return changes
 
@@ -326,6 +329,21 @@ class OperatingPoint:
         self.paths = [follow(self.plant, t) for t in self.tests]
         pairs = zip(self.tests, self.paths, strict=True)
         self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
+        self._extended: dict[tuple[str, ...], tuple[Plant, list[Path]]] = {self.plant.ports: (self.plant, self.paths)}
+
+    def with_ports_of(self, other: Plant) -> tuple[Plant, list[Path]]:
+        """Plant and paths with the ports of another plant, on which an effect may act that is not there yet."""
+        if (known := self._extended.get(other.ports)) is not None:
+            return known
+        plant = replace(self.plant, ports=other.ports)
+        if plant.geometry != other.geometry:
+            return self.plant, self.paths
+        pairs = zip(self.tests, self.paths, strict=True)
+        found = plant, [with_ports(plant, test, path) for test, path in pairs]
+        if len(self._extended) >= KEPT:  # candidates at many places would fill the memory
+            self._extended.popitem()
+        self._extended[other.ports] = found
+        return found
 
 
 def _shown(parameters: Sequence[FreeParameter], test: MeasuredTest) -> tuple[FreeParameter, ...]:

@@ -7,10 +7,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..port_names import SWIVEL_TURNS
+from ..port_names import SWIVEL_TURNS, place_port
 from ..structure import Structure
 
 __all__ = ["COMPOSED"]
+
+ISOLATED = 0.02
+"""Frequency [Hz] of a mass that carries weight and no inertia: below the band of any test."""
 
 Values = Mapping[str, float]
 Place = tuple[float, float, float]
@@ -80,6 +83,14 @@ def _mounted_spring(machine: Structure, components: Sequence[str], values: Value
     return "spring", ports, [(values["stiffness"], lever) for _, lever in tilts]
 
 
+def _placed_spring(machine: Structure, components: Sequence[str], values: Values) -> Any:
+    place = (values["x"], values["y"], values["height"])
+    cosine, sine = math.cos(values["turn"]), math.sin(values["turn"])
+    axes = ((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0))
+    rows = [(values[f"stiffness_{axis}"], values[f"damping_{axis}"]) for axis in "xyz"]
+    return "spring_damper", [place_port(place, axis) for axis in axes], rows
+
+
 def _turns(axis: str, place: Place) -> tuple[tuple[str, float], tuple[str, float]]:
     """The two turns of the platen that move a place (x, y, z from C) along an axis, with their levers."""
     x, y, z = place
@@ -119,6 +130,13 @@ def _resonance(machine: Structure, components: Sequence[str], values: Values) ->
     return _swaying(components, values, values["mass"], machine.platen.gravity)
 
 
+def _sway_alone(machine: Structure, components: Sequence[str], values: Values) -> Any:
+    """A mass that sways along level axes and rests on the platen with its weight, without inertia along the others."""
+    law, ports, rows = _swaying(components, values, 0.0, 0.0)
+    _, weight = _sprung("platen.z", {**values, "damping": 0.1}, values["mass"], ISOLATED, machine.platen.gravity)
+    return law, ports, [*rows[:-1], weight]
+
+
 def _mass(machine: Structure, components: Sequence[str], values: Values) -> Any:
     mass = values["mass"]
     share = mass / (mass * mass + 1.0)  # 1 / mass, and none of a mass of nothing
@@ -142,9 +160,11 @@ COMPOSED = {
     "backlash_before_friction": _backlash_before,
     "bearing_presliding": _bearing_presliding,
     "mounted_spring": _mounted_spring,
+    "placed_spring": _placed_spring,
     "gravity_offset": _gravity,
     "structural_flexibility": _flexibility,
     "specimen_resonance": _resonance,
+    "swaying_specimen": _sway_alone,
     "added_mass": _mass,
     "inertia_coupling": _coupling,
 }

@@ -81,3 +81,15 @@ def test_only_the_kinds_asked_for(before):
     found = change_of(before, plant, before.test, path, ("flow",))
     assert found.flow.any()
     assert found.wrench.shape[1] == found.gas.shape[1] == 0
+
+
+def test_a_place_that_moves_changes_the_wrench(before):
+    """The derivative of an effect by its own place: ports of another place are no more ports of the first."""
+    machine = before.plant.machine.with_effect("placed_spring", ("platen",), stiffness_x=1e6, x=4.0, y=2.0)
+    plant = make_plant(machine)
+    path = follow(plant, before.test)
+    own = Evaluated(plant, before.test, path, evaluate_residuals(plant, before.test, path=path))
+    moved = make_plant(before.plant.machine.with_effect("placed_spring", ("platen",), stiffness_x=1e6, x=4.0, y=2.5))
+    assert_alike(own, moved, before.test)
+    change = change_of(own, moved, before.test, follow(moved, before.test, (plant, path)))
+    assert np.abs(change.wrench).max() > 1e3  # half a metre of lever of a spring of 1 MN/m that moves by centimetres

@@ -2,7 +2,8 @@
 
 from .discover import Discovery, discover
 from .estimates import Estimate
-from .verdict import EffectFinding, Verdict
+from .finding import EffectFinding
+from .verdict import Verdict
 from .verdict_file import save_verdict, verdict_entries
 
 __all__ = ["Discovery", "Estimate", "EffectFinding", "Verdict", "discover", "save_verdict", "verdict_entries"]

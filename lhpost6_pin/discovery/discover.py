@@ -28,6 +28,8 @@ from ..mechanics.plant import make_plant
 from .balances import Balance, evaluate_balances, residual_at
 from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
+from .effect_loops import EffectLoop, effect_loops
+from .estimates import deviations, estimates_of
 from .friction_form import with_friction_form
 from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
@@ -36,6 +38,7 @@ from .residual_function import ResidualFunction, fit_residual_functions, with_re
 from .search import refit, search, without_effect
 from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
+from .time_blocks import in_blocks
 from .unexplained import forces_explained
 from .verdict import Verdict, judge
 from .withdrawal import withdraw_effects
@@ -63,6 +66,7 @@ class Discovery:
     numbers: Parameters
     seed: int
     hashes: dict[str, str]  # of the records that were read, by test
+    loops: tuple[EffectLoop, ...]  # of the effects found, on the held-out tests, else on those searched
     curves: Curves  # of the held-out tests, else of those searched: as delivered, and by the fitted machine
 
 
@@ -99,6 +103,7 @@ def discover(
     records = correct_records(campaign.records, faults)
     hashes = {name: _hash(record) for name, record in zip(names, campaign.records, strict=True)}
     held = _held_out(names, hold_out, campaign.skipped)
+    records, held = in_blocks(records, held, numbers, calibration)
     checkpoint = make_checkpoint(unfinished, machine, sensors, hashes, hold_out, seed)
     begun = checkpoint.read()
     if begun is None:
@@ -113,7 +118,8 @@ def discover(
         )
         report(0.1)
         part = between(report, 0.1, 0.36)
-        begun = _begin(problem, held, numbers, calibration, hold_one_out=hold_out is None, progress=part)
+        whole = hold_out is None and len(records) == len(names)
+        begun = _begin(problem, held, numbers, calibration, hold_one_out=whole, progress=part)
         begun = begun._replace(search=with_lost_motion(begun.search, lost, between(report, 0.36, 0.38)))
         rubbed, held_problem = with_friction_form(begun.search, begun.held_problem, between(report, 0.38, 0.4))
         begun = begun._replace(search=rubbed, held_problem=held_problem)
@@ -133,6 +139,7 @@ def discover(
         replacing = fit_residual_functions(found, linearise(found.refit, calibration))
     report(0.8)
     out, part = [records[i] for i in held], between(report, 0.8, 0.95)
+    proven = tuple(str(record.attrs.get("test", i)) for i, record in zip(held, out, strict=True))
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
     balances: tuple[Balance, ...] = ()
     if (held_problem := begun.held_problem) is not None:
@@ -147,14 +154,15 @@ def discover(
     for one in found.added:
         if one.candidate.name in {gone.name for gone in withdrawn}:
             found = without_effect(found, one.candidate)
+    estimates = estimates_of(found, deviations(found))
     final = found.refit if any(function is one for one in replacing) else found.solution
     fitted = fitted_machine(final)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
         fitted=_sourced(fitted if function is None else with_residual_function(fitted, function), machine, campaign),
-        used=tuple(name for i, name in enumerate(names) if i not in held),
-        held_out=tuple(names[i] for i in held),
+        used=tuple(name for name in names if name not in proven),
+        held_out=proven,
         skipped=campaign.skipped,
         verdict=verdict,
         search=found,
@@ -164,6 +172,7 @@ def discover(
         numbers=numbers,
         seed=seed,
         hashes=hashes,
+        loops=effect_loops(found, residual_at(held_problem or begun.search.problem, found.solution), estimates),
         curves=_curves(held_problem or begun.search.problem, final, found),
     )
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from ..core.arrays import Array
 from ..core.progress import Progress
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
@@ -51,10 +52,25 @@ class Gap:
         return (self.refitted - self.after) / open_ if open_ > 0.1 else float("nan")
 
 
+@dataclass(frozen=True)
+class GapTraces:
+    """The column of a phase of a test in which the refitted model errs most: n samples, in SI."""
+
+    phase: str
+    test: str
+    quantity: str
+    column: str
+    time: Array  # (n,) [s]
+    measured: Array  # (n,)
+    models: Array  # (n, 3) as delivered, refitted, with the effects
+    noise: float  # standard deviation of the last one's error by sensor noise
+
+
 class Proof(NamedTuple):
     """Validation on held-out tests."""
 
     gaps: tuple[Gap, ...]
+    traces: tuple[GapTraces, ...] = ()  # of the phases, by falling error of the refitted model over noise
 
 
 def prove(
@@ -78,14 +94,35 @@ def prove(
     for i, (model, some) in enumerate(models):
         done.append(validate(model, Campaign("held out", tuple(some)), sensors=sensors, phases=phases, jobs=jobs))
         progress((i + 1) / len(models))
-    gaps = []
+    gaps, traces = [], []
     for test in done[0].tests:
         for number in phases:
             three = [v.phase(test, number) for v in done]
             sizes = [normalised_error(phase, three[-1]) for phase in three]
             if np.all(np.isfinite(sizes)):
                 gaps.append(Gap(PHASES[number], test, *sizes))
-    return Proof(tuple(gaps))
+                traces.append((sizes[1], _traces(PHASES[number], test, [p for p in three if p is not None])))
+    traces.sort(key=lambda pair: -pair[0])
+    return Proof(tuple(gaps), tuple(one for _, one in traces if one is not None))
+
+
+def _traces(name: str, test: str, three: Sequence[Phase]) -> GapTraces | None:
+    """The three models in the column where the refitted one errs most, in noise of the last; None without any."""
+    noise = {(a.quantity, a.column): a.noise for a in three[-1].agreement if a.moves and a.noise > 0.0}
+    compared = [a for a in three[1].agreement if a.quantity in _COMPARED[three[1].number] and np.isfinite(a.error)]
+    compared = [a for a in compared if (a.quantity, a.column) in noise]
+    if not compared:
+        return None
+    worst = max(compared, key=lambda a: a.error / noise[a.quantity, a.column])
+    pairs = [phase.pair(worst.quantity) for phase in three]
+    found = [pair for pair in pairs if pair is not None and worst.column in pair.columns]
+    if len(found) < len(three):
+        return None
+    each = [(p.measured, p.model, p.columns.index(worst.column)) for p in found]
+    models = np.stack([model[:, k] for _, model, k in each], axis=1)
+    measured, _, k = each[-1]
+    named = worst.quantity, worst.column
+    return GapTraces(name, test, *named, three[-1].time, measured[:, k], models, noise[named])
 
 
 def normalised_error(phase: Phase | None, noisy: Phase | None) -> float:

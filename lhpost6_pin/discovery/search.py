@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.progress import Progress, between, split
-from ..identification.calibration.fit import solve
+from ..identification.calibration.fit import objective, solve
 from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
 from ..identification.calibration.problem import Problem
@@ -244,12 +244,18 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
     lowest = min(left[i] for i in passed)
     # no real law is exactly that of the library: of a large gain a small share is not decisive
     apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - lowest))
-    alike = [i for i in passed if left[i] - lowest < apart]
+    # nor is one alike that leaves much where another leaves noise, in however few bins
+    settled = max(numbers.number("accept.settled"), min(fitted[i].power for i in passed))
+    alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled]
+    alike = alike or [i for i in passed if left[i] == lowest]
+    beyond = [0.0 if fitted[i].power <= settled else apart for i in range(len(fitted))]
     # the simplest of them: a parameter of the model first, then the fewest numbers
     best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
     contest = tuple(
-        FittedCandidate(rivals[i].candidate, float(left[i] - left[best]), fitted_machine(fitted[i].solution))
+        FittedCandidate(
+            rivals[i].candidate, max(float(left[i] - left[best]), beyond[i]), fitted_machine(fitted[i].solution)
+        )
         for i in order
     )
     more = _refined(fitted[best], between(progress, 0.7, 1.0))
@@ -297,13 +303,32 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -
         kind = "known" if problem.names.index(candidate.release) < len(problem.parameters) else "sensor"
         problem = problem.with_free(candidate.release, found.numbers.number(f"fit.{kind}_free"))
     else:
-        amplitudes = tuple(np.clip(one.score.amplitude, *candidate.bounds).tolist())
+        estimate = one.score.amplitude
+        if found.power >= found.numbers.number("accept.settled"):
+            estimate = _best_strength(found, candidate, estimate, afresh=afresh)
+        amplitudes = tuple(np.clip(estimate, *candidate.bounds).tolist())
         own = candidate.fit_parameters(amplitudes, found.numbers)
         problem, start = with_candidate(problem, candidate, amplitudes, own, start)
     # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
     flows = [*(k.shows_in == ("flow",) for k in problem.parameters), *(u.alone[1] >= 0 for u in problem.unknowns)]
     near = np.array(flows) & ("flow" in candidate.family.shows_in)
     return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
+
+
+def _best_strength(found: Search, candidate: Candidate, amplitude: Array, *, afresh: bool) -> Array:
+    """The linear estimate (q,) of a candidate's amplitudes, times the factor with which it explains most.
+
+    Far from the optimum the linear estimate may be several times too small or too large.
+    """
+    start, best, least = found.solution.at, amplitude, np.inf
+    for factor in found.numbers.vector("accept.strengths"):
+        tried = np.clip(factor * amplitude, *candidate.bounds)
+        problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)
+        x = np.zeros_like(x) if afresh else x
+        value = objective(problem, problem.whitened(x), x)
+        if value < least:
+            best, least = tried, value
+    return np.asarray(best)
 
 
 def with_candidate(

@@ -9,7 +9,7 @@ from ..identification.calibration.friction_forms import own_suffices
 from .acceptance import form_share, squares_by_column
 from .search_state import AddedEffect, Search, fitted_machine
 
-__all__ = ["forces_explained", "leaves_much", "more_than_noise"]
+__all__ = ["forces_explained", "leaves_much", "more_than_noise", "remainders"]
 
 
 def more_than_noise(found: Search) -> bool:
@@ -26,6 +26,24 @@ def more_than_noise(found: Search) -> bool:
         if misfit > limit and _excess(last, doubt) > share * _excess(first, doubt):
             return True
     return False
+
+
+def remainders(found: Search) -> dict[str, float]:
+    """Share of the squares beyond noise that the effects found leave, by kind of residual; none where there were none.
+
+    Compared with the refit without effects.
+    """
+    doubt, out = found.numbers.number("accept.doubt"), {}
+    for kind in found.problem.kinds:
+        rows = found.problem.rows(kind)
+        if not rows.any():
+            continue
+        first, last = ([r[:, rows] for r in tests] for tests in (found.refit.normal.residual, found.residual))
+        count = sum(r.size for r in first)
+        before, after = (sum(float(np.sum(np.abs(r) ** 2)) for r in some) - doubt * count for some in (first, last))
+        if before > 0.1 * count:
+            out[kind] = max(after, 0.0) / before
+    return out
 
 
 def _impacted(found: Search) -> Mask:

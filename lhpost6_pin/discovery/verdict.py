@@ -9,37 +9,25 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2
 
 from ..identification.calibration.scale import Scale, ratios
 from ..machine.parameters import Parameters
 from .acceptance import form_share
 from .estimates import Estimate, amplitude_of, at_bounds, covariance_of, estimates_of, interval_reach, owns, sums_of
+from .finding import EffectFinding, alternatives_of, p_value_of
 from .localise import Spot, worst_spots
+from .outlying import outlying_parameters
 from .residual_function import ResidualFunction
 from .search_state import AddedEffect, Search
 from .sensor_findings import SensorFault
-from .unexplained import leaves_much, more_than_noise
+from .unexplained import leaves_much, more_than_noise, remainders
 from .withdrawal import Withdrawn
 
-__all__ = ["EffectFinding", "SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
+__all__ = ["SensorFinding", "Verdict", "Word", "judge", "reject_effects"]
 
 Functions = Sequence[ResidualFunction]
 MASS = "added_mass"  # family of masses beyond their priors
 Word = Literal["none", "parameters_only", "sensor", "named", "ambiguous", "unexplained", "not_testable"]
-
-
-@dataclass(frozen=True)
-class EffectFinding:
-    """An effect found."""
-
-    family: str
-    components: tuple[str, ...]
-    parameters: dict[str, Estimate]
-    gain: float  # log-likelihood; of a parameter far off, half the square of its distance
-    p_value: float
-    rivals: tuple[str, ...] = ()  # families that explain the campaign equally well
-    form: str = ""  # entry of the library, where a family has several forms
 
 
 @dataclass(frozen=True)
@@ -69,6 +57,9 @@ class Verdict:
     scale: Scale | None = None  # that nothing measured fixes
     ratios: Mapping[str, Estimate] = field(default_factory=dict)  # to that scale, of what was estimated
     sums: Mapping[tuple[str, str], Estimate] = field(default_factory=dict)  # of unknowns that have no interval alone
+    remainder: Mapping[str, float] = field(
+        default_factory=dict
+    )  # share of the squares beyond noise that stays, by kind
 
 
 def judge(
@@ -118,7 +109,10 @@ def judge(
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
-    effects = _merged([_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone])
+    outlying = tuple(outlying_parameters(found, sd, estimates))
+    identified = [_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone]
+    effects = _merged([*identified, *outlying])
+    changed = {name: one for name, one in changed.items() if not any(name in found.parameters for found in outlying)}
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
     word: Word = "not_testable" if blind else "parameters_only" if changed else "none"
@@ -136,6 +130,7 @@ def judge(
         *(word, effects, changed, (*sensors, *removed), function, hidden, nearest, spots, withdrawn, bounded),
         scale=problem.scale,
         ratios={name: Estimate(*ratio) for name, ratio in scaled.items()},
+        remainder=remainders(found) if effects else {},
         sums={names: total for names, total in sums_of(found, covariance).items() if set(names) & set(changed)},
     )
 
@@ -170,10 +165,20 @@ def _of_added(added: AddedEffect, estimates: Mapping[str, Estimate]) -> EffectFi
         components=candidate.components,
         parameters=own,
         gain=added.gain,
-        p_value=min(1.0, float(chi2.sf(2.0 * added.gain, len(own))) * added.tried),
+        p_value=p_value_of(added.gain, len(own), added.tried),
         rivals=tuple(dict.fromkeys(one.candidate.family.named for one in added.rivals)),
         form=candidate.family.name,
+        alternatives=alternatives_of(_behind(added), added.apart),
     )
+
+
+def _behind(added: AddedEffect) -> dict[str, float]:
+    """Log-likelihood by which the best form of each family fitted in an effect's place is behind it."""
+    behind: dict[str, float] = {}
+    for one in added.contest:
+        name = one.candidate.family.named
+        behind[name] = min(behind.get(name, np.inf), one.behind)
+    return behind
 
 
 def _of_fault(fault: SensorFault, reach: float) -> SensorFinding:

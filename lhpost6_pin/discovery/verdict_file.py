@@ -16,6 +16,7 @@ from ..identification.calibration.scale import scale_summary
 from ..machine.library import find_family
 from .discover import Discovery
 from .estimates import Estimate
+from .finding import EffectFinding
 from .held_out import FLOOR
 from .unexplained import forces_explained
 from .verdict import SensorFinding
@@ -31,6 +32,9 @@ _WITHDRAWN: dict[Why, str] = {
     "held_out": "which lowers the residual of the tests searched, but not of those held out",
 }
 """Why an effect that was added is no finding."""
+
+REMAINS = 0.01
+"""Share of the squares beyond noise from which what remains is stated."""
 
 WORSE = 1.05
 """Normalised RMS error on a held-out test over that before, from which it counts as worse."""
@@ -48,8 +52,8 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
     verdict = found.verdict
     closure: dict[str, Any] = {}
     for gap in found.proof.gaps if found.proof else ():
-        entry = {key: round(value, 4) for key, value in asdict(gap).items() if key not in ("phase", "test")}
-        closure.setdefault(gap.phase, {})[gap.test] = {**entry, "floor": 1.0, "closure": _rounded(gap.closure, 4)}
+        entry = {key: value for key, value in asdict(gap).items() if key not in ("phase", "test")}
+        closure.setdefault(gap.phase, {})[gap.test] = {**entry, "floor": 1.0, "closure": _known(gap.closure)}
     return {
         "verdict": verdict.word,
         "effects": [
@@ -57,6 +61,9 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
                 "name": one.family,
                 "family": one.family,
                 "form": one.form,
+                "kind": one.kind,
+                "probability": one.probability,
+                "alternatives": [{"family": a.family, "probability": a.probability} for a in one.alternatives],
                 "components": list(one.components),
                 "parameters": {name: _interval(value) for name, value in one.parameters.items()},
                 "gain": one.gain,
@@ -76,11 +83,12 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "unexplained": None if verdict.word != "unexplained" else _unexplained(found),
         "not_testable": list(verdict.untestable),
         "at_bound": list(verdict.bounded),
+        "remainder": dict(found.verdict.remainder),
         "withdrawn": [{"family": w.family, "why": w.why, "numbers": list(w.numbers)} for w in verdict.withdrawn],
-        "rejected_on_held_out": {w.family: round(w.gain, 2) for w in verdict.withdrawn if w.why == "held_out"},
+        "rejected_on_held_out": {w.family: w.gain for w in verdict.withdrawn if w.why == "held_out"},
         "held_out_balances": [asdict(one) for one in found.balances],
         "next_test": [
-            {"test": n.test, "tells": list(n.families), "margin": _rounded(n.margin, 1), "told": n.informative}
+            {"test": n.test, "tells": list(n.families), "margin": _known(n.margin), "told": n.informative}
             for n in found.next_tests
         ],
         "advice": advice(found),
@@ -95,8 +103,8 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
     }
 
 
-def _rounded(value: float, digits: int) -> float | None:
-    return None if math.isnan(value) else round(value, digits)
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def advice(found: Discovery) -> list[str]:
@@ -124,7 +132,7 @@ def _unexplained(found: Discovery) -> dict[str, Any] | None:
     known = {
         "nearest": list(found.verdict.nearest),
         "where": [
-            {"residual": s.kind, "column": s.label, "band": list(s.band), "misfit": round(s.misfit, 2)}
+            {"residual": s.kind, "column": s.label, "band": list(s.band), "misfit": s.misfit}
             for s in found.verdict.where
         ],
     }
@@ -150,11 +158,11 @@ def _unexplained(found: Discovery) -> dict[str, Any] | None:
 def summary(found: Discovery) -> str:
     """What was identified; and that it is not validated, where no test was held out."""
     verdict = found.verdict
-    effects = " and ".join(f"{title_of(one.family)} ({where(one.components)})" for one in verdict.effects)
+    effects = " and ".join(f"{_name_of(one)} ({where(one.components)})" for one in verdict.effects)
     if verdict.word == "unexplained":
         text = _unexplained_summary(found, effects)
     else:
-        rivals = " and ".join(" or ".join(map(title_of, (e.family, *e.rivals))) for e in verdict.effects if e.rivals)
+        rivals = "; ".join(_rivals_of(one) for one in verdict.effects if one.rivals)
         text = {
             "none": "no missing effect; no parameter differs from the machine file.",
             "not_testable": f"no missing effect, but {len(verdict.untestable)} families are not testable with this "
@@ -163,11 +171,14 @@ def summary(found: Discovery) -> str:
             f"{', '.join(verdict.changed)}.",
             "sensor": f"no missing effect; {_beyond(verdict.sensors)}.",
             "named": f"{effects}.",
-            "ambiguous": f"{effects}; the campaign does not discriminate between {rivals}.",
+            "ambiguous": f"{effects}. {rivals}",
         }[verdict.word]
     if verdict.sensors and verdict.word != "sensor":
         said = _beyond(verdict.sensors)
         text += f" {said[0].upper()}{said[1:]}."
+    if verdict.word in ("named", "ambiguous"):
+        left = [f"{100.0 * share:.2g} % ({kind})" for kind, share in verdict.remainder.items() if share > REMAINS]
+        text += f" Of the squares beyond noise remain {', '.join(left)}." if left else ""
     identified = {one.family for one in verdict.effects}
     for why, reason in _WITHDRAWN.items():
         gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
@@ -186,6 +197,19 @@ def summary(found: Discovery) -> str:
     if verdict.effects and found.proof is None:
         return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
     return text
+
+
+def _name_of(one: EffectFinding) -> str:
+    """Title of an effect's family, or what it and its rivals have in common."""
+    return one.kind if one.rivals and one.kind else title_of(one.family)
+
+
+def _rivals_of(one: EffectFinding) -> str:
+    """Which families explain an effect, how probable each is, and the test that tells them apart."""
+    rivals = {one.family, *one.rivals}
+    each = [f"{title_of(a.family)} ({a.probability:.2f})" for a in one.alternatives if a.family in rivals]
+    tests = dict.fromkeys(find_family(name).tell_apart for name in (one.family, *one.rivals))
+    return f"On {where(one.components)} it is {' or '.join(each)}; to be told apart by {'; or '.join(tests)}."
 
 
 def _beyond(sensors: Sequence[SensorFinding]) -> str:

@@ -335,8 +335,8 @@ class OperatingPoint:
         """Plant and paths with the ports of another plant, on which an effect may act that is not there yet."""
         if (known := self._extended.get(other.ports)) is not None:
             return known
-        plant = replace(self.plant, ports=other.ports)
-        if plant.geometry != other.geometry:
+        own, plant = self.plant.ports, replace(self.plant, ports=other.ports)
+        if plant.geometry != other.geometry or other.ports[: len(own)] != own:
             return self.plant, self.paths
         pairs = zip(self.tests, self.paths, strict=True)
         found = plant, [with_ports(plant, test, path) for test, path in pairs]

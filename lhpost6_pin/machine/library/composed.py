@@ -132,9 +132,9 @@ def _resonance(machine: Structure, components: Sequence[str], values: Values) ->
 
 def _sway_alone(machine: Structure, components: Sequence[str], values: Values) -> Any:
     """A mass that sways along level axes and rests on the platen with its weight, without inertia along the others."""
-    law, ports, rows = _swaying(components, values, 0.0, 0.0)
-    _, weight = _sprung("platen.z", {**values, "damping": 0.1}, values["mass"], ISOLATED, machine.platen.gravity)
-    return law, ports, [*rows[:-1], weight]
+    rows = [_sprung(axis, values, values["mass"], values["frequency"], 0.0) for axis in components]
+    rows.append(_sprung("platen.z", values, values["mass"], ISOLATED, machine.platen.gravity))
+    return "oscillator", [port for port, _ in rows], [numbers for _, numbers in rows]
 
 
 def _mass(machine: Structure, components: Sequence[str], values: Values) -> Any:

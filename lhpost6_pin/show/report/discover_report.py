@@ -7,11 +7,13 @@ from pathlib import Path
 from ...discovery import Discovery, save_verdict
 from ...discovery.balances import Balance
 from ...discovery.estimates import Estimate
+from ...discovery.finding import EffectFinding
 from ...discovery.held_out import Proof
-from ...discovery.verdict import EffectFinding, SensorFinding, Verdict, Word
+from ...discovery.verdict import SensorFinding, Verdict, Word
 from ...discovery.verdict_file import advice, summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
+from .closing_plots import closing_blocks
 from .control_blocks import load_of, numbers_used
 from .curve_plots import curve_blocks
 from .discover_plots import gain_figure, gap_figure, held_out_errors, map_blocks, residual_function_figure
@@ -51,6 +53,7 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
         level=_VERDICTS[found.verdict.word][1],
         headlines=_headlines(found),
         sections=[
+            Section("closing", "Error before and after", closing_blocks(found)),
             Section("effects", "Identified effects", _effect_blocks(found)),
             Section("proof", "Errors on held-out tests", _proof_blocks(found)),
             Section("curves", "Friction and valves", curve_blocks(found.curves, found.machine, _acted_on(found))),
@@ -179,6 +182,17 @@ def _effect_blocks(found: Discovery) -> list[Block]:
     if not verdict.effects and verdict.word != "unexplained":
         return ["No effect is missing."]
     blocks: list[Block] = []
+    rivals = [one for one in verdict.effects if len(one.alternatives) > 1]
+    if rivals:
+        rows = [
+            (where(one.components), title_of(a.family), f"{a.probability:.2f}")
+            for one in rivals
+            for a in one.alternatives
+        ]
+        blocks.append(Table("Families fitted in an effect's place", ("On", "Family", "Probability"), rows))
+    if verdict.remainder:
+        left = [(kind, f"{100.0 * share:.2g} %") for kind, share in verdict.remainder.items()]
+        blocks.append(Table("Remainder of the squares beyond noise", ("Residual", "Share of the refit's"), left))
     for one in verdict.effects:
         family = find_family(one.form or one.family)
         p_value = "less than 1e-300" if one.p_value < 1e-300 else f"{one.p_value:.1g}"

@@ -99,7 +99,8 @@ def _named(
     machine = base.plant.machine
     legs = [c for c in one.candidate.components if c in {a.name for a in machine.actuators}]
     if kind == "wrench" and legs and machine.motion == "free":
-        shares = np.linalg.pinv(kinematic_jacobian(base.plant))[:, [machine.actuator_names.index(n) for n in legs]]
+        places = [machine.actuator_names.index(name) for name in legs]
+        shares = np.linalg.pinv(kinematic_jacobian(base.plant)[places])
         return [(f"force along {name}", "N", -own @ shares[:, i], -rest @ shares[:, i]) for i, name in enumerate(legs)]
     if kind == "wrench":
         units = ["N"] * 3 + ["N m"] * 3

@@ -184,12 +184,10 @@ def _effect_blocks(found: Discovery) -> list[Block]:
     blocks: list[Block] = []
     rivals = [one for one in verdict.effects if len(one.alternatives) > 1]
     if rivals:
-        rows = [
-            (where(one.components), title_of(a.family), f"{a.probability:.2f}")
-            for one in rivals
-            for a in one.alternatives
+        chances = [
+            (where(e.components), title_of(a.family), f"{a.probability:.2f}") for e in rivals for a in e.alternatives
         ]
-        blocks.append(Table("Families fitted in an effect's place", ("On", "Family", "Probability"), rows))
+        blocks.append(Table("Families fitted in an effect's place", ("On", "Family", "Probability"), chances))
     if verdict.remainder:
         left = [(kind, f"{100.0 * share:.2g} %") for kind, share in verdict.remainder.items()]
         blocks.append(Table("Remainder of the squares beyond noise", ("Residual", "Share of the refit's"), left))

@@ -14,17 +14,16 @@ from joblib import Parallel, delayed
 
 from ...core.arrays import Array, Complex, Mask
 from ...data.sensors import SensorSet
-from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
 from ...machine.specimen import Specimen
 from ...mechanics.plant import Plant, make_plant
-from ...mechanics.pose import leg_displacements
-from ..friction_march import made_fine
+from ..friction_march import held_friction, made_fine
 from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Path, Residuals, evaluate_residuals, follow, kinds_shown, with_ports
 from .bin_rows import SparseBins, sparse_bins
-from .free_parameters import FreeParameter, machine_parameters, with_parameters
+from .free_parameters import FreeParameter, with_parameters
+from .parameters_of_tests import parameters_of_tests
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
 from .whitened_residuals import make_whitener, mean_squares, spectrum_of
@@ -100,7 +99,7 @@ class Problem:
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
         clean = [evaluate_residuals(plant, t, kinds) for t in tests]
         self.scale = find_scale(machine, tests[0], clean[0])
-        free = _shown(machine_parameters(machine, _travel(plant, tests)), tests[0])
+        free = parameters_of_tests(machine, plant, tests)
         self._set(machine, without_held(free, self.scale))
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t)[1] for r, t in zip(clean, tests, strict=True)]
@@ -113,7 +112,7 @@ class Problem:
             if test.weight is None:
                 more.append(evaluate_residuals(plant, replace(test, path=None), kinds))
             if preload > 0.0:
-                held = follow(plant, test, start=_held(plant, preload, rng))
+                held = follow(plant, test, start=held_friction(plant, preload, rng))
                 more.append(evaluate_residuals(plant, test, kinds, path=held))
             more += [evaluate_residuals(one, test, kinds) for one in instead]
             draws = len(found)
@@ -344,29 +343,6 @@ class OperatingPoint:
             self._extended.popitem()
         self._extended[other.ports] = found
         return found
-
-
-def _shown(parameters: Sequence[FreeParameter], test: MeasuredTest) -> tuple[FreeParameter, ...]:
-    """Parameters without those of a load cell where pressures are measured."""
-    measured = {"chamber_pressure_a", "pressure_difference"} & test.channels.keys()
-    return tuple(p for p in parameters if not (measured and p.name.endswith(".load_cell_share")))
-
-
-def _travel(plant: Plant, tests: Sequence[MeasuredTest]) -> dict[str, float]:
-    """Largest travel of the actuators and struts of each kind in either direction, with a margin [m]."""
-    most = np.max([np.abs(leg_displacements(plant, t.motion.displacement)[0]).max(axis=0) for t in tests], axis=0)
-    kinds = np.array([c.kind for c in plant.machine.components])
-    return {str(kind): 1.05 * float(most[kinds == kind].max()) for kind in kinds}
-
-
-def _held(plant: Plant, share: float, rng: np.random.Generator) -> Array:
-    """Random hidden states (n_states,) of friction, their standard deviation a share of full force."""
-    out = np.zeros(len(plant.states))
-    for row in plant.rows:
-        if law_of(row).friction_memory:
-            own = out[states_of(row)]
-            own[:] = np.clip(share * rng.standard_normal(len(own)), -0.7, 0.7)  # within the unit disc
-    return out
 
 
 def _less(after: Residuals, before: Residuals) -> Residuals:

@@ -100,9 +100,9 @@ def _pruned(found: Search) -> Search:
 
     Others added since explain the same, or one only led the fit to parameters that do as well without it.
     """
-    fewer: dict[str, Search] = {}
+    fewer: dict[tuple[str, ...], Search] = {}
     for one in found.added:
-        fewer[one.candidate.name] = less = without_effect(found, one.candidate)
+        fewer[found.less(one.candidate)] = less = without_effect(found, one.candidate)
         if less.objective - found.objective + one.from_lengths < gate(one.candidate.family, found.numbers):
             return _pruned(_refined(less, lambda share: None))
     return replace(found, without=fewer)
@@ -110,8 +110,8 @@ def _pruned(found: Search) -> Search:
 
 def without_effect(found: Search, candidate: Candidate) -> Search:
     """The search without one of its effects, everything else refitted."""
-    if candidate.name in found.without:
-        return found.without[candidate.name]
+    if (known := found.without.get(found.less(candidate))) is not None:
+        return known
     problem = found.problem
     if candidate.release:
         less = problem.with_free(candidate.release, None)

@@ -95,7 +95,8 @@ class Search:
     calibration: Parameters  # of `calibration.toml`, with the entries that `discovery.toml` replaces
     added: tuple[AddedEffect, ...] = ()
     rounds: tuple[Round, ...] = ()
-    without: Mapping[str, "Search"] = field(default_factory=dict)  # by effect, where it was refitted without one
+    # by the effects added and the one left out, where it was refitted without that
+    without: Mapping[tuple[str, ...], "Search"] = field(default_factory=dict)
 
     def solved(self, problem: Problem, start: Array, progress: Progress, **options: Any) -> "Search":
         """The search with another problem solved from `start` (p,), by `options` of `solve`.
@@ -109,6 +110,10 @@ class Search:
     def with_effect(self, effect: AddedEffect) -> "Search":
         """The search with one more effect in its list."""
         return replace(self, added=(*self.added, effect))
+
+    def less(self, candidate: Candidate) -> tuple[str, ...]:
+        """Key of `without`."""
+        return (*(one.candidate.name for one in self.added), candidate.name)
 
     @property
     def residual(self) -> list[Complex]:

@@ -21,6 +21,7 @@ from .channels import LAYOUT, LAYOUT_VERSION
 from .layout_faults import RecordFinding, is_number, layout_faults, sampling_rate
 
 __all__ = [
+    "FULL_SCALE",
     "DEFLATE_LIMIT",
     "STEPS",
     "is_measured",
@@ -39,6 +40,10 @@ DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 
 
 
 # ---------------------------------------------------------------------------------------------- disk
+FULL_SCALE = "full_scale_force"
+"""Attribute of a record: force [N] at which an arrow of the viewer has its full length."""
+
+
 def open_record(path: Path | str) -> xr.Dataset:
     """Read a whole netCDF-4 file into memory without checking its content; an older layout is migrated.
 

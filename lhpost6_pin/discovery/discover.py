@@ -35,6 +35,7 @@ from .held_out import Proof, prove
 from .lost_motion import lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
+from .residual_records import residual_records
 from .search import refit, search, without_effect
 from .search_state import Search, fitted_machine, linearise
 from .sensor_findings import correct_records, find_sensor_faults
@@ -66,6 +67,7 @@ class Discovery:
     numbers: Parameters
     seed: int
     hashes: dict[str, str]  # of the records that were read, by test
+    left: dict[str, xr.Dataset]  # residual forces of a held-out test as records, by model
     loops: tuple[EffectLoop, ...]  # of the effects found, on the held-out tests, else on those searched
     curves: Curves  # of the held-out tests, else of those searched: as delivered, and by the fitted machine
 
@@ -142,9 +144,11 @@ def discover(
     proven = tuple(str(record.attrs.get("test", i)) for i, record in zip(held, out, strict=True))
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
     balances: tuple[Balance, ...] = ()
+    left: dict[str, xr.Dataset] = {}
     if (held_problem := begun.held_problem) is not None:
         three = [residual_at(held_problem, one) for one in (None, found.refit, found.solution)]
         balances = evaluate_balances(held_problem, three)
+        left = residual_records(held_problem, dict(zip(("refitted", "with the effects"), three[1:], strict=True)))
     verdict = judge(found, beside, replacing, faults, withdrawn)
     ambiguous = propose and verdict.word == "ambiguous"
     tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()
@@ -172,6 +176,7 @@ def discover(
         numbers=numbers,
         seed=seed,
         hashes=hashes,
+        left=left,
         loops=effect_loops(found, residual_at(held_problem or begun.search.problem, found.solution), estimates),
         curves=_curves(held_problem or begun.search.problem, final, found),
     )

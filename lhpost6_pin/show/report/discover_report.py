@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ...data.records import save_record
 from ...discovery import Discovery, save_verdict
 from ...discovery.balances import Balance
 from ...discovery.estimates import Estimate
@@ -33,8 +34,12 @@ _VERDICTS: dict[Word, tuple[str, Level]] = {
 
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
-    """Write verdict.json, model.toml (headed by `title`) and report.html to a directory; returns the paths."""
+    """Write verdict.json, model.toml (headed by `title`), report.html and residual forces to view; returns paths."""
+    left = [(folder / f"residual_{name.replace(' ', '_')}.nc", record) for name, record in found.left.items()]
+    for path, record in left:
+        save_record(record, path)
     return [
+        *(path for path, _ in left),
         save_verdict(found, folder / "verdict.json"),
         save_machine_toml(found.fitted, folder / "model.toml", title),
         write_discover_report(found, folder / "report.html", command=command),

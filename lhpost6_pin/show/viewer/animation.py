@@ -49,7 +49,7 @@ def draw_animation(window: Window, machine: Machine, bodies: Bodies, frames: Fra
         moves = [one for one in _POSE if np.ptp(pose[:, one[2]], axis=0).max() > UNSEEN]
         tracks = [_track(key, kind, pose[:, part]) for key, kind, part in moves]
         clips.append(_clip(frames, name, tracks))
-    largest = largest_force(frames.force) if frames.force is not None else 1.0
+    largest = frames.full_scale or (largest_force(frames.force) if frames.force is not None else 1.0)
     for name, force in leg_forces(machine, frames).items():
         arrow = f"{name}_rod/force"
         clips.append(_clip(frames, arrow, [_track("scale", "vector", arrow_sizes(machine, force, largest))]))

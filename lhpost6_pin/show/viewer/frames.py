@@ -10,7 +10,7 @@ import xarray as xr
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError, RecordError
-from ...data.records import require
+from ...data.records import FULL_SCALE, require
 from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import forward_kinematics
@@ -71,6 +71,7 @@ class Frames:
     ghosts: tuple[Ghost, ...]  # sampled and enlarged alike
     force: Array | None  # (n, n_legs) that push the platen away from the leg's base [N]; NaN where unknown
     look: Look
+    full_scale: float | None = None  # force at which an arrow has its full length [N]; None: the largest
     joints: Mapping[str, Array] = field(default_factory=dict)  # (n,) of a specimen's joints, points [m, rad], enlarged
 
 
@@ -120,7 +121,8 @@ def record_frames(
         label = f"{record_title(other)}, {other.attrs.get('kind', 'record')}"
         ghosts.append(Ghost(name, label, other["time"].values, _motion(machine, other)))
     frames = make_frames(time, _motion(machine, record), ghosts, _forces(machine, record), look)
-    return replace(frames, joints=_joints(record, frames))
+    scale = record.attrs.get(FULL_SCALE)
+    return replace(frames, joints=_joints(record, frames), full_scale=None if scale is None else float(scale))
 
 
 def record_title(record: xr.Dataset) -> str:

@@ -74,7 +74,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     layers |= {g.label: [f"meshcat/{ROOT}/{g.name}", f"meshcat/{ROOT}/trace/{g.name}"] for g in frames.ghosts}
     if forces := leg_forces(machine, frames):
         assert frames.force is not None
-        most = largest_force(frames.force)
+        most = frames.full_scale or largest_force(frames.force)
         note += f"; longest arrow {most / 1e3:,.0f} kN" + " of change since the start" * look.change
         legend |= {"push": drawing_colour("force_push"), "pull": drawing_colour("force_pull")}
         layers["forces"] = [f"meshcat/{ROOT}/{name}_rod/force" for name in forces]

@@ -285,3 +285,22 @@ def test_scores_count_what_was_named_and_what_was_not():
     curve = {words: share for words, share in scoring.strength_curve(pairs).items() if share.of}
     assert curve == {"0.5 to 1": (0, 2), "2 to 4": (1, 1), "10 to 100": (1, 1)}
     assert scoring.wilson(5, 10) == pytest.approx((0.2366, 0.7634), abs=1e-4)  # a worked value of Wilson's score
+
+
+def test_stated_probabilities_are_held_against_what_was_right():
+    right, wrong = told("named", "backlash"), told("ambiguous", "quadratic_drag")
+    right["effects"][0]["probability"], wrong["effects"][0]["probability"] = 0.95, 0.6
+    label = labelled("one", "named", ("backlash", 3.0))
+    assert scoring.reliability([(label, right), (label, wrong)]) == {"0.5 to 0.7": (0, 1), "0.9 to 0.99": (1, 1)}
+
+
+def test_a_miss_is_listed_with_the_reason_of_the_last_round():
+    label = labelled("two", "named", ("backlash", 20.0), ("quadratic_drag", 0.7))
+    seen = [
+        {"family": "quadratic_drag", "refused": why, "gain": gain} for why, gain in (("", 9.0), ("too little", 7.0))
+    ]
+    answer = {**told("named", "backlash"), "considered": [[one] for one in seen], "withdrawn": []}
+    assert scoring.misses(label, answer) == [("quadratic_drag", 0.7, "too little (gain 7)")]
+    answer["withdrawn"] = [{"family": "quadratic_drag", "why": "held_out"}]
+    assert scoring.misses(label, answer)[0][2] == "withdrawn: held_out"
+    assert scoring.misses(labelled("null", "none"), told("none")) == []

@@ -18,6 +18,7 @@ from .discover import Discovery
 from .estimates import Estimate
 from .finding import EffectFinding
 from .held_out import FLOOR
+from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
 from .withdrawal import Why
@@ -32,6 +33,9 @@ _WITHDRAWN: dict[Why, str] = {
     "held_out": "which lowers the residual of the tests searched, but not of those held out",
 }
 """Why an effect that was added is no finding."""
+
+CONSIDERED = 1.0
+"""Gain of log-likelihood from which a candidate is listed."""
 
 REMAINS = 0.01
 """Share of the squares beyond noise from which what remains is stated."""
@@ -84,6 +88,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "not_testable": list(verdict.untestable),
         "at_bound": list(verdict.bounded),
         "remainder": dict(found.verdict.remainder),
+        "considered": [_considered(one) for one in found.search.rounds],
         "withdrawn": [{"family": w.family, "why": w.why, "numbers": list(w.numbers)} for w in verdict.withdrawn],
         "rejected_on_held_out": {w.family: w.gain for w in verdict.withdrawn if w.why == "held_out"},
         "held_out_balances": [asdict(one) for one in found.balances],
@@ -101,6 +106,22 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "versions": {"lhpost6_pin": __version__},
         "inputs": found.hashes,
     }
+
+
+def _considered(one: Round) -> list[dict[str, Any]]:
+    """The best candidates of a round of the search, one a family, and why each is not accepted as it is."""
+    return [
+        {
+            "family": s.candidate.family.named,
+            "form": s.candidate.family.name,
+            "components": list(s.candidate.components),
+            "gain": s.gain,
+            "cross_validated": float(s.score.held_out.sum()),
+            "refused": s.refused,
+        }
+        for s in one.best.values()
+        if s.gain > CONSIDERED
+    ]
 
 
 def _known(value: float) -> float | None:

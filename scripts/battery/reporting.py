@@ -18,7 +18,18 @@ from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import discover, save_verdict
 from lhpost6_pin.machine.machine import Machine
 
-from .scoring import Answer, Label, Share, families, named_what_is_there, reach, score, strength_curve
+from .scoring import (
+    Answer,
+    Label,
+    Share,
+    families,
+    misses,
+    named_what_is_there,
+    reach,
+    reliability,
+    score,
+    strength_curve,
+)
 
 __all__ = ["answers", "publish", "report", "search", "wrong"]
 
@@ -66,6 +77,11 @@ def report(
         lines.append(f"| seconds a case, median | {seconds[len(seconds) // 2]:.0f} |")
     lines += ["", "| gap of an effect over the floor | its family is named |", "|---|---|"]
     lines += [f"| {words} | {share.text} |" for words, share in strength_curve(pairs).items() if share.of]
+    lines += ["", "| stated probability of a name | right |", "|---|---|"]
+    lines += [f"| {words} | {share.text} |" for words, share in reliability(pairs).items()]
+    lost = [(n, *miss) for n, pair in zip(names, pairs, strict=True) for miss in misses(*pair)]
+    lines += ["", "| hidden and not named | case | gap | why |", "|---|---|---|---|"] if lost else []
+    lines += [f"| {family} | {n} | {gap:.1f} | {why} |" for n, family, gap, why in lost]
     lines += ["", "| case | sort | gap | hidden | verdict | named |", "|---|---|---|---|---|---|"]
     lines += sorted(_case_row(n, *pair) for n, pair in zip(names, pairs, strict=True))
     for n in labels:

@@ -6,7 +6,17 @@ from itertools import pairwise
 from statistics import median
 from typing import Any, NamedTuple
 
-__all__ = ["Share", "families", "named_what_is_there", "reach", "score", "strength_curve", "wilson"]
+__all__ = [
+    "Share",
+    "families",
+    "misses",
+    "named_what_is_there",
+    "reach",
+    "reliability",
+    "score",
+    "strength_curve",
+    "wilson",
+]
 
 Label = Mapping[str, Any]
 Answer = Mapping[str, Any]  # a verdict.json
@@ -69,6 +79,40 @@ def strength_curve(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
         words = f"{low:g} to {high:g}" if math.isfinite(high) else f"above {low:g}"
         curve[words] = Share(sum(hits), len(hits))
     return curve
+
+
+RELIABILITY = (0.0, 0.5, 0.7, 0.9, 0.99, 1.01)
+"""Edges of the stated probability of a name in the table of its reliability."""
+
+
+def reliability(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
+    """How many of the names given were right, by their stated probability."""
+    named = [
+        (effect.get("probability", 1.0), effect["family"] in families(label))
+        for label, answer in cases
+        for effect in answer["effects"]
+        if label["sort"] != "unexcited"
+    ]
+    return {
+        f"{low:g} to {min(high, 1.0):g}": Share(sum(hits), len(hits))
+        for low, high in pairwise(RELIABILITY)
+        if (hits := [hit for chance, hit in named if low <= chance < high])
+    }
+
+
+def misses(label: Label, answer: Answer) -> list[tuple[str, float, str]]:
+    """Hidden effects that were not named: family, gap over the floor, and why, by the last round of the search."""
+    found = []
+    for effect in label["effects"] if label["sort"] in ("one", "two", "three") else ():
+        family = effect["family"]
+        if family in families(answer):
+            continue
+        gone = [f"withdrawn: {w['why']}" for w in answer.get("withdrawn", ()) if w["family"] == family]
+        seen = [c for one in answer.get("considered", ()) for c in one if c["family"] == family]
+        last = [f"{c['refused'] or 'passes, but another fits as well'} (gain {c['gain']:.0f})" for c in seen[-1:]]
+        why = (gone or last or ["no gain"])[0]
+        found.append((family, max(effect["gap"], effect["offset"]), why))
+    return found
 
 
 def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:

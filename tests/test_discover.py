@@ -45,7 +45,6 @@ from lhpost6_pin.identification.calibration.normal_equations import bounds_of
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
-from lhpost6_pin.identification.calibration.whitened_residuals import real_bins
 from lhpost6_pin.laws.supply import Supply
 from lhpost6_pin.laws.tabulated import NODES
 from lhpost6_pin.machine.library import families, find_family
@@ -217,7 +216,9 @@ def test_noise_in_a_candidate_s_column_is_taken_off_its_equations():
         return drawn[..., :p], drawn[..., p : p + 1], drawn[..., -1]
 
     def real(x: np.ndarray) -> np.ndarray:
-        return real_bins(x, root)
+        """Real parts, then imaginary ones, of bins (m, c, ...) times the root of two (2 m c, ...)."""
+        flat = np.sqrt(2.0) * x.reshape(-1, *x.shape[2:])
+        return np.concatenate([flat.real, flat.imag])
 
     def seen() -> tuple[Block, Block]:
         """Equations as measured, and corrected by two replicas, which are what was measured with more noise."""

@@ -12,9 +12,9 @@ from ...core.progress import Progress
 from ...machine.parameters import Parameters
 from .bin_rows import BandSquares, BinRows, SparseBins, bin_rows, row_by_column
 from .problem import OperatingPoint, Problem, Slopes
-from .whitened_residuals import excess, real_bins, real_rows
+from .whitened_residuals import excess
 
-__all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive", "squares"]
+__all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive"]
 
 
 class NormalEquations:
@@ -208,13 +208,6 @@ def _dot(rows: BinRows, rest: Complex, power: Array, columns: Mask | None) -> Ar
     """Right side (p,) of a test's rows over a power (m, c), of some columns (c,) or all."""
     row = row_by_column(rest, power)
     return rows.dot(row if columns is None else row * columns[:, None])
-
-
-def squares(slope: Sequence[Complex] | Complex, rest: Complex, power: Array) -> tuple[Array, Array]:
-    """Normal matrix (p, p) and right side (p,) of bins (m, c) and their p derivatives (m, c) over a power (m, c)."""
-    root = np.sqrt(power)
-    rows = real_rows(slope, root)
-    return rows @ rows.T, rows @ real_bins(rest, root)
 
 
 def positive(matrix: Array, prior: Array) -> Array:

@@ -20,8 +20,8 @@ from ...mechanics.plant import Plant, State, make_plant
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, fastest_engine, simulate
 from ..prepare import MeasuredTest
+from .bin_rows import dense_rows, row_by_column
 from .free_parameters import with_parameters
-from .normal_equations import squares
 from .prepare import as_simulated
 from .problem import Problem
 from .result import Subset
@@ -94,8 +94,9 @@ def by_simulation(
     matrix, side = np.diag(prior**-2.0), x[:count] / prior**2
     for t, f in enumerate(frequency):
         slope = np.stack([(m[t] - rest[t]) / h for m, h in zip(moved, step, strict=True)], axis=-1)
-        more, change = squares(np.moveaxis(whitener.apply(t, slope, f), -1, 0), white[t], power[t])
-        matrix, side = matrix + more, side + change
+        root = np.sqrt(power[t])
+        rows = dense_rows(whitener.apply(t, slope, f)).weighed(root)
+        matrix, side = matrix + rows.squares(), side + rows.dot(row_by_column(white[t], root))
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))
     known, none = sd < numbers.number("report.told") * prior, np.full(len(x) - count, np.nan)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...core.arrays import Array, Complex
 from ...core.errors import RecordError
 
-__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "real_bins", "real_rows", "spectrum_of"]
+__all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "spectrum_of"]
 __all__ += ["negative_log_likelihood"]
 
 
@@ -40,22 +40,6 @@ def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tu
     out = fft.rfft(x[cut : cut + n], axis=0)[inside] * np.sqrt(2.0 * dt / n)
     out[f[inside] == 0.0] /= np.sqrt(2.0)
     return out, f[inside]
-
-
-def real_bins(bins: Complex, root: Array) -> Array:
-    """Bins (m, c, ...) as real rows (2 m c, ...), over the roots of power (m, c): real parts, then imaginary ones."""
-    scaled = bins * (np.sqrt(2.0) / root).reshape(root.shape + (1,) * (bins.ndim - 2))
-    flat = scaled.reshape(-1, *bins.shape[2:])
-    return np.concatenate([flat.real, flat.imag])
-
-
-def real_rows(slopes: Sequence[Complex] | Complex, root: Array) -> Array:
-    """`real_bins` of several arrays of bins (m, c), one a row (p, 2 m c)."""
-    rows = np.empty((len(slopes), 2, *root.shape))
-    for row, bins in zip(rows, slopes, strict=True):
-        row[0], row[1] = bins.real, bins.imag
-        row *= np.sqrt(2.0) / root
-    return rows.reshape(len(slopes), -1)
 
 
 class Whitener(NamedTuple):

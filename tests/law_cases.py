@@ -169,6 +169,7 @@ _ROWS = (
     _case("drag", 9e3, 1.7, passive=True, cycle=0.005),
     _case("spring", 9e5, 1.5, passive=True),
     _case("spring", 9e5, 1.5, port="leg -", passive=True),
+    _case("spring_damper", 9e4, 3e4, cycle=0.005),
     _case("by_position", 0.8, -1e-3, 1e-3, WAVE),
     _case("by_speed", 0.8, -0.02, 0.03, np.roll(WAVE, 5)),
     _case("by_memory", 0.8, -1e-3, 1e-3, WAVE, 0.3, 0.4, z=(1e-4,)),

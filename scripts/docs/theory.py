@@ -30,7 +30,7 @@ PAGES: dict[str, tuple[str, ...]] = {
     "dahl": ("dahl_instead",),
     "ball": ("ball", "smooth_ball"),
     "backlash": ("backlash", "backlash_instead"),
-    "spring": ("spring", "end_stop", "drag"),
+    "spring": ("spring", "spring_damper", "end_stop", "drag"),
     "tabulated": ("tabulated", "by_position", "by_speed", "by_memory"),
     "leaks": ("leaks",),
     "bulk": ("bulk",),

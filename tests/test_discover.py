@@ -17,6 +17,7 @@ from lhpost6_pin.core.errors import ParameterError, RecordError, UnknownNameErro
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.campaign import Campaign, save_campaign
 from lhpost6_pin.data.channels import LAYOUT
+from lhpost6_pin.data.records import FULL_SCALE
 from lhpost6_pin.data.sensors import SensorSet
 from lhpost6_pin.discovery import Discovery, discover, verdict_entries
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
@@ -52,6 +53,7 @@ from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.machine_toml import save_machine_toml
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.show.viewer.frames import record_frames
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
 pytestmark = pytest.mark.long
@@ -673,3 +675,31 @@ def test_what_is_remembered_is_the_law_s_hidden_state() -> None:
         if k + 1 < len(x):
             advance_states(rows, x[k, :1], x[k + 1, :1] - x[k, :1], dt, np.zeros(1), Supply(2e7, 5e5), z)
     np.testing.assert_array_equal(_state("recent travel", memory, x, x, dt), x - past)
+
+
+def test_what_an_effect_does_is_the_residual_without_it_less_that_with_it(found):
+    (loop,) = found.loops
+    assert (loop.family, loop.unit, loop.over_unit) == ("stribeck_friction", "N", "m/s")
+    np.testing.assert_allclose(loop.before - loop.after, loop.own, atol=1e-9 * np.abs(loop.before).max())  # rounding
+    assert loop.spread[0] < 1.0 < loop.spread[1]
+    assert len(loop.state) == len(loop.own) == len(loop.before)
+    sliding = np.abs(loop.state) > 1e-3
+    assert np.mean(loop.own[sliding] * np.sign(loop.state[sliding])) < 0.0  # friction acts against the motion
+
+
+def test_residual_forces_are_viewed_on_one_scale(found):
+    first, second = (found.left[name] for name in ("refitted", "with the effects"))
+    assert first.attrs[FULL_SCALE] == second.attrs[FULL_SCALE] == np.abs(first["actuator_force"].values).max()
+    shape = (first.sizes["time"], len(found.machine.actuators))
+    assert first["actuator_force"].shape == second["actuator_force"].shape == shape
+    frames = record_frames(found.machine, second)
+    assert frames.full_scale == first.attrs[FULL_SCALE]  # the arrows of both have one scale
+
+
+def test_traces_are_those_of_the_model_with_the_largest_error(found):
+    (one,) = found.proof.traces
+    assert (one.phase, one.test) == ("inverse dynamics", "TZ")
+    assert one.models.shape == (len(one.time), 3)
+    error = np.std(one.models - one.measured[:, None], axis=0)
+    assert error[0] >= error[1]  # as delivered it errs more than refitted
+    assert one.noise > 0.0

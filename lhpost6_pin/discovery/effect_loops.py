@@ -84,6 +84,9 @@ def _loops(
         )  # fmt: skip
 
 
+ARM = 3.0
+"""Lever [m] at which a moment counts as much as its force."""
+
 _SIZES = {"N": 1e4, "N m": 3e4, "m3/s": 1e-3, "Pa": 1e5, "1": 1e-3}
 """Sizes that count as equally large where an effect shows in several kinds of residuals."""
 
@@ -100,7 +103,9 @@ def _named(
     legs = [c for c in one.candidate.components if c in {a.name for a in machine.actuators}]
     if kind == "wrench" and legs and machine.motion == "free":
         places = [machine.actuator_names.index(name) for name in legs]
-        shares = np.linalg.pinv(kinematic_jacobian(base.plant)[places])
+        # four legs in one plane have three forces and moments: what cancels among them is no force of theirs
+        even = np.array([1.0, 1.0, 1.0, *3 * [1.0 / ARM]])
+        shares = even[:, None] * np.linalg.pinv(kinematic_jacobian(base.plant)[places] * even, rcond=0.1)
         return [(f"force along {name}", "N", -own @ shares[:, i], -rest @ shares[:, i]) for i, name in enumerate(legs)]
     if kind == "wrench":
         units = ["N"] * 3 + ["N m"] * 3

@@ -30,7 +30,7 @@ def closing_blocks(found: Discovery) -> list[Block]:
     """Return the traces of the held-out test with the widest error, and the loop of every effect found."""
     blocks: list[Block] = []
     if found.proof and found.proof.traces:
-        blocks.append(_trace_figure(found.proof.traces[0]))
+        blocks.append(_trace_figure(found.proof.traces[0], 3 if found.search.added else 2))
     if found.loops:
         blocks += [_loop_figure(found.loops), _share_table(found)]
     return blocks or ["No test was held out, and no effect was found: nothing to compare."]
@@ -44,8 +44,8 @@ def _scale_of(one: GapTraces) -> Scale:
     return SCALES["pressure"] if one.quantity.startswith("chamber") else Scale(1e-3, "kN")
 
 
-def _trace_figure(one: GapTraces) -> Figure:
-    """Measured and three models, and the errors of two, over the seconds in which the refitted model errs most."""
+def _trace_figure(one: GapTraces, count: int) -> Figure:
+    """Measured and `count` models, and their errors, over the seconds in which the refitted model errs most."""
     dt = float(one.time[1] - one.time[0])
     width = min(len(one.time), max(2, round(WINDOW / dt)))
     errors = one.models - one.measured[:, None]
@@ -53,11 +53,11 @@ def _trace_figure(one: GapTraces) -> Figure:
     squares = np.convolve(errors[:, 1] ** 2, np.ones(width), "valid")
     first = int(np.argmax(squares))
     scale = _scale_of(one)
-    names = ("as delivered", "refitted", "with the effects")
+    names = ("as delivered", "refitted", "with the effects")[:count]
     values = [Trace("measured", one.measured, TARGET)]
-    styles = (DELIVERED, BEFORE, AFTER)
-    values += [Trace(n, x, s) for n, x, s in zip(names, one.models.T, styles, strict=True)]
-    rest = [Trace(n, x, s) for n, x, s in zip(names[1:], errors.T[1:], styles[1:], strict=True)]
+    styles = (DELIVERED, BEFORE, AFTER)[:count]
+    values += [Trace(n, x, s) for n, x, s in zip(names, one.models.T[:count], styles, strict=True)]
+    rest = [Trace(n, x, s) for n, x, s in zip(names[1:], errors.T[1:count], styles[1:], strict=True)]
     noise = {"2 σ of noise": 2.0 * one.noise, "": -2.0 * one.noise}
     what = f"{one.quantity.replace('_', ' ')}, {one.column}"
     rows = [Row(what[0].upper() + what[1:], values, scale), Row("Error, mean removed", rest, scale, lines=noise)]

@@ -126,7 +126,8 @@ def _ports(plant: Plant, test: MeasuredTest, moved: PlantMotion) -> tuple[PortPa
     ports = ports_along(plant, moved)
     if test.path is None:
         return ports, ports
-    return ports, ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
+    along = ports_along(plant, plant_motion(plant, test.motion._replace(displacement=test.path)))
+    return ports, along._replace(column=along.column[:0].copy(), turn=along.turn[:0].copy())  # which no state needs
 
 
 def _required(plant: Plant, test: MeasuredTest, moved: PlantMotion, turn: Array) -> Array:

@@ -188,7 +188,7 @@ def solve(
     rest = problem.whitened(x)
     if objective(problem, rest, x) > least + OVERSHOT:
         x, rest = at, held.residual
-    return Solution(x, at, held, rest, before, done, converged)
+    return Solution(x, at, held.released(), rest, before, done, converged)
 
 
 def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:

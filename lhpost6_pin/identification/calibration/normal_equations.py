@@ -90,6 +90,16 @@ class NormalEquations:
         """First bin of every band of a test."""
         return np.unique(self.problem.whitener.band(self.problem.frequency[test]), return_index=True)[1]
 
+    def released(self) -> "NormalEquations":
+        """Itself, without what is kept to sum it again at once, which fills memory."""
+        for known in ("rows", "squares"):
+            vars(self).pop(known, None)
+        self._known = None
+        if self.bias is not None:
+            vars(self.bias).pop("rows", None)
+            self.bias.squares, self.bias._known = {}, {}
+        return self
+
     def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of some tests and columns (c,), by default all."""
         count = len(self.slope[0])

@@ -37,7 +37,7 @@ KINDS = ("wrench", "flow", "gas", "force")
 """Kinds of residuals that are compared by default."""
 
 
-KEPT = 6
+KEPT = 4
 """Sets of ports along which a test's path is kept."""
 
 

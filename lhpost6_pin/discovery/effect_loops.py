@@ -1,8 +1,8 @@
 """What an effect does, over the state that it depends on: the residual of a test without it and with it.
 
 Everything else is as fitted. The effect's own part is the difference of both residuals, in the column where it is
-largest: a force along a leg or an axis, a flow into a chamber, a pressure, a spool's position. Its band is that of its
-amplitude's 90 % interval.
+largest against what is left: a force along a leg or an axis, a flow into a chamber, a pressure, a spool's position. Its
+band is that of its amplitude's 90 % interval.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ from ..data.signals import Band
 from ..identification.calibration.problem import OperatingPoint
 from ..identification.prepare import MeasuredTest
 from ..identification.residual_change import Evaluated, change_of
-from ..identification.residuals import RESIDUALS, follow
+from ..identification.residuals import RESIDUALS, follow, kinds_shown
 from ..mechanics.plant import make_plant
 from ..mechanics.pose import kinematic_jacobian, leg_displacements
 from .balances import HeldOut
@@ -46,11 +46,8 @@ class EffectLoop:
 
 def effect_loops(found: Search, where: HeldOut, estimates: Mapping[str, Estimate]) -> tuple[EffectLoop, ...]:
     """Loops of all effects added that are parts of the machine, on the test where each does most."""
-    return tuple(
-        max(_loops(found, where.base, one, estimates), key=lambda loop: float(np.mean(loop.own**2)))
-        for one in found.added
-        if not one.candidate.release
-    )
+    each = (list(_loops(found, where.base, one, estimates)) for one in found.added if not one.candidate.release)
+    return tuple(max(loops, key=lambda loop: float(np.mean(loop.own**2))) for loops in each if loops)
 
 
 def _loops(
@@ -61,7 +58,8 @@ def _loops(
     bands = found.problem.comparison.bands
     size = estimates.get(amplitude_of(one))
     spread = (size.low / size.value, size.high / size.value) if size and size.value else (1.0, 1.0)
-    kinds = tuple(kind for kind in one.candidate.family.shows_in if kind in RESIDUALS)
+    shown = kinds_shown(one.candidate.family.shows_in, base.tests[0].channels)
+    kinds = tuple(kind for kind in shown if kind in RESIDUALS)
     for test, path, residuals in zip(base.tests, base.paths, base.residuals, strict=True):
         before = Evaluated(base.plant, test, path, residuals)
         change = change_of(before, plant, test, follow(plant, test, (base.plant, path)), kinds)
@@ -72,7 +70,7 @@ def _loops(
                 columns += _named(base, one, kind, own, rest)
         if not columns:
             continue
-        name, unit, own, rest = max(columns, key=lambda c: float(np.mean(c[2] ** 2)) / _size(c[1]))
+        name, unit, own, rest = max(columns, key=lambda c: float(np.mean(c[2] ** 2)) / (float(np.var(c[3])) or 1.0))
         low_pass = Band(high=bands[-1])
         own, rest = (low_pass.apply(x, test.dt) for x in (own, rest))
         over, over_unit, state = _state(base, one, test, name)
@@ -84,17 +82,6 @@ def _loops(
         )  # fmt: skip
 
 
-ARM = 3.0
-"""Lever [m] at which a moment counts as much as its force."""
-
-_SIZES = {"N": 1e4, "N m": 3e4, "m3/s": 1e-3, "Pa": 1e5, "1": 1e-3}
-"""Sizes that count as equally large where an effect shows in several kinds of residuals."""
-
-
-def _size(unit: str) -> float:
-    return _SIZES[unit] ** 2
-
-
 def _named(
     base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: Array
 ) -> list[tuple[str, str, Array, Array]]:
@@ -103,9 +90,11 @@ def _named(
     legs = [c for c in one.candidate.components if c in {a.name for a in machine.actuators}]
     if kind == "wrench" and legs and machine.motion == "free":
         places = [machine.actuator_names.index(name) for name in legs]
+        along = kinematic_jacobian(base.plant)[places]
+        lever = float(np.linalg.norm(along[:, 3:]) / np.linalg.norm(along[:, :3]))
+        even = np.array([1.0, 1.0, 1.0, *3 * [1.0 / max(lever, 1e-6)]])
         # four legs in one plane have three forces and moments: what cancels among them is no force of theirs
-        even = np.array([1.0, 1.0, 1.0, *3 * [1.0 / ARM]])
-        shares = even[:, None] * np.linalg.pinv(kinematic_jacobian(base.plant)[places] * even, rcond=0.1)
+        shares = even[:, None] * np.linalg.pinv(along * even, rcond=0.1)
         return [(f"force along {name}", "N", -own @ shares[:, i], -rest @ shares[:, i]) for i, name in enumerate(legs)]
     if kind == "wrench":
         units = ["N"] * 3 + ["N m"] * 3

@@ -36,6 +36,7 @@ MECHANICAL = {
     "power_law_viscous": (("H3",), {}),
     "stray_spring": (("H1", "platen.yaw"), {}),
     "mounted_spring": (("platen.y",), {"height": 1.5}),
+    "placed_spring": ((), {"x": 6.1, "y": 3.8, "turn": 0.4}),
     "end_stop_stiffening": (("H1",), {"start": 0.0}),
     "unnamed_by_position": (("H1",), {}),
     "unnamed_by_speed": (("V1",), {"share": 0.5}),
@@ -48,6 +49,7 @@ MECHANICAL = {
     "inertia_coupling": ((), {}),
     "structural_flexibility": (("platen.x", "platen.y"), {}),
     "specimen_resonance": (("platen.x", "platen.y"), {}),
+    "swaying_specimen": (("platen.x",), {}),
 }
 """Components and numbers of families of what moves; empty: the first group, typical numbers."""
 
@@ -123,7 +125,7 @@ def test_without_amplitude_nothing_changes_by_a_bit(family: str):
     nothing = base().with_effect(family, components, **{**values, **none})
     run, plain = shaken(nothing, samples=60), shaken(base(), samples=60)
     assert make_plant(nothing).command_path.size == plain.plant.spools
-    if family in ("added_mass", "inertia_coupling", "specimen_resonance"):
+    if family in ("added_mass", "inertia_coupling", "specimen_resonance", "swaying_specimen"):
         # the same Inertia made from its moments; the weight of nothing is -0.0
         np.testing.assert_allclose(run.q, plain.q, rtol=0.0, atol=1e-13)
     else:

@@ -159,6 +159,8 @@ def discover(
         if one.candidate.name in {gone.name for gone in withdrawn}:
             found = without_effect(found, one.candidate)
     estimates = estimates_of(found, deviations(found))
+    tests_of_search = [one for one in (held_problem, begun.search.problem) if one is not None]
+    bases = [residual_at(one, found.solution).base for one in tests_of_search] if found.added else []
     final = found.refit if any(function is one for one in replacing) else found.solution
     fitted = fitted_machine(final)
     return Discovery(
@@ -177,7 +179,7 @@ def discover(
         seed=seed,
         hashes=hashes,
         left=left,
-        loops=effect_loops(found, residual_at(held_problem or begun.search.problem, found.solution), estimates),
+        loops=effect_loops(found, bases, estimates),
         curves=_curves(held_problem or begun.search.problem, final, found),
     )
 

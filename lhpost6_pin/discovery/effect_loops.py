@@ -2,10 +2,10 @@
 
 Everything else is as fitted. The effect's own part is the difference of both residuals, in the column where it is
 largest against what is left: a force along a leg or an axis, a flow into a chamber, a pressure, a spool's position. Its
-band is that of its amplitude's 90 % interval.
+band is that of its amplitude's 90 % interval. Forces are drawn as friction is: positive against a positive velocity.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,6 @@ from ..identification.residual_change import Evaluated, change_of
 from ..identification.residuals import RESIDUALS, follow, kinds_shown
 from ..mechanics.plant import make_plant
 from ..mechanics.pose import kinematic_jacobian, leg_displacements
-from .balances import HeldOut
 from .estimates import Estimate, amplitude_of
 from .search_state import AddedEffect, Search
 
@@ -32,7 +31,7 @@ class EffectLoop:
 
     family: str
     test: str
-    column: str  # such as "force along H2", "flow into H1 A"
+    column: str  # such as "resisting force along H2", "flow into H1 A"
     unit: str
     over: str  # the state
     over_unit: str
@@ -44,10 +43,19 @@ class EffectLoop:
     explained: float  # share of the variance of `before`
 
 
-def effect_loops(found: Search, where: HeldOut, estimates: Mapping[str, Estimate]) -> tuple[EffectLoop, ...]:
-    """Loops of all effects added that are parts of the machine, on the test where each does most."""
-    each = (list(_loops(found, where.base, one, estimates)) for one in found.added if not one.candidate.release)
-    return tuple(max(loops, key=lambda loop: float(np.mean(loop.own**2))) for loops in each if loops)
+def effect_loops(
+    found: Search, bases: Sequence[OperatingPoint], estimates: Mapping[str, Estimate]
+) -> tuple[EffectLoop, ...]:
+    """Loops of all effects added that are parts of the machine, on the test where each does most.
+
+    bases are tests at the solution: those held out, if any, then those searched.
+    """
+    out = []
+    for one in found.added if bases else ():
+        if not one.candidate.release:
+            loops = [loop for base in bases for loop in _loops(found, base, one, estimates)]
+            out += [max(loops, key=lambda loop: float(np.mean(loop.own**2)))] if loops else []
+    return tuple(out)
 
 
 def _loops(
@@ -95,10 +103,13 @@ def _named(
         even = np.array([1.0, 1.0, 1.0, *3 * [1.0 / max(lever, 1e-6)]])
         # four legs in one plane have three forces and moments: what cancels among them is no force of theirs
         shares = even[:, None] * np.linalg.pinv(along * even, rcond=0.1)
-        return [(f"force along {name}", "N", -own @ shares[:, i], -rest @ shares[:, i]) for i, name in enumerate(legs)]
+        return [
+            (f"resisting force along {name}", "N", -own @ shares[:, i], -rest @ shares[:, i])
+            for i, name in enumerate(legs)
+        ]
     if kind == "wrench":
         units = ["N"] * 3 + ["N m"] * 3
-        return [(f"wrench, {AXES[k]}", units[k], -own[:, k], -rest[:, k]) for k in base.plant.axes.tolist()]
+        return [(f"resisting wrench, {AXES[k]}", units[k], -own[:, k], -rest[:, k]) for k in base.plant.axes.tolist()]
     chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
     labels, words, unit = {
         "flow": (chambers, "flow into", "m3/s"),
@@ -115,8 +126,8 @@ def _state(base: OperatingPoint, one: AddedEffect, test: MeasuredTest, name: str
     machine, measured = base.plant.machine, test.channels
     motion, over = test.motion, one.candidate.family.over
     label = name.rpartition(" ")[2] if not name.endswith((" A", " B")) else name.split()[-2]
-    if name.startswith("wrench, "):
-        axis = AXES.index(name.removeprefix("wrench, "))
+    if name.startswith("resisting wrench, "):
+        axis = AXES.index(name.removeprefix("resisting wrench, "))
         unit = "m" if axis < 3 else "rad"
         if over == "velocity":
             return f"velocity, {AXES[axis]}", f"{unit}/s", motion.velocity[:, axis]

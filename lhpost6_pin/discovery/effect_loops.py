@@ -7,6 +7,7 @@ band is that of its amplitude's 90 % interval. Forces are drawn as friction is: 
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,74 +79,84 @@ def _loops(
                 columns += _named(base, one, kind, own, rest)
         if not columns:
             continue
-        name, unit, own, rest = max(columns, key=lambda c: float(np.mean(c[2] ** 2)) / (float(np.var(c[3])) or 1.0))
+        column = max(columns, key=lambda c: float(np.mean(c.own**2)) / (float(np.var(c.rest)) or 1.0))
         low_pass = Band(high=bands[-1])
-        own, rest = (low_pass.apply(x, test.dt) for x in (own, rest))
-        over, over_unit, state = _state(base, one, test, name)
+        own, rest = (low_pass.apply(x, test.dt) for x in (column.own, column.rest))
+        over, over_unit, state = _state(base, one.candidate.family.over, test, column.place)
         whole = own + rest
         left = float(np.var(rest) / np.var(whole)) if np.var(whole) > 0.0 else 0.0
         yield EffectLoop(
-            *(one.candidate.family.named, test.name, name, unit, over, over_unit, state),
+            *(one.candidate.family.named, test.name, column.name, column.unit, over, over_unit, state),
             before=whole, after=rest, own=own, spread=spread, explained=1.0 - left,
         )  # fmt: skip
 
 
-def _named(
-    base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: Array
-) -> list[tuple[str, str, Array, Array]]:
-    """Columns of a kind of residuals by name and unit, with the effect's part and the rest (n,)."""
+class _Column(NamedTuple):
+    """A column of a residual with an effect's part in it."""
+
+    name: str
+    place: str  # actuator, strut, axis or "supply"
+    unit: str
+    own: Array  # (n,)
+    rest: Array  # (n,) with the effect
+
+
+def _named(base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: Array) -> list[_Column]:
+    """Columns of a kind of residuals (n, k) with an effect's part `own` and the `rest`."""
     machine = base.plant.machine
     legs = [c for c in one.candidate.components if c in {a.name for a in machine.actuators}]
     if kind == "wrench" and legs and machine.motion == "free":
-        places = [machine.actuator_names.index(name) for name in legs]
-        along = kinematic_jacobian(base.plant)[places]
+        rows = [machine.actuator_names.index(name) for name in legs]
+        along = kinematic_jacobian(base.plant)[rows]
         lever = float(np.linalg.norm(along[:, 3:]) / np.linalg.norm(along[:, :3]))
         even = np.array([1.0, 1.0, 1.0, *3 * [1.0 / max(lever, 1e-6)]])
         # four legs in one plane have three forces and moments: what cancels among them is no force of theirs
         shares = even[:, None] * np.linalg.pinv(along * even, rcond=0.1)
         return [
-            (f"resisting force along {name}", "N", -own @ shares[:, i], -rest @ shares[:, i])
+            _Column(f"resisting force along {name}", name, "N", -own @ shares[:, i], -rest @ shares[:, i])
             for i, name in enumerate(legs)
         ]
     if kind == "wrench":
-        units = ["N"] * 3 + ["N m"] * 3
-        return [(f"resisting wrench, {AXES[k]}", units[k], -own[:, k], -rest[:, k]) for k in base.plant.axes.tolist()]
-    chambers = [f"{name} A" for name in machine.actuator_names] + [f"{name} B" for name in machine.double_acting]
-    labels, words, unit = {
-        "flow": (chambers, "flow into", "m3/s"),
-        "gas": (list(machine.strut_names), "pressure of", "1"),
-        "servo": (list(machine.actuator_names), "position of the spool of", "1"),
-        "supply": (["supply"], "pressure of the", "Pa"),
-        "force": (list(machine.actuator_names), "force of", "N"),
-    }[kind]
-    return [(f"{words} {label}", unit, own[:, k], rest[:, k]) for k, label in enumerate(labels) if k < own.shape[1]]
+        units = dict(zip(AXES, ["N"] * 3 + ["N m"] * 3, strict=True))
+        free = [(AXES[k], k) for k in base.plant.axes.tolist()]
+        return [_Column(f"resisting wrench, {x}", x, units[x], -own[:, k], -rest[:, k]) for x, k in free]
+    actuators = list(machine.actuator_names)
+    chambers = [(f"{name} A", name) for name in actuators] + [(f"{name} B", name) for name in machine.double_acting]
+    known: dict[str, tuple[str, str, list[tuple[str, str]]]] = {
+        "flow": ("flow into", "m3/s", chambers),
+        "gas": ("pressure of", "1", [(name, name) for name in machine.strut_names]),
+        "servo": ("position of the spool of", "1", [(name, name) for name in actuators]),
+        "supply": ("pressure of the", "Pa", [("supply", "supply")]),
+        "force": ("force of", "N", [(name, name) for name in actuators]),
+    }
+    words, unit, places = known[kind]
+    given = enumerate(places[: own.shape[1]])
+    return [_Column(f"{words} {label}", place, unit, own[:, k], rest[:, k]) for k, (label, place) in given]
 
 
-def _state(base: OperatingPoint, one: AddedEffect, test: MeasuredTest, name: str) -> tuple[str, str, Array]:
-    """The state that an effect's family depends on, along a test: what it is, its unit, and values (n,)."""
-    machine, measured = base.plant.machine, test.channels
-    motion, over = test.motion, one.candidate.family.over
-    label = name.rpartition(" ")[2] if not name.endswith((" A", " B")) else name.split()[-2]
-    if name.startswith("resisting wrench, "):
-        axis = AXES.index(name.removeprefix("resisting wrench, "))
+def _state(base: OperatingPoint, over: str, test: MeasuredTest, place: str) -> tuple[str, str, Array]:
+    """The state `over` which a family is drawn, at a place along a test: what it is, its unit, and values (n,)."""
+    machine, measured, motion = base.plant.machine, test.channels, test.motion
+    if place in AXES:
+        axis = AXES.index(place)
         unit = "m" if axis < 3 else "rad"
         if over == "velocity":
-            return f"velocity, {AXES[axis]}", f"{unit}/s", motion.velocity[:, axis]
-        return f"displacement, {AXES[axis]}", unit, motion.displacement[:, axis]
+            return f"velocity, {place}", f"{unit}/s", motion.velocity[:, axis]
+        return f"displacement, {place}", unit, motion.displacement[:, axis]
     names = [c.name for c in machine.components]
-    if label in names:
+    if place in names:
         if over in ("velocity", "displacement"):
             moved = leg_displacements(base.plant, motion.displacement, motion.velocity)[over == "velocity"]
-            return f"{over} of {label}", "m/s" if over == "velocity" else "m", moved[:, names.index(label)]
-        if over == "pressure difference" and "chamber_pressure_a" in measured and label in machine.double_acting:
-            a = measured["chamber_pressure_a"][:, machine.actuator_names.index(label)]
-            b = measured["chamber_pressure_b"][:, machine.double_acting.index(label)]
-            return f"pressure difference of {label}", "Pa", a - b
+            return f"{over} of {place}", "m/s" if over == "velocity" else "m", moved[:, names.index(place)]
+        if over == "pressure difference" and "chamber_pressure_a" in measured and place in machine.double_acting:
+            a = measured["chamber_pressure_a"][:, machine.actuator_names.index(place)]
+            b = measured["chamber_pressure_b"][:, machine.double_acting.index(place)]
+            return f"pressure difference of {place}", "Pa", a - b
         if over in ("pressure difference", "pressure rate") and "chamber_pressure_a" in measured:
-            place = machine.actuator_names.index(label)
+            column = machine.actuator_names.index(place)
             if over == "pressure rate":
-                return f"rate of pressure, {label} A", "Pa/s", test.rates["chamber_pressure_a"][:, place]
-            return f"pressure, {label} A", "Pa", measured["chamber_pressure_a"][:, place]
+                return f"rate of pressure, {place} A", "Pa/s", test.rates["chamber_pressure_a"][:, column]
+            return f"pressure, {place} A", "Pa", measured["chamber_pressure_a"][:, column]
         if over == "spool" and "spool_position" in measured:
-            return f"spool of {label}", "1", measured["spool_position"][:, machine.actuator_names.index(label)]
+            return f"spool of {place}", "1", measured["spool_position"][:, machine.actuator_names.index(place)]
     return "time", "s", np.asarray(test.dt * np.arange(test.samples), np.float64)

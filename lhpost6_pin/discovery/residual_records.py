@@ -28,14 +28,8 @@ def residual_records(held: Problem, models: Mapping[str, HeldOut]) -> dict[str, 
     scale = max(float(np.abs(next(iter(forces.values()))).max()), 1.0)
     test, found = held.tests[0], {}
     for name, force in forces.items():
-        attrs = {
-            "test": test.name,
-            "title": f"residual forces, {name}",
-            "machine": held.machine.name,
-            FULL_SCALE: scale,
-        }
+        attrs = {"test": test.name, "title": f"residual forces, {name}", "machine": held.machine.name}
         channels = {"platen_displacement": test.motion.displacement, "actuator_force": force}
-        found[name] = make_record(
-            test.dt * np.arange(test.samples), channels, held.machine.labels, attrs | {FULL_SCALE: scale}
-        )
+        time = test.dt * np.arange(test.samples)
+        found[name] = make_record(time, channels, held.machine.labels, attrs | {FULL_SCALE: scale})
     return found

@@ -12,6 +12,10 @@ from .search_state import AddedEffect, Search, fitted_machine
 __all__ = ["forces_explained", "leaves_much", "more_than_noise", "remainders"]
 
 
+LITTLE = 0.1
+"""Squares, over those of noise, of which no share is taken."""
+
+
 def more_than_noise(found: Search) -> bool:
     """Whether the residual exceeds noise by more than errors in the form of the effects found explain."""
     limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
@@ -39,10 +43,9 @@ def remainders(found: Search) -> dict[str, float]:
         if not rows.any():
             continue
         first, last = ([r[:, rows] for r in tests] for tests in (found.refit.normal.residual, found.residual))
-        count = sum(r.size for r in first)
-        before, after = (sum(float(np.sum(np.abs(r) ** 2)) for r in some) - doubt * count for some in (first, last))
-        if before > 0.1 * count:
-            out[kind] = max(after, 0.0) / before
+        before = _beyond(first, doubt)
+        if before > LITTLE * sum(r.size for r in first):
+            out[kind] = max(_beyond(last, doubt), 0.0) / before
     return out
 
 
@@ -55,10 +58,14 @@ def _impacted(found: Search) -> Mask:
     return columns
 
 
+def _beyond(residual: Sequence[Complex], doubt: float) -> float:
+    """Squares of whitened residuals beyond `doubt` times noise; negative where there is less."""
+    return sum(float(np.sum(np.abs(r) ** 2)) for r in residual) - doubt * sum(r.size for r in residual)
+
+
 def _excess(residual: Sequence[Complex], doubt: float) -> float:
-    """Squares of whitened residuals beyond `doubt` times noise; at least a tenth of noise."""
-    count = sum(r.size for r in residual)
-    return max(sum(float(np.sum(np.abs(r) ** 2)) for r in residual) - doubt * count, 0.1 * count)
+    """The same, at least `LITTLE` of noise."""
+    return max(_beyond(residual, doubt), LITTLE * sum(r.size for r in residual))
 
 
 def forces_explained(found: Search) -> bool:

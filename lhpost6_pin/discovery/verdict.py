@@ -57,9 +57,7 @@ class Verdict:
     scale: Scale | None = None  # that nothing measured fixes
     ratios: Mapping[str, Estimate] = field(default_factory=dict)  # to that scale, of what was estimated
     sums: Mapping[tuple[str, str], Estimate] = field(default_factory=dict)  # of unknowns that have no interval alone
-    remainder: Mapping[str, float] = field(
-        default_factory=dict
-    )  # share of the squares beyond noise that stays, by kind
+    remainder: Mapping[str, float] = field(default_factory=dict)  # of the squares beyond noise, by kind of residual
 
 
 def judge(
@@ -112,7 +110,7 @@ def judge(
     outlying = tuple(outlying_parameters(found, sd, estimates))
     identified = [_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone]
     effects = _merged([*identified, *outlying])
-    changed = {name: one for name, one in changed.items() if not any(name in found.parameters for found in outlying)}
+    changed = {name: one for name, one in changed.items() if not any(name in other.parameters for other in outlying)}
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
     word: Word = "not_testable" if blind else "parameters_only" if changed else "none"

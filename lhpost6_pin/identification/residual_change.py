@@ -9,7 +9,6 @@ from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.arrays import Array, Mask
 from ..effects.registry import PORTS, actuator_rows, law_of
@@ -69,7 +68,8 @@ def _wrench(before: Evaluated, plant: Plant, test: MeasuredTest, path: Path) -> 
     if "floor_acceleration" in test.channels:
         required = required + floor_wrench(plant, test.channels["floor_acceleration"])
         required -= floor_wrench(before.plant, before.test.channels["floor_acceleration"])
-    more, less = _differing(own, path.z, old, before.path.z)
+    keys, known = ([_key(row) for row in rows] for rows in (own, old))
+    more, less = _without(keys, known), _without(known, keys)
     out = wrench_residual(plant, path.ports, required, path.z, force - was, own[more])
     if less.any():
         nothing = np.zeros_like(required), before.path.z, np.zeros_like(force), old[less]
@@ -85,13 +85,8 @@ def _servo(before: Evaluated, plant: Plant, test: MeasuredTest) -> Array | None:
     return test.channels["spool_position"] - before.test.channels["spool_position"]
 
 
-def _differing(own: NDArray[np.void], z: Array, old: NDArray[np.void], was: Array) -> tuple[Mask, Mask]:
-    """Rows of two tables that are not in the other, with the same numbers on the same ports."""
-    keys, known = ([_key(row) for row in rows] for rows in (own, old))
-    return _without(keys, known), _without(known, keys)
-
-
 def _key(row: np.void) -> tuple[object, ...]:
+    """All that a row's force depends on beside the motion: its law, ports and numbers."""
     return int(row["law"]), *(int(row[port]) for port in PORTS), row["numbers"].tobytes()
 
 

@@ -144,7 +144,7 @@ def make_plant(machine: Machine) -> Plant:
     rows = effect_table(effects, ports)
     used = max(rows[port].max() for port in PORTS) if len(rows) else len(ports)
     swivels = sum(port.endswith(SWIVEL_TURNS) for port in ports)
-    for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)) if not places else ():
+    for end in (len(ports) - swivels, len(ports) - swivels - len(PLATEN_PORTS)):
         if used < end:
             ports = ports[:end]  # no effect acts on the others: nothing to evaluate there
     states = state_names(effects)

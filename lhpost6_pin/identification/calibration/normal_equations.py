@@ -44,27 +44,29 @@ class NormalEquations:
         self._place = _places(shared, len(problem.names))
         self._known: list[BandSquares] | None = None if known is None else vars(known).get("squares")
 
+    def _copied(self) -> "NormalEquations":
+        """A copy without the sums, which another problem or scale has its own of."""
+        other = copy(self)
+        for name in ("whole", "rows", "squares"):
+            vars(other).pop(name, None)
+        other._known = None
+        return other
+
     def only(self, places: Sequence[int]) -> "NormalEquations":
         """The same of some of the tests, not corrected."""
-        other = copy(self)
+        other = self._copied()
         other.problem = self.problem.only(places)
         for name in ("residual", "slope", "power"):
             setattr(other, name, [getattr(self, name)[i] for i in places])
-        for known in ("whole", "rows", "squares"):
-            other.__dict__.pop(known, None)
-        other._known = None
         return other
 
     def scaled(self, problem: Problem, scale: Array) -> "NormalEquations":
         """The same of a problem whose whitened residuals are (t, b, c) times larger, corrected as this."""
         times = [s[problem.whitener.band(f)] for s, f in zip(scale, problem.frequency, strict=True)]
-        other = copy(self)
+        other = self._copied()
         other.problem = problem
         other.residual = [r * s for r, s in zip(self.residual, times, strict=True)]
         other.slope = [[j.times(s) for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
-        for known in ("whole", "rows", "squares"):
-            other.__dict__.pop(known, None)
-        other._known = None
         return other if self.bias is None else other.less(self.bias.scaled(times))
 
     def less(self, bias: "NoiseBias") -> "NormalEquations":

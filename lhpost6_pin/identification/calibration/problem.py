@@ -270,13 +270,10 @@ class Problem:
         changes = []
         known, paths = base.with_ports_of(plant)
         for k, test in enumerate(tests or base.tests):
-            if test.motion is base.tests[k].motion:
-                path = follow(plant, test, (known, paths[k]))
-                before = Evaluated(known, base.tests[k], paths[k], base.residuals[k])
-                change = change_of(before, plant, test, path, kinds)
-            else:
-                change = _less(evaluate_residuals(plant, test, kinds), base.residuals[k])
-            changes.append(self.bins(change, test)[0])
+            same = test.motion is base.tests[k].motion
+            path = follow(plant, test, (known, paths[k]) if same else None)
+            before = Evaluated(known, base.tests[k], paths[k], base.residuals[k])
+            changes.append(self.bins(change_of(before, plant, test, path, kinds), test)[0])
         return changes
 
     def plant_at(self, x: Array) -> Plant:

@@ -31,7 +31,7 @@ from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import _by_rank, score_pairs
-from lhpost6_pin.discovery.search import _fit_jointly, _pruned, without_effect
+from lhpost6_pin.discovery.search import _best_strength, _fit_jointly, _pruned, with_candidate, without_effect
 from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
 from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import judge, reject_effects
@@ -466,6 +466,18 @@ def test_an_effect_at_a_bound_is_no_finding(found):
     assert less is moved and gone == (Withdrawn(effect.candidate.name, "stribeck_friction", "at_bound", (size,), ANY),)
     verdict = judge(less, (), (), (), gone)
     assert not verdict.effects and verdict.withdrawn == gone
+
+
+def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):
+    one = candidate("inertia_coupling", "platen")
+    problem, x = found.search.problem, found.search.solution.at
+    high = one.bounds[1]
+    with pytest.raises(ParameterError, match="no inertia"):  # a linear estimate may well be that far off
+        make_plant(with_candidate(problem, one, tuple(high), (), x)[0].machine)
+    for size in (high, 1e3 * high):
+        best = _best_strength(found.search, one, size, afresh=False)
+        make_plant(with_candidate(problem, one, tuple(best), (), x)[0].machine)  # is possible
+        assert (np.abs(best) < high).all()
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.errors import ParameterError
 from ..core.progress import Progress, between, split
 from ..identification.calibration.fit import objective, solve
 from ..identification.calibration.free_parameters import FreeParameter
@@ -318,14 +319,18 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -
 def _best_strength(found: Search, candidate: Candidate, amplitude: Array, *, afresh: bool) -> Array:
     """The linear estimate (q,) of a candidate's amplitudes, times the factor with which it explains most.
 
-    Far from the optimum the linear estimate may be several times too small or too large.
+    Far from the optimum the linear estimate may be several times too small or too large. Sizes that leave no possible
+    machine, such as one without inertia, are passed over; zero where none is possible.
     """
-    start, best, least = found.solution.at, amplitude, np.inf
+    start, best, least = found.solution.at, np.zeros_like(amplitude), np.inf
     for factor in found.numbers.vector("accept.strengths"):
         tried = np.clip(factor * amplitude, *candidate.bounds)
         problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)
         x = np.zeros_like(x) if afresh else x
-        value = objective(problem, problem.whitened(x), x)
+        try:
+            value = objective(problem, problem.whitened(x), x)
+        except ParameterError:
+            continue
         if value < least:
             best, least = tried, value
     return np.asarray(best)

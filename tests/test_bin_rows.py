@@ -7,13 +7,11 @@ from lhpost6_pin.identification.calibration.bin_rows import (
     bin_rows,
     dense_rows,
     row_by_column,
-    side_by_side,
     sparse_bins,
     squares_of,
 )
 
 M, C, P = 12, 5, 7
-FIRST = np.array([0, 1, 5])
 
 
 @pytest.fixture
@@ -60,34 +58,20 @@ def test_differences_sums_and_neighbours(bins, rng):
     np.testing.assert_allclose(less.squares(), real(changed - bins, ones).T @ real(changed - bins, ones), atol=1e-12)
     full = real(bins @ parts, ones)
     np.testing.assert_allclose(dense_rows(bins).select(parts).squares(), full.T @ full, atol=1e-12)
-    both = real(np.concatenate([bins, changed], axis=-1), ones)
-    np.testing.assert_allclose(
-        side_by_side([dense_rows(bins), dense_rows(changed)]).squares(), both.T @ both, atol=1e-12
-    )
+    both = dense_rows(np.concatenate([bins, changed], axis=-1))
+    places = np.arange(bins.shape[2], both.count)
+    np.testing.assert_array_equal(both.only(places).squares(), dense_rows(changed).squares())
     sparse = sparse_bins(changed[..., 0]).less(sparse_bins(bins[..., 0]), C)
     out = np.zeros((C, M), complex)
     out[sparse.columns] = sparse.bins
     np.testing.assert_allclose(out.T, changed[..., 0] - bins[..., 0], atol=1e-15)
 
 
-def test_products_by_band_are_weighed_again(bins, rng):
-    power = 1.0 + rng.random((len(FIRST), C))
-    whole = np.repeat(power, np.diff([*FIRST, M]), axis=0)
-    full = real(bins, np.sqrt(whole))
-    squares = dense_rows(bins).squares_by_band(FIRST)
-    np.testing.assert_allclose(squares.over(power), full.T @ full, atol=1e-12)
+def test_products_are_weighed_by_a_power(bins, rng):
+    power = 1.0 + rng.random((M, C))
+    full = real(bins, np.sqrt(power))
+    rows = dense_rows(bins)
+    np.testing.assert_allclose(rows.squares(np.sqrt(power)), full.T @ full, atol=1e-12)
     some = np.arange(C) % 2 == 0
-    part = real(bins[:, some], np.sqrt(whole[:, some]))
-    np.testing.assert_allclose(squares.over(power, some), part.T @ part, atol=1e-12)
-
-
-def test_products_by_band_reuse_those_of_rows_that_stay(bins, rng):
-    """Two quantities change, one goes and one comes: the others' products are taken over."""
-    known = dense_rows(bins).squares_by_band(FIRST)
-    place = np.array([5, -1, 0, 3, -1, 4])  # in what was known
-    fresh = rng.normal(size=(M, C, 2)) + 0j
-    again = np.stack([bins[..., k] if k >= 0 else fresh[..., i % 2] for i, k in enumerate(place)], axis=-1)
-    rows = dense_rows(again)
-    found, wanted = rows.squares_by_band(FIRST, known, place), rows.squares_by_band(FIRST)
-    ones = np.ones((len(FIRST), C))
-    np.testing.assert_allclose(found.over(ones), wanted.over(ones), atol=1e-12)
+    part = real(bins[:, some], np.sqrt(power[:, some]))
+    np.testing.assert_allclose(rows.squares(np.sqrt(power), some), part.T @ part, atol=1e-12)

@@ -40,9 +40,10 @@ from lhpost6_pin.discovery.withdrawal import Withdrawn, lowers_squares, withdraw
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table
-from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration import calibration_numbers, fit
 from lhpost6_pin.identification.calibration.bin_rows import BinRows, dense_rows, row_by_column
-from lhpost6_pin.identification.calibration.normal_equations import bounds_of
+from lhpost6_pin.identification.calibration.fit import objective_at, solve
+from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
@@ -474,10 +475,29 @@ def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):
     high = one.bounds[1]
     with pytest.raises(ParameterError, match="no inertia"):  # a linear estimate may well be that far off
         make_plant(with_candidate(problem, one, tuple(high), (), x)[0].machine)
-    for size in (high, 1e3 * high):
-        best = _best_strength(found.search, one, size, afresh=False)
-        make_plant(with_candidate(problem, one, tuple(best), (), x)[0].machine)  # is possible
-        assert (np.abs(best) < high).all()
+    assert not _best_strength(found.search, one, high, (1.0,), afresh=False).any()
+    small = _best_strength(found.search, one, high, (1.0, 1e-6), afresh=False)
+    np.testing.assert_array_equal(small, 1e-6 * high)
+
+
+def test_a_step_to_a_machine_without_inertia_is_rejected(found, monkeypatch):
+    """Its first step has the largest amplitudes; the fit goes on with a quarter of it, until a machine remains."""
+    search, one = found.search, candidate("inertia_coupling", "platen")
+    absent = tuple(np.zeros_like(one.bounds[1]))
+    own = one.fit_parameters(absent, search.numbers)
+    problem, x = with_candidate(search.problem, one, absent, own, search.solution.at)
+    places = [problem.names.index(k.name) for k in own]
+    far, steps = np.zeros_like(x), []
+    far[places] = one.bounds[1]
+    assert objective_at(problem, x + far) == np.inf
+
+    def too_far(*given):
+        steps.append(far if not steps else bounded_step(*given))
+        return steps[-1]
+
+    monkeypatch.setattr(fit, "bounded_step", too_far)
+    after = solve(problem, search.calibration, x, lambda share: None, search.solution.normal, frugal=True)
+    assert len(steps) > 1 and objective_at(problem, after.x) < objective_at(problem, x) + fit.OVERSHOT
 
 
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):

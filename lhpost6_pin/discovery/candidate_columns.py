@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.arrays import Array, Complex
 from ..effects.registry import LAWS
-from ..identification.calibration.bin_rows import BinRows, dense_rows, side_by_side
+from ..identification.calibration.bin_rows import BinRows, dense_rows
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
 from ..identification.prepare import actuator_forces
@@ -20,38 +20,52 @@ from ..identification.residuals import RESIDUALS, follow
 from ..machine.machine import Machine
 from ..mechanics.plant import make_plant
 from .candidates import Candidate
-from .scores import Columns
 
-__all__ = ["beside", "columns_of"]
+__all__ = ["columns_of", "columns_of_groups"]
 
 
 def columns_of(
     problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]
 ) -> tuple[list[BinRows], list[Array]]:
     """Columns of candidates that differ in components only; and each candidate's combination (k, q) of them."""
+    columns, (parts,) = columns_of_groups(problem, base, [candidates])
+    return columns, parts
+
+
+def columns_of_groups(
+    problem: Problem, base: OperatingPoint, groups: Sequence[Sequence[Candidate]]
+) -> tuple[list[BinRows], list[list[Array]]]:
+    """Columns of several such groups side by side; and the combinations (k, q) of them by group."""
+    each, parts = zip(*(_bins_of(problem, base, group) for group in groups), strict=True)
+    pairs = enumerate(zip(zip(*each, strict=True), problem.frequency, strict=True))
+    columns = [dense_rows(problem.whitener.apply(t, np.concatenate(bins, axis=2), f)) for t, (bins, f) in pairs]
+    ends = np.cumsum([0, *(bins[0].shape[2] for bins in each)])
+    rows = np.eye(ends[-1])
+    return columns, [[rows[:, a:b] @ part for part in own] for (a, b), own in zip(pairwise(ends), parts, strict=True)]
+
+
+def _bins_of(
+    problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]
+) -> tuple[list[Complex], list[Array]]:
+    """Bins (m, c, k) of every test by the amplitudes of one group; and each candidate's combination (k, q) of them."""
     first = candidates[0]
     effect = first.on(base.plant.machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1]
     legs = {c.name for c in base.plant.machine.components}
     alone = sorted({name for c in candidates for name in c.components})
     together = set(alone) <= legs and len(first.amplitudes) == 1
     if together and first.family.shows_in == ("wrench",) and not LAWS[effect.law].modifies:
-        columns = _by_force(problem, base, [first.at((name,)) for name in alone])
+        bins = _by_force(problem, base, [first.at((name,)) for name in alone])
     elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].modifies == "oil":
-        columns = _by_oil(problem, base, first.at(tuple(alone)))
+        bins = _by_oil(problem, base, first.at(tuple(alone)))
     else:
-        columns = beside([_by_difference(problem, base, c) for c in candidates])
+        each = zip(*(_by_difference(problem, base, c) for c in candidates), strict=True)
         ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
         whole = np.eye(ends[-1])
-        return columns, [whole[:, a:b] for a, b in pairwise(ends)]
-    return columns, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
+        return [np.concatenate(bins, axis=2) for bins in each], [whole[:, a:b] for a, b in pairwise(ends)]
+    return bins, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
 
 
-def beside(parts: Sequence[Columns]) -> list[BinRows]:
-    """Columns of every test side by side."""
-    return [side_by_side(rows) for rows in zip(*parts, strict=True)]
-
-
-def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[BinRows]:
+def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
     kinds = tuple(k for k in candidate.family.shows_in if k in RESIDUALS)
     typical = [s.typical for s in candidate.amplitudes]
     parts = []
@@ -59,10 +73,10 @@ def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate)
         machine = candidate.on(base.plant.machine, tuple(size * (k == i) for k in range(len(typical))))
         changes = problem.change(base, make_plant(machine), kinds)
         parts.append([c / size for c in changes])
-    return _whitened(problem, [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)])
+    return [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)]
 
 
-def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[BinRows]:
+def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[Complex]:
     """Wrench of each candidate's force, all in one machine; it reduces the required actuator wrench."""
     size = candidates[0].amplitudes[0].typical
     machine: Machine = base.plant.machine
@@ -71,7 +85,7 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         machine = candidate.on(machine, (size,))
     plant = make_plant(machine)
     rows = plant.rows[plant.rows["effect"] >= known]
-    found: list[BinRows] = []
+    found: list[Complex] = []
     before, paths = base.with_ports_of(plant)
     for test, there in zip(base.tests, paths, strict=True):
         path = follow(plant, test, (before, there))
@@ -79,19 +93,14 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
         own = [wrench[:, rows["effect"] == known + i].sum(axis=1) for i in range(len(candidates))]
-        found.append(dense_rows(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size)))
+        found.append(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size))
     return found
 
 
-def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[BinRows]:
+def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
     """Flows of all actuators of a candidate at once, one by one."""
     size = candidate.amplitudes[0].typical
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), ("flow",))
     places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]
     rows = np.stack([problem.rows_of_actuator(place) for place in places], axis=-1)
-    return _whitened(problem, [c[..., None] * rows / size for c in changes])
-
-
-def _whitened(problem: Problem, bins: Sequence[Complex]) -> list[BinRows]:
-    pairs = enumerate(zip(bins, problem.frequency, strict=True))
-    return [dense_rows(problem.whitener.apply(t, b, f)) for t, (b, f) in pairs]
+    return [c[..., None] * rows / size for c in changes]

@@ -16,7 +16,7 @@ from ..core.arrays import Array
 from ..core.progress import Progress
 from ..identification.calibration.problem import OperatingPoint, Problem
 from .acceptance import Lowered, Reweighting, gate, refusal
-from .candidate_columns import beside, columns_of
+from .candidate_columns import columns_of_groups
 from .candidates import Candidate, list_candidates, list_releases
 from .scores import Block, Columns, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
@@ -42,31 +42,30 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
             why = "may be due to the form of an effect added there"
         return Scored(candidate, one, less.gain, less.share, why)
 
-    def of_group(group: Sequence[Candidate], columns: Columns, parts: Sequence[Array], block: Block) -> list[Scored]:
-        def scores(block: Block) -> list[Score]:
-            pairs = zip(group, parts, strict=True)
-            return [score(background, block.select(q), *c.bounds, c.spread(numbers), look) for c, q in pairs]
-
-        ones = scores(block)
-        if max(one.gain for one in ones) >= look:
-            noisy = [columns_of(again, there, group)[0] for again, there in linear.replicas]
-            ones = scores(less_noise(background, block, columns, noisy))
-        return [
-            judged(candidate, one, background.explained(columns, part @ one.amplitude) if one.gain >= look else [])
-            for candidate, part, one in zip(group, parts, ones, strict=True)
-        ]
+    def scores(group: Sequence[Candidate], parts: Sequence[Array], block: Block) -> list[Score]:
+        pairs = zip(group, parts, strict=True)
+        return [score(background, block.select(q), *c.bounds, c.spread(numbers), look) for c, q in pairs]
 
     def of_batch(groups: Sequence[Sequence[Candidate]]) -> list[Scored]:
-        """Several groups with one pass through the background, which dominates the cost."""
-        each = [columns_of(problem, base, group) for group in groups]
-        block = make_block(background, beside([columns for columns, _ in each]))
-        ends = np.cumsum([0, *(columns[0].count for columns, _ in each)])
-        own = [block.select(part) for part in np.split(np.eye(ends[-1]), ends[1:-1], axis=1)]
-        return [
-            one
-            for group, (columns, parts), b in zip(groups, each, own, strict=True)
-            for one in of_group(group, columns, parts, b)
-        ]
+        """Several groups at once; those that gain are scored again, corrected for noise."""
+        columns, parts = columns_of_groups(problem, base, groups)
+        block = make_block(background, columns)
+        each = [scores(group, own, block) for group, own in zip(groups, parts, strict=True)]
+        gaining = [i for i, ones in enumerate(each) if max(one.gain for one in ones) >= look]
+        some = [groups[i] for i in gaining]
+        noisy = [columns_of_groups(*replica, some) for replica in linear.replicas] if some else []
+        for k, i in enumerate(gaining):
+            own = _places(parts[i])
+            clean, alone = [c.only(own) for c in columns], block.select(np.eye(columns[0].count)[:, own])
+            changed = [[c.only(_places(there[k])) for c in seen] for seen, there in noisy]
+            corrected = less_noise(background, alone, clean, changed)
+            each[i] = scores(groups[i], [part[own] for part in parts[i]], corrected)
+        found = []
+        for group, own_parts, ones in zip(groups, parts, each, strict=True):
+            for candidate, part, one in zip(group, own_parts, ones, strict=True):
+                explained = background.explained(columns, part @ one.amplitude) if one.gain >= look else []
+                found.append(judged(candidate, one, explained))
+        return found
 
     scored: list[Scored] = []
     free, spread = np.full(1, np.inf), np.full(1, numbers.number("fit.sensor_free"))
@@ -120,6 +119,11 @@ def _confused(one: Candidate, other: Candidate) -> bool:
     return first.named == second.named or first.named in second.confused_with or second.named in first.confused_with
 
 
+def _places(parts: Sequence[Array]) -> NDArray[np.intp]:
+    """The columns (k,) of which a group's candidates are combinations (n, q)."""
+    return np.flatnonzero(np.hstack(parts).any(axis=1))
+
+
 class CandidatePair(NamedTuple):
     """Two candidates together."""
 
@@ -163,8 +167,6 @@ def score_pairs(found: Search, linear: Linearisation, candidates: Sequence[Candi
 
 def _all_columns(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> Columns:
     """Columns of every test, those of all candidates' amplitudes."""
-    each = []
-    for candidate in candidates:
-        columns, (part,) = columns_of(problem, base, [candidate])
-        each.append([c.select(part) for c in columns])
-    return beside(each)
+    columns, parts = columns_of_groups(problem, base, [[candidate] for candidate in candidates])
+    amplitudes = np.hstack([part for own in parts for part in own])
+    return [c.select(amplitudes) for c in columns]

@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.errors import ParameterError
 from ..core.progress import Progress, between, split
-from ..identification.calibration.fit import objective, solve
+from ..identification.calibration.fit import objective_at, solve
 from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
 from ..identification.calibration.problem import Problem
@@ -82,12 +81,12 @@ def _screened_as_stated(found: Search, progress: Progress) -> Search | None:
     Without an effect that is missing, a refit may end far off, where no small addition of it would help. It is added if
     its joint fit explains enough of what that refit leaves beyond noise. None, too, where it leaves little.
     """
-    n, problem = found.numbers.number, found.problem
+    n, problem, known = found.numbers.number, found.problem, found.solution.normal
     if found.power < n("accept.settled"):
         return None
     stated, (first, *more, screening, adding) = np.zeros(len(problem.prior)), split(progress, 3 + len(problem.replicas))
-    normal = NormalEquations(problem, stated, first)
-    normal = normal.less(NoiseBias(normal, stated, more))
+    normal = NormalEquations(problem, stated, first, known, problem.bent)
+    normal = normal.less(NoiseBias(normal, stated, more, known))
     solution = found.solution._replace(x=stated, at=stated, normal=normal, residual=normal.residual)
     linear = linearise(solution, found.calibration, replicas=True)
     screened = screen(replace(found, solution=solution), linear, screening)
@@ -304,10 +303,9 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -
         kind = "known" if problem.names.index(candidate.release) < len(problem.parameters) else "sensor"
         problem = problem.with_free(candidate.release, found.numbers.number(f"fit.{kind}_free"))
     else:
-        estimate = one.score.amplitude
-        if found.power >= found.numbers.number("accept.settled"):
-            estimate = _best_strength(found, candidate, estimate, afresh=afresh)
-        amplitudes = tuple(np.clip(estimate, *candidate.bounds).tolist())
+        far = found.power >= found.numbers.number("accept.settled")
+        strengths = found.numbers.vector("accept.strengths") if far else (1.0,)
+        amplitudes = tuple(_best_strength(found, candidate, one.score.amplitude, strengths, afresh=afresh).tolist())
         own = candidate.fit_parameters(amplitudes, found.numbers)
         problem, start = with_candidate(problem, candidate, amplitudes, own, start)
     # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
@@ -316,24 +314,22 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -
     return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
 
 
-def _best_strength(found: Search, candidate: Candidate, amplitude: Array, *, afresh: bool) -> Array:
-    """The linear estimate (q,) of a candidate's amplitudes, times the factor with which it explains most.
+def _best_strength(
+    found: Search, candidate: Candidate, amplitude: Array, strengths: Sequence[float], *, afresh: bool
+) -> Array:
+    """The linear estimate (q,) of a candidate's amplitudes, times the factor of some with which it explains most.
 
-    Far from the optimum the linear estimate may be several times too small or too large. Sizes that leave no possible
-    machine, such as one without inertia, are passed over; zero where none is possible.
+    Far from the optimum the linear estimate may be several times too small or too large. Zero where none of them makes
+    a machine.
     """
     start, best, least = found.solution.at, np.zeros_like(amplitude), np.inf
-    for factor in found.numbers.vector("accept.strengths"):
+    for factor in strengths:
         tried = np.clip(factor * amplitude, *candidate.bounds)
         problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)
-        x = np.zeros_like(x) if afresh else x
-        try:
-            value = objective(problem, problem.whitened(x), x)
-        except ParameterError:
-            continue
+        value = objective_at(problem, np.zeros_like(x) if afresh else x)
         if value < least:
             best, least = tried, value
-    return np.asarray(best)
+    return best
 
 
 def with_candidate(

@@ -3,9 +3,8 @@
 An effect whose law makes forces is one entry of the force ledger; a modifier changes rows of others.
 """
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from ..core.errors import ParameterError, UnknownNameError
 from ..laws.contract import parameter_units
@@ -39,11 +38,12 @@ class Effect:
         law = LAWS[self.law]
         if len(self.params) != len(self.ports):
             raise ParameterError(f"{self.name}: {len(self.params)} sets of numbers for {len(self.ports)} ports")
+        units = parameter_units(law)
         for port, numbers in zip(self.ports, self.params, strict=True):
-            if len(numbers) != len(units := parameter_units(law)):
+            if len(numbers) != len(units):
                 wanted = ", ".join(f"{name} [{unit}]" for name, unit in units)
                 raise ParameterError(f"{self.name} on {port}: {len(numbers)} numbers given; {self.law} takes {wanted}")
-            if not np.all(np.isfinite(numbers)):
+            if not all(map(math.isfinite, numbers)):
                 raise ParameterError(f"{self.name} on {port}: {numbers!r} is not finite")
         if law.takes_spool != bool(self.spools) or (self.spools and len(self.spools) != len(self.ports)):
             raise ParameterError(

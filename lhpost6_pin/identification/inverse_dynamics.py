@@ -21,7 +21,7 @@ from ..core.arrays import Array
 from ..core.compiled import compiled
 from ..core.errors import SimulationError
 from ..effects.evaluate import advance_states
-from ..effects.registry import LAWS, actuator_rows, law_of
+from ..effects.registry import LAWS, actuator_rows
 from ..mechanics.plant import Plant
 from ..mechanics.port_path import PortPath, ports_along
 from ..mechanics.pose import PlatenMotion, kinematic_jacobian, plant_motion
@@ -170,7 +170,7 @@ def with_loads(plant: Plant, ports: PortPath, required: Array, z: Array, measure
     under load explains the force that it was computed from. Each load is set as pressure in chamber A, with none in B.
     Without such friction z is returned as it is.
     """
-    if not any(law_of(row).feels_load for row in plant.rows):
+    if not plant.feels_load:
         return z
     shares = np.linalg.pinv(kinematic_jacobian(plant)[:, plant.axes])
     states, areas = plant.rows["state"][actuator_rows(plant.rows)], plant.actuators.area_a

@@ -6,14 +6,15 @@ differs, the residuals are evaluated anew and subtracted. Both agree to rounding
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.arrays import Array, Mask
-from ..effects.registry import PORTS, actuator_rows, law_of
+from ..effects.registry import actuator_rows
 from ..laws.supply import varies
-from ..mechanics.plant import Plant
+from ..mechanics.plant import Plant, RowKey
 from ..mechanics.required_wrench import floor_wrench
 from .prepare import MeasuredTest, actuator_forces
 from .residual_kernels import wrench_residual
@@ -56,8 +57,7 @@ def change_of(
 
 def _wrench(before: Evaluated, plant: Plant, test: MeasuredTest, path: Path) -> Array | None:
     """Change of the wrench residual (n, 6); None where friction under load makes it nonlinear in forces."""
-    own, old = (p.rows[p.rows["spool"] < 0] for p in (plant, before.plant))
-    if any(law_of(row).feels_load for row in (*own, *old)):
+    if plant.feels_load or before.plant.feels_load:
         return None
     force, was = (actuator_forces(p.machine, t.channels) for p, t in ((plant, test), (before.plant, before.test)))
     if force is None or was is None:
@@ -68,11 +68,11 @@ def _wrench(before: Evaluated, plant: Plant, test: MeasuredTest, path: Path) -> 
     if "floor_acceleration" in test.channels:
         required = required + floor_wrench(plant, test.channels["floor_acceleration"])
         required -= floor_wrench(before.plant, before.test.channels["floor_acceleration"])
-    keys, known = ([_key(row) for row in rows] for rows in (own, old))
-    more, less = _without(keys, known), _without(known, keys)
-    out = wrench_residual(plant, path.ports, required, path.z, force - was, own[more])
+    own, old = (p.rows["spool"] < 0 for p in (plant, before.plant))
+    more, less = own & _without(plant.keys, before.plant.keys), old & _without(before.plant.keys, plant.keys)
+    out = wrench_residual(plant, path.ports, required, path.z, force - was, plant.rows[more])
     if less.any():
-        nothing = np.zeros_like(required), before.path.z, np.zeros_like(force), old[less]
+        nothing = np.zeros_like(required), before.path.z, np.zeros_like(force), before.plant.rows[less]
         out -= wrench_residual(before.plant, before.path.ports, *nothing)
     return out
 
@@ -85,12 +85,7 @@ def _servo(before: Evaluated, plant: Plant, test: MeasuredTest) -> Array | None:
     return test.channels["spool_position"] - before.test.channels["spool_position"]
 
 
-def _key(row: np.void) -> tuple[object, ...]:
-    """All that a row's force depends on beside the motion: its law, ports and numbers."""
-    return int(row["law"]), *(int(row[port]) for port in PORTS), row["numbers"].tobytes()
-
-
-def _without(keys: list[tuple[object, ...]], known: list[tuple[object, ...]]) -> Mask:
+def _without(keys: Sequence[RowKey], known: Sequence[RowKey]) -> Mask:
     """Which keys are not among those known, each of which accounts for one."""
     there, out = Counter(known), np.ones(len(keys), bool)
     for i, key in enumerate(keys):
@@ -102,11 +97,13 @@ def _without(keys: list[tuple[object, ...]], known: list[tuple[object, ...]]) ->
 
 def _flow(before: Evaluated, plant: Plant, test: MeasuredTest, path: Path) -> Array | None:
     """Change of the flow residual (n, n_chambers) of the actuators that differ; None where more than they does."""
-    own, old = (p.rows[actuator_rows(p.rows)] for p in (plant, before.plant))
+    own, old = (actuator_rows(p.rows) for p in (plant, before.plant))
     alone = "chamber_pressure_a" in test.channels and "spool_position" in test.channels
     if not alone or varies(plant.supply) or plant.supply != before.plant.supply or len(own) != len(old):
         return None
-    changed = np.array([_key(a) != _key(b) or a["modified"] != b["modified"] for a, b in zip(own, old, strict=True)])
+    pairs = list(zip(own.tolist(), old.tolist(), strict=True))
+    changed = np.array([plant.keys[i] != before.plant.keys[j] for i, j in pairs])
+    changed |= plant.rows["modified"][own] != before.plant.rows["modified"][old]
     double = np.isin(plant.machine.actuator_names, plant.machine.double_acting)
     for name in ("chamber_pressure_a", "chamber_pressure_b", "spool_position"):
         of = double if name == "chamber_pressure_b" else np.ones_like(double)

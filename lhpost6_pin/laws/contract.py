@@ -52,6 +52,7 @@ def parameter_sizes(law: Law) -> dict[str, int]:
     return {name: max(1, count) for name, (_, count) in _fields(law).items()}
 
 
+@cache
 def parameter_units(law: Law) -> tuple[tuple[str, str], ...]:
     """Names and units of the numbers that an effect states, in order; a table of n values is `name_1` to `name_n`.
 

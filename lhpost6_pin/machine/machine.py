@@ -96,7 +96,12 @@ class Machine(Structure):
 
     def _with_effects(self, entries: Mapping[str, EffectEntry]) -> "Machine":
         machine = replace(self, parameters=replace(self.parameters, effects=entries))
-        _ = machine.added_effects  # raises for an effect that cannot be
+        made = zip(self.parameters.effects.items(), self.added_effects, strict=False)
+        known = {name: effect for (name, entry), effect in made if entries.get(name) is entry}
+        vars(machine)["added_effects"] = (
+            *(known.get(name) or make_named_effect(machine, name, entry) for name, entry in entries.items()),
+            *self.own_effects,
+        )  # raises for an effect that cannot be
         return machine
 
     def with_valves(self, count: int) -> "Machine":

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..effects.modifiers import command_path, supply_of
-from ..effects.registry import PORTS, actuator_rows, columns_of, shapes_of, states_of
+from ..effects.registry import PORTS, actuator_rows, columns_of, law_of, shapes_of, states_of
 from ..effects.table import effect_table, state_names
 from ..laws.supply import Supply
 from ..machine.machine import Machine
@@ -26,7 +26,10 @@ from .rigid_body import free_axes, make_model
 from .specimen_mount import base_placement, modal_participation
 from .tables import Tables, pack_tables
 
-__all__ = ["MovingRow", "Plant", "State", "make_plant"]
+__all__ = ["MovingRow", "Plant", "RowKey", "State", "make_plant"]
+
+RowKey = tuple[object, ...]
+"""Law, ports and numbers of a row: all that its force depends on beside motion and states."""
 
 
 class State(NamedTuple):
@@ -87,6 +90,17 @@ class Plant:
         pairs = zip(rows, shapes_of(rows), strict=True)
         keys = [(int(row["law"]), *(int(row[port]) for port in PORTS), shape.tobytes()) for row, shape in pairs]
         return tuple(MovingRow(key, states_of(row), row) for key, row in zip(keys, rows, strict=True))
+
+    @cached_property
+    def keys(self) -> tuple[RowKey, ...]:
+        """Key of every row."""
+        ports = np.column_stack([self.rows[name] for name in ("law", *PORTS)]).tolist()
+        return tuple((*own, numbers.tobytes()) for own, numbers in zip(ports, self.rows["numbers"], strict=True))
+
+    @cached_property
+    def feels_load(self) -> bool:
+        """Whether a row's force depends on that of the actuator on its leg, so that forces do not add up."""
+        return any(law_of(row).feels_load for row in self.rows)
 
     @cached_property
     def geometry(self) -> bytes:

@@ -6,23 +6,21 @@ are summed column by column over the unknowns that show there, an eighth of the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex, Mask
+from ...core.compiled import compiled
 
 __all__ = [
-    "BandSquares",
     "BinRows",
     "SparseBins",
     "bin_rows",
     "dense_rows",
     "over",
     "row_by_column",
-    "side_by_side",
     "sparse_bins",
     "squares_of",
 ]
@@ -71,39 +69,15 @@ class BinRows:
         """The same with every quantity scaled (p,)."""
         return BinRows(self.count, [(own, rows * scale[own, None]) for own, rows in self.parts])
 
-    def squares(self) -> Array:
-        """Products (p, p) of all rows with each other."""
+    def squares(self, root: Array | None = None, columns: Mask | None = None) -> Array:
+        """Products (p, p) of all rows with each other, over roots of a power (m, c), of some columns (c,) or all."""
         out = np.zeros((self.count, self.count))
-        for own, rows in self.parts:
-            out[np.ix_(own, own)] += rows @ rows.T
-        return out
-
-    def squares_by_band(
-        self, first: NDArray[np.intp], known: "BandSquares | None" = None, place: NDArray[np.intp] | None = None
-    ) -> "BandSquares":
-        """The same of the bins of every band, which begin at `first` (b,).
-
-        Products of quantities whose rows are those of `known`, at `place` (p,) there, are reused; -1: another row.
-        """
-        m = self.parts[0][1].shape[1] // 2
-        bands, parts = [*pairwise([*first.tolist(), m])], []
+        weight = None if root is None else over(root)
         for c, (own, rows) in enumerate(self.parts):
-            each, fresh = np.empty((len(bands), len(own), len(own))), np.ones(len(own), bool)
-            if known is not None and place is not None:
-                others, products = known.parts[c]
-                old = np.flatnonzero(place[own] >= 0)
-                at = np.searchsorted(others, place[own[old]])
-                each[:, old[:, None], old] = products[:, at[:, None], at]
-                fresh[old] = False
-            for out, (low, high) in zip(each, bands if fresh.any() else (), strict=False):
-                real, imaginary = rows[:, low:high], rows[:, m + low : m + high]
-                if fresh.all():
-                    np.add(real @ real.T, imaginary @ imaginary.T, out=out)
-                else:
-                    out[fresh] = real[fresh] @ real.T + imaginary[fresh] @ imaginary.T
-                    out[:, fresh] = out[fresh].T
-            parts.append((own, each))
-        return BandSquares(self.count, parts)
+            if len(own) and (columns is None or columns[c]):
+                weighed = rows if weight is None else rows * weight[c]
+                _add_at(out, own, weighed @ weighed.T)
+        return out
 
     def products(self, other: "BinRows") -> Array:
         """Products (p, q) with other rows of the same columns."""
@@ -124,6 +98,14 @@ class BinRows:
         """Sum (c, n) of all rows times x (p,), by column."""
         return np.array([x[own] @ rows for own, rows in self.parts])
 
+    def only(self, places: NDArray[np.intp]) -> "BinRows":
+        """Rows of some of the quantities, places (q,) rising."""
+        place = np.full(self.count, -1)
+        place[places] = np.arange(len(places))
+        here = [place[own] >= 0 for own, _ in self.parts]
+        pairs = zip(self.parts, here, strict=True)
+        return BinRows(len(places), [(place[own[some]], rows[some]) for (own, rows), some in pairs])
+
     def select(self, parts: Array) -> "BinRows":
         """Rows of quantities that are sums of these, parts (p, q)."""
         return BinRows(parts.shape[1], [_combined(own, rows, parts) for own, rows in self.parts])
@@ -133,20 +115,12 @@ class BinRows:
         return BinRows(self.count, [_less(*both) for both in zip(self.parts, other.parts, strict=True)])
 
 
-@dataclass(frozen=True)
-class BandSquares:
-    """Products of rows with each other by column and band: to be weighed again at little cost."""
-
-    count: int  # p
-    parts: Sequence[tuple[NDArray[np.intp], Array]]  # by column: quantities (a,), products (b, a, a)
-
-    def over(self, power: Array, columns: Mask | None = None) -> Array:
-        """Products (p, p) over a power (b, c), of some columns (c,) or all."""
-        out = np.zeros((self.count, self.count))
-        for c, (own, each) in enumerate(self.parts):
-            if len(own) and (columns is None or columns[c]):
-                out[np.ix_(own, own)] += np.tensordot(1.0 / power[:, c], each, 1)
-        return out
+@compiled
+def _add_at(out: Array, own: NDArray[np.intp], products: Array) -> None:
+    """Add products (a, a) to the rows and columns `own` (a,) of a matrix (p, p)."""
+    for i in range(len(own)):
+        for j in range(len(own)):
+            out[own[i], own[j]] += products[i, j]
 
 
 def _combined(own: NDArray[np.intp], rows: Array, parts: Array) -> tuple[NDArray[np.intp], Array]:
@@ -173,35 +147,20 @@ def bin_rows(quantities: Sequence[SparseBins], columns: int) -> BinRows:
             values[column].append(bins[k])
     width = quantities[0].bins.shape[1] if quantities else 0
     pairs = zip(members, values, strict=True)
-    return BinRows(len(quantities), [(np.array(own, np.intp), _part(bins, width)) for own, bins in pairs])
+    return BinRows(len(quantities), [(np.array(own, np.intp), _part(bins, len(own), width)) for own, bins in pairs])
 
 
-def _part(bins: Sequence[Complex] | Complex, width: int) -> Array:
-    """Real rows (a, 2 m) of bins (m,) each."""
-    rows = np.empty((len(bins), 2 * width))
-    for row, one in zip(rows, bins, strict=True):
-        row[:width], row[width:] = one.real, one.imag
-    rows *= np.sqrt(2.0)
-    return rows
+def _part(bins: Sequence[Complex] | Complex, count: int, width: int) -> Array:
+    """Real rows (a, 2 m) of `count` bins (m,) each."""
+    both = np.asarray(bins, np.complex128).reshape(count, width) * np.sqrt(2.0)
+    return np.hstack([both.real, both.imag])
 
 
 def dense_rows(bins: Complex) -> BinRows:
     """Rows of the quantities of bins (m, c, p)."""
-    columns = range(bins.shape[1])
-    used = [np.flatnonzero(bins[:, c].any(axis=0)) for c in columns]
-    return BinRows(
-        bins.shape[2], [(own, _part(bins[:, c, own].T, len(bins))) for c, own in zip(columns, used, strict=True)]
-    )
-
-
-def side_by_side(several: Sequence[BinRows]) -> BinRows:
-    """Rows of several lots of quantities of the same columns."""
-    first = np.cumsum([0, *(one.count for one in several)])
-    parts = []
-    for column in zip(*(one.parts for one in several), strict=True):
-        own = np.concatenate([places + before for (places, _), before in zip(column, first, strict=False)])
-        parts.append((own, np.concatenate([rows for _, rows in column])))
-    return BinRows(int(first[-1]), parts)
+    used = [np.flatnonzero(some) for some in np.any(bins, axis=0)]
+    parts = [(own, _part(bins[:, c, own].T, len(own), len(bins))) for c, own in enumerate(used)]
+    return BinRows(bins.shape[2], parts)
 
 
 def row_by_column(bins: Complex, root: Array) -> Array:

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array, Complex, Mask
+from ...core.errors import ParameterError
 from ...core.names import AXES
 from ...core.progress import Progress, between, split
 from ...data.campaign import SkippedTest
@@ -33,7 +34,7 @@ from .result import Calibration, Subset, calibration_numbers
 from .simulated_residuals import by_simulation
 from .whitened_residuals import mean_squares, negative_log_likelihood
 
-__all__ = ["Solution", "calibrate", "misfit", "objective", "solve"]
+__all__ = ["Solution", "calibrate", "misfit", "objective", "objective_at", "solve"]
 
 
 OVERSHOT = 1000.0
@@ -125,6 +126,7 @@ def solve(
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps, a rejected step shortened to a quarter.
 
+    A step is rejected, too, where its numbers make no machine; raises ParameterError if those at `start` make none.
     Steps are half as long after each that does not lower the objective. The search ends where steps are short, or where
     two of them do not change the objective.
 
@@ -139,9 +141,7 @@ def solve(
     x, at, step = start.copy(), start, np.zeros(len(start))
     rounds, floor = int(numbers.number("fit.rounds")), numbers.number("fit.floor") * problem.prior
     fresh = np.array([known is None or name not in known.problem.names for name in problem.names])
-    # residuals are nearly linear in shifts of points in plan, and in gains and offsets
-    bent = np.array([*(not k.mirrored for k in problem.parameters), *(u.kind == "delay" for u in problem.unknowns)])
-    again = bent if frugal and not settled else fresh | near | (not frugal)
+    again = problem.bent if frugal and not settled else fresh | near | (not frugal)
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: NoiseBias | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
@@ -154,8 +154,8 @@ def solve(
             normal = first or NormalEquations(problem, x, part, known, None if settled else fresh | again)
             before = misfit(problem, normal.residual)
         else:
-            base = OperatingPoint(problem, x)
-            if objective(problem, problem.residual(base), x) > least + OVERSHOT:
+            base = _possible(problem, x)
+            if base is None or objective(problem, problem.residual(base), x) > least + OVERSHOT:
                 step = 0.25 * step
                 x = at + step
                 continue
@@ -185,10 +185,25 @@ def solve(
             converged = True
             break
     assert held is not None
-    rest = problem.whitened(x)
-    if objective(problem, rest, x) > least + OVERSHOT:
+    base = _possible(problem, x)
+    rest = held.residual if base is None else problem.residual(base)
+    if base is None or objective(problem, rest, x) > least + OVERSHOT:
         x, rest = at, held.residual
     return Solution(x, at, held.released(), rest, before, done, converged)
+
+
+def _possible(problem: Problem, x: Array) -> OperatingPoint | None:
+    """The operating point at x (p,); None where its numbers make no machine, such as one without inertia."""
+    try:
+        return OperatingPoint(problem, x)
+    except ParameterError:
+        return None
+
+
+def objective_at(problem: Problem, x: Array) -> float:
+    """The objective at x (p,); infinite where its numbers make no machine."""
+    base = _possible(problem, x)
+    return np.inf if base is None else objective(problem, problem.residual(base), x)
 
 
 def objective(problem: Problem, rest: Sequence[Complex], x: Array) -> float:

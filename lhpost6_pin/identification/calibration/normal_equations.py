@@ -1,16 +1,15 @@
 """Normal equations of a calibration: summed over tests and columns, corrected for noise, solved within bounds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...machine.parameters import Parameters
-from .bin_rows import BandSquares, BinRows, SparseBins, bin_rows, row_by_column
+from .bin_rows import BinRows, SparseBins, bin_rows, row_by_column
 from .problem import OperatingPoint, Problem, Slopes
 from .whitened_residuals import excess
 
@@ -41,15 +40,14 @@ class NormalEquations:
         self.slope = _together(problem.slopes(base, fresh, report), before, shared)
         self.power = [np.ones(r.shape) for r in self.residual]
         self.bias: NoiseBias | None = None
-        self._place = _places(shared, len(problem.names))
-        self._known: list[BandSquares] | None = None if known is None else vars(known).get("squares")
+        if known is not None and not fresh.any() and "rows" in vars(known) and len(known.slope[0]) == len(fresh):
+            self.rows = known.rows
 
     def _copied(self) -> "NormalEquations":
         """A copy without the sums, which another problem or scale has its own of."""
         other = copy(self)
-        for name in ("whole", "rows", "squares"):
+        for name in ("whole", "rows"):
             vars(other).pop(name, None)
-        other._known = None
         return other
 
     def only(self, places: Sequence[int]) -> "NormalEquations":
@@ -80,26 +78,11 @@ class NormalEquations:
         """Rows of the derivatives of every test."""
         return [bin_rows(slopes, r.shape[1]) for slopes, r in zip(self.slope, self.residual, strict=True)]
 
-    @cached_property
-    def squares(self) -> list[BandSquares]:
-        """Their products of every test."""
-        known, self._known = self._known, None
-        olds: Sequence[BandSquares | None] = known or [None] * len(self.rows)
-        pairs = enumerate(zip(self.rows, olds, strict=True))
-        return [rows.squares_by_band(self.first(t), old, self._place) for t, (rows, old) in pairs]
-
-    def first(self, test: int) -> NDArray[np.intp]:
-        """First bin of every band of a test."""
-        return np.unique(self.problem.whitener.band(self.problem.frequency[test]), return_index=True)[1]
-
     def released(self) -> "NormalEquations":
         """Itself, without what is kept to sum it again at once, which fills memory."""
-        for known in ("rows", "squares"):
-            vars(self).pop(known, None)
-        self._known = None
-        if self.bias is not None:
-            vars(self.bias).pop("rows", None)
-            self.bias.squares, self.bias._known = {}, {}
+        for one in (self, self.bias):
+            if one is not None:
+                vars(one).pop("rows", None)
         return self
 
     def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
@@ -107,11 +90,10 @@ class NormalEquations:
         count = len(self.slope[0])
         matrix, right = np.zeros((count, count)), np.zeros(count)
         for t in tests:
-            power, first = self.power[t], self.first(t)
-            matrix += self.squares[t].over(power[first], columns)
-            right += _dot(self.rows[t], self.residual[t], power, columns)
+            matrix += self.rows[t].squares(np.sqrt(self.power[t]), columns)
+            right += _dot(self.rows[t], self.residual[t], self.power[t], columns)
             if self.bias is not None:
-                more, side = self.bias.of(t, first, columns, power)
+                more, side = self.bias.of(t, columns, self.power[t])
                 matrix -= more
                 right -= side
         return matrix, right
@@ -143,9 +125,6 @@ class NoiseBias:
         """
         shared, fresh = _shared(normal.problem, known)
         self.residual: list[list[Complex]] = []  # by replica and test
-        self.squares: dict[tuple[int, int], BandSquares] = {}  # by replica and test, where they were wanted
-        self._place = _places(shared, len(normal.problem.names))
-        self._known = {} if known is None or known.bias is None else known.bias.squares
         self.slope: list[list[list[SparseBins]]] = []
         for i, (replica, report) in enumerate(zip(normal.problem.replicas, reports, strict=True)):
             base = OperatingPoint(replica, x)
@@ -163,8 +142,7 @@ class NoiseBias:
         other.slope = [
             [[j.times(s) for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
         ]
-        other.__dict__.pop("rows", None)
-        other.squares, other._known = {}, {}
+        vars(other).pop("rows", None)
         return other
 
     @cached_property
@@ -173,17 +151,11 @@ class NoiseBias:
         pairs = zip(self.slope, self.residual, strict=True)
         return [[bin_rows(s, r.shape[1]) for s, r in zip(slope, rest, strict=True)] for slope, rest in pairs]
 
-    def of(self, test: int, first: NDArray[np.intp], columns: Mask | None, power: Array) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of one test and some columns, over the power (m, c) of the residual.
-
-        first (b,) are the first bins of its bands.
-        """
-        for i, rows in enumerate(self.rows):
-            if (i, test) not in self.squares:
-                self.squares[i, test] = rows[test].squares_by_band(first, self._known.get((i, test)), self._place)
-        count, pairs = len(self.rows), zip(self.rows, self.residual, strict=True)
-        matrix = sum(self.squares[i, test].over(power[first], columns) for i in range(count)) / count
-        right = sum(_dot(rows[test], rest[test], power, columns) for rows, rest in pairs) / count
+    def of(self, test: int, columns: Mask | None, power: Array) -> tuple[Array, Array]:
+        """Matrix (p, p) and right side (p,) of one test and some columns, over the power (m, c) of the residual."""
+        both = [(rows[test], rest[test]) for rows, rest in zip(self.rows, self.residual, strict=True)]
+        matrix = sum(rows.squares(np.sqrt(power), columns) for rows, _ in both) / len(both)
+        right = sum(_dot(rows, rest, power, columns) for rows, rest in both) / len(both)
         return np.asarray(matrix), np.asarray(right)
 
 
@@ -196,13 +168,6 @@ def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None 
     place = {} if known is None else {name: i for i, name in enumerate(known.problem.names)}
     fresh = np.array([name not in place for name in names]) if again is None else again
     return {i: place[name] for i, name in enumerate(names) if name in place and not fresh[i]}, fresh
-
-
-def _places(shared: Mapping[int, int], count: int) -> NDArray[np.intp]:
-    """Places (p,) of unknowns in what was known; -1 of those evaluated anew."""
-    out = np.full(count, -1)
-    out[list(shared)] = list(shared.values())
-    return out
 
 
 def _together(

@@ -130,6 +130,8 @@ class Problem:
         self.stated = np.array([one.sd for one in every])
         self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
         self.step = np.array([one.step or self.comparison.step * one.sd for one in every])
+        # (p,) in which residuals are not nearly linear: all but shifts of points in plan, gains and offsets
+        self.bent = np.array([*(not k.mirrored for k in parameters), *(u.kind == "delay" for u in self.unknowns)])
         self.lowest, self.highest = np.array([(one.lowest, one.highest) for one in every]).reshape(-1, 2).T
         groups: dict[tuple[str, tuple[str, ...]], list[tuple[int, int]]] = {}
         for i, one in enumerate(every):
@@ -283,7 +285,7 @@ class Problem:
     def bins(self, residuals: Residuals, test: MeasuredTest) -> tuple[Complex, Array]:
         """Bins (m, c) of a test's stacked residuals, zero for those that have no columns here, or that guides take."""
         c = self.comparison
-        free = np.isin(range(residuals.wrench.shape[1]), self.axes)
+        free = (np.arange(residuals.wrench.shape[1])[:, None] == self.axes).any(axis=1)
         weight = free if test.weight is None else test.weight[:, None] * free
         residuals = residuals._replace(wrench=residuals.wrench * weight)
         bins, f = spectrum_of(residuals.stacked(), test.dt, c.bands[0], c.bands[-1], c.edge)
@@ -295,7 +297,7 @@ class Problem:
         return out, f
 
     def of_wrench(self, test: int, wrench: Array) -> Complex:
-        """Whitened bins (m, c, k) of changes of a test's wrench residual (n, 6, k)."""
+        """Bins (m, c, k) of changes of a test's wrench residual (n, 6, k)."""
         n, _, count = wrench.shape
         c = self.comparison
         weight = self.tests[test].weight
@@ -304,7 +306,7 @@ class Problem:
         bins, f = spectrum_of(weighed, self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
         out = np.zeros((len(f), sum(self.widths), count), np.complex128)
         out[:, self.rows("wrench")] = bins.reshape(len(f), -1, count)
-        return self.whitener.apply(test, out, f)
+        return out
 
     def rows_of_actuator(self, place: int) -> Mask:
         """Mask of the stacked residuals' columns of one actuator."""

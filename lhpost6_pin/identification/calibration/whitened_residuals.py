@@ -62,12 +62,12 @@ class Whitener(NamedTuple):
     def apply(self, test: int, bins: Complex, f: Array) -> Complex:
         """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
         out = np.empty_like(bins)
-        band = self.band(f)
+        bands, first = np.unique(self.band(f), return_index=True)  # f rises: the bins of a band are contiguous
         used = np.flatnonzero(bins.any(axis=(0, 2)))
-        for b in np.unique(band):
-            part = bins[band == b][:, used]
+        for b, low, high in zip(bands, first, (*first[1:], len(f)), strict=True):
+            part = bins[low:high, used]
             mixed = self.factor[test, b][:, used] @ part.swapaxes(0, 1).reshape(len(used), len(part) * bins.shape[2])
-            out[band == b] = mixed.reshape(-1, len(part), bins.shape[2]).swapaxes(0, 1)
+            out[low:high] = mixed.reshape(-1, len(part), bins.shape[2]).swapaxes(0, 1)
         return out
 
 

@@ -240,7 +240,10 @@ def told(verdict: str, *names: str) -> dict:
 
 
 def labelled(sort: str, accept: str, *effects: tuple[str, float], decoys: tuple[str, ...] = ()) -> dict:
-    hidden = [{"family": n, "components": [], "gap": gap, "offset": 0.0} for n, gap in effects]
+    hidden = [
+        {"family": n, "components": [], "gap": gap, "offset": 0.0, "owns": {"acceleration": gap, "pressure_rate": gap}}
+        for n, gap in effects
+    ]
     return {"sort": sort, "accept": [accept], "effects": hidden, "decoys": [{"family": n} for n in decoys]}
 
 
@@ -254,6 +257,15 @@ def test_closure_is_counted_over_all_phases_and_where_the_gap_is_widest():
     assert found["median closure on held-out tests"] == 0.1  # of 0.1, 0.9, -0.2
     assert found["the same where a case's gap is widest"] == pytest.approx(0.35)  # of 0.9 and -0.2
     assert found["held-out tests that got worse"] == (1, 3)
+
+
+def test_closure_counts_where_the_effect_shows():
+    """A null of a valve changes no wrench; a lag of a spool is measured with it."""
+    null, lag = (labelled("one", "named", (name, 3.0)) for name in ("spool_null_bias", "spool_lag"))
+    null["effects"][0]["owns"]["acceleration"] = 0.0
+    phases = ("inverse dynamics", "open loop", "closed loop")
+    assert [scoring.shows(null, phase) for phase in phases] == [False, True, True]
+    assert [scoring.shows(lag, phase) for phase in phases] == [False, False, True]
 
 
 def test_components_are_scored_where_an_effect_has_a_place():

@@ -17,7 +17,7 @@ from ..machine.library import find_family
 from .discover import Discovery
 from .estimates import Estimate
 from .finding import EffectFinding
-from .held_out import FLOOR
+from .held_out import NOISE
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
@@ -57,7 +57,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
     closure: dict[str, Any] = {}
     for gap in found.proof.gaps if found.proof else ():
         entry = {key: value for key, value in asdict(gap).items() if key not in ("phase", "test")}
-        closure.setdefault(gap.phase, {})[gap.test] = {**entry, "floor": 1.0, "closure": _known(gap.closure)}
+        closure.setdefault(gap.phase, {})[gap.test] = {**entry, "closure": _known(gap.closure)}
     return {
         "verdict": verdict.word,
         "effects": [
@@ -247,7 +247,7 @@ def _beyond(sensors: Sequence[SensorFinding]) -> str:
 
 def _worse(found: Discovery) -> str | None:
     """That a refit is worse than the machine as delivered on held-out tests; None where it is not."""
-    worse = [one for one in found.balances if one.error[1] > WORSE * max(one.error[0], FLOOR)]
+    worse = [one for one in found.balances if one.error[1] > WORSE * max(one.error[0], NOISE)]
     if not worse:
         return None
     each = ", ".join(f"{one.kind} of {one.test} {one.error[0]:.2f} to {one.error[1]:.2f}" for one in worse)

@@ -14,6 +14,7 @@ __all__ = [
     "reach",
     "reliability",
     "score",
+    "shows",
     "strength_curve",
     "wilson",
 ]
@@ -81,6 +82,25 @@ def strength_curve(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share]:
     return curve
 
 
+SHOWS = 0.1
+"""What an effect adds to a phase, over noise, from which it shows there."""
+
+OF_SPOOLS = ("transport_delay", "spool_lag")
+"""Families that do not show where spools are measured: neither in inverse dynamics nor in the open loop."""
+
+
+def shows(label: Label, phase: str) -> bool:
+    """Whether an effect of a case shows in a phase by more than a tenth of the noise.
+
+    Inverse dynamics compares wrenches and the struts' gas, both loops what oil and supply do, too.
+    """
+    felt = (
+        ("acceleration", "gas") if phase == "inverse dynamics" else ("acceleration", "gas", "pressure_rate", "supply")
+    )
+    seen = [e for e in label["effects"] if phase == "closed loop" or e["family"] not in OF_SPOOLS]
+    return any(effect["owns"].get(name, 0.0) > SHOWS for effect in seen for name in felt)
+
+
 RELIABILITY = (0.0, 0.5, 0.7, 0.9, 0.99, 1.01)
 """Edges of the stated probability of a name in the table of its reliability."""
 
@@ -132,7 +152,12 @@ def score(cases: Sequence[tuple[Label, Answer]]) -> dict[str, Share | float]:
         return set(families(label)) == set(families(answer))
 
     gaps = [
-        [gap for phase in answer["closure"].values() for gap in phase.values() if gap["closure"] is not None]
+        [
+            gap
+            for phase, tests in answer["closure"].items()
+            for gap in tests.values()
+            if gap["closure"] is not None and shows(label, phase)
+        ]
         for label, answer in cases
         if known(label) and answer["effects"]
     ]

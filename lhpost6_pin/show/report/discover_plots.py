@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...discovery import Discovery
-from ...discovery.held_out import FLOOR
+from ...discovery.held_out import NOISE
 from ...discovery.localise import gap_map
 from ...discovery.residual_function import ResidualFunction
 from ...discovery.search_state import Round
@@ -101,7 +101,7 @@ def gap_figure(found: Discovery) -> Figure:
         for k, (words, color) in enumerate(series)
     ]
     most = max(max(three) for three in errors.values())
-    layout = _bars(list(errors), "Normalised RMS error (1: sensor noise)", 74, FLOOR, most) | {"barmode": "group"}
+    layout = _bars(list(errors), "Normalised RMS error (1: sensor noise)", 74, NOISE, most) | {"barmode": "group"}
     words = (
         "Root mean square error over noise: of all moving channels in a phase, over that of the sensors; of each "
         "balance, over that of the sensors and of what the form of friction leaves open. Dashed: noise alone."

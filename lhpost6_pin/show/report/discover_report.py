@@ -146,7 +146,7 @@ def _proof_table(proof: Proof) -> Table:
         (
             f"{gap.phase}, {gap.test}",
             *(number(error) for error in (gap.delivered, gap.refitted, gap.after)),
-            "1",
+            number(gap.floor),
             "–" if math.isnan(gap.closure) else f"{100 * gap.closure:.0f} %",
         )
         for gap in proof.gaps
@@ -241,7 +241,11 @@ def _margin(value: float) -> str:
 def _proof_blocks(found: Discovery) -> list[Block]:
     if found.proof is None:
         return ["No test was held out; name one with --hold-out."]
-    closure = "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
+    closure = (
+        "Floor: expected of a model that lacks nothing, by sensor noise, uncertain numbers, friction of "
+        "another form and oil that warms. Closure: (refitted − with the effects) ∕ (refitted − floor); –: not "
+        "applicable, already at the floor."
+    )
     return [gap_figure(found), _proof_table(found.proof), closure, _balance_table(found.balances)]
 
 

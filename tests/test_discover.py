@@ -26,6 +26,7 @@ from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_re
 from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import amplitude_of
+from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
@@ -47,6 +48,7 @@ from lhpost6_pin.identification.calibration.normal_equations import bounded_step
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
+from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.laws.supply import Supply
 from lhpost6_pin.laws.tabulated import NODES
 from lhpost6_pin.machine.library import families, find_family
@@ -98,6 +100,7 @@ def ready(machine: Machine, sensors: SensorSet, rubbing: Campaign) -> Problem:
     return prepare_problem(machine, rubbing.records[::2], sensors, calibration_numbers())
 
 
+DRIFT = "scatter.drift"
 ASKED = {"hold_out": ["TZ"], "phases": (1,)}
 
 
@@ -523,11 +526,27 @@ def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_n
         assert gap.after == pytest.approx(other, rel=0.08)  # parameters that share the search's noise
 
 
+def test_the_floor_is_noise_and_what_warmer_oil_leaves(found, rubbing, sensors):
+    search, held = found.search, [r for r in rubbing.records if r.attrs["test"] == "TZ"]
+    machine, records = model_at(search.solution.normal.problem, search.solution.x, held)
+    after = validate(machine, Campaign("held out", tuple(records)), sensors=sensors, phases=(1, 2), jobs=1)
+
+    def floors(drift: float) -> list[float]:
+        known = search.numbers.quantities
+        numbers = replace(search.numbers, quantities=known | {DRIFT: replace(known[DRIFT], value=drift)})
+        return list(expected_gaps(replace(search, numbers=numbers), held, after, sensors, (1, 2), 1).values())
+
+    (wrench, motion), (same, warm) = floors(0.0), floors(0.3)
+    assert wrench == pytest.approx(1.0, abs=0.15)  # noise, a draw of some hundred independent samples
+    assert 1.0 < motion < 2.0  # and numbers of the oil, of which two tests leave much open
+    assert same == pytest.approx(wrench, abs=0.1) and warm > 1.5 * motion  # oil acts on flows and on viscous friction
+
+
 def test_the_verdict_goes_through_json_and_the_model_through_toml(found, tmp_path):
     entries = json.loads(json.dumps(verdict_entries(found)))
     assert entries["verdict"] == "named"
     assert entries["effects"][0]["family"] == "stribeck_friction"
-    assert entries["closure"]["inverse dynamics"]["TZ"]["floor"] == 1.0
+    assert entries["closure"]["inverse dynamics"]["TZ"]["floor"] == found.proof.gaps[0].floor
     again = load_machine(save_machine_toml(found.fitted, tmp_path / "model.toml"))
     assert again.added_effects == found.fitted.added_effects
     assert again.actuators == found.fitted.actuators

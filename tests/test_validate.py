@@ -16,7 +16,7 @@ from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.data.signals import Band, align, resample_band_limited
-from lhpost6_pin.discovery.held_out import normalised_error
+from lhpost6_pin.discovery.floor import normalised_error
 from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, Phase, metrics, validate
 from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
 from lhpost6_pin.identification.validation.prepare_tests import validation_numbers

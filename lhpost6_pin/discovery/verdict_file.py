@@ -17,7 +17,7 @@ from ..machine.library import find_family
 from .discover import Discovery
 from .estimates import Estimate
 from .finding import EffectFinding
-from .held_out import NOISE
+from .floor import NOISE
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding

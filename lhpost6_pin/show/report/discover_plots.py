@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...discovery import Discovery
-from ...discovery.held_out import NOISE
+from ...discovery.floor import NOISE
 from ...discovery.localise import gap_map
 from ...discovery.residual_function import ResidualFunction
 from ...discovery.search_state import Round

@@ -242,9 +242,8 @@ def _proof_blocks(found: Discovery) -> list[Block]:
     if found.proof is None:
         return ["No test was held out; name one with --hold-out."]
     closure = (
-        "Floor: expected of a model that lacks nothing, by sensor noise, uncertain numbers, friction of "
-        "another form and oil that warms. Closure: (refitted − with the effects) ∕ (refitted − floor); –: not "
-        "applicable, already at the floor."
+        "Floor: expected of a model that lacks nothing, by sensor noise, uncertain numbers and oil that warms. "
+        "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
     )
     return [gap_figure(found), _proof_table(found.proof), closure, _balance_table(found.balances)]
 

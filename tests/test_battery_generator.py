@@ -5,9 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from battery import cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table
+from battery import baselines, cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table
 
 from lhpost6_pin.data.records import load_record
+from lhpost6_pin.identification.calibration.bin_rows import dense_rows, row_by_column
 
 pytestmark = pytest.mark.long
 
@@ -316,3 +317,12 @@ def test_a_miss_is_listed_with_the_reason_of_the_last_round():
     answer["withdrawn"] = [{"family": "quadratic_drag", "why": "held_out"}]
     assert scoring.misses(label, answer)[0][2] == "withdrawn: held_out"
     assert scoring.misses(labelled("null", "none"), told("none")) == []
+
+
+def test_baselines_see_the_columns_of_all_residuals():
+    rng = np.random.default_rng(0)
+    bins = rng.normal(size=(4, 3, 2)) + 1j * rng.normal(size=(4, 3, 2))
+    bins[:, 1, 0] = 0.0
+    seen = baselines._dense(dense_rows(bins))
+    for k in range(2):
+        np.testing.assert_array_equal(seen[:, k], row_by_column(bins[..., k], np.ones((4, 3))).ravel())

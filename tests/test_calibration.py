@@ -323,10 +323,12 @@ def problem(machine, sensors, seen) -> Problem:
 def assert_slopes(problem: Problem, chosen: list[int]) -> list[np.ndarray]:
     """Unknowns evaluated together have the derivatives of each alone, which are returned."""
     x, places, found = np.zeros(len(problem.prior)), np.arange(len(problem.prior)), []
-    (slope,) = problem.slopes(OperatingPoint(problem, x), np.isin(places, chosen), lambda share: None)
+    base = OperatingPoint(problem, x)
+    (slope,) = problem.slopes(base, np.isin(places, chosen), lambda share: None)
     for i in chosen:
         step = 0.1 * problem.prior[i] * (places == i)
-        found.append((problem.whitened(x + step)[0] - problem.whitened(x)[0]) / step[i])
+        after = OperatingPoint(problem, x + step)
+        found.append((problem.residual(after)[0] - problem.residual(base)[0]) / step[i])
         # differences of residuals of order one, divided by a step: their rounding is what differs
         out = np.zeros_like(found[-1])
         out[:, slope[i].columns] = slope[i].bins.T
@@ -366,7 +368,8 @@ def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
 def test_whitened_bins_scale_with_the_whitener(problem):
     scale = np.linspace(0.5, 2.0, problem.whitener.factor[..., 0].size).reshape(problem.whitener.factor.shape[:3])
     x = np.zeros(len(problem.prior))
-    before, after = problem.whitened(x)[0], problem.scaled(scale).whitened(x)[0]
+    base = OperatingPoint(problem, x)
+    before, after = problem.residual(base)[0], problem.scaled(scale).residual(base)[0]
     band = problem.whitener.band(problem.frequency[0])
     assert np.allclose(after, before * scale[0][band], rtol=1e-9, atol=1e-12)  # rounding
 
@@ -419,7 +422,7 @@ def test_a_step_that_goes_too_far_is_taken_back(problem, seen, monkeypatch):
     monkeypatch.setattr(fit, "bounded_step", too_far)
     start = np.zeros(len(problem.prior))
     found = fit.solve(problem, numbers, start, lambda share: None, frugal=True)
-    before, after = (fit.objective(problem, problem.whitened(x), x) for x in (start, found.x))
+    before, after = (fit.objective(problem, problem.residual(OperatingPoint(problem, x)), x) for x in (start, found.x))
     assert after < before + fit.OVERSHOT
 
 

@@ -25,6 +25,7 @@ from lhpost6_pin.identification.calibration.fit import misfit, solve
 from lhpost6_pin.identification.calibration.friction_forms import _Force, compare_friction, effect_of_form, own_suffices
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
+from lhpost6_pin.identification.calibration.problem import OperatingPoint
 from lhpost6_pin.laws import backlash, backlash_instead, bouc_wen
 from lhpost6_pin.machine.draft.asked import read_answers
 from lhpost6_pin.machine.draft.draft import draft_machine
@@ -181,7 +182,7 @@ def test_only_the_axis_that_moves_is_compared(tight):
     """Five more columns of zeros would lower the mean square of a force residual by six."""
     problem = prepare_problem(*_given(tight), calibration_numbers())
     (column,) = np.flatnonzero(problem.rows("wrench"))
-    residual = problem.whitened(np.zeros(len(problem.names)))
+    residual = problem.residual(OperatingPoint(problem, np.zeros(len(problem.names))))
     assert column == 0 and not problem.rows("wrench", 1, 5).any()
     own = [np.mean(np.abs(r[:, 0]) ** 2) for r in residual]
     assert np.allclose(misfit(problem, residual)[:, 0], own, rtol=1e-12)
@@ -261,7 +262,7 @@ def test_a_floor_above_guides_has_its_mass_fitted_and_no_moment_that_guides_take
     (tmp_path / "rig.toml").write_text(draft_text(drafted) + FLOOR, encoding="utf-8")
     machine, numbers = load_machine(tmp_path / "rig.toml"), calibration_numbers()
     problem = prepare_problem(machine, list(campaign.records), sensors, numbers)
-    whitened = problem.whitened(np.zeros(len(problem.prior)))
+    whitened = problem.residual(OperatingPoint(problem, np.zeros(len(problem.prior))))
     assert not any(bins[:, ~problem.compared].any() for bins in whitened)
     found = solve(problem, numbers, np.zeros(len(problem.prior)), lambda share: None)
     mass = {p.name: p.at(x) for p, x in zip(problem.parameters, found.x, strict=False) if p.name.endswith("mass")}
@@ -277,7 +278,7 @@ def test_a_test_shorter_than_the_slowest_band_is_used(loose):
     place = [test.name for test in problem.tests].index("short")
     f = problem.frequency[place]
     assert f[0] == 0.0 and f[1] > 0.3
-    assert np.isfinite(problem.whitened(np.zeros(len(problem.prior)))[place]).all()
+    assert np.isfinite(problem.residual(OperatingPoint(problem, np.zeros(len(problem.prior))))[place]).all()
 
 
 def test_candidates_keep_their_bounds_when_a_mass_is_fitted_far_from_its_prior(loose):

@@ -18,7 +18,7 @@ from ..core.progress import Progress, between, split
 from ..identification.calibration.fit import solve
 from ..identification.calibration.friction_forms import compare_friction, effect_of_form, own_suffices
 from ..identification.calibration.normal_equations import bounds_of
-from ..identification.calibration.problem import Problem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..machine.library import find_family, in_size_of
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
@@ -55,7 +55,7 @@ def with_friction_form(found: Search, held: Problem | None, progress: Progress) 
     more, _ = with_candidate(problem, candidate, amplitudes, own, np.zeros(len(problem.names)))
     start = _at(more, forms.best.machine, found.calibration)
     share = numbers.number("scatter.strokes")
-    floor = _floor(more, more.whitened(start), share)
+    floor = _floor(more, more.residual(OperatingPoint(more, start)), share)
     scaled, parts = problem.scaled(floor), split(between(progress, 0.5, 1.0), 2)
     refit = solve(scaled, found.calibration, _at(scaled, forms.own.machine, found.calibration), parts[0])
     before = Search(scaled, refit, refit, numbers, found.calibration)

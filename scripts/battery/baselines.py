@@ -7,12 +7,13 @@ import numpy as np
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import list_candidates
 from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration.bin_rows import BinRows, row_by_column
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint
 
 __all__ = ["baselines"]
 
-KEPT = 4000  # rows of a regression, drawn at random from all bins
+KEPT = 8000  # rows of a regression, drawn at random from the real and imaginary parts of all bins
 
 
 def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, list[str]]:
@@ -23,19 +24,28 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
     """
     problem = prepare_problem(machine, records, sensors, calibration_numbers(), seed=seed, jobs=1)
     base = OperatingPoint(problem, np.zeros(len(problem.prior)))
-    rest = np.concatenate([r.ravel() for r in problem.residual(base)])
+    rest = np.concatenate([row_by_column(r, np.ones(r.shape)).ravel() for r in problem.residual(base)])
     best: dict[str, tuple[float, np.ndarray]] = {}
     for group in list_candidates(base.plant.machine):
         columns, parts = columns_of(problem, base, group)
-        whole = np.concatenate([c.reshape(-1, c.shape[-1]) for c in columns])
+        whole = np.concatenate([_dense(rows) for rows in columns])
         for part in parts:
             for column in (whole @ part).T:
                 size = np.linalg.norm(column)
-                like = abs(np.vdot(column, rest)) / size if size > 0.0 else 0.0
+                like = abs(column @ rest) / size if size > 0.0 else 0.0
                 if like > best.get(group[0].family.name, (0.0, column))[0]:
                     best[group[0].family.name] = (float(like), column / size)
     order = sorted(best, key=lambda name: -best[name][0])
     return {"correlation": order[:1], "e_sindy": _e_sindy(order, [best[n][1] for n in order], rest, seed)}
+
+
+def _dense(rows: BinRows) -> np.ndarray:
+    """Rows of quantities as columns, those of all columns of the residuals below each other."""
+    width = rows.parts[0][1].shape[1]
+    out = np.zeros((len(rows.parts), width, rows.count))
+    for block, (own, values) in zip(out, rows.parts, strict=True):
+        block[:, own] = values.T
+    return out.reshape(-1, rows.count)
 
 
 def _e_sindy(names: list[str], columns: list[np.ndarray], rest: np.ndarray, seed: int) -> list[str]:
@@ -43,8 +53,7 @@ def _e_sindy(names: list[str], columns: list[np.ndarray], rest: np.ndarray, seed
 
     random = np.random.default_rng(seed)
     rows = random.choice(len(rest), min(KEPT, len(rest)), replace=False)
-    features = np.stack(columns, axis=1)[rows]
-    x, y = np.vstack([features.real, features.imag]), -np.concatenate([rest[rows].real, rest[rows].imag])
+    x, y = np.stack(columns, axis=1)[rows], -rest[rows]
     scale = np.linalg.norm(x, axis=0)
     scale[scale == 0.0] = 1.0
     np.random.seed(seed)  # noqa: NPY002  # pysindy draws its bags from the global generator

@@ -1,7 +1,7 @@
 """Real rows of derivatives over the bins of a test, kept by column of the residuals.
 
 Most unknowns show in few columns: those of a valve in its own flows, those of friction in the wrench. Products of rows
-are summed column by column over the unknowns that show there, an eighth of the work of full matrices.
+are summed column by column over the unknowns that show there, at a part of the work of full matrices.
 """
 
 from collections.abc import Sequence

@@ -19,7 +19,7 @@ from ...machine.parameters import Quantity
 from ..residuals import RESIDUALS
 
 __all__ = ["FreeParameter", "drawn_coordinates", "machine_parameters", "plan_parameters", "scatter_parameters"]
-__all__ += ["with_parameters"]
+__all__ += ["parameter_changes", "with_parameters"]
 
 
 Paths = tuple[tuple[str, int], ...]

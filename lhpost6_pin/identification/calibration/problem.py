@@ -22,7 +22,7 @@ from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Path, Residuals, evaluate_residuals, follow, kinds_shown, with_ports
 from .bin_rows import SparseBins, sparse_bins
-from .free_parameters import FreeParameter, with_parameters
+from .free_parameters import FreeParameter, parameter_changes
 from .parameters_of_tests import parameters_of_tests
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
@@ -214,10 +214,6 @@ class Problem:
         """Mask of the stacked residuals' columns that are not zero by the machine's guides."""
         return np.asarray(np.any([self.rows(kind) for kind in RESIDUALS], axis=0))
 
-    def whitened(self, x: Array) -> list[Complex]:
-        """Whitened bins (m, c) of every test with the unknowns at x."""
-        return self.residual(OperatingPoint(self, x))
-
     def residual(self, base: "OperatingPoint") -> list[Complex]:
         """Whitened bins (m, c) of every test at an operating point."""
         pairs = zip(base.residuals, base.tests, strict=True)
@@ -246,7 +242,7 @@ class Problem:
         step = np.where(x + self.step > self.highest, -self.step, self.step)
         more = np.where(np.isin(np.arange(len(x)), [i for i, _ in group.members]), step, 0.0)
         if group.members[0][0] < count:
-            changes = self.change(base, self.plant_at(x + more), group.residuals)
+            changes = self.change(base, self.plant_at(x + more, base), group.residuals)
         else:  # from the corrected tests: derivatives are the same to first order
             tests = [corrected(t, self.unknowns, more[count:]) for t in base.tests]
             changes = self.change(base, base.plant, group.residuals, tests)
@@ -278,9 +274,14 @@ class Problem:
             changes.append(self.bins(change_of(before, plant, test, path, kinds), test)[0])
         return changes
 
-    def plant_at(self, x: Array) -> Plant:
-        """Plant with its parameters set to x (p,)."""
-        return make_plant(with_parameters(self.machine, self.parameters, x[: len(self.parameters)]))
+    def plant_at(self, x: Array, near: "OperatingPoint | None" = None) -> Plant:
+        """Plant with its parameters set to x (p,); sooner from a point `near` it, where little has to be set."""
+        machine, at = self.machine, (x, near.x if near else x)
+        changes, known = (parameter_changes(machine, self.parameters, y[: len(self.parameters)]) for y in at)
+        if near and known.keys() == changes.keys():
+            machine = near.plant.machine
+            changes = {path: value for path, value in changes.items() if value != known[path]}
+        return make_plant(machine.with_params(changes))
 
     def bins(self, residuals: Residuals, test: MeasuredTest) -> tuple[Complex, Array]:
         """Bins (m, c) of a test's stacked residuals, zero for those that have no columns here, or that guides take."""

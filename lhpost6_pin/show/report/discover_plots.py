@@ -100,11 +100,18 @@ def gap_figure(found: Discovery) -> Figure:
         _bar(words, color, [three[k] for three in errors.values()], range(len(errors)), "%{x:.3g} × noise")
         for k, (words, color) in enumerate(series)
     ]
+    floors = [gap.floor for gap in found.proof.gaps] if found.proof else []
+    marks = {"symbol": "line-ns-open", "size": 26, "color": BLACK, "line": {"width": 2.5}}
+    traces.append(
+        {"type": "scatter", "mode": "markers", "name": "floor", "marker": marks, "hovertemplate": "floor %{x:.3g}"}
+        | {"x": floors, "y": [row + _BELOW for row in range(len(floors))]}
+    )
     most = max(max(three) for three in errors.values())
     layout = _bars(list(errors), "Normalised RMS error (1: sensor noise)", 74, NOISE, most) | {"barmode": "group"}
     words = (
         "Root mean square error over noise: of all moving channels in a phase, over that of the sensors; of each "
-        "balance, over that of the sensors and of what the form of friction leaves open. Dashed: noise alone."
+        "balance, over that of the sensors and of what the form of friction leaves open. Dashed: noise alone; upright "
+        "mark: expected of a model that lacks nothing."
     )
     return Figure("gap", "Normalised RMS error on held-out tests", words, traces, layout, layout["height"])
 

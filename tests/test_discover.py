@@ -470,6 +470,10 @@ def test_an_effect_at_a_bound_is_no_finding(found):
     assert less is moved and gone == (Withdrawn(effect.candidate.name, "stribeck_friction", "at_bound", (size,), ANY),)
     verdict = judge(less, (), (), (), gone)
     assert not verdict.effects and verdict.withdrawn == gone
+    # if what it explained is far above noise, no parameter of the model does: that is left unexplained
+    larger = search.refit._replace(residual=[3.0 * bins for bins in search.refit.residual])
+    verdict = judge(replace(less, refit=larger), (), (), (), gone)
+    assert (verdict.word, verdict.nearest) == ("unexplained", ("stribeck_friction",)) and verdict.where
 
 
 def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):
@@ -536,6 +540,9 @@ def test_the_floor_is_noise_and_what_warmer_oil_leaves(found, rubbing, sensors):
         numbers = replace(search.numbers, quantities=known | {DRIFT: replace(known[DRIFT], value=drift)})
         return list(expected_gaps(replace(search, numbers=numbers), held, after, sensors, (1, 2), 1).values())
 
+    alone = [r.assign_attrs(controller="mine") for r in held]  # which is not shipped: no closed loop
+    lone = validate(machine, Campaign("held out", tuple(alone)), sensors=sensors, phases=(1, 3), jobs=1)
+    assert set(expected_gaps(search, alone, lone, sensors, (1, 3), 1)) == {("TZ", 1)}
     (wrench, motion), (same, warm) = floors(0.0), floors(0.3)
     assert wrench == pytest.approx(1.0, abs=0.15)  # noise, a draw of some hundred independent samples
     assert 1.0 < motion < 2.0  # and numbers of the oil, of which two tests leave much open

@@ -110,6 +110,10 @@ def judge(
     outlying = tuple(outlying_parameters(found, sd, estimates))
     identified = [_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone]
     effects = _merged([*identified, *outlying])
+    bare = replace(found, solution=found.refit, added=())
+    left = bare if gone and not effects and more_than_noise(bare) else found
+    if left is bare:  # what was withdrawn explains nothing, and without it the model does not either
+        unexplained, nearest = True, tuple(one.family for one in withdrawn)
     changed = {name: one for name, one in changed.items() if not any(name in other.parameters for other in outlying)}
     hidden, testable = _untestable(found)
     blind = len(hidden) > numbers.number("verdict.blind") * (len(hidden) + testable)
@@ -120,7 +124,7 @@ def judge(
         word = "ambiguous" if any(e.rivals for e in effects) else "named"
     elif sensors:
         word = "sensor"
-    spots = tuple(worst_spots(problem, found.residual)) if unexplained else ()
+    spots = tuple(worst_spots(problem, left.residual)) if unexplained else ()
     kept_own = tuple(f"{one.candidate.name}." for one in found.added if one.candidate.name not in gone)
     told = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(kept_own)}
     scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in told.items() if n not in bounded))

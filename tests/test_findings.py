@@ -9,9 +9,9 @@ import xarray as xr
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import Estimate
 from lhpost6_pin.discovery.finding import EffectFinding, alternatives_of
-from lhpost6_pin.discovery.outlying import outlying_parameters
+from lhpost6_pin.discovery.outlying import _of_kinds, outlying_parameters
 from lhpost6_pin.discovery.time_blocks import in_blocks
-from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
+from lhpost6_pin.identification.calibration.free_parameters import machine_parameters, scatter_parameters
 from lhpost6_pin.machine.machine import load_machine
 
 NUMBERS, CALIBRATION = discovery_numbers()
@@ -52,6 +52,17 @@ def test_a_parameter_at_three_deviations_stands_out_among_others_near_their_valu
     assert outlying({"vertical.pad_friction": 2.95}, 0.9) == []  # as far off as stated deviations allow
     assert outlying({"vertical.pad_friction": 2.5}, 0.3) == []  # calibration
     assert outlying({"vertical.pad_friction": 2.95}, 0.3, deviation=0.6) == []  # hardly told
+
+
+def test_a_shared_number_that_the_scatter_of_all_components_cancels_does_not_stand_out():
+    machine = load_machine("lhpost6")
+    scatter = [p for p in scatter_parameters(machine, 0.03, 3.0) if p.of == "vertical.flow"]
+    parameters = (*machine_parameters(machine), *scatter)
+    x = np.array([0.1 * (p.name == "vertical.flow") - 0.0909 * (p in scatter) for p in parameters])
+    (place,) = (i for i, p in enumerate(parameters) if p.name == "vertical.flow")
+    assert len(scatter) == 6 and abs(_of_kinds(parameters, x)[place]) < 0.005  # a log, or a factor: of second order
+    x[len(parameters) - 6 :] = 0.0
+    assert _of_kinds(parameters, x)[place] == pytest.approx(0.1)
 
 
 def record(name: str, seconds: float) -> xr.Dataset:

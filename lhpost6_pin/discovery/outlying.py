@@ -5,11 +5,12 @@ all others that the campaign tells scatter by a fraction of it, has changed: it 
 Where others are as far off, stated deviations are too small, and none stands out.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..core.arrays import Array
+from ..identification.calibration.free_parameters import FreeParameter
 from .candidates import list_releases
 from .estimates import Estimate
 from .finding import EffectFinding, p_value_of
@@ -32,7 +33,7 @@ def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estima
     told = [
         i for i in places if sd[i] < n("outlying.told") * problem.stated[i] and problem.names[i] not in problem.free
     ]
-    distance = found.solution.x[:count] / problem.stated[:count]
+    distance = _of_kinds(problem.parameters, found.solution.x) / problem.stated[:count]
     releases = {one.release: one for one in list_releases(problem)}
     for i in told:
         others = [k for k in told if k != i]
@@ -50,3 +51,16 @@ def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estima
                 p_value=p_value_of(gain, 1, len(told)),
                 form=one.family.name,
             )
+
+
+def _of_kinds(parameters: Sequence[FreeParameter], x: Array) -> Array:
+    """Coordinates (k,) of parameters, those that a kind shares at the mean of its components.
+
+    A fit may move a shared number one way and the scatter of all its components the other: nothing has changed then.
+    """
+    out = np.array(x[: len(parameters)], float)
+    for i, parameter in enumerate(parameters):
+        scatter = [other.at(float(y)) for other, y in zip(parameters, x, strict=False) if other.of == parameter.name]
+        if scatter:
+            out[i] = parameter.coordinate(parameter.at(float(x[i])) * float(np.mean(scatter)))
+    return out

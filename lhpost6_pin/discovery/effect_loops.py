@@ -120,7 +120,7 @@ def _named(base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: 
         units = dict(zip(AXES, ["N"] * 3 + ["N m"] * 3, strict=True))
         free = [(AXES[k], k) for k in base.plant.axes.tolist()]
         return [_Column(f"resisting wrench, {x}", x, units[x], -own[:, k], -rest[:, k]) for x, k in free]
-    actuators = list(machine.actuator_names)
+    actuators = machine.actuator_names
     chambers = [(f"{name} A", name) for name in actuators] + [(f"{name} B", name) for name in machine.double_acting]
     known: dict[str, tuple[str, str, list[tuple[str, str]]]] = {
         "flow": ("flow into", "m3/s", chambers),

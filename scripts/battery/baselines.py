@@ -7,7 +7,7 @@ import numpy as np
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import list_candidates
 from lhpost6_pin.identification.calibration import calibration_numbers
-from lhpost6_pin.identification.calibration.bin_rows import BinRows, row_by_column
+from lhpost6_pin.identification.calibration.bin_rows import row_by_column
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint
 
@@ -28,24 +28,15 @@ def baselines(machine: Any, records: Any, sensors: Any, seed: int) -> dict[str, 
     best: dict[str, tuple[float, np.ndarray]] = {}
     for group in list_candidates(base.plant.machine):
         columns, parts = columns_of(problem, base, group)
-        whole = np.concatenate([_dense(rows) for rows in columns])
         for part in parts:
-            for column in (whole @ part).T:
+            for one in part.T:
+                column = np.concatenate([rows.times(one).ravel() for rows in columns])
                 size = np.linalg.norm(column)
                 like = abs(column @ rest) / size if size > 0.0 else 0.0
                 if like > best.get(group[0].family.name, (0.0, column))[0]:
                     best[group[0].family.name] = (float(like), column / size)
     order = sorted(best, key=lambda name: -best[name][0])
     return {"correlation": order[:1], "e_sindy": _e_sindy(order, [best[n][1] for n in order], rest, seed)}
-
-
-def _dense(rows: BinRows) -> np.ndarray:
-    """Rows of quantities as columns, those of all columns of the residuals below each other."""
-    width = rows.parts[0][1].shape[1]
-    out = np.zeros((len(rows.parts), width, rows.count))
-    for block, (own, values) in zip(out, rows.parts, strict=True):
-        block[:, own] = values.T
-    return out.reshape(-1, rows.count)
 
 
 def _e_sindy(names: list[str], columns: list[np.ndarray], rest: np.ndarray, seed: int) -> list[str]:

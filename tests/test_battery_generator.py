@@ -269,6 +269,13 @@ def test_closure_counts_where_the_effect_shows():
     assert [scoring.shows(lag, phase) for phase in phases] == [False, False, True]
 
 
+@pytest.mark.parametrize("gap", [0.05, 3.0])
+def test_closure_of_a_case_without_figures_by_channel_counts_where_its_gap_shows(gap):
+    label = labelled("one", "named", ("spool_lag", gap))
+    del label["effects"][0]["owns"]
+    assert scoring.shows(label, "inverse dynamics") is (gap > scoring.SHOWS)
+
+
 def test_components_are_scored_where_an_effect_has_a_place():
     label = labelled("two", "named", ("backlash", 3.0), ("gravity_offset", 4.0))
     label["effects"][0]["components"] = ["H1"]

@@ -92,8 +92,11 @@ OF_SPOOLS = ("transport_delay", "spool_lag")
 def shows(label: Label, phase: str) -> bool:
     """Whether an effect of a case shows in a phase by more than a tenth of the noise.
 
-    Inverse dynamics compares wrenches and the struts' gas, both loops what oil and supply do, too.
+    Inverse dynamics compares wrenches and the struts' gas, both loops what oil and supply do, too. A label of a
+    one-axis case states no figures by channel: its effect's own gap counts in every phase.
     """
+    if any("owns" not in effect for effect in label["effects"]):
+        return reach(label) > SHOWS
     felt = (
         ("acceleration", "gas") if phase == "inverse dynamics" else ("acceleration", "gas", "pressure_rate", "supply")
     )

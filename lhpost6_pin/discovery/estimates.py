@@ -19,8 +19,8 @@ __all__ = [
     *("owns", "sums_of"),
 ]
 
-AT_BOUND = 1e-3
-"""Of an unknown's prior deviation: nearer to a bound it counts as at it."""
+AT_BOUND = 1e-6
+"""Of an unknown's prior deviation: nearer to a bound it counts as at it. Flat priors are wide."""
 
 
 @dataclass(frozen=True)

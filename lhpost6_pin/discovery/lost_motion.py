@@ -105,7 +105,8 @@ def _with_play(found: Search, group: Sequence[LostMotion], progress: Progress) -
     candidate = Candidate(family, tuple(one.component for one in group), first_shape(family))
     weight = np.array([one.deviation**-2.0 for one in group])
     size = float(weight @ [one.half_play for one in group] / weight.sum())
-    sd = float(weight.sum() ** -0.5)  # no wider: impacts bias the estimate of play from the oil
+    # hardly wider than its form may be off: impacts bias the estimate of play from the oil
+    sd = float(np.hypot(weight.sum() ** -0.5, found.numbers.number("lengths.form") * size))
     own = tuple(
         replace(parameter, sd=sd) if parameter.name.endswith(".half_play") else parameter
         for parameter in candidate.fit_parameters((size,), found.numbers)

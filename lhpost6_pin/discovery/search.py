@@ -225,9 +225,20 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
         if not rivals:
             return None
         waiting = [one for one in waiting if one not in rivals]
+        rivals = _with_confused(found, rivals)
         if (best := _best_of(found, rivals, part)) is not None:
             return best
     return None
+
+
+def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
+    """Candidates, and those confused with the first that gain as much on its components, though these were refused.
+
+    Of two that explain alike, one may be refused by a hair: the joint fit decides. One of a family replaces a weaker one.
+    """
+    first = rivals[0]
+    better = [o for o in _in_its_place(found, first) if o.candidate.family.named in first.candidate.family.confused_with]
+    return best_per_family(sorted([*rivals, *better], key=lambda one: -one.gain))
 
 
 def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:
@@ -266,8 +277,12 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
 
 
 def _refined(found: Search, progress: Progress) -> Search:
-    """The search with all derivatives evaluated again."""
-    return found.solved(found.problem, found.solution.x, progress)
+    """The search with all derivatives evaluated again, until that changes little: what is left looks like an effect."""
+    for part in split(progress, int(found.numbers.number("fit.refinements"))):
+        before, found = found.objective, found.solved(found.problem, found.solution.x, part)
+        if before - found.objective < found.numbers.number("fit.refined"):
+            break
+    return found
 
 
 def _fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | None = None) -> Search:

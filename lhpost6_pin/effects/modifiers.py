@@ -22,6 +22,9 @@ __all__ = ["added_inertias", "command_path", "modify_rows", "supply_of", "thrust
 
 _PLACE = {name: i for i, name in enumerate(Hydraulic._fields)}
 
+_OF_CHAMBERS = ("dead_volume", "external_leakage")
+"""Laws of chambers whose second number is the side of the piston."""
+
 
 def _acting(effects: Sequence[Effect], kind: str) -> Iterator[tuple[Effect, str, tuple[float, ...]]]:
     """Effect, component and numbers of all modifiers of a kind."""
@@ -48,6 +51,8 @@ def modify_rows(rows: NDArray[np.void], effects: Sequence[Effect], at: Mapping[s
         row, law = rows[at[component]], LAWS[effect.law]
         if numbers[0] == 0.0:
             continue
+        if effect.law in _OF_CHAMBERS and row["numbers"][_PLACE["area_b"]] == 0.0:
+            numbers = (numbers[0], 0.0)  # one chamber alone has no side
         if effect.law == "dead_volume":
             for side, share in zip("ab", side_shares(numbers[1]), strict=True):
                 if (area := row["numbers"][_PLACE[f"area_{side}"]]) > 0.0:

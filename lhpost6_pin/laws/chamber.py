@@ -35,7 +35,7 @@ class DeadVolume(NamedTuple):
     """Parameters of a volume that adds to the chambers'."""
 
     volume: Annotated[float, "m3"]
-    side: Annotated[float, "1"]  # 0 both chambers, 1 A alone, -1 B alone
+    side: Annotated[float, "1"]  # 0 both chambers, 1 A alone, -1 B alone; of no meaning without B
 
 
 LAWS = {"dead_volume": Law(DeadVolume, modifies="oil", fields=("dead_volume",))}

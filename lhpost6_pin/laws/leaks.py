@@ -36,7 +36,7 @@ class ExternalLeakage(NamedTuple):
     """Parameters of laminar leakage out of the chambers."""
 
     leakage: Annotated[float, "m3/s/Pa"]
-    side: Annotated[float, "1"]  # 0 both chambers, 1 A alone, -1 B alone
+    side: Annotated[float, "1"]  # 0 both chambers, 1 A alone, -1 B alone; of no meaning without B
 
 
 class NullLeakage(NamedTuple):

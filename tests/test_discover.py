@@ -27,12 +27,13 @@ from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import amplitude_of
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
+from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, with_candidate
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import _by_rank, score_pairs
-from lhpost6_pin.discovery.search import _best_strength, _fit_jointly, _pruned, with_candidate, without_effect
+from lhpost6_pin.discovery.search import _pruned, without_effect
 from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
 from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import judge, reject_effects
@@ -510,7 +511,7 @@ def test_a_step_to_a_machine_without_inertia_is_rejected(found, monkeypatch):
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
     search = found.search
     helper = scored("asymmetric_friction", ("V1",), 50.0)
-    both = _fit_jointly(search, helper, lambda share: None)
+    both = fit_jointly(search, helper, lambda share: None)
     both = replace(both, added=(replace(search.added[0], candidate=helper.candidate), *both.added))
     assert len(both.problem.machine.parameters.effects) == 1 + len(search.problem.machine.parameters.effects)
     left = _pruned(both)

@@ -107,8 +107,14 @@ def form_share(family: Family, numbers: Parameters) -> float:
     return numbers.number("verdict.rest_friction" if family.confusable else "verdict.rest")
 
 
-def refusal(families: Sequence[Family], one: Score, less: Lowered, numbers: Parameters) -> str:
-    """Why a candidate, or several together, may not be added; empty if they may be."""
+def refusal(
+    families: Sequence[Family], one: Score, less: Lowered, numbers: Parameters, *, absorbed: bool = False
+) -> str:
+    """Why a candidate, or several together, may not be added; empty if they may be.
+
+    Where nuisances that run to their bounds have `absorbed` a part of it, what is left need not be beyond noise, nor a
+    share of the initial residual.
+    """
     n = numbers.number
     if one.gain < n("accept.look"):
         return "gain below the threshold"
@@ -121,10 +127,10 @@ def refusal(families: Sequence[Family], one: Score, less: Lowered, numbers: Para
     better = np.mean(held > -max(chance, n("accept.worse") * one.gain))
     if better < n("accept.better") or held.min() < -max(2.0 * chance, n("accept.worst") * one.gain):
         return "fails cross-validation"
-    if less.beyond < sum(gate(family, numbers) for family in families if family.confusable):
+    if not absorbed and less.beyond < sum(gate(family, numbers) for family in families if family.confusable):
         return "within the uncertainty of the noise"
     if less.share < n("accept.closure"):
         return "explains too little of the residual beyond noise"
-    if less.of_first < n("accept.of_first"):
+    if not absorbed and less.of_first < n("accept.of_first"):
         return "explains too little of the initial residual"
     return ""

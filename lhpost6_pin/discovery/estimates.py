@@ -12,11 +12,12 @@ from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.library import find_family
 from ..machine.parameters import Parameters
+from .candidates import Candidate
 from .search_state import AddedEffect, Search
 
 __all__ = [
     *("Estimate", "amplitude_of", "at_bounds", "covariance_of", "deviations", "estimates_of", "interval_reach"),
-    *("owns", "sums_of"),
+    *("is_absorbed", "own_at_bounds", "owns", "sums_of"),
 ]
 
 AT_BOUND = 1e-6
@@ -52,6 +53,18 @@ def at_bounds(found: Search) -> tuple[str, ...]:
     near = AT_BOUND * problem.prior
     ends = (x <= low + near) & ~(natural & (low == problem.lowest)) | (x >= high - near)
     return tuple(name for name, end in zip(problem.names, ends, strict=True) if end)
+
+
+def own_at_bounds(found: Search) -> tuple[FreeParameter, ...]:
+    """Components' own numbers, factors of their kind's, that are at a bound."""
+    bounded = at_bounds(found)
+    return tuple(p for p in found.problem.parameters if p.of and p.name in bounded)
+
+
+def is_absorbed(candidate: Candidate, ends: Sequence[FreeParameter]) -> bool:
+    """Whether a part of a candidate is in its components' own numbers, of which `ends` are at a bound."""
+    owners = {p.name.partition(".")[0] for p in ends if {*p.shows_in} & {*candidate.family.shows_in}}
+    return not owners.isdisjoint(candidate.components)
 
 
 def covariance_of(found: Search) -> Array:

@@ -25,7 +25,7 @@ from ..machine.parameters import Parameters
 from .acceptance import gate, squares_by_column
 from .balances import residual_at
 from .candidates import Candidate
-from .search import with_candidate
+from .joint_fit import with_candidate
 from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
 __all__ = ["with_friction_form"]

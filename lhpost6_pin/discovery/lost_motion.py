@@ -23,7 +23,7 @@ from ..machine.parameters import Parameters
 from ..mechanics.plant import Plant
 from .acceptance import squares_by_column
 from .candidates import Candidate, first_shape
-from .search import with_candidate
+from .joint_fit import with_candidate
 from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
 __all__ = ["LostMotion", "lost_motion", "with_lost_motion"]

@@ -18,6 +18,7 @@ from ..identification.calibration.problem import OperatingPoint, Problem
 from .acceptance import Lowered, Reweighting, gate, refusal
 from .candidate_columns import columns_of_groups
 from .candidates import Candidate, list_candidates, list_releases
+from .estimates import is_absorbed, own_at_bounds
 from .scores import Block, Columns, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
 
@@ -34,10 +35,11 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     taken = {a.candidate.name for a in found.added}
     groups = [g for g in list_candidates(base.plant.machine, base.tests[0].channels) if not taken & {c.name for c in g}]
     weigh, look = Reweighting(found, background), numbers.number("accept.look")
+    ends = own_at_bounds(found)
 
     def judged(candidate: Candidate, one: Score, explained: Sequence[Array]) -> Scored:
         less = weigh.lowered(explained, one) if explained else Lowered(one.gain, 0.0, 0.0, 0.0)
-        why = refusal([candidate.family], one, less, numbers)
+        why = refusal([candidate.family], one, less, numbers, absorbed=is_absorbed(candidate, ends))
         if not why and less.gain < numbers.number("accept.again") * found_there(found, candidate):
             why = "may be due to the form of an effect added there"
         return Scored(candidate, one, less.gain, less.share, why)

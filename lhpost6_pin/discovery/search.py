@@ -9,15 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.arrays import Array
 from ..core.progress import Progress, between, split
-from ..identification.calibration.fit import objective_at, solve
-from ..identification.calibration.free_parameters import FreeParameter
+from ..identification.calibration.fit import solve
 from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
 from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained, squares_by_column
 from .candidates import Candidate
+from .joint_fit import fit_jointly, refined
 from .screening import found_there, is_confused, score_pairs, screen
 from .search_state import (
     AddedEffect,
@@ -30,7 +29,7 @@ from .search_state import (
     linearise,
 )
 
-__all__ = ["refit", "search", "with_candidate", "without_effect"]
+__all__ = ["refit", "search", "without_effect"]
 
 
 def refit(
@@ -104,7 +103,7 @@ def _pruned(found: Search) -> Search:
     for one in found.added:
         fewer[found.less(one.candidate)] = less = without_effect(found, one.candidate)
         if less.objective - found.objective + one.from_lengths < gate(one.candidate.family, found.numbers):
-            return _pruned(_refined(less, lambda share: None))
+            return _pruned(refined(less, lambda share: None))
     return replace(found, without=fewer)
 
 
@@ -232,12 +231,12 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
 
 
 def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
-    """Candidates, and those confused with the first that gain as much on its components, though these were refused.
+    """Candidates, and those confused with the first that gain as much on its components, though they were refused.
 
-    Of two that explain alike, one may be refused by a hair: the joint fit decides. One of a family replaces a weaker one.
+    Of two that explain alike, one may be refused by a hair: joint fits decide. One replaces a weaker of its family.
     """
-    first = rivals[0]
-    better = [o for o in _in_its_place(found, first) if o.candidate.family.named in first.candidate.family.confused_with]
+    confused = rivals[0].candidate.family.confused_with
+    better = [one for one in _in_its_place(found, rivals[0]) if one.candidate.family.named in confused]
     return best_per_family(sorted([*rivals, *better], key=lambda one: -one.gain))
 
 
@@ -246,7 +245,7 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
     numbers, parts = found.numbers, split(between(progress, 0.0, 0.7), len(rivals))
     fitted: list[Search] = []
     for rival, part in zip(rivals, parts, strict=True):
-        fitted.append(_fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
+        fitted.append(fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
     before, *left = (one.objective for one in (found, *fitted))
     gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
     passed = [i for i, required in enumerate(gates) if before - left[i] >= required]
@@ -269,88 +268,8 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
         )
         for i in order
     )
-    more = _refined(fitted[best], between(progress, 0.7, 1.0))
+    more = refined(fitted[best], between(progress, 0.7, 1.0))
     fall = squares_by_column(found.residual) - squares_by_column(more.residual)
     place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
     gain = before - left[best]
     return more.with_effect(AddedEffect(rivals[best].candidate, gain, place, tried, contest, fall, apart))
-
-
-def _refined(found: Search, progress: Progress) -> Search:
-    """The search with all derivatives evaluated again, until that changes little: what is left looks like an effect."""
-    for part in split(progress, int(found.numbers.number("fit.refinements"))):
-        before, found = found.objective, found.solved(found.problem, found.solution.x, part)
-        if before - found.objective < found.numbers.number("fit.refined"):
-            break
-    return found
-
-
-def _fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | None = None) -> Search:
-    """The search with a candidate fitted jointly with all parameters, from its linear estimate.
-
-    Where the residual stays large, it is fitted from the stated parameters, too, since a missing effect may have biased
-    them out of reach; and from other shapes that explain nearly as much. Not so where the `best` rival so far leaves
-    little, and this one is far behind it.
-    """
-    n = found.numbers.number
-    same = [s for s in found.rounds[-1].scored if s.candidate.of_one_form(one.candidate) and s is not one]
-    others = [s for s in same if s.gain >= n("accept.near") * one.gain][: int(n("accept.shapes"))]
-    starts = [(one, False), (one, True), *((other, False) for other in others)]
-    fits: list[Search] = []
-    for (start, afresh), part in zip(starts, split(progress, len(starts)), strict=True):
-        fits.append(_fit_from(found, start, part, afresh=afresh))
-        if fits[-1].power < n("accept.settled"):
-            break
-        if best is not None and best.power < n("accept.settled"):
-            far = n("accept.far") * (found.objective - best.objective)
-            if fits[-1].objective - best.objective > far:
-                break
-    return min(fits, key=lambda fit: fit.objective)
-
-
-def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -> Search:
-    """The search with a candidate fitted jointly, from the present solution or from the stated parameters (`afresh`).
-
-    Derivatives by everything else are reused: accurate enough to compare candidates.
-    """
-    problem, candidate, start = found.problem, one.candidate, found.solution.at
-    if candidate.release:
-        kind = "known" if problem.names.index(candidate.release) < len(problem.parameters) else "sensor"
-        problem = problem.with_free(candidate.release, found.numbers.number(f"fit.{kind}_free"))
-    else:
-        far = found.power >= found.numbers.number("accept.settled")
-        strengths = found.numbers.vector("accept.strengths") if far else (1.0,)
-        amplitudes = tuple(_best_strength(found, candidate, one.score.amplitude, strengths, afresh=afresh).tolist())
-        own = candidate.fit_parameters(amplitudes, found.numbers)
-        problem, start = with_candidate(problem, candidate, amplitudes, own, start)
-    # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
-    flows = [*(k.shows_in == ("flow",) for k in problem.parameters), *(u.alone[1] >= 0 for u in problem.unknowns)]
-    near = np.array(flows) & ("flow" in candidate.family.shows_in)
-    return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
-
-
-def _best_strength(
-    found: Search, candidate: Candidate, amplitude: Array, strengths: Sequence[float], *, afresh: bool
-) -> Array:
-    """The linear estimate (q,) of a candidate's amplitudes, times the factor of some with which it explains most.
-
-    Far from the optimum the linear estimate may be several times too small or too large. Zero where none of them makes
-    a machine.
-    """
-    start, best, least = found.solution.at, np.zeros_like(amplitude), np.inf
-    for factor in strengths:
-        tried = np.clip(factor * amplitude, *candidate.bounds)
-        problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)
-        value = objective_at(problem, np.zeros_like(x) if afresh else x)
-        if value < least:
-            best, least = tried, value
-    return best
-
-
-def with_candidate(
-    problem: Problem, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[FreeParameter], x: Array
-) -> tuple[Problem, Array]:
-    """The problem with a candidate in the machine and its parameters in the fit; and x (p,) with zeros for these."""
-    machine = candidate.on(problem.machine, amplitudes)
-    more = problem.with_machine(machine, (*problem.parameters, *own))
-    return more, np.insert(x, len(problem.parameters), np.zeros(len(own)))

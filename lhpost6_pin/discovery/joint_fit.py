@@ -1,0 +1,95 @@
+"""Joint fits: a candidate fitted together with all parameters and sensor errors, from several starts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.progress import Progress, split
+from ..identification.calibration.fit import objective_at
+from ..identification.calibration.free_parameters import FreeParameter
+from ..identification.calibration.problem import Problem
+from .candidates import Candidate
+from .search_state import Scored, Search
+
+__all__ = ["fit_jointly", "refined", "with_candidate"]
+
+
+def refined(found: Search, progress: Progress) -> Search:
+    """The search with all derivatives evaluated again, until that changes little: what is left looks like an effect."""
+    for part in split(progress, int(found.numbers.number("fit.refinements"))):
+        before, found = found.objective, found.solved(found.problem, found.solution.x, part)
+        if before - found.objective < found.numbers.number("fit.refined"):
+            break
+    return found
+
+
+def fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | None = None) -> Search:
+    """The search with a candidate fitted jointly with all parameters, from its linear estimate.
+
+    Where the residual stays large, it is fitted from the stated parameters, too, since a missing effect may have biased
+    them out of reach; and from other shapes that explain nearly as much. Not so where the `best` rival so far leaves
+    little, and this one is far behind it.
+    """
+    n = found.numbers.number
+    same = [s for s in found.rounds[-1].scored if s.candidate.of_one_form(one.candidate) and s is not one]
+    others = [s for s in same if s.gain >= n("accept.near") * one.gain][: int(n("accept.shapes"))]
+    starts = [(one, False), (one, True), *((other, False) for other in others)]
+    fits: list[Search] = []
+    for (start, afresh), part in zip(starts, split(progress, len(starts)), strict=True):
+        fits.append(_fit_from(found, start, part, afresh=afresh))
+        if fits[-1].power < n("accept.settled"):
+            break
+        if best is not None and best.power < n("accept.settled"):
+            far = n("accept.far") * (found.objective - best.objective)
+            if fits[-1].objective - best.objective > far:
+                break
+    return min(fits, key=lambda fit: fit.objective)
+
+
+def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -> Search:
+    """The search with a candidate fitted jointly, from the present solution or from the stated parameters (`afresh`).
+
+    Derivatives by everything else are reused: accurate enough to compare candidates.
+    """
+    problem, candidate, start = found.problem, one.candidate, found.solution.at
+    if candidate.release:
+        kind = "known" if problem.names.index(candidate.release) < len(problem.parameters) else "sensor"
+        problem = problem.with_free(candidate.release, found.numbers.number(f"fit.{kind}_free"))
+    else:
+        far = found.power >= found.numbers.number("accept.settled")
+        strengths = found.numbers.vector("accept.strengths") if far else (1.0,)
+        amplitudes = tuple(_best_strength(found, candidate, one.score.amplitude, strengths, afresh=afresh).tolist())
+        own = candidate.fit_parameters(amplitudes, found.numbers)
+        problem, start = with_candidate(problem, candidate, amplitudes, own, start)
+    # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
+    flows = [*(k.shows_in == ("flow",) for k in problem.parameters), *(u.alone[1] >= 0 for u in problem.unknowns)]
+    near = np.array(flows) & ("flow" in candidate.family.shows_in)
+    return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
+
+
+def _best_strength(
+    found: Search, candidate: Candidate, amplitude: Array, strengths: Sequence[float], *, afresh: bool
+) -> Array:
+    """The linear estimate (q,) of a candidate's amplitudes, times the factor of some with which it explains most.
+
+    Far from the optimum the linear estimate may be several times too small or too large. Zero where none of them makes
+    a machine.
+    """
+    start, best, least = found.solution.at, np.zeros_like(amplitude), np.inf
+    for factor in strengths:
+        tried = np.clip(factor * amplitude, *candidate.bounds)
+        problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)
+        value = objective_at(problem, np.zeros_like(x) if afresh else x)
+        if value < least:
+            best, least = tried, value
+    return best
+
+
+def with_candidate(
+    problem: Problem, candidate: Candidate, amplitudes: tuple[float, ...], own: Sequence[FreeParameter], x: Array
+) -> tuple[Problem, Array]:
+    """The problem with a candidate in the machine and its parameters in the fit; and x (p,) with zeros for these."""
+    machine = candidate.on(problem.machine, amplitudes)
+    more = problem.with_machine(machine, (*problem.parameters, *own))
+    return more, np.insert(x, len(problem.parameters), np.zeros(len(own)))

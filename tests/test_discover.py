@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import ANY
@@ -25,16 +26,24 @@ from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.estimates import amplitude_of
+from lhpost6_pin.discovery.estimates import amplitude_of, at_bounds, is_absorbed, own_at_bounds
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
-from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, with_candidate
+from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, refined, with_candidate
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import _by_rank, score_pairs
-from lhpost6_pin.discovery.search import _pruned, without_effect
-from lhpost6_pin.discovery.search_state import AddedEffect, FittedCandidate, Linearisation, Scored, linearise
+from lhpost6_pin.discovery.search import _pruned, _with_confused, without_effect
+from lhpost6_pin.discovery.search_state import (
+    AddedEffect,
+    FittedCandidate,
+    Linearisation,
+    Round,
+    Scored,
+    Search,
+    linearise,
+)
 from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import judge, reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
@@ -289,6 +298,41 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     assert refusal([spring], against, clear, numbers) == "fails cross-validation"
 
 
+def test_a_family_confused_with_the_first_contests_though_it_was_refused(found):
+    """A stray_spring gains more but was refused, as one of two that explain alike may be; other families may not."""
+    first = scored("end_stop_stiffening", ("H2",), 150.0)
+    rivals = [first, scored("local_viscous", ("H2",), 120.0)]
+    refused = [
+        replace(scored(family, components, gain), refused="explains too little of the residual beyond noise")
+        for family, components, gain in (
+            ("stray_spring", ("H2",), 200.0),
+            ("stray_spring", ("H1",), 300.0),  # elsewhere
+            ("gas_heat_transfer", ("H2",), 20.0),  # far behind
+            ("backlash", ("H2",), 140.0),  # not confused with an end stop
+        )
+    ]
+    search = replace(found.search, added=(), rounds=(Round((*refused, *rivals)),))
+    assert _with_confused(search, rivals) == [refused[0], *rivals]
+
+
+def test_what_is_absorbed_by_a_component_s_own_number_at_its_bound_need_not_be_beyond_noise(found):
+    numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
+    one, rubs = Score(60.0, np.zeros(1), np.ones(1), np.full(3, 20.0), np.zeros(1)), find_family("bearing_friction")
+    little = Lowered(60.0, 10.0, 1.0, 0.001)
+    assert refusal([rubs], one, little, numbers) == "within the uncertainty of the noise"
+    assert refusal([rubs], one, little, numbers, absorbed=True) == ""
+    search = found.search
+    name = "V1.pad_friction"
+    place = search.problem.names.index(name)
+    assert not own_at_bounds(search)
+    x = search.solution.x.copy()
+    x[place] = bounds_of(search.problem, search.calibration)[1][place]
+    ends = own_at_bounds(replace(search, solution=search.solution._replace(x=x)))
+    assert [p.name for p in ends] == [name]
+    absorbed = [("bearing_friction", "V1"), ("bearing_friction", "V2"), ("dead_volume", "V1")]
+    assert [is_absorbed(candidate(*of), ends) for of in absorbed] == [True, False, False]  # oil shows in flows alone
+
+
 def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):
     """Columns of two effects laid into what is left: with a third one, only these two go together."""
     search = found.search
@@ -475,6 +519,40 @@ def test_an_effect_at_a_bound_is_no_finding(found):
     larger = search.refit._replace(residual=[3.0 * bins for bins in search.refit.residual])
     verdict = judge(replace(less, refit=larger), (), (), (), gone)
     assert (verdict.word, verdict.nearest) == ("unexplained", ("stribeck_friction",)) and verdict.where
+
+
+def test_a_small_amplitude_is_not_at_the_bound_of_none(found):
+    """A flat prior is wide: a play of a hundredth of a typical one is far from zero for those sensors that tell it."""
+    search = found.search
+    one = candidate("swivel_play", "H1")
+    small = 0.01 * one.family.shapes[0].typical
+    problem, _ = with_candidate(
+        search.problem, one, (small,), one.fit_parameters((small,), search.numbers), search.solution.x
+    )
+    for size, ends in ((0.0, False), (-small, True)):
+        at = np.insert(search.solution.x, len(search.problem.parameters), [size, 0.0])
+        moved = replace(search, problem=problem, solution=search.solution._replace(x=at))
+        assert ("swivel_play_H1.half_play" in at_bounds(moved)) is ends
+
+
+def test_a_refined_fit_is_evaluated_until_it_settles(found, monkeypatch):
+    """From numbers far off; the last evaluation of all derivatives lowers the objective by little."""
+    search, left = found.search, []
+    away = search.solution.x + 2.0 * search.problem.prior * (np.array(search.problem.names) == "horizontal.flow")
+    rest = search.problem.residual(OperatingPoint(search.problem, away))
+    off = replace(search, solution=search.solution._replace(x=away, at=away, residual=rest))
+    solved = Search.solved
+
+    def counted(self, *given, **options):
+        after = solved(self, *given, **options)
+        left.append(after.objective)
+        return after
+
+    monkeypatch.setattr(Search, "solved", counted)
+    settled = refined(off, lambda share: None)
+    assert off.objective - settled.objective > 1000.0 and len(left) > 1
+    assert all(before - after >= 5.0 for before, after in pairwise([off.objective, *left[:-1]]))
+    assert left[-2] - left[-1] < 5.0 and settled.objective == left[-1] == pytest.approx(search.objective, abs=5.0)
 
 
 def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):

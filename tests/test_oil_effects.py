@@ -209,6 +209,15 @@ def test_a_dead_volume_is_as_much_more_chamber():
     assert both["modified"] == 0  # no more work than the report's oil
 
 
+@pytest.mark.parametrize("side", [-1.0, -0.4, 1.0])
+def test_one_chamber_alone_has_no_side(side):
+    """Else its volume and the side would be one number in two."""
+    dead = parameters_of(Case("dead_volume", chamber.DeadVolume(0.02, side), on=SINGLE).rows[0])
+    assert dead.chamber_a == pytest.approx(SINGLE.chamber_a + 0.02 / SINGLE.area_a, rel=1e-14)
+    leak = parameters_of(Case("external_leakage", leaks.ExternalLeakage(1e-11, side), on=SINGLE).rows[0])
+    assert (leak.external, leak.external_side) == (1e-11, 0.0)
+
+
 def test_a_rod_with_play_runs_ahead_by_all_of_it():
     """From far pulled to far pushed, the slope adds up to the whole play, and the flanks' energy to the work done."""
     assert play.play_travel(2e6, 3e-4, 5e3) - play.play_travel(-2e6, 3e-4, 5e3) == pytest.approx(6e-4, rel=1e-5)

@@ -1,15 +1,16 @@
 """A blind battery: cases of another simulator with sealed labels, searched, then unsealed and scored.
 
-    python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast | --brief] [--jobs 2] [--out FOLDER] [--baselines]
-                                    [--dask] [--publish] [--check]
+    python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast | --brief] [--anew] [--fewer] [--jobs 2]
+                                    [--out FOLDER] [--baselines] [--dask] [--publish] [--check]
 
 Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
 searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests,
---brief shorter ones of four, proven by inverse dynamics alone. --check exits with 1 where a campaign that lacks nothing
-got a name, or too few a right one: a smoke test, which `scripts/checks.py` runs.
+--brief shorter ones of four, proven by inverse dynamics alone. --anew draws a table of its own for each case, other in
+size, valves, oil and friction than the LHPOST6; --fewer leaves out a third of the sensors. --check exits with 1 where a
+campaign that lacks nothing got a name, or too few a right one: a smoke test, which `scripts/checks.py` runs.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the same cases. --dask runs the cases
 on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes. --publish writes the scores
-to scripts/battery/results.md, too.
+to scripts/battery/results.md, too; of batteries of another variety to results_anew.md and the like.
 """
 
 import argparse
@@ -20,7 +21,9 @@ from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
+from battery.cases import Case, Variety, model
 from battery.generate import draw_cases, seal, unseal, write_case
+from battery.machines import changed_values
 from battery.reach import measured_label
 from battery.reporting import answers, publish, report, search, wrong
 from battery.scoring import score
@@ -29,26 +32,38 @@ from joblib import Parallel, delayed, parallel_config
 from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.data.sensors import load_sensors
-from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.machine import Machine, load_machine
+from lhpost6_pin.machine.machine_toml import save_machine_toml
 
-RESULTS = Path(__file__).parent / "battery" / "results.md"
-"""The latest published scores."""
+MACHINE = "machine.toml"
+"""In the folder of a case: its table as its lab knows it; the LHPOST6 where there is none."""
+
+RESULTS = Path(__file__).parent / "battery"
+"""Folder of the latest published scores."""
 
 LEAST = 0.4
 """Share of right names below which something is broken; brief campaigns do not show all that is hidden."""
 
 
-def make(case, folder: Path) -> dict:
-    """Write a case's campaign, unless it is there; its label."""
+def make(case: Case, folder: Path) -> dict:
+    """Write a case's campaign and its lab's machine file, unless they are there; its label."""
     if not (folder / case.id / "campaign.toml").exists():
+        if changes := changed_values(case.model, model()):
+            (folder / case.id).mkdir(parents=True, exist_ok=True)
+            save_machine_toml(load_machine().with_params(changes), folder / case.id / MACHINE)
         write_case(case, folder)
     return measured_label(case)
+
+
+def machine_of(home: Path) -> Machine:
+    """The machine as the lab of a case knows it."""
+    return load_machine(home / MACHINE) if (home / MACHINE).exists() else load_machine()
 
 
 def search_case(name: str, folder: Path, phases: tuple[int, ...], with_baselines: bool) -> None:
     """Search one case, unless that was done; leaves verdict.json in its folder, or error.txt."""
     home = folder / name
-    machine, sensors = load_machine(), load_sensors()
+    machine, sensors = machine_of(home), load_sensors()
     search(home, machine, sensors, phases)
     if not with_baselines or (home / "baselines.json").exists() or not (home / "verdict.json").exists():
         return
@@ -76,7 +91,7 @@ def baseline_rows(folder: Path, names: list[str], pairs: list[tuple[dict, dict]]
 def command_of(asked: argparse.Namespace) -> str:
     """The command that was run."""
     length = f" --{asked.campaign}" if asked.campaign != "full" else ""
-    length += " --baselines" if asked.baselines else ""
+    length += "".join(f" --{option}" for option in ("anew", "fewer", "baselines") if getattr(asked, option))
     return f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{length}"
 
 
@@ -87,7 +102,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     for length in ("fast", "brief"):
         parser.add_argument(f"--{length}", dest="campaign", action="store_const", const=length, default="full")
-    parser.add_argument("--check", action="store_true")
+    for option in ("anew", "fewer", "check"):
+        parser.add_argument(f"--{option}", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out") / "battery")
     parser.add_argument("--baselines", action="store_true")
@@ -96,7 +112,7 @@ def main() -> None:
     asked = parser.parse_args()
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
-    cases = draw_cases(asked.cases, asked.seed, asked.campaign)
+    cases = draw_cases(asked.cases, asked.seed, asked.campaign, Variety(asked.anew, asked.fewer))
     phases = (1,) if asked.campaign == "brief" else (1, 2)
     cluster = nullcontext()
     if asked.dask:
@@ -117,7 +133,8 @@ def main() -> None:
         beside.write_text(text, encoding="utf-8")
     print(text)
     if asked.publish:
-        publish(text, RESULTS, "Scores of the blind battery", command_of(asked))
+        words = [option for option in ("anew", "fewer") if getattr(asked, option)]
+        publish(text, RESULTS / f"{'_'.join(['results', *words])}.md", "Scores of the blind battery", command_of(asked))
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

@@ -2,13 +2,16 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from battery import cases, generate, hidden, motions, rates, reach, scoring, sensors, simulate, table
+from battery import cases, generate, hidden, machines, motions, rates, reach, scoring, sensors, simulate, table
 
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.identification.calibration.bin_rows import dense_rows, row_by_column
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.machine_toml import save_machine_toml
 
 pytestmark = pytest.mark.long
 
@@ -127,6 +130,55 @@ def test_the_same_seed_draws_the_same_cases_in_the_stated_mix():
     families = {effect.family for case in first if case.label["sort"] == "one" for effect in case.effects}
     assert len(families) == 31  # one of each before any comes again
     assert {case.id for case in first}.isdisjoint(case.id for case in cases.draw_cases(20, 8, campaign="fast"))
+
+
+@pytest.mark.parametrize("variety", [cases.Variety(anew=True), cases.Variety(fewer=True)])
+def test_a_variety_changes_nothing_else_of_a_case(variety):
+    """Names, effects and errors are those of the same seed without it."""
+    plain, other = (cases.draw_case("one", ("dead_volume",), seed=4, variety=v) for v in (cases.Variety(), variety))
+    assert other.effects == plain.effects and other.tests == plain.tests and plain.left_out == ()
+    assert {**other.label, "left_out": []} == plain.label
+    assert (other.model == plain.model) is (not variety.anew)
+    assert bool(other.left_out) is variety.fewer
+
+
+def test_a_table_drawn_anew_is_known_to_its_lab_and_follows_its_motions(tmp_path):
+    """With no more error than the nominal table's tenth of the stroke, and its valves short of their limit."""
+    nominal = cases.model()
+    factors = []
+    for seed in range(4):
+        case = cases.draw_case("null", seed=seed, campaign="brief", variety=cases.Variety(anew=True))
+        changes = machines.changed_values(case.model, nominal)
+        path = save_machine_toml(load_machine().with_params(changes), tmp_path / f"{seed}.toml")
+        lab = table.nominal_values(table.load_model(path))
+        known = table.nominal_values(case.model)
+        assert lab.keys() == known.keys()
+        for name, entries in known.items():
+            for key, value in entries.items():
+                if not isinstance(value, str):
+                    np.testing.assert_allclose(lab[name][key], value, rtol=1e-12)
+        for test in case.tests:
+            run = generate.run_test(case, test)
+            assert np.abs(run.channels.spool).max() < 0.8
+            assert np.abs(run.truth()["platen_displacement"] - run.reference).max(axis=0)[:3].max() < 0.02
+        factors.append(known["platen"]["mass"][0] / nominal["platen"]["mass"]["value"][0])
+    assert np.ptp(factors) > 0.1 and 0.6 <= min(factors) <= max(factors) <= 1.5
+
+
+def test_of_a_third_of_the_sensors_nothing_is_recorded(tmp_path):
+    rule, seen = cases.numbers()["left_out"], set()
+    for seed in range(30):
+        out = cases.draw_case("null", seed=seed, campaign="brief", variety=cases.Variety(fewer=True)).left_out
+        assert sum(set(group) <= set(out) for group in rule["groups"]) == rule["count"]
+        assert not set(rule["one_of"]) <= set(out)
+        seen |= set(out)
+    assert seen == {name for group in rule["groups"] for name in group}
+    case = cases.draw_case("one", ("added_mass",), seed=1, campaign="brief", variety=cases.Variety(fewer=True))
+    home = generate.write_case(replace(case, tests=case.tests[:1]), tmp_path)
+    there = load_record(next(home.glob("*.nc")))
+    assert set(case.left_out).isdisjoint(there.data_vars)
+    gaps = reach.measured_label(replace(case, hold_out=(case.tests[0].name,)))["effects"][0]["gaps"]
+    assert set(case.left_out).isdisjoint(gaps) and gaps
 
 
 def test_bold_parameters_are_three_deviations_off_and_others_within_the_clip():

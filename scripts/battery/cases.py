@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from .hidden import Effect
+from .machines import Model, draw_anew
 from .sensors import Fault, Instruments, draw_instruments
 from .table import ACTUATORS, load_model, nominal_values
 
-__all__ = ["Case", "Test", "draw_case", "draw_cases", "model", "numbers"]
+__all__ = ["Case", "Test", "Variety", "draw_case", "draw_cases", "model", "numbers"]
 
 KIND_LEGS = {"horizontal": ACTUATORS[:4], "vertical": ACTUATORS[4:], "strut": ("S1", "S2", "S3")}
 
@@ -27,6 +28,14 @@ class Test:
 
 
 @dataclass(frozen=True)
+class Variety:
+    """How cases differ beside what they hide."""
+
+    anew: bool = False  # every case has a table of its own
+    fewer: bool = False  # a third of the sensors is left out
+
+
+@dataclass(frozen=True)
 class Case:
     """One blind campaign, complete: `generate.write_case` needs nothing else."""
 
@@ -38,7 +47,9 @@ class Case:
     effects: tuple[Effect, ...]
     instruments: Instruments
     tests: tuple[Test, ...]
-    hold_out: tuple[str, ...] = field(default=())
+    hold_out: tuple[str, ...]
+    model: Model = field(repr=False)  # as its lab knows the table
+    left_out: tuple[str, ...]  # variables that are not recorded
 
 
 @cache
@@ -54,8 +65,8 @@ def model() -> dict[str, dict]:
     return load_model(Path(__file__).parents[2] / "models" / "lhpost6.toml")
 
 
-def draw_cases(count: int, seed: int, campaign: str = "full") -> list[Case]:
-    """`count` cases in the battery's mix, in random order; the same for the same count, seed and campaign."""
+def draw_cases(count: int, seed: int, campaign: str = "full", variety: Variety = Variety()) -> list[Case]:
+    """`count` cases in the battery's mix, in random order; the same for the same arguments."""
     root = np.random.SeedSequence(seed)
     random = np.random.default_rng(root)
     mix = numbers()["mix"]
@@ -68,7 +79,7 @@ def draw_cases(count: int, seed: int, campaign: str = "full") -> list[Case]:
     decks = {name: _Deck(list(numbers()[group]), random) for name, group in piles.items()}
     hidden = [_deal(sort, decks) for sort in sorts]
     each = zip(sorts, hidden, root.spawn(count), strict=True)
-    return [draw_case(sort, families, seed=own, campaign=campaign) for sort, families, own in each]
+    return [draw_case(sort, families, seed=own, campaign=campaign, variety=variety) for sort, families, own in each]
 
 
 class _Deck:
@@ -103,12 +114,16 @@ def draw_case(
     campaign: str = "full",
     strength: float | None = None,
     variant: int | None = None,
+    variety: Variety = Variety(),
 ) -> Case:
     """One case of a sort of the mix with given families; `strength` and `variant` fix what is otherwise drawn."""
     random = np.random.default_rng(seed)
     sizes = numbers()["strength"]
     bold = sort == "null" and random.random() < numbers()["parameters"]["bold_share"]
-    values, moved = draw_parameters(random, bold)
+    own = random.spawn(2)  # what else is drawn stays the same with them
+    table = draw_anew(model(), numbers()["anew"], own[0]) if variety.anew else model()
+    left_out = draw_left_out(own[1]) if variety.fewer else ()
+    values, moved = draw_parameters(table, random, bold)
     scatter = {name: random.normal(1.0, numbers()["scatter"]["sd"], 13) for name in numbers()["scatter"]["fields"]}
     stretch = numbers()["campaign"][campaign]["stretch"]
     effects: list[Effect] = []
@@ -121,8 +136,8 @@ def draw_case(
         effects = [draw_effect(family, numbers()[sort][family], sizes, random, 1.0, variant)]
         campaign = numbers()[sort][family][0].get("campaign", campaign)
     elif sort != "null":
-        table = numbers()["unknown" if sort == "unknown" else "effect"]
-        effects = [draw_effect(family, table[family], sizes, random, strength, variant) for family in families]
+        library = numbers()["unknown" if sort == "unknown" else "effect"]
+        effects = [draw_effect(family, library[family], sizes, random, strength, variant) for family in families]
     described = [_describe(effect) for effect in effects]
     verdict, accept = VERDICTS[sort]
     name = random.bytes(5).hex()
@@ -136,6 +151,7 @@ def draw_case(
         "decoys": described if decoy else [],
         "parameters_sd": {name: round(by, 3) for name, by in moved.items()},
         "campaign": campaign,
+        "left_out": list(left_out),
     }
     plan = numbers()["campaign"][campaign]
     settings = [_stretched(numbers()["test"][t["motion"]], stretch) for t in plan["tests"]]
@@ -158,6 +174,8 @@ def draw_case(
         instruments=instruments,
         tests=tests,
         hold_out=tuple(plan["hold_out"]),
+        model=table,
+        left_out=left_out,
     )
 
 
@@ -173,34 +191,42 @@ VERDICTS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 
 
-def draw_parameters(random: np.random.Generator, bold: bool) -> tuple[dict[str, dict], dict[str, float]]:
-    """Parameters off by their stated deviation, alike for twins; `bold`: one or two of them by three deviations.
+def draw_left_out(random: np.random.Generator) -> tuple[str, ...]:
+    """Variables that are not recorded: a third of what is measured, never both forces and pressures."""
+    rule = numbers()["left_out"]
+    stays = str(random.choice(rule["one_of"]))
+    groups = [group for group in rule["groups"] if stays not in group]
+    return tuple(name for i in sorted(random.permutation(len(groups))[: rule["count"]]) for name in groups[i])
+
+
+def draw_parameters(model: Model, random: np.random.Generator, bold: bool) -> tuple[dict[str, dict], dict[str, float]]:
+    """Parameters of a table off by their stated deviation, alike for twins; `bold`: one or two by three deviations.
 
     Returns the values and by how many deviations each went.
     """
     rules = numbers()["parameters"]
-    values, moved = nominal_values(model()), dict[str, float]()
-    known = [(t, k) for t, table in model().items() for k, entry in table.items() if _deviation(entry) is not None]
+    values, moved = nominal_values(model), dict[str, float]()
+    known = [(t, k) for t, table in model.items() for k, entry in table.items() if _deviation(entry) is not None]
     far = list(random.permutation(rules["bold"])[: random.integers(1, 3)]) if bold else list[str]()
     mirrored: dict[tuple[str, str], np.ndarray] = {}
     for table, key in known:
         if key in rules["unused"]:
             continue
-        entry = model()[table][key]
+        entry = model[table][key]
         value, sd = np.array(entry["value"], dtype=float), np.array(_deviation(entry))
         step = np.clip(random.standard_normal(value.shape), -rules["clip"], rules["clip"])
         if f"{table}.{key}" in far:
             worst = np.all(value - 3 * sd >= rules["least"] * value)
             step = np.full(value.shape, 3.0) * (random.choice([-1, 1]) if worst else 1)
         if table.startswith("component."):  # twins' points move alike, mirrored
-            kind = model()[table]["kind"]
+            kind = model[table]["kind"]
             step = mirrored.setdefault((kind, "plan" if kind == "vertical" else key), step)
             values[table][key] = value + sd * step * np.where(value != 0, np.sign(value), 0.0) * [1, 1, -1]
         else:
             values[table][key] = np.maximum(value + sd * step, rules["least"] * np.abs(value) * np.sign(value))
             if value.ndim and (value == 0).any():
                 values[table][key] = value + sd * step
-        name = table if not table.startswith("component.") else f"component.{model()[table]['kind']}"
+        name = table if not table.startswith("component.") else f"component.{model[table]['kind']}"
         moved |= _steps(f"{name}.{key}", step)
     plane = values["platen"]["bearing_plane"][2]
     for name in KIND_LEGS["vertical"]:  # the bearings lie in the sliding plane

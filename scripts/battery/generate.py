@@ -9,6 +9,7 @@ import xarray as xr
 
 from .cases import Case, Test, draw_cases, model, numbers
 from .hidden import Effect, switch_on
+from .machines import loop_of
 from .motions import make_motion
 from .sealing import seal, unseal
 from .sensors import VARIABLES, observe, truth
@@ -51,10 +52,10 @@ def run_test(case: Case, test: Test, effects: tuple[Effect, ...] | None = None) 
     """Run a test with the case's effects, or others in their place."""
     settings = numbers()["integration"]
     legs, platen = machine(case, test, case.effects if effects is None else effects)
-    nominal = make_table(nominal_values(model()), settings["yield_factor"])
+    nominal = make_table(nominal_values(case.model), settings["yield_factor"])
     reference = make_motion(test.settings, test.seed)
     surge = platen[0]["surge"] * _bursts(len(reference), test.seed)
-    gains = make_gains(*nominal, numbers()["loop"])
+    gains = make_gains(*nominal, loop_of(case.model, model(), numbers()["loop"]))
     channels = simulate(legs, platen, nominal, gains, reference, surge, settings["substeps"])
     return Run(channels, legs, platen, reference, surge)
 
@@ -76,7 +77,7 @@ def write_case(case: Case, folder: Path) -> Path:
     for test in case.tests:
         random = np.random.default_rng([test.seed, 2])
         seen = observe(run_test(case, test).truth(), case.instruments, numbers()["sensors"], random)
-        _save(_record(seen, test.name), home / f"{test.name}.nc")
+        _save(_record(seen, test.name).drop_vars(case.left_out), home / f"{test.name}.nc")
     names = ", ".join(f'"{name}"' for name in case.hold_out)
     (home / "campaign.toml").write_text(f"hold_out = [{names}]\n", encoding="utf-8")
     return home

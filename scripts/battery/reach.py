@@ -30,7 +30,10 @@ def measured_label(case: Case) -> dict:
     for i, entry in enumerate(case.label[part]):
         rest = case.effects[:i] + case.effects[i + 1 :]
         each = [
-            (*_changes(run.truth(), run_test(case, test, rest).truth()), _own(run, *machine(case, test, rest)))
+            (
+                *_changes(*(_seen(case, one) for one in (run, run_test(case, test, rest)))),
+                _own(run, *machine(case, test, rest)),
+            )
             for run, test in zip(with_all, tests, strict=True)
         ]
         worst = [
@@ -40,6 +43,11 @@ def measured_label(case: Case) -> dict:
         largest = {name: max(values.values()) for name, values in figures.items()}
         described.append({**entry, **largest, **{f"{name}s": values for name, values in figures.items()}})
     return {**case.label, part: described}
+
+
+def _seen(case: Case, run: Run) -> dict[str, np.ndarray]:
+    """What is recorded of a run, without noise."""
+    return {name: values for name, values in run.truth().items() if name not in case.left_out}
 
 
 def _changes(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> tuple[dict[str, float], dict[str, float]]:

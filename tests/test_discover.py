@@ -28,6 +28,7 @@ from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import amplitude_of, at_bounds, is_absorbed, own_at_bounds
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
+from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, refined, with_candidate
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
@@ -607,6 +608,21 @@ def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_n
     (gap,) = found.proof.gaps
     for other in (gap.refitted, gap.delivered):  # the machine as delivered is right about what this test feels
         assert gap.after == pytest.approx(other, rel=0.08)  # parameters that share the search's noise
+
+
+def test_shares_are_of_the_error_that_each_effect_removes(found, machine, rubbing, sensors):
+    """Of two effects, one is there and the other is not; of one alone, the model without it is the refit."""
+    search, test = found.search, [r for r in rubbing.records if r.attrs["test"] == "TX"]
+    options = {"phases": (1,), "jobs": 1, "progress": lambda share: None}
+    (alone,) = prove(machine, search, test, sensors, **options).gaps
+    (name,) = alone.shares
+    assert alone.shares[name] == pytest.approx(1.0 - (alone.after / alone.refitted) ** 2, rel=1e-12)
+    helper = scored("asymmetric_friction", ("V1",), 50.0)
+    both = fit_jointly(search, helper, lambda share: None)
+    both = replace(both, added=(*search.added, replace(search.added[0], candidate=helper.candidate)))
+    (gap,) = prove(machine, both, test, sensors, **options).gaps
+    assert gap.shares[name] == pytest.approx(alone.shares[name], abs=0.02) and gap.shares[name] > 0.8
+    assert gap.shares[helper.candidate.name] == pytest.approx(0.0, abs=0.02)  # parameters share its noise
 
 
 def test_the_floor_is_noise_and_what_warmer_oil_leaves(found, rubbing, sensors):

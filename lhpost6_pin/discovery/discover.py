@@ -140,7 +140,13 @@ def discover(
     if forces and misfit > numbers.number("accept.settled"):  # else no function could fit far better
         replacing = fit_residual_functions(found, linearise(found.refit, calibration))
     report(0.8)
-    out, part = [records[i] for i in held], between(report, 0.8, 0.95)
+    verdict = judge(found, beside, replacing, faults, withdrawn)
+    ambiguous = propose and verdict.word == "ambiguous"
+    tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()
+    for one in found.added:  # what is validated is the model that is delivered
+        if one.candidate.name in {gone.name for gone in withdrawn}:
+            found = without_effect(found, one.candidate)
+    out, part = [records[i] for i in held], between(report, 0.85, 1.0)
     proven = tuple(str(record.attrs.get("test", i)) for i, record in zip(held, out, strict=True))
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
     balances: tuple[Balance, ...] = ()
@@ -149,15 +155,9 @@ def discover(
         three = [residual_at(held_problem, one) for one in (None, found.refit, found.solution)]
         balances = evaluate_balances(held_problem, three)
         left = residual_records(held_problem, dict(zip(("refitted", "with the effects"), three[1:], strict=True)))
-    verdict = judge(found, beside, replacing, faults, withdrawn)
-    ambiguous = propose and verdict.word == "ambiguous"
-    tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()
     checkpoint.remove()
     report(1.0)
     function = verdict.residual_function
-    for one in found.added:
-        if one.candidate.name in {gone.name for gone in withdrawn}:
-            found = without_effect(found, one.candidate)
     estimates = estimates_of(found, deviations(found))
     tests_of_search = [one for one in (held_problem, begun.search.problem) if one is not None]
     bases = [residual_at(one, found.solution).base for one in tests_of_search] if found.added else []

@@ -6,10 +6,12 @@ noise, so that noise alone gives one. The noise that reaches a balance depends o
 are over that of the model with the effects.
 
 closure = (refitted - after) / (refitted - floor); the floor is expected of a model that lacks nothing (`floor`).
+share of an effect = 1 - after^2 / without^2: of the squared error of the model without that effect, everything else
+refitted, the part that the effect removes.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +25,7 @@ from ..identification.calibration.prepare import as_simulated
 from ..identification.validation import PHASES, Phase, validate
 from ..machine.machine import Machine
 from .floor import COMPARED, NOISE, expected_gaps, model_at, normalised_error
+from .search import without_effect
 from .search_state import Search
 
 __all__ = ["Gap", "Proof", "prove"]
@@ -41,6 +44,7 @@ class Gap:
     refitted: float
     after: float
     floor: float
+    shares: Mapping[str, float] = field(default_factory=dict)  # of the effects by name, negative where one adds error
 
     @property
     def closure(self) -> float:
@@ -82,12 +86,15 @@ def prove(
 ) -> Proof:
     """Validate the three models on held-out records; `machine` is the one delivered."""
     models = [(as_simulated(found.problem, machine), list(records))]
-    for problem, x in ((s.normal.problem, s.x) for s in (found.refit, found.solution)):
+    names = [one.candidate.name for one in found.added]
+    less = [without_effect(found, one.candidate).solution for one in found.added] if len(names) > 1 else []
+    for problem, x in ((s.normal.problem, s.x) for s in (found.refit, found.solution, *less)):
         models.append(model_at(problem, x, records))
     done = []
     for i, (model, some) in enumerate(models):
         done.append(validate(model, Campaign("held out", tuple(some)), sensors=sensors, phases=phases, jobs=jobs))
         progress((i + 1) / (len(models) + 1))
+    without, done = done[3:] or done[1:2], done[:3]
     floors = expected_gaps(found, records, done[-1], sensors, phases, jobs)
     progress(1.0)
     gaps, traces = [], []
@@ -96,7 +103,10 @@ def prove(
             each = [v.phase(test, number) for v in done]
             delivered, refitted, after = sizes = [normalised_error(phase, each[-1]) for phase in each]
             if np.all(np.isfinite(sizes)):
-                gaps.append(Gap(PHASES[number], test, delivered, refitted, after, floors.get((test, number), NOISE)))
+                errors = (normalised_error(v.phase(test, number), each[-1]) for v in without)
+                shares = {n: 1.0 - (after / error) ** 2 for n, error in zip(names, errors, strict=False) if error > 0.0}
+                floor = floors.get((test, number), NOISE)
+                gaps.append(Gap(PHASES[number], test, delivered, refitted, after, floor, shares))
                 traces.append((refitted, _traces(PHASES[number], test, [p for p in each if p is not None])))
     traces.sort(key=lambda pair: -pair[0])
     return Proof(tuple(gaps), tuple(one for _, one in traces if one is not None))

@@ -36,7 +36,7 @@ MECHANICAL = {
     "power_law_viscous": (("H3",), {}),
     "stray_spring": (("H1", "platen.yaw"), {}),
     "mounted_spring": (("platen.y",), {"height": 1.5}),
-    "placed_spring": ((), {"x": 6.1, "y": 3.8, "turn": 0.4}),
+    "placed_spring": ((), {"x": 6.1, "y": 3.8, "turn": 0.4, "tilt": 0.2}),
     "end_stop_stiffening": (("H1",), {"start": 0.0}),
     "unnamed_by_position": (("H1",), {}),
     "unnamed_by_speed": (("V1",), {"share": 0.5}),

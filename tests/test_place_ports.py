@@ -11,7 +11,7 @@ from lhpost6_pin.mechanics.port_path import ports_along
 from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
-PLACE, TURN = (6.1, 3.8, 0.2), 0.4
+PLACE, TURN, TILT = (6.1, 3.8, 0.2), 0.4, 0.3
 MACHINE = load_machine("lhpost6")
 
 
@@ -23,7 +23,7 @@ def placed(**values):
 @pytest.fixture(scope="module")
 def along():
     """Ports of a machine with a spring at a corner along a motion of all six axes."""
-    machine = placed(stiffness_x=1e6, x=PLACE[0], y=PLACE[1], height=PLACE[2], turn=TURN)
+    machine = placed(stiffness_x=1e6, x=PLACE[0], y=PLACE[1], height=PLACE[2], turn=TURN, tilt=TILT)
     plant = make_plant(machine)
     t = np.arange(0.0, 1.0, 1e-3)
     wave = np.sin(2.0 * np.pi * t[:, None] * [1.0, 1.3, 0.7, 1.1, 0.9, 1.2])
@@ -36,6 +36,7 @@ def along():
 def test_a_port_is_where_pinocchio_has_the_point_and_pulls_as_a_force_there(along):
     plant, motion, path, _ = along
     axes = [np.array(place_of(port)[1]) for port in plant.ports[-3:]]
+    np.testing.assert_allclose(np.transpose(axes), pin.rpy.rpyToMatrix(0.0, TILT, TURN), atol=1e-15)
     rho = np.array(PLACE) - MACHINE.platen.centre_of_gravity
     for k in range(0, len(motion.q), 97):
         pose = pin.XYZQUATToSE3(motion.q[k])
@@ -54,7 +55,7 @@ def test_the_rate_of_a_port_is_the_derivative_of_its_coordinate(along):
 
 
 def test_a_spring_at_c_is_one_along_the_platen_s_axis():
-    own = placed(stiffness_x=2e6, x=0.0, y=0.0, height=0.0, turn=0.0)
+    own = placed(stiffness_x=2e6, x=0.0, y=0.0, height=0.0, turn=0.0, tilt=0.0)
     other = MACHINE.with_effect("stray_spring", ("platen.x",), stiffness=2e6)
     spool = np.zeros((400, len(MACHINE.actuators)))
     spool[:, 0] = 0.05

@@ -220,7 +220,7 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
     n, waiting = found.numbers.number, best_per_family(passed)
     for part in split(progress, int(n("accept.batches"))):
         near = n("accept.near") * waiting[0].gain if waiting else 0.0
-        rivals = [one for one in waiting if one.gain >= near][: int(n("accept.rivals"))]
+        rivals = _of_few_names([one for one in waiting if one.gain >= near], int(n("accept.rivals")))
         if not rivals:
             return None
         waiting = [one for one in waiting if one not in rivals]
@@ -228,6 +228,12 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
         if (best := _best_of(found, rivals, part)) is not None:
             return best
     return None
+
+
+def _of_few_names(ranked: Sequence[Scored], count: int) -> list[Scored]:
+    """Those of the first `count` families that a verdict reports, in each of their forms."""
+    names = list(dict.fromkeys(one.candidate.family.named for one in ranked))[:count]
+    return [one for one in ranked if one.candidate.family.named in names]
 
 
 def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:

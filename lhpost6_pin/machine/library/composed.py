@@ -85,8 +85,8 @@ def _mounted_spring(machine: Structure, components: Sequence[str], values: Value
 
 def _placed_spring(machine: Structure, components: Sequence[str], values: Values) -> Any:
     place = (values["x"], values["y"], values["height"])
-    cosine, sine = math.cos(values["turn"]), math.sin(values["turn"])
-    axes = ((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0))
+    (c, s), (up, down) = ((math.cos(values[angle]), math.sin(values[angle])) for angle in ("turn", "tilt"))
+    axes = ((c * up, s * up, -down), (-s, c, 0.0), (c * down, s * down, up))  # about the vertical, then the second
     rows = [(values[f"stiffness_{axis}"], values[f"damping_{axis}"]) for axis in "xyz"]
     return "spring_damper", [place_port(place, axis) for axis in axes], rows
 

@@ -299,15 +299,15 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     assert refusal([spring], against, clear, numbers) == "fails cross-validation"
 
 
-def test_a_family_confused_with_the_first_contests_though_it_was_refused(found):
-    """A stray_spring gains more but was refused, as one of two that explain alike may be; other families may not."""
-    first = scored("end_stop_stiffening", ("H2",), 150.0)
-    rivals = [first, scored("local_viscous", ("H2",), 120.0)]
+def test_families_confused_with_a_rival_contest_on_its_components_though_refused(found):
+    """What gains more may be refused by a hair, of two that explain alike; or its family be there on another leg."""
+    stop, beside = scored("end_stop_stiffening", ("H2",), 150.0), scored("stray_spring", ("H1",), 120.0)
+    rivals = [stop, beside]
     refused = [
         replace(scored(family, components, gain), refused="explains too little of the residual beyond noise")
         for family, components, gain in (
             ("stray_spring", ("H2",), 200.0),
-            ("stray_spring", ("H1",), 300.0),  # elsewhere
+            ("stray_spring", ("H3",), 300.0),  # of no rival's components
             ("gas_heat_transfer", ("H2",), 20.0),  # far behind
             ("backlash", ("H2",), 140.0),  # not confused with an end stop
         )

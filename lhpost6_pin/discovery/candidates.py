@@ -149,10 +149,12 @@ def first_shape(family: Family) -> tuple[tuple[str, float], ...]:
 def list_candidates(machine: Machine, channels: Collection[str] = LAYOUT) -> tuple[tuple[Candidate, ...], ...]:
     """All candidates of the library for a machine: each family at each start of its shapes, on each group together.
 
-    Where spools are not among the measured `channels`, errors of the command path are calibrated, not named: delay and
-    lag of a valve cannot be told apart from those that its machine states.
+    Not on components on which the machine has an effect of that family. Where spools are not among the measured
+    `channels`, errors of the command path are calibrated, not named: delay and lag of a valve cannot be told apart from
+    those that its machine states.
     """
-    found, there = [], {effect.name for effect in machine.added_effects}
+    found: list[tuple[Candidate, ...]] = []
+    there = {(entry.family, name) for entry in machine.parameters.effects.values() for name in entry.components}
     for family in scaled_families(machine).values():
         unseen = family.shows_in == ("servo",) and "spool_position" not in channels
         if family.search != "named" or unseen:
@@ -161,8 +163,8 @@ def list_candidates(machine: Machine, channels: Collection[str] = LAYOUT) -> tup
         names = [s.name for s in shapes]
         for values in product(*(s.start for s in shapes)):
             shape = tuple(zip(names, values, strict=True))
-            each = tuple(Candidate(family, group, shape) for group in family.groups(machine))
-            found.append(() if there & {one.name for one in each} else each)  # evaluated together, by name
+            free = (g for g in family.groups(machine) if there.isdisjoint((family.name, name) for name in g))
+            found.append(tuple(Candidate(family, group, shape) for group in free))
     return tuple(group for group in found if group)
 
 

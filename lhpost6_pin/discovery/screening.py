@@ -32,8 +32,7 @@ BATCH = 8
 def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     """Score all candidates."""
     problem, numbers, base, background = found.problem, found.numbers, linear.base, linear.background
-    taken = {a.candidate.name for a in found.added}
-    groups = [g for g in list_candidates(base.plant.machine, base.tests[0].channels) if not taken & {c.name for c in g}]
+    groups = list_candidates(base.plant.machine, base.tests[0].channels)
     weigh, look = Reweighting(found, background), numbers.number("accept.look")
     ends = own_at_bounds(found)
 

@@ -237,13 +237,17 @@ def _of_few_names(ranked: Sequence[Scored], count: int) -> list[Scored]:
 
 
 def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
-    """Candidates, and those confused with the first that gain as much on its components, though they were refused.
+    """Candidates, and those confused with one of them that gain nearly as much on its components; by falling gain.
 
-    Of two that explain alike, one may be refused by a hair: joint fits decide. One replaces a weaker of its family.
+    Of two that explain alike, one may be refused by a hair, or its family be there on other components: joint fits
+    decide, of fewer than twice as many candidates.
     """
-    confused = rivals[0].candidate.family.confused_with
-    better = [one for one in _in_its_place(found, rivals[0]) if one.candidate.family.named in confused]
-    return best_per_family(sorted([*rivals, *better], key=lambda one: -one.gain))
+    every = list(rivals)
+    for one in rivals:
+        alike = (o for o in _in_its_place(found, one) if o.candidate.family.named in one.candidate.family.confused_with)
+        every += [other for other in alike if other not in every]
+    most = 2 * int(found.numbers.number("accept.rivals")) - 1
+    return sorted(every, key=lambda one: -one.gain)[: max(most, len(rivals))]
 
 
 def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:

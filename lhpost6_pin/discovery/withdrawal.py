@@ -102,9 +102,9 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     original is their residual before any effect, `after` that of the search's solution. The effect is compared with
     everything else refitted without it, in the residuals that its family shows in. It must gain there a share of what
     is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a
-    share of those before any effect, unless without it numbers of its components run to their bounds. One that the
-    held-out tests do not excite, with an expected gain within chance, stays, but not on a table with one actuator,
-    which every test excites.
+    share of those before any effect, unless without it numbers of its components run to their bounds, or it is one of
+    two of a family and gains what is expected. One that the held-out tests do not excite, with an expected gain within
+    chance, stays, but not on a table with one actuator, which every test excites.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -115,7 +115,12 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
     gain, expected = gain_on(held, before, after, rows)
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
-    lower = is_absorbed(one.candidate, own_at_bounds(less)) or lowers_squares(first, old, new, n("accept.of_first"))
+    twins = [a for a in found.added if a is not one and a.candidate.family.name == one.candidate.family.name]
+    lower = (
+        lowers_squares(first, old, new, n("accept.of_first"))
+        or is_absorbed(one.candidate, own_at_bounds(less))
+        or (twins and gain >= n("accept.consistent") * expected)
+    )
     least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
     if (single or expected > n("accept.chance")) and (not lower or gain < least):
         return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)

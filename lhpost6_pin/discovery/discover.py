@@ -38,6 +38,7 @@ from .residual_function import ResidualFunction, fit_residual_functions, with_re
 from .residual_records import residual_records
 from .search import refit, search, without_effect
 from .search_state import Search, fitted_machine, linearise
+from .searched_range import Beyond, beyond_search
 from .sensor_findings import correct_records, find_sensor_faults
 from .time_blocks import in_blocks
 from .unexplained import forces_explained
@@ -63,6 +64,7 @@ class Discovery:
     search: Search
     proof: Proof | None  # None where no test was held out
     balances: tuple[Balance, ...]  # of the held-out tests
+    beyond: tuple[Beyond, ...]  # legs that these move farther than the tests searched
     next_tests: tuple[NextTest, ...]  # simulated: tests that would discriminate between rivals
     numbers: Parameters
     seed: int
@@ -174,6 +176,7 @@ def discover(
         search=found,
         proof=proof,
         balances=balances,
+        beyond=beyond_search(found, held_problem) if held_problem else (),
         next_tests=tests,
         numbers=numbers,
         seed=seed,

@@ -91,6 +91,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "considered": [_considered(one) for one in found.search.rounds],
         "withdrawn": [{"family": w.family, "why": w.why, "numbers": list(w.numbers)} for w in verdict.withdrawn],
         "rejected_on_held_out": {w.family: w.gain for w in verdict.withdrawn if w.why == "held_out"},
+        "beyond_search": [one._asdict() for one in found.beyond],
         "held_out_balances": [asdict(one) for one in found.balances],
         "next_test": [
             {"test": n.test, "tells": list(n.families), "margin": _known(n.margin), "told": n.informative}
@@ -205,6 +206,9 @@ def summary(found: Discovery) -> str:
         gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
         if names := [title_of(family) for family in gone if family not in identified]:
             text += f" Not identified: {' and '.join(names)}, {reason}."
+    for one in found.beyond:
+        far = f"{one.test} moves {one.component} by {one.reached:.3g} m, the tests searched by {one.searched:.3g} m"
+        text += f" {far}: beyond that, {title_of(one.family)} is extrapolated."
     if (worse := _worse(found)) is not None:
         text += f" {worse}"
     if (scatter := _scatter(found)) is not None:

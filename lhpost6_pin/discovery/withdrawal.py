@@ -28,6 +28,7 @@ from .estimates import (
 )
 from .search import without_effect
 from .search_state import AddedEffect, Search, fitted_machine
+from .searched_range import within_search
 
 __all__ = ["Why", "Withdrawn", "lowers_squares", "withdraw_effects"]
 
@@ -45,7 +46,11 @@ class Withdrawn(NamedTuple):
 
 
 def withdraw_effects(found: Search, held: Problem | None) -> tuple[Search, tuple[Withdrawn, ...]]:
-    """Effects that are no findings, and the search, on guides without them; `held` are the held-out tests."""
+    """Effects that are no findings, and the search, on guides without them; `held` are the held-out tests.
+
+    These judge where legs are within the range that was searched (`searched_range`).
+    """
+    held = held and within_search(found, held)
     if found.problem.machine.motion == "free":
         return found, tuple(_doubtful(found, held))
     gone: list[Withdrawn] = []

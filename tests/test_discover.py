@@ -34,7 +34,7 @@ from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
-from lhpost6_pin.discovery.screening import _by_rank, score_pairs
+from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, score_pairs
 from lhpost6_pin.discovery.search import _pruned, _with_confused, without_effect
 from lhpost6_pin.discovery.search_state import (
     AddedEffect,
@@ -283,6 +283,17 @@ def test_more_components_come_first_only_if_they_gain_more():
     assert order == [*wanted, ("local_viscous", 3)]
 
 
+def test_a_part_of_what_may_be_due_to_a_form_may_be_so_too():
+    whole = replace(scored("friction_warm_up", ("H1", "H2"), 386.0), refused=FORM)
+    others = [
+        scored("friction_warm_up", ("H2",), 140.0),
+        scored("friction_warm_up", ("H1",), 390.0),  # more than on both
+        scored("friction_warm_up", ("H3",), 140.0),
+        scored("stribeck_friction", ("H2",), 140.0),
+    ]
+    assert [one.refused for one in _without_parts([whole, *others])] == [FORM, FORM, "", "", ""]
+
+
 def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     one = Score(40.0, np.zeros(1), np.ones(1), np.full(3, 10.0), np.zeros(1))
@@ -332,6 +343,8 @@ def test_what_is_absorbed_by_a_component_s_own_number_at_its_bound_need_not_be_b
     assert [p.name for p in ends] == [name]
     absorbed = [("bearing_friction", "V1"), ("bearing_friction", "V2"), ("dead_volume", "V1")]
     assert [is_absorbed(candidate(*of), ends) for of in absorbed] == [True, False, False]  # oil shows in flows alone
+    there = replace(search.added[0], candidate=candidate("stribeck_friction", "V1"))
+    assert not own_at_bounds(replace(search, solution=search.solution._replace(x=x), added=(there,)))  # it is its form
 
 
 def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):

@@ -56,9 +56,14 @@ def at_bounds(found: Search) -> tuple[str, ...]:
 
 
 def own_at_bounds(found: Search) -> tuple[FreeParameter, ...]:
-    """Components' own numbers, factors of their kind's, that are at a bound."""
-    bounded = at_bounds(found)
-    return tuple(p for p in found.problem.parameters if p.of and p.name in bounded)
+    """Components' own numbers, factors of their kind's, that are at a bound.
+
+    Not of components on which an effect was added: these take up what its form leaves.
+    """
+    bounded = set(at_bounds(found))
+    occupied = {component for one in found.added for component in one.candidate.components}
+    own = (p for p in found.problem.parameters if p.of and p.name.partition(".")[0] not in occupied)
+    return tuple(p for p in own if p.name in bounded)
 
 
 def is_absorbed(candidate: Candidate, ends: Sequence[FreeParameter]) -> bool:

@@ -5,6 +5,7 @@ unexplained; and one of a wrong form may substitute for two, so that neither is 
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -25,6 +26,8 @@ from .search_state import Linearisation, Round, Scored, Search
 __all__ = ["CandidatePair", "found_there", "is_confused", "screen", "score_pairs"]
 
 
+FORM = "may be due to the form of an effect added there"
+
 BATCH = 8
 """Groups of candidates that are scored at once."""
 
@@ -40,7 +43,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
         less = weigh.lowered(explained, one) if explained else Lowered(one.gain, 0.0, 0.0, 0.0)
         why = refusal([candidate.family], one, less, numbers, absorbed=is_absorbed(candidate, ends))
         if not why and less.gain < numbers.number("accept.again") * found_there(found, candidate):
-            why = "may be due to the form of an effect added there"
+            why = FORM
         return Scored(candidate, one, less.gain, less.share, why)
 
     def scores(group: Sequence[Candidate], parts: Sequence[Array], block: Block) -> list[Score]:
@@ -81,7 +84,20 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
         for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
             scored += some
             progress((done + 1) / len(batches))
-    return Round(tuple(_by_rank(scored, numbers.number("accept.simpler"))))
+    return Round(tuple(_by_rank(_without_parts(scored), numbers.number("accept.simpler"))))
+
+
+def _without_parts(scored: Sequence[Scored]) -> list[Scored]:
+    """The same; what is on a part of where its family gains more, but may be due to a form, may be so, too."""
+    forms = [one for one in scored if one.refused == FORM]
+
+    def is_part(one: Scored) -> bool:
+        there, name = set(one.candidate.components), one.candidate.family.name
+        return any(
+            o.candidate.family.name == name and there < {*o.candidate.components} and o.gain > one.gain for o in forms
+        )
+
+    return [replace(one, refused=FORM) if not one.refused and is_part(one) else one for one in scored]
 
 
 def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:

@@ -116,11 +116,16 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
 
 
 def found_there(found: Search, candidate: Candidate) -> float:
-    """Largest gain of an effect added on the same components that shows in the same residuals or is often confused."""
-    shows, gain = set(candidate.family.shows_in), 0.0
+    """Largest gain of an effect added whose form may leave what a candidate explains.
+
+    One that is often confused with it on some of the same components, or shows in the same residuals on all of them.
+    """
+    shows, there, gain = set(candidate.family.shows_in), set(candidate.components), 0.0
     for added in found.added:
-        alike = _confused(added.candidate, candidate) or shows & set(added.candidate.family.shows_in)
-        if added.candidate.components == candidate.components and alike:
+        own = set(added.candidate.components)
+        if (_confused(added.candidate, candidate) and own & there) or (
+            own == there and shows & set(added.candidate.family.shows_in)
+        ):
             gain = max(gain, added.gain)
     return gain
 

@@ -119,17 +119,21 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
     rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
     gain, expected = gain_on(held, before, after, rows)
+    if not single and expected <= n("accept.chance"):
+        return None
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
-    twins = [a for a in found.added if a is not one and a.candidate.family.name == one.candidate.family.name]
-    lower = (
+    if gain >= max(np.sqrt(2.0 * expected), n("accept.held_out") * expected) and (
         lowers_squares(first, old, new, n("accept.of_first"))
         or is_absorbed(one.candidate, own_at_bounds(less))
-        or (twins and gain >= n("accept.consistent") * expected)
-    )
-    least = max(np.sqrt(2.0 * expected), n("accept.held_out") * expected)
-    if (single or expected > n("accept.chance")) and (not lower or gain < least):
-        return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)
-    return None
+        or (_has_twin(found, one) and gain >= n("accept.consistent") * expected)
+    ):
+        return None
+    return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)
+
+
+def _has_twin(found: Search, one: AddedEffect) -> bool:
+    """Whether another effect of the same family was added, on other components."""
+    return any(other is not one and other.candidate.family.name == one.candidate.family.name for other in found.added)
 
 
 def lowers_squares(first: Array, before: Array, after: Array, share: float) -> bool:

@@ -1,9 +1,12 @@
 """Ports at places of the platen: against Pinocchio's placement of a point, and against the platen's own ports."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from lhpost6_pin.discovery.effect_loops import _shares_of_places
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.port_names import place_of, place_port
 from lhpost6_pin.mechanics.plant import make_plant
@@ -45,6 +48,21 @@ def test_a_port_is_where_pinocchio_has_the_point_and_pulls_as_a_force_there(alon
             assert path.s[k, i - 3] == pytest.approx(at, abs=1e-14)  # rounding of metres
             f = pose.rotation.T @ n
             np.testing.assert_allclose(path.column[k, i - 3], np.concatenate([f, np.cross(rho, f)]), atol=1e-14)
+
+
+def test_forces_at_a_place_are_told_from_the_wrench_that_they_make(along):
+    """Of Pinocchio's placement of three forces along the axes, whose sum is taken apart again."""
+    plant, motion, path, _ = along
+    ports, force = list(plant.ports[-3:]), np.random.default_rng(0).normal(0.0, 1e5, (len(motion.q), 3))
+    axes = np.array([place_of(port)[1] for port in ports])
+    wrench = np.zeros((len(motion.q), 6))
+    for k, q in enumerate(motion.q):
+        f = pin.XYZQUATToSE3(q).rotation.T @ (force[k] @ axes)
+        wrench[k] = np.concatenate([f, np.cross(PLACE, f)])  # at C, on platen axes
+    told = _shares_of_places(SimpleNamespace(plant=plant), ports, SimpleNamespace(ports=path))
+    for i, (name, share) in enumerate(told.values()):
+        np.testing.assert_allclose(np.einsum("nk,nk->n", wrench, share), force[:, i], atol=1e-7)  # rounding of 1e5
+        assert name.count(",") == 2
 
 
 def test_the_rate_of_a_port_is_the_derivative_of_its_coordinate(along):

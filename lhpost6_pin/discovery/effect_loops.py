@@ -17,7 +17,8 @@ from ..data.signals import Band
 from ..identification.calibration.problem import OperatingPoint
 from ..identification.prepare import MeasuredTest
 from ..identification.residual_change import Evaluated, change_of
-from ..identification.residuals import RESIDUALS, follow, kinds_shown
+from ..identification.residuals import RESIDUALS, Path, follow, kinds_shown
+from ..machine.port_names import place_of
 from ..mechanics.plant import make_plant
 from ..mechanics.pose import kinematic_jacobian, leg_displacements
 from .estimates import Estimate, amplitude_of
@@ -76,13 +77,13 @@ def _loops(
         for kind in kinds:
             own, rest = getattr(change, kind), getattr(residuals, kind)
             if own.shape[1]:
-                columns += _named(base, one, kind, own, rest)
+                columns += _named(base, one, kind, own, rest, path)
         if not columns:
             continue
         column = max(columns, key=lambda c: float(np.mean(c.own**2)) / (float(np.var(c.rest)) or 1.0))
         low_pass = Band(high=bands[-1])
         own, rest = (low_pass.apply(x, test.dt) for x in (column.own, column.rest))
-        over, over_unit, state = _state(base, one.candidate.family.over, test, column.place)
+        over, over_unit, state = _state(base, one.candidate.family.over, test, column.place, path)
         whole = own + rest
         left = float(np.var(rest) / np.var(whole)) if np.var(whole) > 0.0 else 0.0
         yield EffectLoop(
@@ -95,13 +96,13 @@ class _Column(NamedTuple):
     """A column of a residual with an effect's part in it."""
 
     name: str
-    place: str  # actuator, strut, axis or "supply"
+    place: str  # actuator, strut, axis, port at a place of the platen, or "supply"
     unit: str
     own: Array  # (n,)
     rest: Array  # (n,) with the effect
 
 
-def _named(base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: Array) -> list[_Column]:
+def _named(base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: Array, path: Path) -> list[_Column]:
     """Columns of a kind of residuals (n, k) with an effect's part `own` and the `rest`."""
     machine = base.plant.machine
     legs = [c for c in one.candidate.components if c in {a.name for a in machine.actuators}]
@@ -115,6 +116,13 @@ def _named(base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: 
         return [
             _Column(f"resisting force along {name}", name, "N", -own @ shares[:, i], -rest @ shares[:, i])
             for i, name in enumerate(legs)
+        ]
+    if kind == "wrench" and (ports := _at_places(base, one)):
+        return [
+            _Column(
+                f"resisting force along {name}", port, "N", *(-np.einsum("nk,nk->n", x, share) for x in (own, rest))
+            )
+            for port, (name, share) in _shares_of_places(base, ports, path).items()
         ]
     if kind == "wrench":
         units = dict(zip(AXES, ["N"] * 3 + ["N m"] * 3, strict=True))
@@ -134,9 +142,32 @@ def _named(base: OperatingPoint, one: AddedEffect, kind: str, own: Array, rest: 
     return [_Column(f"{words} {label}", place, unit, own[:, k], rest[:, k]) for k, (label, place) in given]
 
 
-def _state(base: OperatingPoint, over: str, test: MeasuredTest, place: str) -> tuple[str, str, Array]:
+def _at_places(base: OperatingPoint, one: AddedEffect) -> list[str]:
+    """Ports at places of the platen on which an effect acts."""
+    (effect,) = (e for e in base.plant.machine.added_effects if e.name == one.candidate.name)
+    return [port for port in effect.ports if place_of(port)]
+
+
+def _shares_of_places(base: OperatingPoint, ports: Sequence[str], path: Path) -> dict[str, tuple[str, Array]]:
+    """Direction in words of ports at one place, and shares (n, 6) of the wrench at C that are forces along them.
+
+    By least squares, moments over their lever.
+    """
+    known = {port: found for port in ports if (found := place_of(port))}
+    place = np.array(known[ports[0]][0])
+    even = np.array([1.0, 1.0, 1.0, *3 * [1.0 / max(float(np.linalg.norm(place)), 1.0)]])
+    force = path.ports.column[:, [base.plant.ports.index(port) for port in ports], :3]
+    columns = np.concatenate([force, np.cross(place, force)], axis=2) * even
+    inverse = np.linalg.pinv(columns.swapaxes(1, 2)) * even
+    words = [f"({', '.join(f'{x:.2g}' for x in along)})" for _, along in known.values()]
+    return {port: (name, inverse[:, k]) for k, (port, name) in enumerate(zip(ports, words, strict=True))}
+
+
+def _state(base: OperatingPoint, over: str, test: MeasuredTest, place: str, path: Path) -> tuple[str, str, Array]:
     """The state `over` which a family is drawn, at a place along a test: what it is, its unit, and values (n,)."""
     machine, measured, motion = base.plant.machine, test.channels, test.motion
+    if place_of(place):
+        return "displacement of the point", "m", path.ports.s[:, base.plant.ports.index(place)]
     if place in AXES:
         axis = AXES.index(place)
         unit = "m" if axis < 3 else "rad"

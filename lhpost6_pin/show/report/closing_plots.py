@@ -77,7 +77,7 @@ def _loop_figure(loops: Sequence[EffectLoop]) -> Figure:
         across = _STATES.get(one.over_unit, Scale(1.0, one.over_unit))
         keep = np.arange(0, len(one.state), max(1, -(-len(one.state) // POINTS)))
         x = one.state[keep] * across.factor
-        title = f"{title_of(one.family)}: {one.column} [{up.unit}]"
+        title, family = (f"{x[0].upper()}{x[1:]} [{up.unit}]" for x in (one.column, title_of(one.family)))
         sides = [("residual without the effect", one.before, BEFORE), ("with it", one.after, AFTER)]
         both = [Curve(name, x, y[keep] * up.factor, style, "markers") for name, y, style in sides]
         order = np.argsort(x)
@@ -85,7 +85,7 @@ def _loop_figure(loops: Sequence[EffectLoop]) -> Figure:
         for name, factor in zip(("90 % interval, low", "90 % interval, high"), one.spread, strict=True):
             own.append(Curve(name, x[order], one.own[keep][order] * factor * up.factor, TARGET, "markers"))
         over = f"{one.over[0].upper()}{one.over[1:]} [{across.unit}]"
-        rows.append((Plot(title, over, both), Plot(f"Its own part [{up.unit}]", over, own[::-1])))
+        rows.append((Plot(title, over, both), Plot(family, over, own[::-1])))
     words = (
         "Every effect on the test where it does most, in the column where it is largest, all other numbers as fitted: "
         "left the residual without it and with it, right the difference of both, which is the effect itself."

@@ -45,6 +45,7 @@ from lhpost6_pin.discovery.search_state import (
     Search,
     linearise,
 )
+from lhpost6_pin.discovery.searched_range import beyond_search, within_search
 from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import judge, reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
@@ -67,6 +68,7 @@ from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.machine_toml import save_machine_toml
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import leg_displacements
 from lhpost6_pin.show.viewer.frames import record_frames
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
@@ -325,6 +327,30 @@ def test_families_confused_with_a_rival_contest_on_its_components_though_refused
     ]
     search = replace(found.search, added=(), rounds=(Round((*refused, *rivals)),))
     assert _with_confused(search, rivals) == [refused[0], *rivals]
+
+
+def test_a_held_out_wrench_weighs_nothing_where_a_leg_is_farther_out_than_searched(found):
+    search = found.search
+    problem = search.problem
+    far = [replace(t, motion=t.motion._replace(displacement=1.5 * t.motion.displacement)) for t in problem.tests]
+    held = problem.with_tests(far)
+    assert within_search(search, held) is held and not beyond_search(search, held)  # breakaway is over velocity
+    stop = replace(search, added=(replace(search.added[0], candidate=candidate("end_stop_stiffening", "H1")),))
+    assert within_search(stop, problem).tests == problem.tests and not beyond_search(stop, problem)
+    tests = within_search(stop, held).tests
+    reach = [
+        np.abs(leg_displacements(problem.plant_at(search.solution.x), t.motion.displacement)[0][:, 0]) for t in far
+    ]
+    most = max(x.max() for x in reach) / 1.5
+    for test, before, out in zip(tests, far, reach, strict=True):
+        base = np.ones(test.samples) if before.weight is None else before.weight
+        assert not test.weight[out > 1.1 * most].any() if (out > 1.1 * most).any() else test is before
+        assert (test.weight is before.weight) or np.all(test.weight <= base)
+        calm = np.abs(np.convolve(out > 0.95 * most, np.ones(2 * round(0.25 / test.dt) + 1), "same")) < 0.5
+        if test is not before:
+            np.testing.assert_allclose(test.weight[calm], base[calm], atol=1e-12)  # a blend away from all crossings
+    (one,) = {(b.component, round(b.reached / b.searched, 1)) for b in beyond_search(stop, held)}
+    assert one == ("H1", 1.5)  # lengths are not linear in poses, by a hundredth
 
 
 def test_what_is_absorbed_by_a_component_s_own_number_at_its_bound_need_not_be_beyond_noise(found):

@@ -1,4 +1,4 @@
-"""Effects at a place, in a direction, or of a frequency of their own, hidden in simulated campaigns and searched."""
+"""Effects at a place, in a direction, of a frequency or of a range of their own, hidden in simulated campaigns."""
 
 import numpy as np
 import pinocchio as pin
@@ -6,6 +6,7 @@ import pytest
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.discovery import Discovery, discover
+from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
@@ -15,9 +16,9 @@ TESTS = ("TX", "TY", "TZ", "WN")
 SPRING = {f"{kind}_{axis}": 0.0 for kind in ("stiffness", "damping") for axis in "xyz"}
 
 
-def searched(hiding: Machine, machine: Machine, sensors) -> Discovery:
+def searched(hiding: Machine, machine: Machine, sensors, hold_out: str = "TY") -> Discovery:
     campaign = simulate_campaign(hiding, load_controller("lhpost6"), sensors, seed=3, tests=TESTS)
-    return discover(machine, campaign, sensors, hold_out=["TY"], phases=(1,), jobs=1, propose=False)
+    return discover(machine, campaign, sensors, hold_out=[hold_out], phases=(1,), jobs=1, propose=False)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.6])
@@ -53,3 +54,19 @@ def test_a_specimen_with_a_frequency_of_its_own_along_each_axis_is_two_effects(m
         assert one.parameters["frequency"].value == pytest.approx(frequency, rel=0.005)
         assert one.parameters["mass"].value == pytest.approx(4e3, rel=0.03)
     assert not found.verdict.withdrawn
+
+
+def test_a_stop_is_named_though_a_test_that_goes_farther_contradicts_its_numbers(machine, sensors):
+    """Its second stage begins behind all that was searched: TY moves H1 by 0.07 m, TX by 0.16 m."""
+    hiding = machine
+    for name, force, start in (("soft", 1.5e5, 0.045), ("hard", 2e6, 0.09)):
+        values = {"force": force, "start": start, "exponent": 1.0}
+        hiding = hiding.with_effect("end_stop_stiffening", ("H1",), name=name, **values)
+    found = searched(hiding, machine, sensors, hold_out="TX")
+    assert [(one.family, one.components) for one in found.verdict.effects] == [("end_stop_stiffening", ("H1",))]
+    assert not found.verdict.withdrawn
+    (gap,) = found.proof.gaps
+    assert gap.after > 5.0  # extrapolated, it is far from right
+    (beyond,) = found.beyond
+    assert (beyond.component, beyond.test) == ("H1", "TX") and 0.06 < beyond.searched < 0.09 < beyond.reached
+    assert "TX moves H1" in summary(found) and "extrapolated" in summary(found)

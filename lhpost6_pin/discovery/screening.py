@@ -27,6 +27,7 @@ __all__ = ["CandidatePair", "found_there", "is_confused", "screen", "score_pairs
 
 
 FORM = "may be due to the form of an effect added there"
+"""Why a candidate is refused that explains little beside an effect found on its components."""
 
 BATCH = 8
 """Groups of candidates that are scored at once."""

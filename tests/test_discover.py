@@ -20,13 +20,13 @@ from lhpost6_pin.data.campaign import Campaign, save_campaign
 from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.records import FULL_SCALE
 from lhpost6_pin.data.sensors import SensorSet
-from lhpost6_pin.discovery import Discovery, discover, verdict_entries
+from lhpost6_pin.discovery import Discovery, discover, verdict_entries, withdrawal
 from lhpost6_pin.discovery.acceptance import Lowered, refusal
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.estimates import amplitude_of, at_bounds, is_absorbed, own_at_bounds
+from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, refined, with_candidate
@@ -353,24 +353,49 @@ def test_a_held_out_wrench_weighs_nothing_where_a_leg_is_farther_out_than_search
     assert one == ("H1", 1.5)  # lengths are not linear in poses, by a hundredth
 
 
-def test_what_is_absorbed_by_a_component_s_own_number_at_its_bound_need_not_be_beyond_noise(found):
+def test_what_parameters_at_their_bounds_have_absorbed_need_not_be_beyond_noise(found):
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     one, rubs = Score(60.0, np.zeros(1), np.ones(1), np.full(3, 20.0), np.zeros(1)), find_family("bearing_friction")
     little = Lowered(60.0, 10.0, 1.0, 0.001)
     assert refusal([rubs], one, little, numbers) == "within the uncertainty of the noise"
     assert refusal([rubs], one, little, numbers, absorbed=True) == ""
     search = found.search
-    name = "V1.pad_friction"
-    place = search.problem.names.index(name)
-    assert not own_at_bounds(search)
-    x = search.solution.x.copy()
-    x[place] = bounds_of(search.problem, search.calibration)[1][place]
-    ends = own_at_bounds(replace(search, solution=search.solution._replace(x=x)))
-    assert [p.name for p in ends] == [name]
-    absorbed = [("bearing_friction", "V1"), ("bearing_friction", "V2"), ("dead_volume", "V1")]
-    assert [is_absorbed(candidate(*of), ends) for of in absorbed] == [True, False, False]  # oil shows in flows alone
+    free = {e.components for e in absorbing(search)}
+
+    def with_bounds(*names: str, **changes) -> Search:
+        x, most = search.solution.x.copy(), bounds_of(search.problem, search.calibration)[1]
+        places = [search.problem.names.index(name) for name in names]
+        x[places] = most[places]
+        return replace(search, solution=search.solution._replace(x=x), **changes)
+
+    ends = [e for e in absorbing(with_bounds("V1.pad_friction", "platen.mass[y]")) if e.components not in free]
+    told = {
+        ("bearing_friction", "V1"): True,
+        ("bearing_friction", "V2"): False,
+        ("dead_volume", "V1"): False,  # oil shows in flows alone
+        ("added_mass", "platen"): True,
+        ("inertia_coupling", "platen"): False,  # a mass is attributed to added_mass
+    }
+    assert {of: is_absorbed(candidate(*of), ends) for of in told} == told
     there = replace(search.added[0], candidate=candidate("stribeck_friction", "V1"))
-    assert not own_at_bounds(replace(search, solution=search.solution._replace(x=x), added=(there,)))  # it is its form
+    left = absorbing(with_bounds("V1.pad_friction", added=(there,)))
+    assert not any("V1" in e.components for e in left)  # it takes up what that form leaves
+
+
+def test_of_two_effects_that_pass_for_each_other_one_stays(found, monkeypatch):
+    """Neither is needed beside the other: a lag and a delay of the same valves."""
+    lag, delay = (
+        replace(found.search.added[0], candidate=candidate(f, "H1")) for f in ("spool_lag", "transport_delay")
+    )
+    bends = replace(found.search.added[0], candidate=candidate("valve_deadband", "H1"))
+    told = Withdrawn("", "", "held_out")
+    monkeypatch.setattr(withdrawal, "_by_estimate", lambda *given: None)
+    monkeypatch.setattr(withdrawal, "residual_at", lambda *given: None)
+    monkeypatch.setattr(withdrawal, "_by_held_out", lambda search, *rest: told if len(search.added) > 1 else None)
+    less = lambda search, gone: replace(search, added=tuple(o for o in search.added if o.candidate is not gone))  # noqa: E731
+    monkeypatch.setattr(withdrawal, "without_effect", less)
+    for pair, count in (((lag, delay), 1), ((lag, bends), 2)):
+        assert len(list(withdrawal._doubtful(replace(found.search, added=pair), found.search.problem))) == count
 
 
 def test_a_pair_explains_what_both_have_left_and_one_alone_does_not(found):

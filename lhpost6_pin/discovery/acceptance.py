@@ -112,8 +112,8 @@ def refusal(
 ) -> str:
     """Why a candidate, or several together, may not be added; empty if they may be.
 
-    Where nuisances that run to their bounds have `absorbed` a part of it, what is left need not be beyond noise, nor a
-    share of the initial residual.
+    Where parameters that run to their bounds have `absorbed` a part of it, what is left need not be beyond noise, nor
+    a share of the initial residual.
     """
     n = numbers.number
     if one.gain < n("accept.look"):
@@ -127,10 +127,12 @@ def refusal(
     better = np.mean(held > -max(chance, n("accept.worse") * one.gain))
     if better < n("accept.better") or held.min() < -max(2.0 * chance, n("accept.worst") * one.gain):
         return "fails cross-validation"
-    if not absorbed and less.beyond < sum(gate(family, numbers) for family in families if family.confusable):
+    if absorbed:
+        return ""
+    if less.beyond < sum(gate(family, numbers) for family in families if family.confusable):
         return "within the uncertainty of the noise"
     if less.share < n("accept.closure"):
         return "explains too little of the residual beyond noise"
-    if not absorbed and less.of_first < n("accept.of_first"):
+    if less.of_first < n("accept.of_first"):
         return "explains too little of the initial residual"
     return ""

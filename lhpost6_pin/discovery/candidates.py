@@ -15,8 +15,8 @@ from ..machine.library import Family, Shape, families, find_family, in_size_of, 
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 
-__all__ = ["Candidate", "first_shape", "list_candidates", "list_releases", "with_background", "with_other_form"]
-__all__ += ["with_warm_oil"]
+__all__ = ["Candidate", "attributed", "first_shape", "list_candidates", "list_releases", "with_background"]
+__all__ += ["with_other_form", "with_warm_oil"]
 
 
 _PARAMETER = {
@@ -168,6 +168,13 @@ def list_candidates(machine: Machine, channels: Collection[str] = LAYOUT) -> tup
     return tuple(group for group in found if group)
 
 
+def attributed(parameter: FreeParameter, machine: Machine) -> tuple[str, tuple[str, ...]]:
+    """Family that a parameter far from its prior is attributed to, empty without any; and components that it is of."""
+    section, _, name = parameter.name.partition(".")
+    where = tuple(c.name for c in machine.components if c.kind == section) or (section,)
+    return "" if parameter.of else _PARAMETER.get(name.split(".")[-1].split("[")[0], ""), where
+
+
 def list_releases(problem: Problem) -> tuple[Candidate, ...]:
     """All parameters and sensor errors that are not released yet and correspond to a family of the library.
 
@@ -176,10 +183,8 @@ def list_releases(problem: Problem) -> tuple[Candidate, ...]:
     """
     found = []
     for parameter in problem.parameters:
-        section, _, name = parameter.name.partition(".")
-        family = "" if parameter.of else _PARAMETER.get(name.split(".")[-1].split("[")[0], "")
+        family, where = attributed(parameter, problem.machine)
         if family and parameter.name not in problem.free:
-            where = tuple(c.name for c in problem.machine.components if c.kind == section) or (section,)
             found.append(Candidate(in_size_of(find_family(family), problem.machine), where, (), parameter.name))
     for unknown in problem.unknowns:  # those of the platen's motion were cross-checked before
         if unknown.name in problem.free or (unknown.kind == "delay" and unknown.column >= 0):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import norm
@@ -12,12 +13,12 @@ from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.library import find_family
 from ..machine.parameters import Parameters
-from .candidates import Candidate
+from .candidates import Candidate, attributed
 from .search_state import AddedEffect, Search
 
 __all__ = [
-    *("Estimate", "amplitude_of", "at_bounds", "covariance_of", "deviations", "estimates_of", "interval_reach"),
-    *("is_absorbed", "own_at_bounds", "owns", "sums_of"),
+    *("Absorbing", "Estimate", "absorbing", "amplitude_of", "at_bounds", "covariance_of", "deviations"),
+    *("estimates_of", "interval_reach", "is_absorbed", "owns", "sums_of"),
 ]
 
 AT_BOUND = 1e-6
@@ -55,21 +56,35 @@ def at_bounds(found: Search) -> tuple[str, ...]:
     return tuple(name for name, end in zip(problem.names, ends, strict=True) if end)
 
 
-def own_at_bounds(found: Search) -> tuple[FreeParameter, ...]:
-    """Components' own numbers, factors of their kind's, that are at a bound.
+class Absorbing(NamedTuple):
+    """A parameter at its bound, which may have taken up a part of an effect."""
+
+    components: frozenset[str]  # that it is of
+    family: str  # that it is attributed to; empty for a component's own number, which takes up what its residuals show
+    shows_in: frozenset[str]
+
+
+def absorbing(found: Search) -> tuple[Absorbing, ...]:
+    """Parameters of the machine at a bound: a reason to look for an effect there.
 
     Not of components on which an effect was added: these take up what its form leaves.
     """
-    bounded = set(at_bounds(found))
+    bounded, machine, ends = set(at_bounds(found)), found.problem.machine, []
     occupied = {component for one in found.added for component in one.candidate.components}
-    own = (p for p in found.problem.parameters if p.of and p.name.partition(".")[0] not in occupied)
-    return tuple(p for p in own if p.name in bounded)
+    for parameter in (p for p in found.problem.parameters if p.name in bounded):
+        family, where = attributed(parameter, machine)
+        if (parameter.of or family) and occupied.isdisjoint(where):
+            ends.append(Absorbing(frozenset(where), family, frozenset(parameter.shows_in)))
+    return tuple(ends)
 
 
-def is_absorbed(candidate: Candidate, ends: Sequence[FreeParameter]) -> bool:
-    """Whether a part of a candidate is in its components' own numbers, of which `ends` are at a bound."""
-    owners = {p.name.partition(".")[0] for p in ends if {*p.shows_in} & {*candidate.family.shows_in}}
-    return not owners.isdisjoint(candidate.components)
+def is_absorbed(candidate: Candidate, ends: Sequence[Absorbing]) -> bool:
+    """Whether a part of a candidate may be in parameters at their bounds."""
+    family, there = candidate.family, set(candidate.components)
+    return any(
+        there & end.components and (end.family == family.named if end.family else end.shows_in & {*family.shows_in})
+        for end in ends
+    )
 
 
 def covariance_of(found: Search) -> Array:

@@ -19,7 +19,7 @@ from ..identification.calibration.problem import OperatingPoint, Problem
 from .acceptance import Lowered, Reweighting, gate, refusal
 from .candidate_columns import columns_of_groups
 from .candidates import Candidate, list_candidates, list_releases
-from .estimates import is_absorbed, own_at_bounds
+from .estimates import absorbing, is_absorbed
 from .scores import Block, Columns, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
 
@@ -38,7 +38,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     problem, numbers, base, background = found.problem, found.numbers, linear.base, linear.background
     groups = list_candidates(base.plant.machine, base.tests[0].channels)
     weigh, look = Reweighting(found, background), numbers.number("accept.look")
-    ends = own_at_bounds(found)
+    ends = absorbing(found)
 
     def judged(candidate: Candidate, one: Score, explained: Sequence[Array]) -> Scored:
         less = weigh.lowered(explained, one) if explained else Lowered(one.gain, 0.0, 0.0, 0.0)

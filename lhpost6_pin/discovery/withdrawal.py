@@ -7,6 +7,7 @@ everything else refitted. A platform on legs is judged with all effects in place
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -16,16 +17,8 @@ from ..identification.calibration.problem import Problem
 from ..identification.residuals import kinds_shown
 from .acceptance import squares_by_column
 from .balances import HeldOut, gain_on, residual_at
-from .estimates import (
-    Estimate,
-    amplitude_of,
-    at_bounds,
-    deviations,
-    estimates_of,
-    is_absorbed,
-    own_at_bounds,
-    owns,
-)
+from .estimates import Estimate, absorbing, amplitude_of, at_bounds, deviations, estimates_of, is_absorbed, owns
+from .screening import is_confused
 from .search import without_effect
 from .search_state import AddedEffect, Search, fitted_machine
 from .searched_range import within_search
@@ -76,6 +69,10 @@ def _doubtful(found: Search, held: Problem | None) -> Iterator[Withdrawn]:
     for one in remaining:
         if (why := _by_held_out(found, one, held, original, after)) is not None:
             yield why
+            if is_confused(replace(found, added=tuple(o for o in found.added if o is not one)), one.candidate):
+                # of two that pass for each other neither is needed beside the other: the next is judged without it
+                found = without_effect(found, one.candidate)
+                after = residual_at(held, found.solution)
 
 
 def _by_estimate(
@@ -107,7 +104,7 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     original is their residual before any effect, `after` that of the search's solution. The effect is compared with
     everything else refitted without it, in the residuals that its family shows in. It must gain there a share of what
     is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a
-    share of those before any effect, unless without it numbers of its components run to their bounds, or it is one of
+    share of those before any effect, unless without it parameters there run to their bounds, or it is one of
     two of a family and gains what is expected. One that the held-out tests do not excite, with an expected gain within
     chance, stays, but not on a table with one actuator, which every test excites.
     """
@@ -124,7 +121,7 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
     if gain >= max(np.sqrt(2.0 * expected), n("accept.held_out") * expected) and (
         lowers_squares(first, old, new, n("accept.of_first"))
-        or is_absorbed(one.candidate, own_at_bounds(less))
+        or is_absorbed(one.candidate, absorbing(less))
         or (_has_twin(found, one) and gain >= n("accept.consistent") * expected)
     ):
         return None

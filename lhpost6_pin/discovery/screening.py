@@ -132,9 +132,9 @@ def found_there(found: Search, candidate: Candidate) -> float:
 
 
 def is_confused(found: Search, candidate: Candidate) -> bool:
-    """Whether an effect added on one of the same components is often confused with a candidate, or is of its family."""
-    there = set(candidate.components)
-    return any(_confused(added.candidate, candidate) and there & {*added.candidate.components} for added in found.added)
+    """Whether another effect added on one of its components is often confused with a candidate, or of its family."""
+    there, others = set(candidate.components), (a.candidate for a in found.added if a.candidate != candidate)
+    return any(_confused(other, candidate) and there & {*other.components} for other in others)
 
 
 def _confused(one: Candidate, other: Candidate) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.arrays import Array, Mask
 from ..identification.calibration.problem import Problem
 from ..identification.prepare import MeasuredTest
+from ..mechanics.plant import Plant
 from ..mechanics.pose import leg_displacements
 from .search_state import AddedEffect, Search
 
@@ -37,9 +38,10 @@ class Beyond(NamedTuple):
 def beyond_search(found: Search, held: Problem) -> tuple[Beyond, ...]:
     """Legs whose effects are extrapolated in held-out tests."""
     names = [component.name for component in found.problem.machine.components]
-    extremes, every = _extremes(found), []
+    plant, every = found.problem.plant_at(found.solution.x), list[Beyond]()
+    extremes = _extremes(found, plant)
     for test in held.tests:
-        out = _elongations(found, test)
+        out = _elongations(plant, test)
         far = ~np.all(_inside(out, extremes), axis=0)
         for one in found.added:
             for leg in (leg for leg in _legs_of(found, one) if far[leg]):
@@ -53,9 +55,10 @@ def within_search(found: Search, held: Problem) -> Problem:
     legs = sorted({leg for one in found.added for leg in _legs_of(found, one)})
     if not legs:
         return held
-    extremes, tests = _extremes(found)[:, legs], []
+    plant, tests = found.problem.plant_at(found.solution.x), []
+    extremes = _extremes(found, plant)[:, legs]
     for test in held.tests:
-        inside = np.all(_inside(_elongations(found, test)[:, legs], extremes), axis=1)
+        inside = np.all(_inside(_elongations(plant, test)[:, legs], extremes), axis=1)
         weight = np.ones(test.samples) if test.weight is None else test.weight
         tests.append(test if inside.all() else replace(test, weight=weight * _blended(inside, test.dt)))
     return held.with_tests(tests)
@@ -68,14 +71,14 @@ def _legs_of(found: Search, one: AddedEffect) -> list[int]:
     return [legs.index(name) for name in one.candidate.components if over and name in legs]
 
 
-def _elongations(found: Search, test: MeasuredTest) -> Array:
+def _elongations(plant: Plant, test: MeasuredTest) -> Array:
     """Elongations (n, legs) [m] along a test."""
-    return leg_displacements(found.problem.plant_at(found.solution.x), test.motion.displacement)[0]
+    return leg_displacements(plant, test.motion.displacement)[0]
 
 
-def _extremes(found: Search) -> Array:
+def _extremes(found: Search, plant: Plant) -> Array:
     """Least and largest elongation (2, legs) [m] of the tests searched."""
-    each = [_elongations(found, test) for test in found.problem.tests]
+    each = [_elongations(plant, test) for test in found.problem.tests]
     return np.array([np.min([x.min(axis=0) for x in each], axis=0), np.max([x.max(axis=0) for x in each], axis=0)])
 
 

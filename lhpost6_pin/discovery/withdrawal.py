@@ -3,11 +3,11 @@
 An effect is none whose size is at its bound, or that does not close the gap on tests that were not searched. On guides,
 where few sensors leave much to be confused, it is none either with any of its numbers at a bound, if it cannot be told
 from zero, or if it is no more than what the form of friction may be off by; there effects are removed one by one, with
-everything else refitted. A platform on legs is judged with all effects in place.
+everything else refitted. A platform on legs is judged with all effects in place, but of two that pass for each other
+the second without the first.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -69,7 +69,7 @@ def _doubtful(found: Search, held: Problem | None) -> Iterator[Withdrawn]:
     for one in remaining:
         if (why := _by_held_out(found, one, held, original, after)) is not None:
             yield why
-            if is_confused(replace(found, added=tuple(o for o in found.added if o is not one)), one.candidate):
+            if is_confused(found, one.candidate):
                 # of two that pass for each other neither is needed beside the other: the next is judged without it
                 found = without_effect(found, one.candidate)
                 after = residual_at(held, found.solution)

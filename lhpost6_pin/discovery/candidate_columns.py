@@ -1,7 +1,7 @@
 """Columns: derivatives of the whitened residuals by a candidate's amplitudes, in the frequency domain.
 
-Candidates of one family and shape on different components are evaluated together where they are independent: a force
-along a leg has one wrench per leg, a modifier of an actuator's oil acts on its own chambers.
+Candidates of one family and shape on different components are evaluated together where they are independent: each
+force has a wrench of its own, a modifier of an actuator's oil or valve acts on its own chambers and spool.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,14 @@ from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.inverse_dynamics import with_loads
 from ..identification.prepare import actuator_forces
 from ..identification.residual_kernels import row_wrenches
-from ..identification.residuals import RESIDUALS, follow
-from ..machine.machine import Machine
+from ..identification.residuals import follow
 from ..mechanics.plant import make_plant
 from .candidates import Candidate
 
 __all__ = ["columns_of", "columns_of_groups"]
+
+OF_AN_ACTUATOR = ("oil", "valve")
+"""What laws modify that act on the residuals of one actuator alone."""
 
 
 def columns_of(
@@ -48,41 +50,54 @@ def _bins_of(
     problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]
 ) -> tuple[list[Complex], list[Array]]:
     """Bins (m, c, k) of every test by the amplitudes of one group; and each candidate's combination (k, q) of them."""
-    first = candidates[0]
-    effect = first.on(base.plant.machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1]
-    legs = {c.name for c in base.plant.machine.components}
+    machine, first = base.plant.machine, candidates[0]
+    law = LAWS[first.on(machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1].law]
+    forces = first.family.shows_in == ("wrench",) and not law.modifies
+    of_actuators = law.modifies in OF_AN_ACTUATOR and set(first.family.shows_in) <= {"flow", "servo"}
     alone = sorted({name for c in candidates for name in c.components})
-    together = set(alone) <= legs and len(first.amplitudes) == 1
-    if together and first.family.shows_in == ("wrench",) and not LAWS[effect.law].modifies:
-        bins = _by_force(problem, base, [first.at((name,)) for name in alone])
-    elif together and first.family.shows_in == ("flow",) and LAWS[effect.law].modifies == "oil":
-        bins = _by_oil(problem, base, first.at(tuple(alone)))
+    on_legs = set(alone) <= {c.name for c in machine.components} and len(first.amplitudes) == 1
+    if on_legs and (forces or of_actuators):  # on several legs it is the sum of that on each
+        if forces:
+            bins = _by_force(problem, base, [first.at((name,)) for name in alone])
+        else:
+            bins = _by_actuator(problem, base, first.at(tuple(alone)))
+        return bins, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
+    if forces:
+        bins = _by_force(problem, base, candidates)
     else:
         each = zip(*(_by_difference(problem, base, c) for c in candidates), strict=True)
-        ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
-        whole = np.eye(ends[-1])
-        return [np.concatenate(bins, axis=2) for bins in each], [whole[:, a:b] for a, b in pairwise(ends)]
-    return bins, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
+        bins = [np.concatenate(parts, axis=2) for parts in each]
+    ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
+    whole = np.eye(ends[-1])
+    return bins, [whole[:, a:b] for a, b in pairwise(ends)]
 
 
 def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
-    kinds = tuple(k for k in candidate.family.shows_in if k in RESIDUALS)
-    typical = [s.typical for s in candidate.amplitudes]
+    """Change of the residuals by each amplitude of a candidate."""
     parts = []
-    for i, size in enumerate(typical):
-        machine = candidate.on(base.plant.machine, tuple(size * (k == i) for k in range(len(typical))))
-        changes = problem.change(base, make_plant(machine), kinds)
+    for size, one in _one_by_one(candidate):
+        changes = problem.change(base, make_plant(candidate.on(base.plant.machine, one)), candidate.family.shows_in)
         parts.append([c / size for c in changes])
     return [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)]
 
 
+def _one_by_one(candidate: Candidate) -> list[tuple[float, tuple[float, ...]]]:
+    """Typical size of each amplitude; and all amplitudes, the others zero."""
+    typical = [s.typical for s in candidate.amplitudes]
+    return [(size, tuple(size * (k == i) for k in range(len(typical)))) for i, size in enumerate(typical)]
+
+
 def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[Complex]:
-    """Wrench of each candidate's force, all in one machine; it reduces the required actuator wrench."""
-    size = candidates[0].amplitudes[0].typical
-    machine: Machine = base.plant.machine
+    """Wrench of the force by each amplitude of each candidate, all in one machine.
+
+    It reduces the required actuator wrench.
+    """
+    machine, sizes = base.plant.machine, []
     known = len(machine.effects)
     for candidate in candidates:
-        machine = candidate.on(machine, (size,))
+        for size, one in _one_by_one(candidate):
+            machine = candidate.on(machine, one, name=f"{candidate.name}, {len(sizes)}")
+            sizes.append(size)
     plant = make_plant(machine)
     rows = plant.rows[plant.rows["effect"] >= known]
     found: list[Complex] = []
@@ -92,15 +107,15 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         force = actuator_forces(plant.machine, test.channels)
         z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
-        own = [wrench[:, rows["effect"] == known + i].sum(axis=1) for i in range(len(candidates))]
-        found.append(problem.of_wrench(len(found), np.stack(own, axis=-1) / -size))
+        own = [wrench[:, rows["effect"] == known + i].sum(axis=1) / -size for i, size in enumerate(sizes)]
+        found.append(problem.of_wrench(len(found), np.stack(own, axis=-1)))
     return found
 
 
-def _by_oil(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
-    """Flows of all actuators of a candidate at once, one by one."""
+def _by_actuator(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
+    """Residuals of all actuators of a candidate at once, one by one."""
     size = candidate.amplitudes[0].typical
-    changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), ("flow",))
+    changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), candidate.family.shows_in)
     places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]
     rows = np.stack([problem.rows_of_actuator(place) for place in places], axis=-1)
     return [c[..., None] * rows / size for c in changes]

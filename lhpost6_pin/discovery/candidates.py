@@ -72,10 +72,10 @@ class Candidate:
         """Whether only their shapes differ."""
         return replace(self, shape=()) == replace(other, shape=())
 
-    def on(self, machine: Machine, amplitudes: tuple[float, ...]) -> Machine:
-        """The machine with this effect, amplitudes in the order of `amplitudes`."""
+    def on(self, machine: Machine, amplitudes: tuple[float, ...], *, name: str = "") -> Machine:
+        """The machine with this effect, amplitudes in the order of `amplitudes`; by default by its own name."""
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
-        return machine.with_effect(self.family.name, self.components, name=self.name, **values)
+        return machine.with_effect(self.family.name, self.components, name=name or self.name, **values)
 
     def fit_parameters(self, amplitudes: tuple[float, ...], numbers: Parameters) -> tuple[FreeParameter, ...]:
         """Unknowns of a joint fit; `numbers` are those of `models/procedures/discovery.toml`."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import UnknownNameError
-from ..laws.contract import Law
+from ..laws.contract import Law, first_numbers
 from .effect import Effect
 from .modifiers import modify_rows
-from .registry import CODES, LAWS, PORTS, ROW, parameters_of
+from .registry import CODES, LAWS, PORTS, ROW
 
 __all__ = ["effect_table", "state_names"]
 
@@ -39,7 +39,7 @@ def effect_table(effects: Sequence[Effect], ports: Sequence[str]) -> NDArray[np.
                 row[column] = number[name]
             row["spool"] = effect.spools[k] if effect.spools else -1
             row["numbers"][: len(effect.params[k])] = effect.params[k]
-            states = _states(law, row)
+            states = _states(law, effect.params[k])
             row["state"] = state if states else -1
             if law.takes_spool:
                 actuator[names[0]] = i
@@ -56,12 +56,13 @@ def _port_names(port: str, law: Law) -> tuple[str, ...]:
     return tuple(port.removesuffix(" -").split()) if " " in port else (f"{port}.x", f"{port}.y")
 
 
-def _states(law: Law, row: np.void) -> tuple[str, ...]:
-    """Hidden states of a row, whose law and numbers are filled."""
+def _states(law: Law, numbers: Sequence[float]) -> tuple[str, ...]:
+    """Hidden states of a row with the law's first numbers; others are zero."""
     if not law.state_needs:
         return law.states
-    p, needs = parameters_of(row), dict(law.state_needs)
-    return tuple(name for name in law.states if name not in needs or getattr(p, needs[name]) > 0.0)
+    needs, place = dict(law.state_needs), first_numbers(law)
+    given = {name: sum(numbers[place[parameter] :][:1]) for name, parameter in needs.items()}
+    return tuple(name for name in law.states if name not in given or given[name] > 0.0)
 
 
 def state_names(effects: Sequence[Effect]) -> tuple[str, ...]:
@@ -69,11 +70,9 @@ def state_names(effects: Sequence[Effect]) -> tuple[str, ...]:
 
     Of two ports named, the first counts.
     """
-    row, names = np.zeros(1, ROW)[0], []
+    names = []
     for effect in sorted(effects, key=lambda effect: bool(LAWS[effect.law].modifies)):
         law = LAWS[effect.law]
         for port, numbers in zip(effect.ports, effect.params, strict=True):
-            if law.state_needs:
-                row["law"], row["numbers"][: len(numbers)] = CODES[effect.law], numbers
-            names += [f"{effect.name}.{port.split()[0]}.{state}" for state in _states(law, row)]
+            names += [f"{effect.name}.{port.split()[0]}.{state}" for state in _states(law, numbers)]
     return tuple(names)

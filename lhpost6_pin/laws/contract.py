@@ -16,9 +16,10 @@ A law that modifies others (`modifies`) makes no force; its parameters fill `fie
 """
 
 from functools import cache
+from itertools import accumulate
 from typing import Any, NamedTuple, get_type_hints
 
-__all__ = ["Law", "parameter_sizes", "parameter_units"]
+__all__ = ["Law", "first_numbers", "parameter_sizes", "parameter_units"]
 
 
 class Law(NamedTuple):
@@ -47,9 +48,17 @@ def _fields(law: Law) -> dict[str, tuple[str, int]]:
     return {name: (*hint.__metadata__, 0)[:2] for name, hint in hints.items()}
 
 
+@cache
 def parameter_sizes(law: Law) -> dict[str, int]:
     """How many numbers each parameter has, in order."""
     return {name: max(1, count) for name, (_, count) in _fields(law).items()}
+
+
+@cache
+def first_numbers(law: Law) -> dict[str, int]:
+    """Place of each parameter's first number among all."""
+    sizes = parameter_sizes(law)
+    return dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
 
 
 @cache

@@ -39,13 +39,13 @@ class Machine(Structure):
     own_effects: tuple[Effect, ...] = ()
     specimen: Specimen | None = None
 
-    @property
+    @cached_property
     def effects(self) -> tuple[Effect, ...]:
         """All effects that make forces, in ledger order: the report's, then those added."""
         added = (e for e in self.added_effects if not LAWS[e.law].modifies)
         return (*standard_effects(self), *added)
 
-    @property
+    @cached_property
     def modifiers(self) -> tuple[Effect, ...]:
         """Effects added that make no force of their own but modify what is there."""
         return tuple(e for e in self.added_effects if LAWS[e.law].modifies)

@@ -25,35 +25,35 @@ def build_section(cls: type[_T], parameters: Parameters, sections: tuple[str, ..
 
     Raises ParameterError naming file and key for what is missing, has another unit or shape, or is out of bounds.
     """
-    values = dict(given)
+    values, known = dict(given), parameters.quantities
     for spec in fields(cls):  # type: ignore[arg-type]
         if spec.name in given:
             continue
-        path = next((f"{s}.{spec.name}" for s in sections if f"{s}.{spec.name}" in parameters), None)
+        path = next((path for s in sections if (path := f"{s}.{spec.name}") in known), None)
         if path is None:
             if spec.metadata["optional"]:
                 continue
             raise ParameterError(f"{parameters.origin}: {sections[-1]}.{spec.name} is missing")
-        quantity = parameters[path]
-        key = f"{parameters.origin}: {path}"
-        if quantity.unit != spec.metadata["unit"]:
-            raise ParameterError(f"{key}: unit {quantity.unit!r} should be {spec.metadata['unit']!r}")
-        values[spec.name] = _bounded(quantity.value, spec.metadata["length"], spec.metadata["bound"], key)
+        quantity, meta = known[path], spec.metadata
+        if quantity.unit != meta["unit"]:
+            raise ParameterError(f"{parameters.origin}: {path}: unit {quantity.unit!r} should be {meta['unit']!r}")
+        if wrong := _wrong(quantity.value, meta["length"], meta["bound"]):
+            raise ParameterError(f"{parameters.origin}: {path}: {wrong}")
+        values[spec.name] = quantity.value
     return cls(**values)
 
 
-def _bounded(value: Value, length: int, bound: str, key: str) -> Value:
+def _wrong(value: Value, length: int, bound: str) -> str:
+    """What is wrong with a value; empty if nothing is."""
     entries = value if isinstance(value, tuple) else (value,)
     if isinstance(value, tuple) != bool(length) or (length and len(entries) != length):
-        wanted = f"{length} numbers" if length else "one number"
-        raise ParameterError(f"{key}: {value!r} should be {wanted}")
-    impossible = {
-        "any": False,
-        "positive": min(entries) <= 0.0,
-        "nonnegative": min(entries) < 0.0,
-        "fraction": min(entries) < 0.0 or max(entries) > 1.0,
-    }
-    if impossible[bound]:
-        wanted = {"positive": "positive", "nonnegative": "zero or positive", "fraction": "between 0 and 1"}[bound]
-        raise ParameterError(f"{key}: {value!r} is impossible; it should be {wanted}")
-    return value
+        return f"{value!r} should be {f'{length} numbers' if length else 'one number'}"
+    if bound == "any" or (min(entries) >= 0.0 and (bound == "nonnegative" or _within(entries, bound))):
+        return ""
+    wanted = {"positive": "positive", "nonnegative": "zero or positive", "fraction": "between 0 and 1"}[bound]
+    return f"{value!r} is impossible; it should be {wanted}"
+
+
+def _within(entries: tuple[float, ...], bound: str) -> bool:
+    """Whether numbers that are not negative are "positive", or a "fraction"."""
+    return min(entries) > 0.0 if bound == "positive" else max(entries) <= 1.0

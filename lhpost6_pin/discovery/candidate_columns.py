@@ -92,7 +92,7 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
 
     It reduces the required actuator wrench.
     """
-    machine, sizes = base.plant.machine, []
+    machine, sizes = base.plant.machine, list[float]()
     known = len(machine.effects)
     for candidate in candidates:
         for size, one in _one_by_one(candidate):

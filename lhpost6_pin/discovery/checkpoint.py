@@ -2,12 +2,11 @@
 
 import hashlib
 import logging
+import pickle
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
-
-import joblib
 
 from ..core.files import write_whole
 from ..identification.calibration.problem import Problem
@@ -39,15 +38,15 @@ class Checkpoint:
         """The last state; None if there is none."""
         if self.path is None or not self.path.is_file():
             return None
-        state: SearchCheckpoint = joblib.load(self.path)
+        state: SearchCheckpoint = pickle.loads(self.path.read_bytes())
         log.warning("resuming the interrupted search, with %d effects found", len(state.search.added))
         return state
 
     def write(self, state: SearchCheckpoint) -> None:
         """Write a state, whole or not at all."""
         if self.path is not None:
-            with write_whole(self.path) as beside:
-                joblib.dump(state, beside)
+            with write_whole(self.path) as beside, beside.open("wb") as file:
+                pickle.dump(state, file, pickle.HIGHEST_PROTOCOL)  # many small arrays, which joblib writes one by one
 
     def remove(self) -> None:
         """Remove the file: the search has ended."""
@@ -64,7 +63,7 @@ def make_checkpoint(folder: Path | None, machine: Machine, *inputs: object) -> C
     if folder is None or machine.own_effects:
         return Checkpoint(None)
     known = repr((_sources(Path(__file__).parents[1]), machine_toml(machine), machine.specimen, *inputs))
-    return Checkpoint(folder / f".unfinished-{hashlib.sha256(known.encode()).hexdigest()[:16]}.joblib")
+    return Checkpoint(folder / f".unfinished-{hashlib.sha256(known.encode()).hexdigest()[:16]}.pickle")
 
 
 @cache

@@ -16,7 +16,6 @@ A law that modifies others (`modifies`) makes no force; its parameters fill `fie
 """
 
 from functools import cache
-from itertools import accumulate
 from typing import Any, NamedTuple, get_type_hints
 
 __all__ = ["Law", "first_numbers", "parameter_sizes", "parameter_units"]
@@ -57,8 +56,10 @@ def parameter_sizes(law: Law) -> dict[str, int]:
 @cache
 def first_numbers(law: Law) -> dict[str, int]:
     """Place of each parameter's first number among all."""
-    sizes = parameter_sizes(law)
-    return dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
+    places, at = {}, 0
+    for name, size in parameter_sizes(law).items():
+        places[name], at = at, at + size
+    return places
 
 
 @cache

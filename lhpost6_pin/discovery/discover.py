@@ -32,12 +32,12 @@ from .effect_loops import EffectLoop, effect_loops
 from .estimates import deviations, estimates_of
 from .friction_form import with_friction_form
 from .held_out import Proof, prove
-from .lost_motion import lost_motion, with_lost_motion
+from .lost_motion import LostMotion, lost_motion, with_lost_motion
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
 from .residual_records import residual_records
 from .search import refit, search, without_effect
-from .search_state import Search, fitted_machine, linearise
+from .search_state import Linearisation, Search, fitted_machine, linearise
 from .searched_range import Beyond, beyond_search
 from .sensor_findings import correct_records, find_sensor_faults
 from .time_blocks import in_blocks
@@ -111,36 +111,20 @@ def discover(
     checkpoint = make_checkpoint(unfinished, machine, sensors, hashes, hold_out, seed)
     begun = checkpoint.read()
     if begun is None:
-        n = numbers.number
-        problem = prepare_problem(
-            *(machine, records, sensors, calibration),
-            kinds=RESIDUALS,
-            others=lambda m: (with_other_form(m, n("scatter.form")), with_warm_oil(m, n("scatter.drift"))),
-            preload=n("scatter.preload"),
-            seed=seed,
-            jobs=jobs,
-        )
-        report(0.1)
-        part = between(report, 0.1, 0.36)
         whole = hold_out is None and len(records) == len(names)
-        begun = _begin(problem, held, numbers, calibration, hold_one_out=whole, progress=part)
-        begun = begun._replace(search=with_lost_motion(begun.search, lost, between(report, 0.36, 0.38)))
-        rubbed, held_problem = with_friction_form(begun.search, begun.held_problem, between(report, 0.38, 0.4))
-        begun = begun._replace(search=rubbed, held_problem=held_problem)
+        problem = _prepared(machine, records, sensors, numbers, calibration, seed=seed, jobs=jobs)
+        report(0.1)
+        part = between(report, 0.1, 0.4)
+        begun = _begin(problem, held, lost, numbers, calibration, hold_one_out=whole, progress=part)
         checkpoint.write(begun)
-    machine, held = begun.machine, begun.held
+    machine, held, held_problem = begun.machine, begun.held, begun.held_problem
     found, linear = search(
         begun.search, lambda one: checkpoint.write(begun._replace(search=one)), between(report, 0.4, 0.75)
     )
-    kept, withdrawn = withdraw_effects(found, begun.held_problem)
+    kept, withdrawn = withdraw_effects(found, held_problem)
     if kept is not found:
         found, linear = kept, linearise(kept.solution, calibration)
-    misfit = 0.0 if forces_explained(found) else found.misfit("wrench")
-    beside = fit_residual_functions(found, linear) if misfit > numbers.number("left.noise") else ()
-    replacing: tuple[ResidualFunction, ...] = ()
-    forces = any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added)
-    if forces and misfit > numbers.number("accept.settled"):  # else no function could fit far better
-        replacing = fit_residual_functions(found, linearise(found.refit, calibration))
+    beside, replacing = _residual_functions(found, linear)
     report(0.8)
     verdict = judge(found, beside, replacing, faults, withdrawn)
     ambiguous = propose and verdict.word == "ambiguous"
@@ -151,18 +135,12 @@ def discover(
     out, part = [records[i] for i in held], between(report, 0.85, 1.0)
     proven = tuple(str(record.attrs.get("test", i)) for i, record in zip(held, out, strict=True))
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
-    balances: tuple[Balance, ...] = ()
-    left: dict[str, xr.Dataset] = {}
-    if (held_problem := begun.held_problem) is not None:
-        three = [residual_at(held_problem, one) for one in (None, found.refit, found.solution)]
-        balances = evaluate_balances(held_problem, three)
-        left = residual_records(held_problem, dict(zip(("refitted", "with the effects"), three[1:], strict=True)))
+    balances, left = _what_is_left(found, held_problem)
     checkpoint.remove()
     report(1.0)
-    function = verdict.residual_function
-    estimates = estimates_of(found, deviations(found))
     tests_of_search = [one for one in (held_problem, begun.search.problem) if one is not None]
     bases = [residual_at(one, found.solution).base for one in tests_of_search] if found.added else []
+    function = verdict.residual_function
     final = found.refit if any(function is one for one in replacing) else found.solution
     fitted = fitted_machine(final)
     return Discovery(
@@ -182,9 +160,53 @@ def discover(
         seed=seed,
         hashes=hashes,
         left=left,
-        loops=effect_loops(found, bases, estimates),
-        curves=_curves(held_problem or begun.search.problem, final, found),
+        loops=effect_loops(found, bases, estimates_of(found, deviations(found))),
+        curves=_curves(tests_of_search[0], final, found),
     )
+
+
+def _prepared(
+    machine: Machine,
+    records: Sequence[xr.Dataset],
+    sensors: SensorSet,
+    numbers: Parameters,
+    calibration: Parameters,
+    *,
+    seed: int,
+    jobs: int,
+) -> Problem:
+    """The least-squares problem of all tests, with the scatter of friction's form and of the oil as noise."""
+    n = numbers.number
+    return prepare_problem(
+        *(machine, records, sensors, calibration),
+        kinds=RESIDUALS,
+        others=lambda m: (with_other_form(m, n("scatter.form")), with_warm_oil(m, n("scatter.drift"))),
+        preload=n("scatter.preload"),
+        seed=seed,
+        jobs=jobs,
+    )
+
+
+def _residual_functions(
+    found: Search, linear: Linearisation
+) -> tuple[tuple[ResidualFunction, ...], tuple[ResidualFunction, ...]]:
+    """Residual functions in addition to the effects found, and in their place, where the misfit is beyond noise."""
+    n = found.numbers.number
+    misfit = 0.0 if forces_explained(found) else found.misfit("wrench")
+    beside = fit_residual_functions(found, linear) if misfit > n("left.noise") else ()
+    forces = any("wrench" in one.candidate.family.shows_in and not one.candidate.release for one in found.added)
+    if not (forces and misfit > n("accept.settled")):  # no function could fit far better
+        return beside, ()
+    return beside, fit_residual_functions(found, linearise(found.refit, found.calibration))
+
+
+def _what_is_left(found: Search, held: Problem | None) -> tuple[tuple[Balance, ...], dict[str, xr.Dataset]]:
+    """Balances of the held-out tests, and residual forces of one as records; empty without any."""
+    if held is None:
+        return (), {}
+    three = [residual_at(held, one) for one in (None, found.refit, found.solution)]
+    left = residual_records(held, dict(zip(("refitted", "with the effects"), three[1:], strict=True)))
+    return evaluate_balances(held, three), left
 
 
 def _sourced(fitted: Machine, delivered: Machine, campaign: Campaign) -> Machine:
@@ -215,25 +237,31 @@ def _curves(problem: Problem, final: Solution, found: Search) -> Curves:
 def _begin(
     problem: Problem,
     held: tuple[int, ...],
+    lost: Sequence[LostMotion],
     numbers: Parameters,
     calibration: Parameters,
     *,
     hold_one_out: bool,
     progress: Progress,
 ) -> SearchCheckpoint:
-    """Refit all parameters to the tests that are not held out, nor, if `hold_one_out`, the least informative one."""
+    """Refit all parameters to the tests that are not held out, nor, if `hold_one_out`, the least informative one.
+
+    What is added already is the play that lengths show (`lost`), and the form of friction that explains most.
+    """
     machine = problem.machine
     identical = scatter_parameters(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))
     whole, forms = with_background(machine, numbers.number("scatter.spread"), problem.tests[0].channels)
     parameters = (*problem.parameters, *plan_parameters(machine), *identical, *forms)
     used = [i for i in range(len(problem.tests)) if i not in held]
     every, problem = problem, problem.with_machine(whole, parameters).only(used)
-    first = NormalEquations(problem, np.zeros(len(problem.prior)), between(progress, 0.0, 0.3))
+    first = NormalEquations(problem, np.zeros(len(problem.prior)), between(progress, 0.0, 0.26))
     if hold_one_out and len(used) > FEWEST:
         held = (used.pop(_least_informative(first)),)
         problem, first = problem.only(used), first.only(used)
-    begun = refit(problem, first, numbers, calibration, between(progress, 0.3, 1.0))
-    return SearchCheckpoint(machine, held, every.only(held) if held else None, begun)
+    begun = refit(problem, first, numbers, calibration, between(progress, 0.26, 0.86))
+    begun = with_lost_motion(begun, lost, between(progress, 0.86, 0.93))
+    rubbed, held_problem = with_friction_form(begun, every.only(held) if held else None, between(progress, 0.93, 1.0))
+    return SearchCheckpoint(machine, held, held_problem, rubbed)
 
 
 def discovery_numbers() -> tuple[Parameters, Parameters]:

@@ -97,11 +97,13 @@ def _share_table(found: Discovery) -> Table:
     """Share of the variance that each effect explains in its own column, and in every phase; and all of them there."""
     rows = [(title_of(o.family), f"{o.column}, {o.test}", f"{100.0 * o.explained:.1f} %") for o in found.loops]
     titles = {one.candidate.name: title_of(one.candidate.family.named) for one in found.search.added}
+    every = "all effects" if len(titles) > 1 else "".join(titles.values())
     for gap in found.proof.gaps if found.proof else ():
         where = f"{gap.phase}, {gap.test}"
-        rows += [(titles[name], where, f"{100.0 * own:.1f} %") for name, own in gap.shares.items()]
+        if len(titles) > 1:
+            rows += [(titles[name], where, f"{100.0 * own:.1f} %") for name, own in gap.shares.items()]
         share = 1.0 - gap.after**2 / gap.refitted**2 if gap.refitted > 0.0 else 0.0
-        rows.append(("all effects", where, f"{100.0 * share:.1f} % ({number(gap.refitted)} before)"))
+        rows.append((every, where, f"{100.0 * share:.1f} % ({number(gap.refitted)} before)"))
     return Table(
         "Share of the error's variance explained: by an effect against the model without it, by all against the refit",
         ("Effect", "Of", "Share"),

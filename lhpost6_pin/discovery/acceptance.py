@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core.arrays import Array, Complex
 from ..identification.calibration.bin_rows import squares_of
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
+from ..identification.residuals import RESIDUALS, kinds_shown
 from ..machine.library import Family
 from ..machine.parameters import Parameters
 from .scores import Background, Score
@@ -75,17 +76,19 @@ def _beyond_noise(means: Array, counts: NDArray[np.intp], f: Array, doubt: float
     return np.array([negative_log_likelihood(excess[p], counts[p]) - counts[p].sum() for p in parts])
 
 
-def share_explained(before: Search, after: Search) -> float:
+def share_explained(before: Search, after: Search, family: Family) -> float:
     """Share of the log-likelihood beyond noise that a joint fit explains, in the column where it explains most.
 
-    As of `Lowered`, without linearisation.
+    As of `Lowered`, without linearisation; of the residuals that a family shows in.
     """
     doubt, problem = before.numbers.number("accept.doubt"), before.problem
+    kinds = kinds_shown(family.shows_in, problem.tests[0].channels)
+    rows = np.any([problem.rows(kind) for kind in kinds if kind in RESIDUALS], axis=0)
 
     def beyond(residual: Sequence[Complex]) -> Array:
         pairs = zip(residual, problem.frequency, strict=True)
         means = ((mean_squares(problem.whitener, np.abs(bins) ** 2, f), f) for bins, f in pairs)
-        return np.asarray(sum(_beyond_noise(*m, f, doubt) for m, f in means))
+        return np.asarray(sum(_beyond_noise(*m, f, doubt) for m, f in means))[:, rows]
 
     old, new = beyond(before.residual), beyond(after.residual)
     most = np.unravel_index(np.argmax(old - new), old.shape)

@@ -18,8 +18,10 @@ __all__ = ["fit_jointly", "refined", "with_candidate"]
 def refined(found: Search, progress: Progress) -> Search:
     """The search with all derivatives evaluated again, until that changes little: what is left looks like an effect."""
     for part in split(progress, int(found.numbers.number("fit.refinements"))):
-        before, found = found.objective, found.solved(found.problem, found.solution.x, part)
-        if before - found.objective < found.numbers.number("fit.refined"):
+        again = found.solved(found.problem, found.solution.x, part)
+        fall = found.objective - again.objective
+        found = again if fall > 0.0 else found
+        if fall < found.numbers.number("fit.refined"):
             break
     return found
 

@@ -29,6 +29,9 @@ __all__ = ["CandidatePair", "found_there", "is_confused", "screen", "score_pairs
 FORM = "may be due to the form of an effect added there"
 """Why a candidate is refused that explains little beside an effect found on its components."""
 
+SUPPLY = "supply"
+"""Component that all actuators share."""
+
 BATCH = 8
 """Groups of candidates that are scored at once."""
 
@@ -124,7 +127,7 @@ def found_there(found: Search, candidate: Candidate) -> float:
     shows, there, gain = set(candidate.family.shows_in), set(candidate.components), 0.0
     for added in found.added:
         own = set(added.candidate.components)
-        if (_confused(added.candidate, candidate) and own & there) or (
+        if (_confused(added.candidate, candidate) and _meet(added.candidate, candidate)) or (
             own == there and shows & set(added.candidate.family.shows_in)
         ):
             gain = max(gain, added.gain)
@@ -133,13 +136,20 @@ def found_there(found: Search, candidate: Candidate) -> float:
 
 def is_confused(found: Search, candidate: Candidate) -> bool:
     """Whether another effect added on one of its components is often confused with a candidate, or of its family."""
-    there, others = set(candidate.components), (a.candidate for a in found.added if a.candidate != candidate)
-    return any(_confused(other, candidate) and there & {*other.components} for other in others)
+    others = (a.candidate for a in found.added if a.candidate != candidate)
+    return any(_confused(other, candidate) and _meet(other, candidate) for other in others)
 
 
 def _confused(one: Candidate, other: Candidate) -> bool:
     first, second = one.family, other.family
     return first.named == second.named or first.named in second.confused_with or second.named in first.confused_with
+
+
+def _meet(one: Candidate, other: Candidate) -> bool:
+    """Whether two candidates act on a component in common, or on the oil of the supply and of what it feeds."""
+    first, second = {*one.components}, {*other.components}
+    oil = all("flow" in c.family.shows_in for c in (one, other))
+    return bool(first & second) or (oil and SUPPLY in first | second)
 
 
 def _places(parts: Sequence[Array]) -> NDArray[np.intp]:

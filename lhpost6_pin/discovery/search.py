@@ -9,10 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..core.arrays import Array
 from ..core.progress import Progress, between, split
-from ..identification.calibration.fit import solve
+from ..identification.calibration.fit import objective, objective_at, solve
 from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
-from ..identification.calibration.problem import Problem
+from ..identification.calibration.problem import OperatingPoint, Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained, squares_by_column
 from .candidates import Candidate
@@ -91,7 +92,10 @@ def _screened_as_stated(found: Search, progress: Progress) -> Search | None:
     screened = screen(replace(found, solution=solution), linear, screening)
     passed = [one for one in screened.scored if not (one.refused or one.candidate.release)]
     added = _add(replace(found, rounds=(*found.rounds[:-1], screened)), passed, adding)
-    return added if added is not None and share_explained(found, added) >= n("accept.closure") else None
+    if added is None:
+        return None
+    share = share_explained(found, added, added.added[-1].candidate.family)
+    return added if share >= n("accept.closure") else None
 
 
 def _pruned(found: Search) -> Search:
@@ -108,9 +112,19 @@ def _pruned(found: Search) -> Search:
 
 
 def without_effect(found: Search, candidate: Candidate) -> Search:
-    """The search without one of its effects, everything else refitted."""
+    """The search without one of its effects, everything else refitted unless that explains less."""
     if (known := found.without.get(found.less(candidate))) is not None:
         return known
+    problem, start = _removed(found, candidate)
+    less = found.solved(problem, start, lambda share: None, settled=True)
+    rest = problem.residual(OperatingPoint(problem, start))
+    if objective(problem, rest, start) < less.objective:  # equations corrected for noise have their root elsewhere
+        less = replace(less, solution=less.solution._replace(x=start, residual=rest))
+    return replace(less, added=tuple(one for one in found.added if one.candidate.name != candidate.name))
+
+
+def _removed(found: Search, candidate: Candidate) -> tuple[Problem, Array]:
+    """The problem of a search without one of its candidates, and all other unknowns (p,) as they are."""
     problem = found.problem
     if candidate.release:
         less = problem.with_free(candidate.release, None)
@@ -118,9 +132,7 @@ def without_effect(found: Search, candidate: Candidate) -> Search:
         parameters = tuple(k for k in problem.parameters if not k.name.startswith(f"{candidate.name}."))
         less = problem.with_machine(problem.machine.without_effect(candidate.name), parameters)
     place = dict(zip(problem.names, found.solution.x, strict=True))
-    start = np.clip([place[name] for name in less.names], *bounds_of(less, found.calibration))
-    kept = tuple(one for one in found.added if one.candidate.name != candidate.name)
-    return replace(found.solved(less, start, lambda share: None, settled=True), added=kept)
+    return less, np.clip([place[name] for name in less.names], *bounds_of(less, found.calibration))
 
 
 def _more_effects(found: Search, linear: Linearisation, progress: Progress) -> Search | None:
@@ -189,7 +201,7 @@ def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | 
     if more is None:
         return None
     best = more.added[-1]
-    share = share_explained(found, more)
+    share = share_explained(found, more, best.candidate.family)
     if best.gain < n("accept.again") * found_there(found, best.candidate):
         own = next(o for o in found.rounds[-1].scored if o.candidate == best.candidate)
         consistent = (
@@ -258,7 +270,11 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
         fitted.append(fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
     before, *left = (one.objective for one in (found, *fitted))
     gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
-    passed = [i for i, required in enumerate(gates) if before - left[i] >= required]
+    passed = [
+        i
+        for i, (required, fit) in enumerate(zip(gates, fitted, strict=True))
+        if before - left[i] >= required and _is_worth(fit, rivals[i].candidate, required)
+    ]
     if not passed:
         return None
     lowest = min(left[i] for i in passed)
@@ -283,3 +299,8 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
     place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
     gain = before - left[best]
     return more.with_effect(AddedEffect(rivals[best].candidate, gain, place, tried, contest, fall, apart))
+
+
+def _is_worth(fit: Search, candidate: Candidate, required: float) -> bool:
+    """Whether a fit loses as much without its candidate, all else as it is; else it has only ended elsewhere."""
+    return objective_at(*_removed(fit, candidate)) - fit.objective >= required

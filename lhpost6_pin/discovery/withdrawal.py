@@ -104,9 +104,10 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     original is their residual before any effect, `after` that of the search's solution. The effect is compared with
     everything else refitted without it, in the residuals that its family shows in. It must gain there a share of what
     is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a
-    share of those before any effect, unless without it parameters there run to their bounds, or it is one of
-    two of a family and gains what is expected. One that the held-out tests do not excite, with an expected gain within
-    chance, stays, but not on a table with one actuator, which every test excites.
+    share of those before any effect. Not so where parameters run to their bounds without it, or where it gains what is
+    expected, and is one of two of a family or explains a good part of what is beyond noise there. One that the held-out
+    tests do not excite, with an expected gain within chance, stays, but not on a table with one actuator, which every
+    test excites.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -119,10 +120,12 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     if not single and expected <= n("accept.chance"):
         return None
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
+    noise = sum(len(bins) for bins in before.whitened)
+    as_expected = gain >= n("accept.consistent") * expected
     if gain >= max(np.sqrt(2.0 * expected), n("accept.held_out") * expected) and (
         lowers_squares(first, old, new, n("accept.of_first"))
         or is_absorbed(one.candidate, absorbing(less))
-        or (_has_twin(found, one) and gain >= n("accept.consistent") * expected)
+        or (as_expected and (_has_twin(found, one) or _explains(old, new, noise) >= n("accept.most")))
     ):
         return None
     return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)
@@ -131,6 +134,13 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
 def _has_twin(found: Search, one: AddedEffect) -> bool:
     """Whether another effect of the same family was added, on other components."""
     return any(other is not one and other.candidate.family.name == one.candidate.family.name for other in found.added)
+
+
+def _explains(before: Array, after: Array, noise: float) -> float:
+    """Share of the squares (c,) beyond those of noise that is explained, in the column where most is."""
+    most = int(np.argmax(before - after))
+    beyond = float(before[most] - noise)
+    return float(before[most] - after[most]) / beyond if beyond > 0.0 else 0.0
 
 
 def lowers_squares(first: Array, before: Array, after: Array, share: float) -> bool:

@@ -145,7 +145,8 @@ def solve(
     gain = np.inf  # of the last step, of log-likelihood and log-prior
     bias: NoiseBias | None = None
     held: NormalEquations | None = None  # at `at`, where the last step began
-    least, damped, quiet, converged, replicas = np.inf, 1.0, 0, False, len(problem.again)
+    least, last = np.inf, np.inf  # objective: the lowest, and that at the last step
+    damped, quiet, converged, replicas = 1.0, 0, False, len(problem.again)
     flat = numbers.number("fit.flat")
     parts = split(progress, rounds + replicas)
     for done in range(1, rounds + 1):
@@ -170,9 +171,9 @@ def solve(
         if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
         value = objective(problem, normal.residual, x)
-        quiet = quiet + 1 if abs(value - least) < flat else 0
-        damped *= 0.5 if value > least else 1.0  # else steps may go to and fro where the objective is flat
-        least, held, at = value, normal, x
+        quiet = quiet + 1 if abs(value - last) < flat else 0
+        damped *= 0.5 if value > last else 1.0  # else steps may go to and fro where the objective is flat
+        least, last, held, at = min(least, value), value, normal, x
         posterior = normal.posterior(problem.prior)
         step = bounded_step(normal, posterior, x, problem, numbers)
         slope = normal.whole[1] + x / problem.prior**2

@@ -1,6 +1,7 @@
 """The search for missing effects: its columns are derivatives, its gains are gains, its verdicts are true."""
 
 import json
+import pickle
 import shutil
 from dataclasses import replace
 from itertools import pairwise
@@ -8,7 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import ANY
 
-import joblib
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -35,7 +35,7 @@ from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, found_there, score_pairs
-from lhpost6_pin.discovery.search import _is_worth, _pruned, _with_confused, without_effect
+from lhpost6_pin.discovery.search import _loss_without, _pruned, _with_confused, without_effect
 from lhpost6_pin.discovery.search_state import (
     AddedEffect,
     FittedCandidate,
@@ -637,7 +637,9 @@ def test_a_fit_that_ends_higher_than_it_began_is_not_kept(found, monkeypatch):
     worse = replace(search, solution=search.refit, problem=search.refit.normal.problem)
     assert worse.objective > search.objective + 1000.0
     monkeypatch.setattr(Search, "solved", lambda self, *given, **options: worse)
-    assert refined(search, lambda share: None) is search
+    kept = refined(search, lambda share: None)
+    assert kept.objective == pytest.approx(search.objective, rel=1e-9)  # the same numbers
+    np.testing.assert_array_equal(kept.solution.at, search.solution.x)
 
 
 def test_an_effect_is_not_credited_with_what_others_gain(found, monkeypatch):
@@ -649,7 +651,7 @@ def test_an_effect_is_not_credited_with_what_others_gain(found, monkeypatch):
     rest = problem.residual(OperatingPoint(problem, x))
     added = (*search.added, replace(search.added[0], candidate=one))
     both = replace(search, problem=problem, solution=search.solution._replace(x=x, residual=rest), added=added)
-    assert not _is_worth(both, one, 1.0) and _is_worth(both, search.added[0].candidate, 1000.0)
+    assert _loss_without(both, one) < 1.0 and _loss_without(both, search.added[0].candidate) > 1000.0
     solved = Search.solved
 
     def elsewhere(self, *given, **options):
@@ -657,7 +659,9 @@ def test_an_effect_is_not_credited_with_what_others_gain(found, monkeypatch):
         return replace(after, solution=after.solution._replace(residual=[2.0 * r for r in after.residual]))
 
     monkeypatch.setattr(Search, "solved", elsewhere)
-    assert without_effect(both, one).objective == pytest.approx(search.objective, abs=1.0)
+    less = without_effect(both, one)
+    assert less.objective == pytest.approx(search.objective, abs=1.0)
+    np.testing.assert_array_equal(less.solution.at, less.solution.x)
 
 
 def test_the_share_that_an_effect_explains_is_of_residuals_in_which_it_shows(found):
@@ -678,6 +682,8 @@ def test_what_imitates_the_form_of_a_droop_is_on_the_actuators_that_it_feeds(fou
     assert found_there(search, candidate("flow_curve_error", "H1", "H2")) == 1e5
     assert found_there(search, candidate("piston_leakage", "H1")) == 0.0  # seldom confused with it
     assert found_there(search, candidate("stribeck_friction", "H1")) == 0.0
+    curve = replace(droop, candidate=candidate("flow_curve_error", "H1"))
+    assert found_there(replace(search, added=(curve,)), droop.candidate) == 0.0  # one valve is no supply
 
 
 def test_the_share_explained_of_held_out_tests_is_of_what_is_beyond_noise():
@@ -801,7 +807,7 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
 def test_the_command_resumes_what_a_search_had_kept_to_the_same_verdict(lhpost6, rubbing, bookmarked, tmp_path, caplog):
     found, folder = bookmarked
     (kept,) = folder.iterdir()
-    assert [a.candidate.family.name for a in joblib.load(kept).search.added] == ["stribeck_friction"]
+    assert [a.candidate.family.name for a in pickle.loads(kept.read_bytes()).search.added] == ["stribeck_friction"]
     save_campaign(rubbing, tmp_path)
     ended = lhpost6("discover", tmp_path, "--hold-out", *ASKED["hold_out"], "--out", folder)
     assert ended.code == 0, ended

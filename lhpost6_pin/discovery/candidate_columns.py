@@ -51,25 +51,25 @@ def _bins_of(
 ) -> tuple[list[Complex], list[Array]]:
     """Bins (m, c, k) of every test by the amplitudes of one group; and each candidate's combination (k, q) of them."""
     machine, first = base.plant.machine, candidates[0]
-    law = LAWS[first.on(machine, tuple(s.typical for s in first.amplitudes)).added_effects[-1].law]
-    forces = first.family.shows_in == ("wrench",) and not law.modifies
-    of_actuators = law.modifies in OF_AN_ACTUATOR and set(first.family.shows_in) <= {"flow", "servo"}
+    whole = first.on(machine, tuple(s.typical for s in first.amplitudes))
+    (law,) = (LAWS[effect.law] for effect in whole.added_effects if effect.name == first.name)
     alone = sorted({name for c in candidates for name in c.components})
     on_legs = set(alone) <= {c.name for c in machine.components} and len(first.amplitudes) == 1
-    if on_legs and (forces or of_actuators):  # on several legs it is the sum of that on each
-        if forces:
-            bins = _by_force(problem, base, [first.at((name,)) for name in alone])
-        else:
-            bins = _by_actuator(problem, base, first.at(tuple(alone)))
-        return bins, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
+    forces = first.family.shows_in == ("wrench",) and not law.modifies and (on_legs or not base.plant.feels_load)
+    of_actuators = law.modifies in OF_AN_ACTUATOR and set(first.family.shows_in) <= {"flow", "servo"}
+    summed = on_legs and (forces or of_actuators)  # on several legs it is the sum of that on each
     if forces:
-        bins = _by_force(problem, base, candidates)
+        bins = _by_force(problem, base, [first.at((name,)) for name in alone] if summed else candidates)
+    elif summed:
+        bins = _by_actuator(problem, base, first.at(tuple(alone)))
     else:
         each = zip(*(_by_difference(problem, base, c) for c in candidates), strict=True)
         bins = [np.concatenate(parts, axis=2) for parts in each]
+    if summed:
+        return bins, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
     ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
-    whole = np.eye(ends[-1])
-    return bins, [whole[:, a:b] for a, b in pairwise(ends)]
+    places = np.eye(ends[-1])
+    return bins, [places[:, a:b] for a, b in pairwise(ends)]
 
 
 def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
@@ -90,16 +90,16 @@ def _one_by_one(candidate: Candidate) -> list[tuple[float, tuple[float, ...]]]:
 def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[Complex]:
     """Wrench of the force by each amplitude of each candidate, all in one machine.
 
-    It reduces the required actuator wrench.
+    Less than zero: it reduces what is required of the actuators.
     """
-    machine, sizes = base.plant.machine, list[float]()
-    known = len(machine.effects)
+    machine, sizes = base.plant.machine, dict[str, float]()  # by the name of an effect
     for candidate in candidates:
         for size, one in _one_by_one(candidate):
-            machine = candidate.on(machine, one, name=f"{candidate.name}, {len(sizes)}")
-            sizes.append(size)
+            name = f"{candidate.name}, {len(sizes)}"
+            machine, sizes[name] = candidate.on(machine, one, name=name), size
     plant = make_plant(machine)
-    rows = plant.rows[plant.rows["effect"] >= known]
+    place = {effect.name: i for i, effect in enumerate(machine.effects)}
+    rows = plant.rows[np.isin(plant.rows["effect"], [place[name] for name in sizes])]
     found: list[Complex] = []
     before, paths = base.with_ports_of(plant)
     for test, there in zip(base.tests, paths, strict=True):
@@ -107,13 +107,13 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         force = actuator_forces(plant.machine, test.channels)
         z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
-        own = [wrench[:, rows["effect"] == known + i].sum(axis=1) / -size for i, size in enumerate(sizes)]
+        own = [wrench[:, rows["effect"] == place[name]].sum(axis=1) / -size for name, size in sizes.items()]
         found.append(problem.of_wrench(len(found), np.stack(own, axis=-1)))
     return found
 
 
 def _by_actuator(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
-    """Residuals of all actuators of a candidate at once, one by one."""
+    """Change of the residuals by the amplitude on each actuator, from one evaluation."""
     size = candidate.amplitudes[0].typical
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), candidate.family.shows_in)
     places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]

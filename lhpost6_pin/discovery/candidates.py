@@ -73,7 +73,7 @@ class Candidate:
         return replace(self, shape=()) == replace(other, shape=())
 
     def on(self, machine: Machine, amplitudes: tuple[float, ...], *, name: str = "") -> Machine:
-        """The machine with this effect, amplitudes in the order of `amplitudes`; by default by its own name."""
+        """The machine with this effect, amplitudes (q,) in order; by default with the name of the candidate."""
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}
         return machine.with_effect(self.family.name, self.components, name=name or self.name, **values)
 

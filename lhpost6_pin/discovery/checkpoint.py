@@ -38,7 +38,8 @@ class Checkpoint:
         """The last state; None if there is none."""
         if self.path is None or not self.path.is_file():
             return None
-        state: SearchCheckpoint = pickle.loads(self.path.read_bytes())
+        with self.path.open("rb") as file:
+            state: SearchCheckpoint = pickle.load(file)
         log.warning("resuming the interrupted search, with %d effects found", len(state.search.added))
         return state
 

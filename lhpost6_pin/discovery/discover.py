@@ -246,7 +246,7 @@ def _begin(
 ) -> SearchCheckpoint:
     """Refit all parameters to the tests that are not held out, nor, if `hold_one_out`, the least informative one.
 
-    What is added already is the play that lengths show (`lost`), and the form of friction that explains most.
+    Then adds the play that lengths show (`lost`) and, on guides, backlash before friction where tests prefer that.
     """
     machine = problem.machine
     identical = scatter_parameters(machine, numbers.number("scatter.share"), numbers.number("scatter.reach"))

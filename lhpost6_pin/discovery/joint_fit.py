@@ -16,11 +16,16 @@ __all__ = ["fit_jointly", "refined", "with_candidate"]
 
 
 def refined(found: Search, progress: Progress) -> Search:
-    """The search with all derivatives evaluated again, until that changes little: what is left looks like an effect."""
+    """The search with derivatives evaluated again, until that changes little: what is left looks like an effect.
+
+    Those by unknowns in which residuals are not nearly linear. It keeps its numbers where a fit from them ends higher.
+    """
     for part in split(progress, int(found.numbers.number("fit.refinements"))):
         again = found.solved(found.problem, found.solution.x, part)
         fall = found.objective - again.objective
-        found = again if fall > 0.0 else found
+        if fall <= 0.0:  # the same numbers, with derivatives there
+            return found.moved(found.solution.x, found.problem.bent, lambda share: None)
+        found = again
         if fall < found.numbers.number("fit.refined"):
             break
     return found

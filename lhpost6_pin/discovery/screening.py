@@ -26,8 +26,8 @@ from .search_state import Linearisation, Round, Scored, Search
 __all__ = ["CandidatePair", "found_there", "is_confused", "screen", "score_pairs"]
 
 
-FORM = "may be due to the form of an effect added there"
-"""Why a candidate is refused that explains little beside an effect found on its components."""
+FORM = "may be due to the form of an effect added there or at the supply"
+"""Why a candidate is refused that explains little beside an effect found on its components, or on their supply."""
 
 SUPPLY = "supply"
 """Component that all actuators share."""
@@ -122,7 +122,8 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
 def found_there(found: Search, candidate: Candidate) -> float:
     """Largest gain of an effect added whose form may leave what a candidate explains.
 
-    One that is often confused with it on some of the same components, or shows in the same residuals on all of them.
+    One that is often confused with it on some of the same components or their supply, or shows in the same residuals on
+    all of them.
     """
     shows, there, gain = set(candidate.family.shows_in), set(candidate.components), 0.0
     for added in found.added:
@@ -135,7 +136,7 @@ def found_there(found: Search, candidate: Candidate) -> float:
 
 
 def is_confused(found: Search, candidate: Candidate) -> bool:
-    """Whether another effect added on one of its components is often confused with a candidate, or of its family."""
+    """Whether an effect added on its components, or their supply, is confused with a candidate or of its family."""
     others = (a.candidate for a in found.added if a.candidate != candidate)
     return any(_confused(other, candidate) and _meet(other, candidate) for other in others)
 
@@ -145,11 +146,10 @@ def _confused(one: Candidate, other: Candidate) -> bool:
     return first.named == second.named or first.named in second.confused_with or second.named in first.confused_with
 
 
-def _meet(one: Candidate, other: Candidate) -> bool:
-    """Whether two candidates act on a component in common, or on the oil of the supply and of what it feeds."""
-    first, second = {*one.components}, {*other.components}
-    oil = all("flow" in c.family.shows_in for c in (one, other))
-    return bool(first & second) or (oil and SUPPLY in first | second)
+def _meet(added: Candidate, candidate: Candidate) -> bool:
+    """Whether a candidate is on a component of one added, or on oil that comes from the supply on which that is."""
+    fed = SUPPLY in added.components and "flow" in candidate.family.shows_in
+    return fed or bool({*added.components} & {*candidate.components})
 
 
 def _places(parts: Sequence[Array]) -> NDArray[np.intp]:

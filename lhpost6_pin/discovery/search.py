@@ -11,9 +11,9 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.progress import Progress, between, split
-from ..identification.calibration.fit import objective, objective_at, solve
+from ..identification.calibration.fit import objective_at, solve
 from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained, squares_by_column
 from .candidates import Candidate
@@ -117,14 +117,14 @@ def without_effect(found: Search, candidate: Candidate) -> Search:
         return known
     problem, start = _removed(found, candidate)
     less = found.solved(problem, start, lambda share: None, settled=True)
-    rest = problem.residual(OperatingPoint(problem, start))
-    if objective(problem, rest, start) < less.objective:  # equations corrected for noise have their root elsewhere
-        less = replace(less, solution=less.solution._replace(x=start, residual=rest))
+    as_it_was = less.moved(start, np.zeros(len(start), bool), lambda share: None)
+    if as_it_was.objective < less.objective:  # equations corrected for noise have their root elsewhere
+        less = as_it_was
     return replace(less, added=tuple(one for one in found.added if one.candidate.name != candidate.name))
 
 
 def _removed(found: Search, candidate: Candidate) -> tuple[Problem, Array]:
-    """The problem of a search without one of its candidates, and all other unknowns (p,) as they are."""
+    """The problem of a search without one of its candidates, and all other unknowns (p,) as they are, within bounds."""
     problem = found.problem
     if candidate.release:
         less = problem.with_free(candidate.release, None)
@@ -168,8 +168,9 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
         there = {added.candidate.name for added in both.added}
         rivals = [o for o in (one, *_in_its_place(both, one)) if o.candidate.name not in there]
         both = (_best_of(both, rivals, part, least=-np.inf) if rivals else None) or both
-    gates = [gate(one.candidate.family, found.numbers) for one in two]
-    if found.objective - both.objective < sum(gates):
+    gates, new = [gate(one.candidate.family, found.numbers) for one in two], both.added[len(found.added) :]
+    worth = all(_loss_without(both, added.candidate) >= gate(added.candidate.family, found.numbers) for added in new)
+    if found.objective - both.objective < sum(gates) or not worth:
         return more
     return both if more is None or more.objective - both.objective >= max(gates) else more
 
@@ -270,11 +271,10 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
         fitted.append(fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
     before, *left = (one.objective for one in (found, *fitted))
     gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
-    passed = [
-        i
-        for i, (required, fit) in enumerate(zip(gates, fitted, strict=True))
-        if before - left[i] >= required and _is_worth(fit, rivals[i].candidate, required)
+    gains = [
+        min(before - fit.objective, _loss_without(fit, one.candidate)) for fit, one in zip(fitted, rivals, strict=True)
     ]
+    passed = [i for i, gain in enumerate(gains) if gain >= gates[i]]
     if not passed:
         return None
     lowest = min(left[i] for i in passed)
@@ -297,10 +297,12 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
     more = refined(fitted[best], between(progress, 0.7, 1.0))
     fall = squares_by_column(found.residual) - squares_by_column(more.residual)
     place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
-    gain = before - left[best]
-    return more.with_effect(AddedEffect(rivals[best].candidate, gain, place, tried, contest, fall, apart))
+    return more.with_effect(AddedEffect(rivals[best].candidate, gains[best], place, tried, contest, fall, apart))
 
 
-def _is_worth(fit: Search, candidate: Candidate, required: float) -> bool:
-    """Whether a fit loses as much without its candidate, all else as it is; else it has only ended elsewhere."""
-    return objective_at(*_removed(fit, candidate)) - fit.objective >= required
+def _loss_without(found: Search, candidate: Candidate) -> float:
+    """By how much the objective rises without one of the candidates, all other unknowns as they are.
+
+    What a fit gains beyond that is due to the others, which may only have ended elsewhere.
+    """
+    return objective_at(*_removed(found, candidate)) - found.objective

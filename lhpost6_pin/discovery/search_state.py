@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.arrays import Array, Complex
+from ..core.arrays import Array, Complex, Mask
 from ..core.progress import Progress
 from ..identification.calibration.bin_rows import BinRows, row_by_column
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
-from ..identification.calibration.normal_equations import bounds_of, positive
+from ..identification.calibration.normal_equations import NormalEquations, bounds_of, positive
 from ..identification.calibration.problem import OperatingPoint, Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
@@ -106,6 +106,14 @@ class Search:
         known = self.solution.normal
         solution = solve(problem, self.calibration, start, progress, known, frugal=True, **options)
         return replace(self, problem=problem, solution=solution, without={})
+
+    def moved(self, x: Array, again: Mask, progress: Progress) -> "Search":
+        """The search at x (p,): derivatives by the unknowns `again` (p,) evaluated there, all others reused."""
+        was = self.solution.normal
+        normal = NormalEquations(self.problem, x, progress, was, again)
+        normal = normal if was.bias is None else normal.less(was.bias)
+        solution = self.solution._replace(x=x, at=x, normal=normal.released(), residual=normal.residual)
+        return replace(self, solution=solution, without={})
 
     def with_effect(self, effect: AddedEffect) -> "Search":
         """The search with one more effect in its list."""

@@ -57,12 +57,12 @@ def _port_names(port: str, law: Law) -> tuple[str, ...]:
 
 
 def _states(law: Law, numbers: Sequence[float]) -> tuple[str, ...]:
-    """Hidden states of a row with the law's first numbers; others are zero."""
+    """Hidden states of a row with the numbers that its effect states; those that only modifiers fill are zero."""
     if not law.state_needs:
         return law.states
-    needs, place = dict(law.state_needs), first_numbers(law)
-    given = {name: sum(numbers[place[parameter] :][:1]) for name, parameter in needs.items()}
-    return tuple(name for name in law.states if name not in given or given[name] > 0.0)
+    place = first_numbers(law)
+    at = {name: place[parameter] for name, parameter in law.state_needs}
+    return tuple(n for n in law.states if n not in at or (at[n] < len(numbers) and numbers[at[n]] > 0.0))
 
 
 def state_names(effects: Sequence[Effect]) -> tuple[str, ...]:

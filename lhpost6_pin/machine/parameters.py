@@ -142,8 +142,8 @@ def _overridden(
         quantities[key] = _changed(base, entry, key, origin)
         if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
             raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
-    again = parameters.origin.endswith(f" + {origin}")
-    return Parameters(quantities, words, parameters.origin if again else f"{parameters.origin} + {origin}", effects)
+    origins = f"{parameters.origin.removesuffix(f' + {origin}')} + {origin}"
+    return Parameters(quantities, words, origins, effects)
 
 
 def _unknown_parameter(path: str, known: Iterable[str]) -> UnknownNameError:

@@ -1,5 +1,6 @@
 """Typed sections of a parameter file: dataclasses whose fields state unit, length and bound."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import field, fields
 from typing import Any, TypeVar
 
@@ -9,6 +10,14 @@ from .parameters import Parameters, Value
 __all__ = ["build_section", "quantity_field"]
 
 _T = TypeVar("_T")
+
+_BOUNDS: Mapping[str, tuple[str, Callable[[float], bool]]] = {
+    "any": ("a number", lambda value: True),
+    "positive": ("positive", lambda value: value > 0.0),
+    "nonnegative": ("zero or positive", lambda value: value >= 0.0),
+    "fraction": ("between 0 and 1", lambda value: 0.0 <= value <= 1.0),
+}
+"""Bounds of a quantity: in words, and whether a number is within."""
 
 
 def quantity_field(unit: str, *, length: int = 0, bound: str = "any", optional: bool = False) -> Any:
@@ -48,12 +57,5 @@ def _wrong(value: Value, length: int, bound: str) -> str:
     entries = value if isinstance(value, tuple) else (value,)
     if isinstance(value, tuple) != bool(length) or (length and len(entries) != length):
         return f"{value!r} should be {f'{length} numbers' if length else 'one number'}"
-    if bound == "any" or (min(entries) >= 0.0 and (bound == "nonnegative" or _within(entries, bound))):
-        return ""
-    wanted = {"positive": "positive", "nonnegative": "zero or positive", "fraction": "between 0 and 1"}[bound]
-    return f"{value!r} is impossible; it should be {wanted}"
-
-
-def _within(entries: tuple[float, ...], bound: str) -> bool:
-    """Whether numbers that are not negative are "positive", or a "fraction"."""
-    return min(entries) > 0.0 if bound == "positive" else max(entries) <= 1.0
+    wanted, possible = _BOUNDS[bound]
+    return "" if all(map(possible, entries)) else f"{value!r} is impossible; it should be {wanted}"

@@ -38,7 +38,7 @@ __all__ = ["Solution", "calibrate", "misfit", "objective", "objective_at", "solv
 
 
 OVERSHOT = 1000.0
-"""Increase of the objective from which a step is rejected: corrections for noise alone cost hundreds."""
+"""Height of the objective over its lowest from which a step is rejected: corrections for noise alone cost hundreds."""
 
 
 def calibrate(
@@ -126,7 +126,8 @@ def solve(
 ) -> Solution:
     """Search from `start` (p,) by Gauss-Newton steps, a rejected step shortened to a quarter.
 
-    A step is rejected, too, where its numbers make no machine; raises ParameterError if those at `start` make none.
+    A step is rejected where the objective is `OVERSHOT` above its lowest so far, or where its numbers make no machine;
+    raises ParameterError if those at `start` make none.
     Steps are half as long after each that does not lower the objective. The search ends where steps are short, or where
     two of them do not change the objective.
 

@@ -97,7 +97,7 @@ def _share_table(found: Discovery) -> Table:
     """Share of the variance that each effect explains in its own column, and in every phase; and all of them there."""
     rows = [(title_of(o.family), f"{o.column}, {o.test}", f"{100.0 * o.explained:.1f} %") for o in found.loops]
     titles = {one.candidate.name: title_of(one.candidate.family.named) for one in found.search.added}
-    every = "all effects" if len(titles) > 1 else "".join(titles.values())
+    every = next(iter(titles.values())) if len(titles) == 1 else "all effects"
     for gap in found.proof.gaps if found.proof else ():
         where = f"{gap.phase}, {gap.test}"
         if len(titles) > 1:

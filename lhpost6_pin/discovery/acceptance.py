@@ -10,17 +10,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.arrays import Array, Complex
+from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration.bin_rows import squares_of
+from ..identification.calibration.problem import Problem
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
-from ..identification.residuals import RESIDUALS, kinds_shown
+from ..identification.residuals import kinds_shown
 from ..machine.library import Family
 from ..machine.parameters import Parameters
 from .scores import Background, Score
 from .search_state import Search
 
 __all__ = ["Lowered", "Reweighting", "form_share", "gate", "refusal", "share_explained"]
-__all__ += ["squares_by_column"]
+__all__ += ["rows_shown", "squares_by_column"]
 
 
 class Lowered(NamedTuple):
@@ -82,8 +83,7 @@ def share_explained(before: Search, after: Search, family: Family) -> float:
     As of `Lowered`, without linearisation; of the residuals that a family shows in.
     """
     doubt, problem = before.numbers.number("accept.doubt"), before.problem
-    kinds = kinds_shown(family.shows_in, problem.tests[0].channels)
-    rows = np.any([problem.rows(kind) for kind in kinds if kind in RESIDUALS], axis=0)
+    rows = rows_shown(problem, family)
 
     def beyond(residual: Sequence[Complex]) -> Array:
         pairs = zip(residual, problem.frequency, strict=True)
@@ -93,6 +93,12 @@ def share_explained(before: Search, after: Search, family: Family) -> float:
     old, new = beyond(before.residual), beyond(after.residual)
     most = np.unravel_index(np.argmax(old - new), old.shape)
     return float((old - new)[most] / old[most]) if old[most] > before.numbers.number("accept.gain") else 0.0
+
+
+def rows_shown(problem: Problem, family: Family) -> Mask:
+    """Mask (c,) of the residuals' columns in which a family shows, with the channels of the tests."""
+    kinds = kinds_shown(family.shows_in, problem.tests[0].channels)
+    return np.asarray(np.any([problem.rows(kind) for kind in kinds if kind in problem.kinds], axis=0))
 
 
 def squares_by_column(residual: Sequence[Complex]) -> Array:

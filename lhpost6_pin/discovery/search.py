@@ -271,10 +271,9 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
         fitted.append(fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
     before, *left = (one.objective for one in (found, *fitted))
     gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
-    gains = [
-        min(before - fit.objective, _loss_without(fit, one.candidate)) for fit, one in zip(fitted, rivals, strict=True)
-    ]
-    passed = [i for i, gain in enumerate(gains) if gain >= gates[i]]
+    gaining = [i for i, required in enumerate(gates) if before - left[i] >= required]
+    gains = {i: min(before - left[i], _loss_without(fitted[i], rivals[i].candidate)) for i in gaining}
+    passed = [i for i in gaining if gains[i] >= gates[i]]
     if not passed:
         return None
     lowest = min(left[i] for i in passed)

@@ -14,8 +14,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..identification.calibration.problem import Problem
-from ..identification.residuals import kinds_shown
-from .acceptance import squares_by_column
+from .acceptance import rows_shown, squares_by_column
 from .balances import HeldOut, gain_on, residual_at
 from .estimates import Estimate, absorbing, amplitude_of, at_bounds, deviations, estimates_of, is_absorbed, owns
 from .screening import is_confused
@@ -114,8 +113,7 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     n, single = found.numbers.number, len(found.problem.machine.actuators) == 1
     less = without_effect(found, one.candidate)
     before = residual_at(held, less.solution)
-    kinds = kinds_shown(one.candidate.family.shows_in, held.tests[0].channels)
-    rows = np.any([held.rows(kind) for kind in kinds if kind in held.kinds], axis=0)
+    rows = rows_shown(held, one.candidate.family)
     gain, expected = gain_on(held, before, after, rows)
     if not single and expected <= n("accept.chance"):
         return None

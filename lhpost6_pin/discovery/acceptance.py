@@ -77,22 +77,24 @@ def _beyond_noise(means: Array, counts: NDArray[np.intp], f: Array, doubt: float
     return np.array([negative_log_likelihood(excess[p], counts[p]) - counts[p].sum() for p in parts])
 
 
-def share_explained(before: Search, after: Search, family: Family) -> float:
-    """Share of the log-likelihood beyond noise that a joint fit explains, in the column where it explains most.
+def share_explained(
+    problem: Problem, before: Sequence[Complex], after: Sequence[Complex], family: Family, numbers: Parameters
+) -> float:
+    """Share of the log-likelihood beyond noise that is explained, in the column where it is most.
 
-    As of `Lowered`, without linearisation; of the residuals that a family shows in.
+    As of `Lowered`, of residuals of a problem's tests, whitened bins (m, c), before and after a joint fit; in the
+    columns that a family shows in.
     """
-    doubt, problem = before.numbers.number("accept.doubt"), before.problem
-    rows = rows_shown(problem, family)
+    doubt, rows = numbers.number("accept.doubt"), rows_shown(problem, family)
 
     def beyond(residual: Sequence[Complex]) -> Array:
         pairs = zip(residual, problem.frequency, strict=True)
         means = ((mean_squares(problem.whitener, np.abs(bins) ** 2, f), f) for bins, f in pairs)
         return np.asarray(sum(_beyond_noise(*m, f, doubt) for m, f in means))[:, rows]
 
-    old, new = beyond(before.residual), beyond(after.residual)
+    old, new = beyond(before), beyond(after)
     most = np.unravel_index(np.argmax(old - new), old.shape)
-    return float((old - new)[most] / old[most]) if old[most] > before.numbers.number("accept.gain") else 0.0
+    return float((old - new)[most] / old[most]) if old[most] > numbers.number("accept.gain") else 0.0
 
 
 def rows_shown(problem: Problem, family: Family) -> Mask:

@@ -94,8 +94,7 @@ def _screened_as_stated(found: Search, progress: Progress) -> Search | None:
     added = _add(replace(found, rounds=(*found.rounds[:-1], screened)), passed, adding)
     if added is None:
         return None
-    share = share_explained(found, added, added.added[-1].candidate.family)
-    return added if share >= n("accept.closure") else None
+    return added if _share_explained(found, added) >= n("accept.closure") else None
 
 
 def _pruned(found: Search) -> Search:
@@ -201,8 +200,7 @@ def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | 
     more = _best_of(found, [one, *_in_its_place(found, one)], progress)
     if more is None:
         return None
-    best = more.added[-1]
-    share = share_explained(found, more, best.candidate.family)
+    best, share = more.added[-1], _share_explained(found, more)
     if best.gain < n("accept.again") * found_there(found, best.candidate):
         own = next(o for o in found.rounds[-1].scored if o.candidate == best.candidate)
         consistent = (
@@ -214,9 +212,18 @@ def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | 
     return more if closes or (best.gain >= far and not best.candidate.family.confusable) else None
 
 
-def _in_its_place(found: Search, one: Scored) -> list[Scored]:
-    """The best candidates of other families on the same components with nearly the same gain, not added yet."""
-    near = found.numbers.number("accept.near") * one.gain
+def _share_explained(found: Search, more: Search) -> float:
+    """Share of the log-likelihood beyond noise that the effect added last explains, in the column explained best."""
+    family = more.added[-1].candidate.family
+    return share_explained(found.problem, found.residual, more.residual, family, found.numbers)
+
+
+def _in_its_place(found: Search, one: Scored, share: str = "near") -> list[Scored]:
+    """The best candidates of other families on the same components with nearly the same gain, not added yet.
+
+    share is the number of `accept` that states how near.
+    """
+    near = found.numbers.number(f"accept.{share}") * one.gain
     taken = {one.candidate.family.name, *(a.candidate.family.name for a in found.added)}
     some = [o for o in found.rounds[-1].scored if o.gain >= near and not o.candidate.release]
     there = best_per_family([o for o in some if o.candidate.components == one.candidate.components])
@@ -257,7 +264,8 @@ def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
     """
     every = list(rivals)
     for one in rivals:
-        alike = (o for o in _in_its_place(found, one) if o.candidate.family.named in one.candidate.family.confused_with)
+        there = _in_its_place(found, one, "confused")
+        alike = (o for o in there if o.candidate.family.named in one.candidate.family.confused_with)
         every += [other for other in alike if other not in every]
     most = 2 * int(found.numbers.number("accept.rivals")) - 1
     return sorted(every, key=lambda one: -one.gain)[: max(most, len(rivals))]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..identification.calibration.problem import Problem
-from .acceptance import rows_shown, squares_by_column
+from .acceptance import rows_shown, share_explained, squares_by_column
 from .balances import HeldOut, gain_on, residual_at
 from .estimates import Estimate, absorbing, amplitude_of, at_bounds, deviations, estimates_of, is_absorbed, owns
 from .screening import is_confused
@@ -118,12 +118,12 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     if not single and expected <= n("accept.chance"):
         return None
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
-    noise = sum(len(bins) for bins in before.whitened)
-    as_expected = gain >= n("accept.consistent") * expected
+    share = share_explained(held, before.whitened, after.whitened, one.candidate.family, found.numbers)
+    as_expected = gain >= n("accept.expected") * expected
     if gain >= max(np.sqrt(2.0 * expected), n("accept.held_out") * expected) and (
         lowers_squares(first, old, new, n("accept.of_first"))
         or is_absorbed(one.candidate, absorbing(less))
-        or (as_expected and (_has_twin(found, one) or _explains(old, new, noise) >= n("accept.most")))
+        or (as_expected and (_has_twin(found, one) or share >= n("accept.most")))
     ):
         return None
     return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)
@@ -132,13 +132,6 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
 def _has_twin(found: Search, one: AddedEffect) -> bool:
     """Whether another effect of the same family was added, on other components."""
     return any(other is not one and other.candidate.family.name == one.candidate.family.name for other in found.added)
-
-
-def _explains(before: Array, after: Array, noise: float) -> float:
-    """Share of the squares (c,) beyond those of noise that is explained, in the column where most is."""
-    most = int(np.argmax(before - after))
-    beyond = float(before[most] - noise)
-    return float(before[most] - after[most]) / beyond if beyond > 0.0 else 0.0
 
 
 def lowers_squares(first: Array, before: Array, after: Array, share: float) -> bool:

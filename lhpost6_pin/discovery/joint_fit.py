@@ -21,10 +21,12 @@ def refined(found: Search, progress: Progress) -> Search:
     Those by unknowns in which residuals are not nearly linear. It keeps its numbers where a fit from them ends higher.
     """
     for part in split(progress, int(found.numbers.number("fit.refinements"))):
-        again = found.solved(found.problem, found.solution.x, part)
-        fall = found.objective - again.objective
-        if fall <= 0.0:  # the same numbers, with derivatives there
-            return found.moved(found.solution.x, found.problem.bent, lambda share: None)
+        here = found.moved(found.solution.x, found.problem.bent, part)
+        again = here.solved(found.problem, here.solution.x, part, first=here.solution.normal)
+        fall = here.objective - again.objective
+        if fall <= 0.0:
+            here.solution.normal.released()
+            return here
         found = again
         if fall < found.numbers.number("fit.refined"):
             break

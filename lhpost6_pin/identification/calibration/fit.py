@@ -40,6 +40,9 @@ __all__ = ["Solution", "calibrate", "misfit", "objective", "objective_at", "solv
 OVERSHOT = 1000.0
 """Height of the objective over its lowest from which a step is rejected: corrections for noise alone cost hundreds."""
 
+DAMPED = 0.1
+"""Share of a step below which a brief search ends: it has not lowered the objective several times."""
+
 
 def calibrate(
     machine: Machine,
@@ -135,7 +138,8 @@ def solve(
     Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
     already evaluated. A frugal search evaluates derivatives by nearly linear unknowns only at `start`, all others while
     steps gain much and nothing is `known`; a `settled` one only those that `known` lacks, and those `near` (p,) them.
-    It ends where a step gains little. With few unknowns no search is frugal, though a settled one ends so.
+    It ends where a step gains little, or steps have become short by not lowering the objective. With few unknowns no
+    search is frugal, though a settled one ends so.
     """
     brief = frugal and (settled or len(start) > numbers.number("fit.few"))
     frugal = frugal and len(start) > numbers.number("fit.few")
@@ -183,7 +187,8 @@ def solve(
         still = np.max(np.abs(step) / sd) < numbers.number("fit.converged")
         step = damped * step
         x = x + step
-        if quiet == 2 or (done > 1 and (still or (brief and gain < numbers.number("fit.still")))):
+        spent = brief and (gain < numbers.number("fit.still") or damped < DAMPED)
+        if quiet == 2 or (done > 1 and (still or spent)):
             converged = True
             break
     assert held is not None

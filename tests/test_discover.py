@@ -1,10 +1,11 @@
 """The search for missing effects: its columns are derivatives, its gains are gains, its verdicts are true."""
 
+import copy
 import json
 import pickle
 import shutil
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import ANY
@@ -32,7 +33,13 @@ from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, refined, with_candidate
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
-from lhpost6_pin.discovery.residual_function import ResidualFunction, _state, sparse_formula, with_residual_function
+from lhpost6_pin.discovery.residual_function import (
+    ResidualFunction,
+    _state,
+    fit_residual_functions,
+    sparse_formula,
+    with_residual_function,
+)
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, found_there, score_pairs
 from lhpost6_pin.discovery.search import _loss_without, _pruned, _with_confused, without_effect
@@ -60,6 +67,7 @@ from lhpost6_pin.identification.calibration.normal_equations import bounded_step
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
+from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.laws.supply import Supply
 from lhpost6_pin.laws.tabulated import NODES
@@ -68,7 +76,7 @@ from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.machine_toml import save_machine_toml
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
-from lhpost6_pin.mechanics.pose import leg_displacements
+from lhpost6_pin.mechanics.pose import leg_displacements, plant_motion
 from lhpost6_pin.show.viewer.frames import record_frames
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
@@ -678,6 +686,32 @@ def test_the_share_that_an_effect_explains_is_of_residuals_in_which_it_shows(fou
     assert share("stribeck_friction") == 0.0  # the wrench is noise
 
 
+def test_a_residual_function_has_the_size_of_the_force_that_is_missing(found):
+    """Of each test, in newtons: columns are whitened as residuals are."""
+    search, size, waves = found.search, 2e4, 3.0
+    problem, base = search.problem, OperatingPoint(search.problem, search.solution.at)
+    leg = [c.name for c in base.plant.machine.components].index("H3")
+    moved = [leg_displacements(base.plant, *t.motion[:2])[0][:, leg] for t in base.tests]
+    first, last = min(x.min() for x in moved), max(x.max() for x in moved)
+    rest = []
+    for t, (test, x) in enumerate(zip(base.tests, moved, strict=True)):
+        force = np.zeros((len(x), len(base.plant.machine.components)))
+        force[:, leg] = size * np.sin(2.0 * np.pi * waves * (x - first) / (last - first))
+        wrench = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, force).sum(axis=1)
+        bins = problem.whitener.apply(t, problem.of_wrench(t, wrench[..., None]), problem.frequency[t])[..., 0]
+        rest.append(search.solution.normal.residual[t] + bins)
+    normal = copy.copy(search.solution.normal)
+    normal.residual = rest
+    linear = linearise(search.solution._replace(normal=normal, residual=rest), search.calibration)
+    functions = fit_residual_functions(search, linear)
+    one = next(f for f in functions if f.components == ("H3",) and f.state == "position")
+    wanted = size * np.sin(2.0 * np.pi * waves * (one.nodes - first) / (last - first))
+    known = one.sd < 0.2 * size
+    assert known.sum() >= 10
+    # sampled at nodes, three waves of the sine are a tenth flatter between them
+    assert np.sqrt(np.mean((one.value - wanted)[known] ** 2)) < 0.2 * size
+
+
 def test_what_imitates_the_form_of_a_droop_is_on_the_actuators_that_it_feeds(found):
     droop = replace(found.search.added[0], candidate=candidate("supply_droop", "supply"), gain=1e5)
     search = replace(found.search, added=(droop,))
@@ -851,15 +885,14 @@ def test_another_state_of_the_package_does_not_go_on_from_there(machine, tmp_pat
     """Its machine may lack an attribute that the code reads since: a search of small_table ended in a traceback."""
     before = make_checkpoint(tmp_path, machine).path
     assert make_checkpoint(tmp_path, machine).path == before
-    monkeypatch.setattr("lhpost6_pin.discovery.checkpoint._sources", lambda package: "as edited")
+    monkeypatch.setattr("lhpost6_pin.discovery.checkpoint._sources", lambda *folders: "as edited")
     assert make_checkpoint(tmp_path, machine).path != before
-    source = tmp_path / "module.py"
     digests = set()
-    for text in ("a = 1", "a = 2"):
-        source.write_text(text)
+    for name, text in product(("module.py", "numbers.toml"), ("a = 1", "a = 2")):
+        (tmp_path / name).write_text(text)
         _sources.cache_clear()
         digests.add(_sources(tmp_path))
-    assert len(digests) == 2
+    assert len(digests) == 4
 
 
 def test_tests_that_are_not_there_cannot_be_held_out(machine, sensors, rubbing):

@@ -82,8 +82,8 @@ def share_explained(
 ) -> float:
     """Share of the log-likelihood beyond noise that is explained, in the column where it is most.
 
-    As of `Lowered`, of residuals of a problem's tests, whitened bins (m, c), before and after a joint fit; in the
-    columns that a family shows in.
+    Of residuals of a problem's tests, whitened bins (m, c), before and after a joint fit, in the columns that a family
+    shows in; zero where hardly anything is beyond noise.
     """
     doubt, rows = numbers.number("accept.doubt"), rows_shown(problem, family)
 

@@ -58,7 +58,7 @@ def with_friction_form(found: Search, held: Problem | None, progress: Progress) 
     floor = _floor(more, more.residual(OperatingPoint(more, start)), share)
     scaled, parts = problem.scaled(floor), split(between(progress, 0.5, 1.0), 2)
     refit = solve(scaled, found.calibration, _at(scaled, forms.own.machine, found.calibration), parts[0])
-    before = Search(scaled, refit, refit, numbers, found.calibration)
+    before = Search(scaled, refit, refit, numbers, found.calibration, found.added)
     after = before.solved(more.scaled(floor), start, parts[1], settled=True, near=np.ones(len(start), bool))
     gain = before.objective - after.objective
     if gain < gate(known, numbers):

@@ -21,8 +21,9 @@ def refined(found: Search, progress: Progress) -> Search:
     Those by unknowns in which residuals are not nearly linear. It keeps its numbers where a fit from them ends higher.
     """
     for part in split(progress, int(found.numbers.number("fit.refinements"))):
-        here = found.moved(found.solution.x, found.problem.bent, part)
-        again = here.solved(found.problem, here.solution.x, part, first=here.solution.normal)
+        first, second = split(part, 2)
+        here = found.moved(found.solution.x, found.problem.bent, first)
+        again = here.solved(found.problem, here.solution.x, second, first=here.solution.normal)
         fall = here.objective - again.objective
         if fall <= 0.0:
             here.solution.normal.released()
@@ -41,9 +42,9 @@ def fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | N
     little, and this one is far behind it.
     """
     n = found.numbers.number
-    same = [s for s in found.rounds[-1].scored if s.candidate.of_one_form(one.candidate) and s is not one]
-    others = [s for s in same if s.gain >= n("accept.near") * one.gain][: int(n("accept.shapes"))]
-    starts = [(one, False), (one, True), *((other, False) for other in others)]
+    near = [s for s in found.rounds[-1].scored if s.gain >= n("accept.near") * one.gain]
+    others = [s for s in near if s.candidate.of_one_form(one.candidate) and s.candidate != one.candidate]
+    starts = [(one, False), (one, True), *((other, False) for other in others[: int(n("accept.shapes"))])]
     fits: list[Search] = []
     for (start, afresh), part in zip(starts, split(progress, len(starts)), strict=True):
         fits.append(_fit_from(found, start, part, afresh=afresh))

@@ -99,15 +99,16 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
     numbers, base, weigh = found.numbers, linear.base, Reweighting(found, linear.background)
     problem, background, components = weigh.problem, linear.background, base.plant.machine.components
     free, spread = np.full(NODES, np.inf), np.full(NODES, numbers.number("left.spread"))
-    tests = []
+    motions = []
     for test in base.tests:
         moved = leg_displacements(base.plant, test.motion.displacement, test.motion.velocity)
         unit = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, np.ones_like(moved[0]))
-        tests.append((test, moved, unit))  # elongations and rates (n, legs), wrenches (n, legs, 6) of unit forces
+        motions.append((test, moved, unit))  # elongations and rates (n, legs), wrenches (n, legs, 6) of unit forces
 
     def fitted(names: tuple[str, ...], bins: Sequence[Complex]) -> ResidualFunction:
         """The function whose values have these columns (m, c, k) of each test."""
-        columns = [dense_rows(own) for own in bins]
+        tests = enumerate(zip(bins, problem.frequency, strict=True))
+        columns = [dense_rows(problem.whitener.apply(t, own, f)) for t, (own, f) in tests]
         one = score(background, make_block(background, columns), -free, free, spread)
         less = weigh.lowered(background.explained(columns, one.amplitude), one)
         return ResidualFunction(names, state, memory, nodes, one.amplitude, one.sd, *less[:2], one.held_out)
@@ -117,7 +118,7 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
         members = [i for i, c in enumerate(components) if c.kind == kind]
         names = tuple(components[i].name for i in members)
         for state, memory in _states(numbers):
-            along = [_state(state, memory, *moved, test.dt) for test, moved, _ in tests]
+            along = [_state(state, memory, *moved, test.dt) for test, moved, _ in motions]
             low, high = (f([f(x[:, members]) for x in along]) for f in (np.min, np.max))
             if state != "velocity" and high - low < numbers.number("left.travel"):
                 continue
@@ -125,7 +126,7 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
             each = [
                 [
                     problem.of_wrench(t, -unit[:, i, :, None] * _hats(x[:, i], nodes)[:, None, :])
-                    for t, ((_, _, unit), x) in enumerate(zip(tests, along, strict=True))
+                    for t, ((_, _, unit), x) in enumerate(zip(motions, along, strict=True))
                 ]
                 for i in members
             ]

@@ -138,7 +138,7 @@ def found_there(found: Search, candidate: Candidate) -> float:
 def is_confused(found: Search, candidate: Candidate) -> bool:
     """Whether an effect added on its components, or their supply, is confused with a candidate or of its family."""
     others = (a.candidate for a in found.added if a.candidate != candidate)
-    return any(_confused(other, candidate) and _meet(other, candidate) for other in others)
+    return any(_confused(other, candidate) and (_meet(other, candidate) or _meet(candidate, other)) for other in others)
 
 
 def _confused(one: Candidate, other: Candidate) -> bool:

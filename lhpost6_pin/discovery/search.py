@@ -168,9 +168,11 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
         rivals = [o for o in (one, *_in_its_place(both, one)) if o.candidate.name not in there]
         both = (_best_of(both, rivals, part, least=-np.inf) if rivals else None) or both
     gates, new = [gate(one.candidate.family, found.numbers) for one in two], both.added[len(found.added) :]
-    worth = all(_loss_without(both, added.candidate) >= gate(added.candidate.family, found.numbers) for added in new)
+    new = tuple(replace(added, gain=_loss_without(both, added.candidate)) for added in new)
+    worth = all(added.gain >= gate(added.candidate.family, found.numbers) for added in new)
     if found.objective - both.objective < sum(gates) or not worth:
         return more
+    both = replace(both, added=(*found.added, *new))
     return both if more is None or more.objective - both.objective >= max(gates) else more
 
 
@@ -218,14 +220,16 @@ def _share_explained(found: Search, more: Search) -> float:
     return share_explained(found.problem, found.residual, more.residual, family, found.numbers)
 
 
-def _in_its_place(found: Search, one: Scored, share: str = "near") -> list[Scored]:
+def _in_its_place(found: Search, one: Scored, *, confused: bool = False) -> list[Scored]:
     """The best candidates of other families on the same components with nearly the same gain, not added yet.
 
-    share is the number of `accept` that states how near.
+    Or, of families confused with its own, with a good part of that gain.
     """
-    near = found.numbers.number(f"accept.{share}") * one.gain
+    near = found.numbers.number("accept.confused" if confused else "accept.near") * one.gain
     taken = {one.candidate.family.name, *(a.candidate.family.name for a in found.added)}
     some = [o for o in found.rounds[-1].scored if o.gain >= near and not o.candidate.release]
+    if confused:
+        some = [o for o in some if o.candidate.family.named in one.candidate.family.confused_with]
     there = best_per_family([o for o in some if o.candidate.components == one.candidate.components])
     rivals = [o for o in there if o.candidate.family.name not in taken]
     return rivals[: int(found.numbers.number("accept.rivals")) - 1]
@@ -257,16 +261,14 @@ def _of_few_names(ranked: Sequence[Scored], count: int) -> list[Scored]:
 
 
 def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
-    """Candidates, and those confused with one of them that gain nearly as much on its components; by falling gain.
+    """Candidates, and those confused with one of them that gain a good part on its components; by falling gain.
 
     Of two that explain alike, one may be refused by a hair, or its family be there on other components: joint fits
     decide, of fewer than twice as many candidates.
     """
     every = list(rivals)
     for one in rivals:
-        there = _in_its_place(found, one, "confused")
-        alike = (o for o in there if o.candidate.family.named in one.candidate.family.confused_with)
-        every += [other for other in alike if other not in every]
+        every += [other for other in _in_its_place(found, one, confused=True) if other not in every]
     most = 2 * int(found.numbers.number("accept.rivals")) - 1
     return sorted(every, key=lambda one: -one.gain)[: max(most, len(rivals))]
 
@@ -291,10 +293,10 @@ def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least:
     settled = max(numbers.number("accept.settled"), min(fitted[i].power for i in passed))
     alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled]
     alike = alike or [i for i in passed if left[i] == lowest]
-    beyond = [0.0 if fitted[i].power <= settled else apart for i in range(len(fitted))]
     # the simplest of them: a parameter of the model first, then the fewest numbers
     best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
+    beyond = [apart if i != best and fitted[i].power > settled else 0.0 for i in range(len(fitted))]
     contest = tuple(
         FittedCandidate(
             rivals[i].candidate, max(float(left[i] - left[best]), beyond[i]), fitted_machine(fitted[i].solution)

@@ -48,7 +48,7 @@ class FittedCandidate:
     """A candidate fitted jointly with all parameters, compared with the one that was added."""
 
     candidate: Candidate
-    behind: float  # log-likelihood; 0 for the one added, negative for one that gains more but is less simple
+    behind: float  # log-likelihood; 0 for the one added, and for one that gains more but is less simple
     machine: Machine  # with it, all numbers as fitted
 
 
@@ -57,7 +57,7 @@ class AddedEffect:
     """An effect that the search has added."""
 
     candidate: Candidate
-    gain: float  # of log-likelihood and log-prior, of the joint fit
+    gain: float  # of log-likelihood and log-prior, of the joint fit, and no more than what removing it costs
     round: int  # of the search, from 0
     tried: int  # candidates in that round
     contest: tuple[FittedCandidate, ...]  # itself, then the candidates fitted in its place

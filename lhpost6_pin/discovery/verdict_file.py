@@ -89,7 +89,10 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "at_bound": list(verdict.bounded),
         "remainder": dict(found.verdict.remainder),
         "considered": [_considered(one) for one in found.search.rounds],
-        "withdrawn": [{"family": w.family, "why": w.why, "numbers": list(w.numbers)} for w in verdict.withdrawn],
+        "withdrawn": [
+            {"name": w.name, "family": w.family, "why": w.why, "numbers": list(w.numbers), "gain": _known(w.gain)}
+            for w in verdict.withdrawn
+        ],
         "rejected_on_held_out": {w.family: w.gain for w in verdict.withdrawn if w.why == "held_out"},
         "beyond_search": [one._asdict() for one in found.beyond],
         "held_out_balances": [asdict(one) for one in found.balances],

@@ -101,32 +101,34 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     """Whether held-out tests reject an effect: it does not close the gap there.
 
     original is their residual before any effect, `after` that of the search's solution. The effect is compared with
-    everything else refitted without it, in the residuals that its family shows in. It must gain there a share of what
-    is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some column by a
-    share of those before any effect. Not so where parameters run to their bounds without it, or where it gains what is
-    expected, and is one of two of a family or explains a good part of what is beyond noise there. One that the held-out
-    tests do not excite, with an expected gain within chance, stays, but not on a table with one actuator, which every
-    test excites.
+    everything else refitted without it, in the residuals that its family shows in. It must gain there a share of
+    what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some
+    column by a share of those before any effect. Not so where parameters run to their bounds without it, or where
+    it gains most of what is expected, and is one of two of a family or explains a good part of what is beyond noise
+    there. One that the held-out tests do not excite, with an expected gain within chance, stays, but not on a table
+    with one actuator, which every test excites.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
     n, single = found.numbers.number, len(found.problem.machine.actuators) == 1
     less = without_effect(found, one.candidate)
     before = residual_at(held, less.solution)
-    rows = rows_shown(held, one.candidate.family)
+    family, both = one.candidate.family, (before.whitened, after.whitened)
+    rows = rows_shown(held, family)
     gain, expected = gain_on(held, before, after, rows)
     if not single and expected <= n("accept.chance"):
         return None
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
-    share = share_explained(held, before.whitened, after.whitened, one.candidate.family, found.numbers)
-    as_expected = gain >= n("accept.expected") * expected
     if gain >= max(np.sqrt(2.0 * expected), n("accept.held_out") * expected) and (
         lowers_squares(first, old, new, n("accept.of_first"))
         or is_absorbed(one.candidate, absorbing(less))
-        or (as_expected and (_has_twin(found, one) or share >= n("accept.most")))
+        or (
+            gain >= n("accept.expected") * expected
+            and (_has_twin(found, one) or share_explained(held, *both, family, found.numbers) >= n("accept.most"))
+        )
     ):
         return None
-    return Withdrawn(one.candidate.name, one.candidate.family.named, "held_out", gain=gain)
+    return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
 
 
 def _has_twin(found: Search, one: AddedEffect) -> bool:

@@ -1007,7 +1007,7 @@ def test_what_an_effect_does_is_the_residual_without_it_less_that_with_it(found)
 
 
 def test_residual_forces_are_viewed_on_one_scale(found):
-    first, second = (found.left[name] for name in ("refitted", "with the effects"))
+    first, second = (found.residual_forces[name] for name in ("refitted", "with the effects"))
     assert first.attrs[FULL_SCALE] == second.attrs[FULL_SCALE] == np.abs(first["actuator_force"].values).max()
     shape = (first.sizes["time"], len(found.machine.actuators))
     assert first["actuator_force"].shape == second["actuator_force"].shape == shape

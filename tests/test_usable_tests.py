@@ -161,7 +161,7 @@ def test_pressures_tell_ratios_to_the_area_and_a_load_cell_its_own_scale(test):
         scale = scale_of(TABLE, seen_by(test, *names))
         assert scale is not None and scale.name == "drive.area" and scale.unit == "m2"
         assert scale.has("N") and scale.has("m3/s/Pa") and not scale.has("m") and not scale.has("Pa")
-        assert "Only ratios to drive.area can be told" in scale_summary(scale)
+        assert "Only ratios to drive.area can be identified" in scale_summary(scale)
     cell = scale_of(TABLE, seen_by(test, "actuator_force"))
     assert cell is not None and cell.name == "actuator_force" and "calibration of actuator_force" in scale_summary(cell)
     assert scale_of(TABLE, seen_by(test, "actuator_force", *pressures)) is None

@@ -18,7 +18,7 @@ _OIL = "pressures, or a load cell on a piston of equal areas"
 
 
 class Observable(NamedTuple):
-    """One quantity: whether its value can be told, only a ratio or a sum, or nothing; and why."""
+    """One quantity: whether its value can be identified, only a ratio or a sum, or nothing; and why."""
 
     quantity: str
     verdict: Verdict

@@ -150,8 +150,8 @@ def list_candidates(machine: Machine, channels: Collection[str] = LAYOUT) -> tup
     """All candidates of the library for a machine: each family at each start of its shapes, on each group together.
 
     Not on components on which the machine has an effect of that family. Where spools are not among the measured
-    `channels`, errors of the command path are calibrated, not named: delay and lag of a valve cannot be told apart from
-    those that its machine states.
+    `channels`, errors of the command path are calibrated, not named: delay and lag of a valve cannot be
+    distinguished from those that its machine states.
     """
     found: list[tuple[Candidate, ...]] = []
     there = {(entry.family, name) for entry in machine.parameters.effects.values() for name in entry.components}

@@ -69,7 +69,7 @@ class Discovery:
     numbers: Parameters
     seed: int
     hashes: dict[str, str]  # of the records that were read, by test
-    left: dict[str, xr.Dataset]  # residual forces of a held-out test as records, by model
+    residual_forces: dict[str, xr.Dataset]  # residual forces of a held-out test as records, by model
     loops: tuple[EffectLoop, ...]  # of the effects found, on the held-out tests, else on those searched
     curves: Curves  # of the held-out tests, else of those searched: as delivered, and by the fitted machine
 
@@ -135,7 +135,7 @@ def discover(
     out, part = [records[i] for i in held], between(report, 0.85, 1.0)
     proven = tuple(str(record.attrs.get("test", i)) for i, record in zip(held, out, strict=True))
     proof = prove(machine, found, out, sensors, phases=phases, jobs=jobs, progress=part) if held else None
-    balances, left = _what_is_left(found, held_problem)
+    balances, forces = _balances_and_forces(found, held_problem)
     checkpoint.remove()
     report(1.0)
     tests_of_search = [one for one in (held_problem, begun.search.problem) if one is not None]
@@ -159,7 +159,7 @@ def discover(
         numbers=numbers,
         seed=seed,
         hashes=hashes,
-        left=left,
+        residual_forces=forces,
         loops=effect_loops(found, bases, estimates_of(found, deviations(found))),
         curves=_curves(tests_of_search[0], final, found),
     )
@@ -200,13 +200,13 @@ def _residual_functions(
     return beside, fit_residual_functions(found, linearise(found.refit, found.calibration))
 
 
-def _what_is_left(found: Search, held: Problem | None) -> tuple[tuple[Balance, ...], dict[str, xr.Dataset]]:
+def _balances_and_forces(found: Search, held: Problem | None) -> tuple[tuple[Balance, ...], dict[str, xr.Dataset]]:
     """Balances of the held-out tests, and residual forces of one as records; empty without any."""
     if held is None:
         return (), {}
     three = [residual_at(held, one) for one in (None, found.refit, found.solution)]
-    left = residual_records(held, dict(zip(("refitted", "with the effects"), three[1:], strict=True)))
-    return evaluate_balances(held, three), left
+    models = dict(zip(("refitted", "with the effects"), three[1:], strict=True))
+    return evaluate_balances(held, three), residual_records(held, models)
 
 
 def _sourced(fitted: Machine, delivered: Machine, campaign: Campaign) -> Machine:

@@ -123,10 +123,10 @@ def estimates_of(found: Search, sd: Array) -> dict[str, Estimate]:
 
 
 def sums_of(found: Search, covariance: Array) -> dict[tuple[str, str], Estimate]:
-    """Sums of two unknowns of which the tests tell no more, by their names, with intervals.
+    """Sums of two unknowns of which the tests determine no more, by their names, with intervals.
 
     That of a number of a component and an effect of the background in its path, where the channel between them is not
-    measured (`Family.sum_with`). A single one of them follows from what a fit cannot tell: its interval is none.
+    measured (`Family.sum_with`). A single one of them depends on what a fit does not determine: its interval is none.
     """
     problem = found.problem
     place = {p.name: i for i, p in enumerate(problem.parameters)}

@@ -1,7 +1,8 @@
 """Parameters that stand out: three stated deviations off, where those of the same machine are much nearer.
 
 Within three deviations of its prior a parameter is calibration. One that reaches beyond that within its interval, while
-all others that the campaign tells scatter by a fraction of it, has changed: it is reported as an effect of its family.
+all others that the campaign informs on scatter by a fraction of it, has changed: it is reported as an effect of its
+family.
 Where others are as far off, stated deviations are too small, and none stands out.
 """
 
@@ -22,7 +23,7 @@ __all__ = ["outlying_parameters"]
 def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estimate]) -> Iterator[EffectFinding]:
     """Findings of parameters that stand out; sd (p,) are deviations of the unknowns, `estimates` theirs in their units.
 
-    None on guides, where few parameters are told and priors are assumed.
+    None on guides, where few parameters are informed and priors are assumed.
     """
     n, problem = found.numbers.number, found.problem
     if problem.machine.motion != "free":
@@ -30,13 +31,12 @@ def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estima
     own = tuple(f"{one.candidate.name}." for one in found.added)
     count = len(problem.parameters)
     places = [i for i, p in enumerate(problem.parameters) if not (p.of or p.name.startswith(own) or p.natural)]
-    told = [
-        i for i in places if sd[i] < n("outlying.told") * problem.stated[i] and problem.names[i] not in problem.free
-    ]
+    known = sd < n("outlying.informative") * problem.stated
+    informed = [i for i in places if known[i] and problem.names[i] not in problem.free]
     distance = _of_kinds(problem.parameters, found.solution.x) / problem.stated[:count]
     releases = {one.release: one for one in list_releases(problem)}
-    for i in told:
-        others = [k for k in told if k != i]
+    for i in informed:
+        others = [k for k in informed if k != i]
         name, reach = problem.names[i], n("outlying.reach") * sd[i] / problem.stated[i]
         if name not in releases or len(others) < n("outlying.fewest"):
             continue
@@ -48,7 +48,7 @@ def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estima
                 components=one.components,
                 parameters={name: estimates[name]},
                 gain=gain,
-                p_value=p_value_of(gain, 1, len(told)),
+                p_value=p_value_of(gain, 1, len(informed)),
                 form=one.family.name,
             )
 

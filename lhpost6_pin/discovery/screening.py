@@ -148,8 +148,8 @@ def _confused(one: Candidate, other: Candidate) -> bool:
 
 def _meet(added: Candidate, candidate: Candidate) -> bool:
     """Whether a candidate is on a component of one added, or on oil that comes from the supply on which that is."""
-    fed = SUPPLY in added.components and "flow" in candidate.family.shows_in
-    return fed or bool({*added.components} & {*candidate.components})
+    from_supply = SUPPLY in added.components and "flow" in candidate.family.shows_in
+    return from_supply or bool({*added.components} & {*candidate.components})
 
 
 def _places(parts: Sequence[Array]) -> NDArray[np.intp]:

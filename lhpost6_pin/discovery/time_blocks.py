@@ -2,7 +2,7 @@
 
 Cross-validation leaves one test out. With one test or two it has nothing to compare: an error of one sensor's clock in
 one test is as consistent as an effect. Each is then cut into blocks, which are searched like tests. States with a long
-memory (warm friction, leaking gas) start anew in every block, so that these effects need more tests to be told.
+memory (warm friction, leaking gas) start anew in every block, so that these effects need more tests to be found.
 """
 
 from collections.abc import Collection, Sequence

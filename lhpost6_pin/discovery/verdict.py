@@ -126,8 +126,8 @@ def judge(
         word = "sensor"
     spots = tuple(worst_spots(problem, left.residual)) if unexplained else ()
     kept_own = tuple(f"{one.candidate.name}." for one in found.added if one.candidate.name not in gone)
-    told = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(kept_own)}
-    scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in told.items() if n not in bounded))
+    listed = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(kept_own)}
+    scaled = ratios(problem.scale, ((n, e.unit, e.value, e.low, e.high) for n, e in listed.items() if n not in bounded))
     return Verdict(
         *(word, effects, changed, (*sensors, *removed), function, hidden, nearest, spots, withdrawn, bounded),
         scale=problem.scale,

@@ -28,7 +28,7 @@ __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "
 
 _WITHDRAWN: dict[Why, str] = {
     "at_bound": "of which a number is at the bound of its range",
-    "zero": "whose size cannot be told from zero",
+    "zero": "whose size cannot be distinguished from zero",
     "own_form": "which is no more than what the form of friction may be off by",
     "held_out": "which lowers the residual of the tests searched, but not of those held out",
 }
@@ -143,7 +143,7 @@ def _interval(value: Estimate) -> dict[str, Any]:
 
 
 def _scale(found: Discovery) -> dict[str, Any] | None:
-    """What the scale is taken from that nothing measured fixes, and the ratios that can be told."""
+    """What the scale is taken from that nothing measured fixes, and the ratios that are known."""
     scale = found.verdict.scale
     if scale is None:
         return None
@@ -191,7 +191,7 @@ def summary(found: Discovery) -> str:
         text = {
             "none": "no missing effect; no parameter differs from the machine file.",
             "not_testable": f"no missing effect, but {len(verdict.untestable)} families are not testable with this "
-            "campaign: it needs more excitation, or sensors that tell of them (lhpost6 check).",
+            "campaign: it needs more excitation, or sensors that observe them (lhpost6 check).",
             "parameters_only": f"no missing effect; {len(verdict.changed)} parameters differ: "
             f"{', '.join(verdict.changed)}.",
             "sensor": f"no missing effect; {_beyond(verdict.sensors)}.",
@@ -199,8 +199,8 @@ def summary(found: Discovery) -> str:
             "ambiguous": f"{effects}. {rivals}",
         }[verdict.word]
     if verdict.sensors and verdict.word != "sensor":
-        said = _beyond(verdict.sensors)
-        text += f" {said[0].upper()}{said[1:]}."
+        beyond = _beyond(verdict.sensors)
+        text += f" {beyond[0].upper()}{beyond[1:]}."
     if verdict.word in ("named", "ambiguous"):
         left = [f"{100.0 * share:.2g} % ({kind})" for kind, share in verdict.remainder.items() if share > REMAINS]
         text += f" Of the squares beyond noise remain {', '.join(left)}." if left else ""
@@ -233,11 +233,11 @@ def _name_of(one: EffectFinding) -> str:
 
 
 def _rivals_of(one: EffectFinding) -> str:
-    """Which families explain an effect, how probable each is, and the test that tells them apart."""
+    """Which families explain an effect, how probable each is, and the test that distinguishes them."""
     rivals = {one.family, *one.rivals}
     each = [f"{title_of(a.family)} ({a.probability:.2f})" for a in one.alternatives if a.family in rivals]
     tests = dict.fromkeys(find_family(name).tell_apart for name in (one.family, *one.rivals))
-    return f"On {where(one.components)} it is {' or '.join(each)}; to be told apart by {'; or '.join(tests)}."
+    return f"On {where(one.components)} it is {' or '.join(each)}; to be distinguished by {'; or '.join(tests)}."
 
 
 def _beyond(sensors: Sequence[SensorFinding]) -> str:

@@ -1,10 +1,10 @@
 """Effects that a search has added and that are no findings.
 
 An effect is none whose size is at its bound, or that does not close the gap on tests that were not searched. On guides,
-where few sensors leave much to be confused, it is none either with any of its numbers at a bound, if it cannot be told
-from zero, or if it is no more than what the form of friction may be off by; there effects are removed one by one, with
-everything else refitted. A platform on legs is judged with all effects in place, but of two that pass for each other
-the second without the first.
+where few sensors leave much to be confused, it is none either with any of its numbers at a bound, if it cannot be
+distinguished from zero, or if it is no more than what the form of friction may be off by; there effects are removed one
+by one, with everything else refitted. A platform on legs is judged with all effects in place, but of two that pass for
+each other the second without the first.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -124,14 +124,14 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
         or is_absorbed(one.candidate, absorbing(less))
         or (
             gain >= n("accept.expected") * expected
-            and (_has_twin(found, one) or share_explained(held, *both, family, found.numbers) >= n("accept.most"))
+            and (_is_one_of_two(found, one) or share_explained(held, *both, family, found.numbers) >= n("accept.most"))
         )
     ):
         return None
     return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
 
 
-def _has_twin(found: Search, one: AddedEffect) -> bool:
+def _is_one_of_two(found: Search, one: AddedEffect) -> bool:
     """Whether another effect of the same family was added, on other components."""
     return any(other is not one and other.candidate.family.name == one.candidate.family.name for other in found.added)
 

@@ -150,33 +150,33 @@ class Machine(Structure):
         found = {key: f"estimates.{estimate}.{key}" for key in ("mass", "inertia")}
         if estimate not in ESTIMATES or not all(path in self.parameters for path in found.values()):
             known = [e for e in ESTIMATES if f"estimates.{e}.mass" in self.parameters]
-            said = f"choose {' or '.join(known)}" if known else "its file states no estimates of the platen's inertia"
-            raise ParameterError(f"{self.parameters.origin}: no estimate {estimate!r}; {said}")
+            hint = f"choose {' or '.join(known)}" if known else "its file states no estimates of the platen's inertia"
+            raise ParameterError(f"{self.parameters.origin}: no estimate {estimate!r}; {hint}")
         return self.with_params({f"platen.{key}": self.parameters[path] for key, path in found.items()})
 
-    def as_tested(self, attrs: Mapping[str, Any], said: str) -> "Machine":
+    def as_tested(self, attrs: Mapping[str, Any], record: str) -> "Machine":
         """Return a copy with the specimen and the open servovalves that a record's attributes state, if any.
 
         Raises what `as_mounted` does.
         """
-        return self.as_mounted(attrs, said).with_valves(int(attrs.get("valves_per_horizontal_actuator", 0)))
+        return self.as_mounted(attrs, record).with_valves(int(attrs.get("valves_per_horizontal_actuator", 0)))
 
-    def as_mounted(self, attrs: Mapping[str, Any], said: str) -> "Machine":
-        """Return a copy with the specimen that a record, `said` in words, was made with; one that is mounted stays.
+    def as_mounted(self, attrs: Mapping[str, Any], record: str) -> "Machine":
+        """Return a copy with the specimen that `record` was made with; one that is mounted stays.
 
         Raises RecordError if its place or its file is not known.
         """
-        mounting = None if self.specimen else recorded_mounting(attrs, said)
+        mounting = None if self.specimen else recorded_mounting(attrs, record)
         if mounting is None:
-            self.refuse_unmounted(attrs, said)
+            self.refuse_unmounted(attrs, record)
             return self
         return self.with_specimen(mounting.file, mounting.position, mounting.rpy, locked=mounting.locked)
 
-    def refuse_unmounted(self, attrs: Mapping[str, Any], said: str) -> None:
-        """Raise RecordError if a record, `said` in words, was made with a specimen and this table is bare."""
+    def refuse_unmounted(self, attrs: Mapping[str, Any], record: str) -> None:
+        """Raise RecordError if `record` was made with a specimen and this table is bare."""
         carried = str(attrs.get("specimen", "none"))
         if carried != "none" and self.specimen is None:
-            raise RecordError(f"{said} was made with specimen {carried!r} on the table; mount it with --specimen")
+            raise RecordError(f"{record} was made with specimen {carried!r} on the table; mount it with --specimen")
 
     def with_specimen(
         self,
@@ -292,8 +292,8 @@ def build_machine(
 def _word(parameters: Parameters, path: str, valid: tuple[str, ...], default: str | None = None) -> str:
     word = parameters.words.get(path, default)
     if word not in valid:
-        said = "is missing" if word is None else f"= {word!r}"
-        raise ParameterError(f"{parameters.origin}: {path} {said}; it should be one of {', '.join(valid)}")
+        state = "is missing" if word is None else f"= {word!r}"
+        raise ParameterError(f"{parameters.origin}: {path} {state}; it should be one of {', '.join(valid)}")
     return str(word)
 
 

@@ -44,13 +44,13 @@ def check_names(parameters: Parameters, components: list[str], kinds: set[str], 
         if section in _COMPARISONS and path in parameters.quantities:
             continue
         if section not in known:
-            said = instead_of(section, sorted(known))
+            hint = instead_of(section, sorted(known))
             if f"{section}.mass" in parameters:
-                said = f'a floor of a specimen, [floor.{section}], needs along, such as "x", beside its mass'
-            raise ParameterError(f"{parameters.origin}: {path} is in no known section; {said}")
+                hint = f'a floor of a specimen, [floor.{section}], needs along, such as "x", beside its mass'
+            raise ParameterError(f"{parameters.origin}: {path} is in no known section; {hint}")
         if key not in known[section]:
-            said = instead_of(key, sorted(known[section]))
-            raise ParameterError(f"{parameters.origin}: unknown key {path}; {said}")
+            hint = instead_of(key, sorted(known[section]))
+            raise ParameterError(f"{parameters.origin}: unknown key {path}; {hint}")
 
 
 def check_actuator(actuator: Actuator, origin: str) -> None:

@@ -52,13 +52,13 @@ def sections_toml(comments: Iterable[str], groups: Mapping[str, Iterable[str]]) 
 
 def quantity_toml(quantity: Quantity) -> str:
     """A number as a table with its unit, evidence and source."""
-    said = [f"value = {_number(quantity.value)}", f"unit = {_text(quantity.unit)}"]
-    said += [f"evidence = {_text(quantity.evidence)}", f"source = {_text(quantity.source)}"]
+    entries = [f"value = {_number(quantity.value)}", f"unit = {_text(quantity.unit)}"]
+    entries += [f"evidence = {_text(quantity.evidence)}", f"source = {_text(quantity.source)}"]
     if quantity.sd is not None:
-        said.append(f"sd = {_number(quantity.sd)}")
+        entries.append(f"sd = {_number(quantity.sd)}")
     if quantity.printed is not None:
-        said.append(f"printed = {_text(quantity.printed)}")
-    return f"{{ {', '.join(said)} }}"
+        entries.append(f"printed = {_text(quantity.printed)}")
+    return f"{{ {', '.join(entries)} }}"
 
 
 def section_of(machine: Machine, path: str) -> tuple[str, str]:

@@ -42,8 +42,8 @@ def specimen_facts(specimen: Specimen | None) -> dict[str, Any]:
     }
 
 
-def recorded_mounting(attrs: Mapping[str, Any], said: str) -> Mounting | None:
-    """Specimen that a record, `said` in words, was made with; None for a bare table or where its place is not stated.
+def recorded_mounting(attrs: Mapping[str, Any], record: str) -> Mounting | None:
+    """Specimen that `record` was made with; None for a bare table or where its place is not stated.
 
     Raises RecordError for a file that is not there, or numbers that are none.
     """
@@ -57,7 +57,7 @@ def recorded_mounting(attrs: Mapping[str, Any], said: str) -> Mounting | None:
         places, locked = [], False
     if [len(place) for place in places] != [3, 3]:
         raise RecordError(
-            f"{said} was made with specimen {name!r}, and its attributes specimen_position and specimen_rpy are not "
+            f"{record} was made with specimen {name!r}, and its attributes specimen_position and specimen_rpy are not "
             "three numbers each; mount it with --specimen and --specimen-at"
         )
     try:
@@ -66,7 +66,7 @@ def recorded_mounting(attrs: Mapping[str, Any], said: str) -> Mounting | None:
         found = Path(file)
     if not found.is_file():
         raise RecordError(
-            f"{said} was made with specimen {name!r} of {file}, which is not there; mount it with --specimen FILE"
+            f"{record} was made with specimen {name!r} of {file}, which is not there; mount it with --specimen FILE"
         )
     position, rpy = places
     return Mounting(file, position, rpy, locked)

@@ -178,10 +178,10 @@ def _matrices(entries: Mapping[str, Any], points: tuple[Point, ...], path: Path)
     arrays, where = _arrays(entries, path), f"{path}: matrices"
     turning = any(p.direction.startswith("r") for p in points)
     for key, unit in _UNITS.items():
-        said = entries.get(key, {}).get("unit", unit) if isinstance(entries.get(key), dict) else unit
-        if turning and said != unit:
+        given = entries.get(key, {}).get("unit", unit) if isinstance(entries.get(key), dict) else unit
+        if turning and given != unit:
             raise ParameterError(
-                f"{where}: {key} in {said}; with rotations among its points give it in SI, unit {unit!r}"
+                f"{where}: {key} in {given}; with rotations among its points give it in SI, unit {unit!r}"
             )
     read = {k: read_entry(entries, k, u, 2, arrays, where) for k, u in _UNITS.items() if k in entries}
     for key in ("mass", "stiffness"):

@@ -34,7 +34,7 @@ class LoopCheck:
 
     @property
     def stable(self) -> bool:
-        """Whether no motion grows faster than can be told from rounding."""
+        """Whether no motion grows faster than can be distinguished from rounding."""
         return self.growth <= self.limits.growth
 
     @property

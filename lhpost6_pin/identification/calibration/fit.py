@@ -250,6 +250,6 @@ def _subsets(
             covariance = np.linalg.inv(positive(h, problem.prior) + np.diag(problem.prior**-2.0))
             sd = np.sqrt(np.diag(covariance))
             estimate = x - covariance @ (g + x / problem.prior**2)
-            known = sd < numbers.number("report.told") * problem.prior
+            known = sd < numbers.number("report.informative") * problem.prior
             found.append(Subset(name, np.where(known, estimate, np.nan), np.where(known, np.hypot(sd, floor), np.nan)))
     return tuple(found)

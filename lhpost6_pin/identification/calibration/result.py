@@ -106,8 +106,8 @@ class Calibration:
 
     def ratios(self) -> dict[str, Ratio]:
         """Ratios of identifiable parameters to a number of the machine whose scale nothing measured fixes."""
-        told = [i for i, _ in enumerate(self.parameters) if self.informed[i]]
-        each = ((self.parameters[i], self.estimate[i], self.interval(i)) for i in told)
+        informed = [i for i, _ in enumerate(self.parameters) if self.informed[i]]
+        each = ((self.parameters[i], self.estimate[i], self.interval(i)) for i in informed)
         return ratios(self.scale, ((p.name, p.unit, p.at(float(x)), *ends) for p, x, ends in each))
 
     def correlated_pairs(self) -> list[tuple[str, str, float]]:

@@ -2,8 +2,8 @@
 
 A pressure measures a force only through a piston area, a load cell through its own calibration. With the area, all
 masses, forces, flows and leaks s times larger, the residuals of a table without a load cell are s times larger, and
-zero where they were: only ratios to one of these numbers can be told. The best stated one is held, and so is the gain
-of a sensor that alone measures what it scales (`sensor_errors`).
+zero where they were: only ratios to one of these numbers can be identified. The best stated one is held, and so is the
+gain of a sensor that alone measures what it scales (`sensor_errors`).
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -82,9 +82,9 @@ def find_scale(machine: Machine, test: MeasuredTest, residuals: Residuals) -> Sc
 
 
 def measures_alone(machine: Machine, name: str, channels: Collection[str]) -> bool:
-    """Whether a sensor of force alone fixes the scale of what it measures, so that its gain cannot be told.
+    """Whether a sensor of force alone fixes the scale of what it measures, so that its gain cannot be identified.
 
-    Several actuators along one axis share the errors of their sensors; their ratios can be told.
+    Several actuators along one axis share the errors of their sensors; their ratios can be identified.
     """
     return (
         name in ("actuator_force", "pressure_difference")
@@ -112,7 +112,7 @@ def ratios(scale: Scale | None, estimates: Iterable[tuple[str, str, float, float
 
 
 def scale_summary(scale: Scale | None) -> str:
-    """What cannot be told, in a sentence; empty where a sensor fixes the scale."""
+    """What cannot be identified, in a sentence; empty where a sensor fixes the scale."""
     if scale is None:
         return ""
     if not scale.unit:
@@ -120,7 +120,7 @@ def scale_summary(scale: Scale | None) -> str:
     stated = f"{scale.value:.4g} {scale.unit}"
     stated += f" +- {100 * scale.deviation:.2g} %" if scale.deviation else ""
     return (
-        f"Only ratios to {scale.name} can be told, as pressures alone measure the force: it is held as stated "
+        f"Only ratios to {scale.name} can be identified, as pressures alone measure the force: it is held as stated "
         f"({stated}), and masses, friction, flow and leakage are wrong by the same factor if it is."
     )
 

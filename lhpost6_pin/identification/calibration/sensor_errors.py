@@ -6,7 +6,7 @@ Commands are held for a sample of the controller, while the valves' delay is not
 record may be up to half such a sample early or late, in addition to the delay of its group.
 
 The gain of a sensor that alone fixes the scale of numbers that are free (the only one of force on an axis, the only one
-of motion, a floor's) is none of them: it cannot be told from these numbers.
+of motion, a floor's) is none of them: it cannot be identified from these numbers.
 
 Displacement, velocity and acceleration of the platen are fused into one motion; each channel's gain acts on its share
 of the motion, to first order. Skews between them have been removed; other delays are relative to the platen's motion.

@@ -48,8 +48,8 @@ def by_simulation(
     """Estimates of the parameters by open-loop simulation about x (p,), under the problem's priors; NaN for sensors.
 
     noisy are draws of the tests in order, any number of times, each with more noise; `numbers` are those of
-    `models/procedures/calibration.toml`. NaN where the deviation exceeds `report.told` of the prior's. None without
-    spools and pressures, or if a run fails.
+    `models/procedures/calibration.toml`. NaN where the deviation exceeds `report.informative` of the prior's. None
+    without spools and pressures, or if a run fails.
     """
     band, count, tests = numbers.vector("simulation.bands"), len(problem.parameters), len(problem.tests)
     if any(not {"spool_position", "chamber_pressure_a"} <= t.channels.keys() for t in problem.tests):
@@ -99,7 +99,7 @@ def by_simulation(
         matrix, side = matrix + rows.squares(), side + rows.dot(row_by_column(white[t], root))
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))
-    known, none = sd < numbers.number("report.told") * prior, np.full(len(x) - count, np.nan)
+    known, none = sd < numbers.number("report.informative") * prior, np.full(len(x) - count, np.nan)
     estimate = np.where(known, x[:count] - covariance @ side, np.nan)
     sd = np.where(known, np.hypot(sd, numbers.number("simulation.floor") * prior), np.nan)
     return Subset("simulation", np.append(estimate, none), np.append(sd, none), part=False)

@@ -1,6 +1,6 @@
 """Tests of a campaign that can be compared with a model: not too short nor too slow, no force sensor dead in one alone.
 
-A test that cannot is skipped and said; the others are used.
+A test that cannot is skipped, with the reason; the others are used.
 """
 
 import logging

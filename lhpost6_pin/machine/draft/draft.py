@@ -167,9 +167,9 @@ def _ends(basis: Basis, legs: Sequence[Leg]) -> dict[str, dict[str, Quantity]]:
         "as stated": [n for n in names if n in basis.known],
         "typical": [n for n in names if n not in basis.known],
     }
-    said = [f"{how}: {', '.join(chosen)}".replace("_", " ") for how, chosen in groups.items() if chosen]
+    choices = [f"{how}: {', '.join(chosen)}".replace("_", " ") for how, chosen in groups.items() if chosen]
     evidence = "derived" if groups["as stated"] else "assumed"
-    rest = evidence, "; ".join([where, *said]), basis.rule("stated.leg_point")
+    rest = evidence, "; ".join([where, *choices]), basis.rule("stated.leg_point")
     return {
         leg.name: {
             "platen_point": Quantity(tuple(leg.platen_point.tolist()), "m", *rest),

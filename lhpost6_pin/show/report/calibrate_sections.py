@@ -82,7 +82,7 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
 
 
 def ratio_tables(calibration: Calibration) -> list[Table]:
-    """Return the ratios that can be told, where nothing measured fixes a scale."""
+    """Return the ratios that can be identified, where nothing measured fixes a scale."""
     each = calibration.ratios()
     if calibration.scale is None or not each:
         return []

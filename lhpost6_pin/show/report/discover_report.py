@@ -35,11 +35,11 @@ _VERDICTS: dict[Word, tuple[str, Level]] = {
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
     """Write verdict.json, model.toml (headed by `title`), report.html and residual forces to view; returns paths."""
-    left = [(folder / f"residual_{name.replace(' ', '_')}.nc", record) for name, record in found.left.items()]
-    for path, record in left:
+    forces = {folder / f"residual_{name.replace(' ', '_')}.nc": record for name, record in found.residual_forces.items()}
+    for path, record in forces.items():
         save_record(record, path)
     return [
-        *(path for path, _ in left),
+        *forces,
         save_verdict(found, folder / "verdict.json"),
         save_machine_toml(found.fitted, folder / "model.toml", title),
         write_discover_report(found, folder / "report.html", command=command),

@@ -35,7 +35,8 @@ _VERDICTS: dict[Word, tuple[str, Level]] = {
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
     """Write verdict.json, model.toml (headed by `title`), report.html and residual forces to view; returns paths."""
-    forces = {folder / f"residual_{name.replace(' ', '_')}.nc": record for name, record in found.residual_forces.items()}
+    named = found.residual_forces.items()
+    forces = {folder / f"residual_{name.replace(' ', '_')}.nc": record for name, record in named}
     for path, record in forces.items():
         save_record(record, path)
     return [

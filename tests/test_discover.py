@@ -26,6 +26,7 @@ from lhpost6_pin.discovery.acceptance import Lowered, refusal, share_explained
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
+from lhpost6_pin.discovery.contest import loss_without
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
@@ -42,7 +43,7 @@ from lhpost6_pin.discovery.residual_function import (
 )
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, found_there, score_pairs
-from lhpost6_pin.discovery.search import _loss_without, _pruned, _with_confused, without_effect
+from lhpost6_pin.discovery.search import _pruned, _with_confused, without_effect
 from lhpost6_pin.discovery.search_state import (
     AddedEffect,
     FittedCandidate,
@@ -659,7 +660,7 @@ def test_an_effect_is_not_credited_with_what_others_gain(found, monkeypatch):
     rest = problem.residual(OperatingPoint(problem, x))
     added = (*search.added, replace(search.added[0], candidate=one))
     both = replace(search, problem=problem, solution=search.solution._replace(x=x, residual=rest), added=added)
-    assert _loss_without(both, one) < 1.0 and _loss_without(both, search.added[0].candidate) > 1000.0
+    assert loss_without(both, one) < 1.0 and loss_without(both, search.added[0].candidate) > 1000.0
     solved = Search.solved
 
     def elsewhere(self, *given, **options):
@@ -756,7 +757,7 @@ def test_a_step_to_a_machine_without_inertia_is_rejected(found, monkeypatch):
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
     search = found.search
     helper = scored("asymmetric_friction", ("V1",), 50.0)
-    both = fit_jointly(search, helper, lambda share: None)
+    both = fit_jointly(search, helper, lambda share: None).search
     both = replace(both, added=(replace(search.added[0], candidate=helper.candidate), *both.added))
     assert len(both.problem.machine.parameters.effects) == 1 + len(search.problem.machine.parameters.effects)
     left = _pruned(both)
@@ -784,7 +785,7 @@ def test_shares_are_of_the_error_that_each_effect_removes(found, machine, rubbin
     (name,) = alone.shares
     assert alone.shares[name] == pytest.approx(1.0 - (alone.after / alone.refitted) ** 2, rel=1e-12)
     helper = scored("asymmetric_friction", ("V1",), 50.0)
-    both = fit_jointly(search, helper, lambda share: None)
+    both = fit_jointly(search, helper, lambda share: None).search
     both = replace(both, added=(*search.added, replace(search.added[0], candidate=helper.candidate)))
     (gap,) = prove(machine, both, test, sensors, **options).gaps
     assert gap.shares[name] == pytest.approx(alone.shares[name], abs=0.02) and gap.shares[name] > 0.8

@@ -1,6 +1,8 @@
 """Joint fits: a candidate fitted together with all parameters and sensor errors, from several starts."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from ..identification.calibration.problem import Problem
 from .candidates import Candidate
 from .search_state import Scored, Search
 
-__all__ = ["fit_jointly", "refined", "with_candidate"]
+__all__ = ["JointFit", "fit_from_rival", "fit_jointly", "refined", "with_candidate"]
 
 
 def refined(found: Search, progress: Progress) -> Search:
@@ -34,12 +36,19 @@ def refined(found: Search, progress: Progress) -> Search:
     return found
 
 
-def fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | None = None) -> Search:
+class JointFit(NamedTuple):
+    """The best of a candidate's joint fits."""
+
+    search: Search
+    starts: int  # fits up to it
+
+
+def fit_jointly(found: Search, one: Scored, progress: Progress, best: JointFit | None = None) -> JointFit:
     """The search with a candidate fitted jointly with all parameters, from its linear estimate.
 
     Where the residual stays large, it is fitted from the stated parameters, too, since a missing effect may have biased
-    them out of reach; and from other shapes that explain nearly as much. Not so where the `best` rival so far leaves
-    little, and this one is far behind it.
+    them out of reach; and from other shapes that explain nearly as much. From as many starts as the `best` rival so far
+    required; then no more where that leaves little, and this one is far behind it.
     """
     n = found.numbers.number
     near = [s for s in found.rounds[-1].scored if s.gain >= n("accept.near") * one.gain]
@@ -48,13 +57,35 @@ def fit_jointly(found: Search, one: Scored, progress: Progress, best: Search | N
     fits: list[Search] = []
     for (start, afresh), part in zip(starts, split(progress, len(starts)), strict=True):
         fits.append(_fit_from(found, start, part, afresh=afresh))
+        if best is not None and len(fits) < best.starts:
+            continue
         if fits[-1].power < n("accept.settled"):
             break
-        if best is not None and best.power < n("accept.settled"):
-            far = n("accept.far") * (found.objective - best.objective)
-            if fits[-1].objective - best.objective > far:
+        if best is not None and best.search.power < n("accept.settled"):
+            far = n("accept.far") * (found.objective - best.search.objective)
+            if fits[-1].objective - best.search.objective > far:
                 break
-    return min(fits, key=lambda fit: fit.objective)
+    place = min(range(len(fits)), key=lambda i: fits[i].objective)
+    return JointFit(fits[place], place + 1)
+
+
+def fit_from_rival(found: Search, one: Scored, rival: Scored, fitted: Search, progress: Progress) -> Search | None:
+    """The search with a candidate fitted jointly from the numbers of a fitted rival; None if it has others.
+
+    Of two families that differ in one respect, such as an inertia upright, the one may stop far from what the other,
+    which has a number more, has found.
+    """
+    problem, candidate, prefix = fitted.problem, one.candidate, f"{rival.candidate.name}."
+    pairs = zip(problem.parameters, fitted.solution.x, strict=False)
+    values = {p.name.removeprefix(prefix): p.at(float(x)) for p, x in pairs if p.name.startswith(prefix)}
+    if not values or any(s.name not in values for s in candidate.amplitudes):
+        return None
+    own = replace(candidate, shape=tuple((name, values.get(name, value)) for name, value in candidate.shape))
+    wanted = np.clip([values[s.name] for s in own.amplitudes], *own.bounds)
+    amplitudes, place = tuple(wanted.tolist()), dict(zip(problem.names, fitted.solution.x, strict=True))
+    others = np.array([place[name] for name in found.problem.names])
+    start = with_candidate(found.problem, own, amplitudes, own.fit_parameters(amplitudes, found.numbers), others)
+    return found.solved(*start, progress, settled=True)
 
 
 def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -> Search:

@@ -9,24 +9,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.arrays import Array
 from ..core.progress import Progress, between, split
-from ..identification.calibration.fit import objective_at, solve
-from ..identification.calibration.normal_equations import NoiseBias, NormalEquations, bounds_of
+from ..identification.calibration.fit import solve
+from ..identification.calibration.normal_equations import NoiseBias, NormalEquations
 from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
-from .acceptance import gate, share_explained, squares_by_column
+from .acceptance import gate, share_explained
 from .candidates import Candidate
-from .joint_fit import fit_jointly, refined
+from .contest import best_of, loss_without, removed
+from .joint_fit import refined
 from .screening import found_there, is_confused, score_pairs, screen
 from .search_state import (
-    AddedEffect,
-    FittedCandidate,
     Linearisation,
     Scored,
     Search,
     best_per_family,
-    fitted_machine,
     linearise,
 )
 
@@ -114,24 +111,12 @@ def without_effect(found: Search, candidate: Candidate) -> Search:
     """The search without one of its effects, everything else refitted unless that explains less."""
     if (known := found.without.get(found.less(candidate))) is not None:
         return known
-    problem, start = _removed(found, candidate)
+    problem, start = removed(found, candidate)
     less = found.solved(problem, start, lambda share: None, settled=True)
     as_it_was = less.moved(start, np.zeros(len(start), bool), lambda share: None)
     if as_it_was.objective < less.objective:  # equations corrected for noise have their root elsewhere
         less = as_it_was
     return replace(less, added=tuple(one for one in found.added if one.candidate.name != candidate.name))
-
-
-def _removed(found: Search, candidate: Candidate) -> tuple[Problem, Array]:
-    """The problem of a search without one of its candidates, and all other unknowns (p,) as they are, within bounds."""
-    problem = found.problem
-    if candidate.release:
-        less = problem.with_free(candidate.release, None)
-    else:
-        parameters = tuple(k for k in problem.parameters if not k.name.startswith(f"{candidate.name}."))
-        less = problem.with_machine(problem.machine.without_effect(candidate.name), parameters)
-    place = dict(zip(problem.names, found.solution.x, strict=True))
-    return less, np.clip([place[name] for name in less.names], *bounds_of(less, found.calibration))
 
 
 def _more_effects(found: Search, linear: Linearisation, progress: Progress) -> Search | None:
@@ -166,9 +151,9 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
         # one in the other's place may be added already
         there = {added.candidate.name for added in both.added}
         rivals = [o for o in (one, *_in_its_place(both, one)) if o.candidate.name not in there]
-        both = (_best_of(both, rivals, part, least=-np.inf) if rivals else None) or both
+        both = (best_of(both, rivals, part, least=-np.inf) if rivals else None) or both
     gates, new = [gate(one.candidate.family, found.numbers) for one in two], both.added[len(found.added) :]
-    new = tuple(replace(added, gain=_loss_without(both, added.candidate)) for added in new)
+    new = tuple(replace(added, gain=loss_without(both, added.candidate)) for added in new)
     worth = all(added.gain >= gate(added.candidate.family, found.numbers) for added in new)
     if found.objective - both.objective < sum(gates) or not worth:
         return more
@@ -199,7 +184,7 @@ def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | 
     the same amplitude in all tests.
     """
     n = found.numbers.number
-    more = _best_of(found, [one, *_in_its_place(found, one)], progress)
+    more = best_of(found, [one, *_in_its_place(found, one)], progress)
     if more is None:
         return None
     best, share = more.added[-1], _share_explained(found, more)
@@ -249,7 +234,7 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
             return None
         waiting = [one for one in waiting if one not in rivals]
         rivals = _with_confused(found, rivals)
-        if (best := _best_of(found, rivals, part)) is not None:
+        if (best := best_of(found, rivals, part)) is not None:
             return best
     return None
 
@@ -271,47 +256,3 @@ def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
         every += [other for other in _in_its_place(found, one, confused=True) if other not in every]
     most = 2 * int(found.numbers.number("accept.rivals")) - 1
     return sorted(every, key=lambda one: -one.gain)[: max(most, len(rivals))]
-
-
-def _best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:
-    """The search with the best of these candidates, all fitted jointly; None if none gains `least`, or its gate."""
-    numbers, parts = found.numbers, split(between(progress, 0.0, 0.7), len(rivals))
-    fitted: list[Search] = []
-    for rival, part in zip(rivals, parts, strict=True):
-        fitted.append(fit_jointly(found, rival, part, min(fitted, key=lambda fit: fit.objective, default=None)))
-    before, *left = (one.objective for one in (found, *fitted))
-    gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
-    gaining = [i for i, required in enumerate(gates) if before - left[i] >= required]
-    gains = {i: min(before - left[i], _loss_without(fitted[i], rivals[i].candidate)) for i in gaining}
-    passed = [i for i in gaining if gains[i] >= gates[i]]
-    if not passed:
-        return None
-    lowest = min(left[i] for i in passed)
-    # no real law is exactly that of the library: of a large gain a small share is not decisive
-    apart = max(numbers.number("accept.apart"), numbers.number("accept.alike") * (before - lowest))
-    # nor is one alike that leaves much where another leaves noise, in however few bins
-    settled = max(numbers.number("accept.settled"), min(fitted[i].power for i in passed))
-    alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled]
-    alike = alike or [i for i in passed if left[i] == lowest]
-    # the simplest of them: a parameter of the model first, then the fewest numbers
-    best = min(alike, key=lambda i: (not rivals[i].candidate.release, len(rivals[i].candidate.family.shapes), left[i]))
-    order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
-    beyond = [apart if i != best and fitted[i].power > settled else 0.0 for i in range(len(fitted))]
-    contest = tuple(
-        FittedCandidate(
-            rivals[i].candidate, max(float(left[i] - left[best]), beyond[i]), fitted_machine(fitted[i].solution)
-        )
-        for i in order
-    )
-    more = refined(fitted[best], between(progress, 0.7, 1.0))
-    fall = squares_by_column(found.residual) - squares_by_column(more.residual)
-    place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
-    return more.with_effect(AddedEffect(rivals[best].candidate, gains[best], place, tried, contest, fall, apart))
-
-
-def _loss_without(found: Search, candidate: Candidate) -> float:
-    """By how much the objective rises without one of the candidates, all other unknowns as they are.
-
-    What a fit gains beyond that is due to the others, which may only have ended elsewhere.
-    """
-    return objective_at(*_removed(found, candidate)) - found.objective

@@ -1,0 +1,107 @@
+"""Contests: candidates fitted jointly in one another's place, the simplest of those that explain alike, its credit."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.progress import Progress, between, split
+from ..identification.calibration.fit import objective_at
+from ..identification.calibration.normal_equations import bounds_of
+from ..identification.calibration.problem import Problem
+from .acceptance import gate, squares_by_column
+from .candidates import Candidate
+from .estimates import at_bounds
+from .joint_fit import JointFit, fit_from_rival, fit_jointly, refined
+from .search_state import AddedEffect, FittedCandidate, Scored, Search, fitted_machine
+
+__all__ = ["best_of", "loss_without", "removed"]
+
+
+def best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:
+    """The search with the best of these candidates, all fitted jointly; None if none gains `least`, or its gate."""
+    numbers, parts = found.numbers, split(between(progress, 0.0, 0.7), len(rivals))
+    fitted = _fits_of(found, rivals, parts)
+    before, *left = (one.objective for one in (found, *fitted))
+    gates = [gate(one.candidate.family, numbers) if least is None else least for one in rivals]
+    gaining = [i for i, required in enumerate(gates) if before - left[i] >= required]
+    gains = {i: min(before - left[i], loss_without(fitted[i], rivals[i].candidate)) for i in gaining}
+    passed = [i for i in gaining if gains[i] >= gates[i]]
+    if not passed:
+        return None
+    lowest = min(left[i] for i in passed)
+    apart = _apart(found, fitted[left.index(lowest)])
+    # nor is one alike that leaves much where another leaves noise, in however few bins
+    settled = max(numbers.number("accept.settled"), min(fitted[i].power for i in passed))
+    alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled]
+    alike = alike or [i for i in passed if left[i] == lowest]
+    best = min(alike, key=lambda i: (_complexity(fitted[i], rivals[i].candidate), left[i]))
+    order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
+    beyond = [apart if i != best and fitted[i].power > settled else 0.0 for i in range(len(fitted))]
+    contest = tuple(
+        FittedCandidate(
+            rivals[i].candidate, max(float(left[i] - left[best]), beyond[i]), fitted_machine(fitted[i].solution)
+        )
+        for i in order
+    )
+    more = refined(fitted[best], between(progress, 0.7, 1.0))
+    fall = squares_by_column(found.residual) - squares_by_column(more.residual)
+    place, tried = len(found.rounds) - 1, len(found.rounds[-1].scored)
+    return more.with_effect(AddedEffect(rivals[best].candidate, gains[best], place, tried, contest, fall, apart))
+
+
+def _fits_of(found: Search, rivals: Sequence[Scored], parts: Sequence[Progress]) -> list[Search]:
+    """Joint fits of candidates; those confused with the best of them, but far behind it, from its numbers, too."""
+    fits: list[JointFit] = []
+    for rival, part in zip(rivals, parts, strict=True):
+        fits.append(fit_jointly(found, rival, part, min(fits, key=lambda fit: fit.search.objective, default=None)))
+    fitted = [fit.search for fit in fits]
+    lead = min(range(len(fitted)), key=lambda i: fitted[i].objective)
+    first, best = rivals[lead].candidate, fitted[lead]
+    apart = _apart(found, best)
+    for i, one in enumerate(rivals):
+        confused = one.candidate.family.named in first.family.confused_with
+        if confused and one.candidate.components == first.components and fitted[i].objective - best.objective >= apart:
+            again = fit_from_rival(found, one, rivals[lead], best, parts[i])
+            if again is not None and again.objective < fitted[i].objective:
+                fitted[i] = again
+    return fitted
+
+
+def _apart(found: Search, best: Search) -> float:
+    """Log-likelihood within which two families explain alike: of a large gain a small share is not decisive.
+
+    No real law is exactly that of the library.
+    """
+    n = found.numbers.number
+    return max(n("accept.apart"), n("accept.alike") * (found.objective - best.objective))
+
+
+def _complexity(fit: Search, candidate: Candidate) -> tuple[bool, int, int]:
+    """By which the simplest of candidates that explain alike is chosen.
+
+    A parameter of the model comes first; then a form with fewest numbers at their bounds, to which it had to be
+    stretched; then one with fewest numbers.
+    """
+    bounded = sum(name.startswith(f"{candidate.name}.") for name in at_bounds(fit))
+    return not candidate.release, bounded, len(candidate.family.shapes)
+
+
+def loss_without(found: Search, candidate: Candidate) -> float:
+    """By how much the objective rises without one of the candidates, all other unknowns as they are.
+
+    What a fit gains beyond that is due to the others, which may only have ended elsewhere.
+    """
+    return objective_at(*removed(found, candidate)) - found.objective
+
+
+def removed(found: Search, candidate: Candidate) -> tuple[Problem, Array]:
+    """The problem of a search without one of its candidates, and all other unknowns (p,) as they are, within bounds."""
+    problem = found.problem
+    if candidate.release:
+        less = problem.with_free(candidate.release, None)
+    else:
+        parameters = tuple(k for k in problem.parameters if not k.name.startswith(f"{candidate.name}."))
+        less = problem.with_machine(problem.machine.without_effect(candidate.name), parameters)
+    place = dict(zip(problem.names, found.solution.x, strict=True))
+    return less, np.clip([place[name] for name in less.names], *bounds_of(less, found.calibration))

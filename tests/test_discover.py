@@ -26,12 +26,12 @@ from lhpost6_pin.discovery.acceptance import Lowered, refusal, share_explained
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
-from lhpost6_pin.discovery.contest import loss_without
+from lhpost6_pin.discovery.contest import _complexity, loss_without
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
-from lhpost6_pin.discovery.joint_fit import _best_strength, fit_jointly, refined, with_candidate
+from lhpost6_pin.discovery.joint_fit import _best_strength, fit_from_rival, fit_jointly, refined, with_candidate
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import (
@@ -790,6 +790,28 @@ def test_shares_are_of_the_error_that_each_effect_removes(found, machine, rubbin
     (gap,) = prove(machine, both, test, sensors, **options).gaps
     assert gap.shares[name] == pytest.approx(alone.shares[name], abs=0.02) and gap.shares[name] > 0.8
     assert gap.shares[helper.candidate.name] == pytest.approx(0.0, abs=0.02)  # parameters share its noise
+
+
+def test_a_candidate_starts_from_the_numbers_of_a_rival_that_has_those_of_its_own(found):
+    """From an estimate of nothing, it ends where the rival is; what has other numbers does not start there."""
+    search, added = found.search, found.search.added[0].candidate
+    bare, names = without_effect(search, added), added.components
+    one, rival = (scored(added.family.name, names, 50.0) for _ in range(2))
+    again = fit_from_rival(bare, one, rival, search, lambda share: None)
+    # a fit that ends where a step gains less than one
+    assert again is not None and again.objective == pytest.approx(search.objective, abs=2.0)
+    assert fit_from_rival(bare, scored("piston_leakage", names, 50.0), rival, search, lambda share: None) is None
+
+
+def test_of_forms_that_explain_alike_one_stretched_to_a_bound_comes_last(found):
+    search, added = found.search, found.search.added[0].candidate
+    free, bounded, count = _complexity(search, added)
+    assert (free, bounded) == (True, 0) and count == len(added.family.shapes)
+    x = search.solution.x.copy()
+    x[search.problem.names.index(f"{added.name}.speed")] = 1e9
+    assert _complexity(replace(search, solution=search.solution._replace(x=x)), added) == (True, 1, count)
+    release = replace(added, release="horizontal.seal_friction")
+    assert _complexity(search, release) < (free, bounded, count)
 
 
 def test_the_floor_is_noise_and_what_warmer_oil_leaves(found, rubbing, sensors):

@@ -543,23 +543,23 @@ def test_a_free_function_takes_the_place_of_names_it_beats_and_is_the_form_of_th
         none = np.zeros(2)
         return ResidualFunction(components, "position", 0.0, none, none, none, gain, beyond, np.full(3, 100.0))
 
-    spring, leak = added("stray_spring", ("H1",), 400.0), added("piston_leakage", ("H1",), 400.0)
+    spring, leak = added("stray_spring", ("H1",), 1600.0), added("piston_leakage", ("H1",), 1600.0)
     names = {one.candidate.family.name: one.candidate.name for one in (spring, leak)}
 
-    def told(left: list[ResidualFunction], instead: list[ResidualFunction]) -> tuple[float, set[str]]:
-        function, doubted = reject_effects([spring, leak], left, instead, numbers)
+    def judged(beside: list[ResidualFunction], instead: list[ResidualFunction]) -> tuple[float, set[str]]:
+        function, doubted = reject_effects([spring, leak], beside, instead, numbers)
         return (0.0 if function is None else function.gain), doubted
 
-    assert told([], [free(500.0, "H1")]) == (0.0, set())  # a little better than the name: no wonder, of 24 values
-    assert told([], [free(600.0, "H1")]) == (600.0, {names["stray_spring"]})  # a force says nothing of a leak
-    assert told([free(100.0, "H2")], []) == (100.0, set())  # beside it, and elsewhere
-    assert told([free(500.0, "H2")], []) == (500.0, {names["stray_spring"]})
-    assert told([free(100.0, "H1")], []) == (100.0, {names["stray_spring"]})  # much, where the name acts
-    assert told([free(70.0, "H2", beyond=10.0)], []) == (0.0, set())  # may be noise
-    spring = added("stray_spring", ("H1",), 4000.0)
-    assert told([free(200.0, "H1")], []) == (0.0, set())  # the form of what was found there
-    assert told([free(100.0, "H2")], []) == (0.0, set())  # and what that leaves elsewhere
-    assert told([free(200.0, "H2")], []) == (200.0, set())
+    assert judged([], [free(2000.0, "H1")]) == (0.0, set())  # a little better than the name: no wonder, of 24 values
+    assert judged([], [free(2400.0, "H1")]) == (2400.0, {names["stray_spring"]})  # a force says nothing of a leak
+    assert judged([free(400.0, "H2")], []) == (400.0, set())  # beside it, and elsewhere
+    assert judged([free(2000.0, "H2")], []) == (2000.0, {names["stray_spring"]})
+    assert judged([free(400.0, "H1")], []) == (400.0, {names["stray_spring"]})  # much, where the name acts
+    assert judged([free(280.0, "H2", beyond=10.0)], []) == (0.0, set())  # may be noise
+    spring = added("stray_spring", ("H1",), 16000.0)
+    assert judged([free(800.0, "H1")], []) == (0.0, set())  # the form of what was found there
+    assert judged([free(400.0, "H2")], []) == (0.0, set())  # and what that leaves elsewhere
+    assert judged([free(800.0, "H2")], []) == (800.0, set())
 
 
 def test_a_small_effect_is_not_blamed_for_the_form_of_a_large_one_beside_it(ready):

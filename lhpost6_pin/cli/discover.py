@@ -110,7 +110,7 @@ def demo(
         f"   by {1e3 * after:.1f} mm with the effect identified."
     )
     title = f"{machine.name} with what `lhpost6 demo` found"
-    _, model, report = save_discovery(found, folder, title, repeating_command())
+    *_, model, report = save_discovery(found, folder, title, repeating_command())
     view = folder / "view.html"
     show_record(machine, loops.measured, [loops.delivered, loops.found], Look(gap=10.0)).save(view)
     echo(

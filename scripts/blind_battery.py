@@ -79,16 +79,13 @@ def search_case(name: str, folder: Path, phases: tuple[int, ...], with_baselines
 
 def baseline_rows(folder: Path, names: list[str], pairs: list[tuple[dict, dict]]) -> list[str]:
     """What the simpler methods named, where they were tried."""
-    some = [(folder / n / "baselines.json", pair) for n, pair in zip(names, pairs, strict=True)]
-    some = [(file, pair) for file, pair in some if file.exists()]
-    if not some:
-        return []
-    named = [json.loads(file.read_text(encoding="utf-8")) for file, _ in some]
+    files = (folder / n / "baselines.json" for n in names)
+    both = zip(files, pairs, strict=True)
+    tried = [(json.loads(file.read_text(encoding="utf-8")), *pair) for file, pair in both if file.exists()]
     rows = []
-    for method in named[0]:
-        effects = [[{"family": f, "components": []} for f in one[method]] for one in named]
-        tried = zip(some, effects, strict=True)
-        found = score([(label, {**answer, "effects": e}) for (_, (label, answer)), e in tried])
+    for method in tried[0][0] if tried else ():
+        effects = [[{"family": f, "components": []} for f in named[method]] for named, _, _ in tried]
+        found = score([(label, {**answer, "effects": e}) for (_, label, answer), e in zip(tried, effects, strict=True)])
         rows += [f"| {method}: {m} | {found[m].text} |" for m in ("family first", "false name on nulls")]
     return rows
 
@@ -128,8 +125,10 @@ def main() -> None:
         if not (folder / "seals.txt").exists():
             seal(Parallel()(delayed(make)(case, folder) for case in cases), folder)
             print(f"{len(cases)} labels sealed in {folder / 'seals.txt'}", flush=True)
-        compared = [asked.baselines and i < COMPARED for i in range(len(cases))]
-        searches = (delayed(search_case)(case.id, folder, phases, c) for case, c in zip(cases, compared, strict=True))
+        searches = (
+            delayed(search_case)(case.id, folder, phases, asked.baselines and i < COMPARED)
+            for i, case in enumerate(cases)
+        )
         for done, _ in enumerate(Parallel(return_as="generator_unordered")(searches), 1):
             print(f"searched {done} of {len(cases)}", flush=True)
     labels = unseal(folder)

@@ -20,7 +20,7 @@ from ..identification.residuals import follow
 from ..mechanics.plant import make_plant
 from .candidates import Candidate
 
-__all__ = ["columns_of", "columns_of_groups"]
+__all__ = ["columns_of", "columns_of_groups", "whitened_rows"]
 
 OF_AN_ACTUATOR = ("oil", "valve")
 """What laws modify that act on the residuals of one actuator alone."""
@@ -39,11 +39,16 @@ def columns_of_groups(
 ) -> tuple[list[BinRows], list[list[Array]]]:
     """Columns of several such groups side by side; and the combinations (k, q) of them by group."""
     each, parts = zip(*(_bins_of(problem, base, group) for group in groups), strict=True)
-    pairs = enumerate(zip(zip(*each, strict=True), problem.frequency, strict=True))
-    columns = [dense_rows(problem.whitener.apply(t, np.concatenate(bins, axis=2), f)) for t, (bins, f) in pairs]
+    columns = whitened_rows(problem, [np.concatenate(bins, axis=2) for bins in zip(*each, strict=True)])
     ends = np.cumsum([0, *(bins[0].shape[2] for bins in each)])
     rows = np.eye(ends[-1])
     return columns, [[rows[:, a:b] @ part for part in own] for (a, b), own in zip(pairwise(ends), parts, strict=True)]
+
+
+def whitened_rows(problem: Problem, bins: Sequence[Complex]) -> list[BinRows]:
+    """Rows, whitened as residuals are, of bins (m, c, k) of every test."""
+    pairs = enumerate(zip(bins, problem.frequency, strict=True))
+    return [dense_rows(problem.whitener.apply(t, own, f)) for t, (own, f) in pairs]
 
 
 def _bins_of(

@@ -62,7 +62,7 @@ def _fits_of(found: Search, rivals: Sequence[Scored], parts: Sequence[Progress])
     for i, one in enumerate(rivals):
         confused = one.candidate.family.named in first.family.confused_with
         if confused and one.candidate.components == first.components and fitted[i].objective - best.objective >= apart:
-            again = fit_from_rival(found, one, rivals[lead], best, parts[i])
+            again = fit_from_rival(found, one, rivals[lead], best, lambda share: None)
             if again is not None and again.objective < fitted[i].objective:
                 fitted[i] = again
     return fitted

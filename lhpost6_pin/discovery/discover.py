@@ -69,7 +69,7 @@ class Discovery:
     numbers: Parameters
     seed: int
     hashes: dict[str, str]  # of the records that were read, by test
-    residual_forces: dict[str, xr.Dataset]  # residual forces of a held-out test as records, by model
+    residual_forces: dict[str, xr.Dataset]  # of a held-out test as records, by model
     loops: tuple[EffectLoop, ...]  # of the effects found, on the held-out tests, else on those searched
     curves: Curves  # of the held-out tests, else of those searched: as delivered, and by the fitted machine
 

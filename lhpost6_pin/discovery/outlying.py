@@ -2,8 +2,7 @@
 
 Within three deviations of its prior a parameter is calibration. One that reaches beyond that within its interval, while
 all others that the campaign informs on scatter by a fraction of it, has changed: it is reported as an effect of its
-family.
-Where others are as far off, stated deviations are too small, and none stands out.
+family. Where others are as far off, stated deviations are too small, and none stands out.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -15,7 +15,6 @@ from typing import Literal
 import numpy as np
 
 from ..core.arrays import Array, Complex
-from ..identification.calibration.bin_rows import dense_rows
 from ..identification.inverse_dynamics import leg_wrenches
 from ..laws.lines import filter_shares
 from ..laws.tabulated import NODES
@@ -23,6 +22,7 @@ from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.pose import leg_displacements, plant_motion
 from .acceptance import Reweighting
+from .candidate_columns import whitened_rows
 from .scores import make_block, score
 from .search_state import Linearisation, Search
 
@@ -107,8 +107,7 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
 
     def fitted(names: tuple[str, ...], bins: Sequence[Complex]) -> ResidualFunction:
         """The function whose values have these columns (m, c, k) of each test."""
-        tests = enumerate(zip(bins, problem.frequency, strict=True))
-        columns = [dense_rows(problem.whitener.apply(t, own, f)) for t, (own, f) in tests]
+        columns = whitened_rows(problem, bins)
         one = score(background, make_block(background, columns), -free, free, spread)
         less = weigh.lowered(background.explained(columns, one.amplitude), one)
         return ResidualFunction(names, state, memory, nodes, one.amplitude, one.sd, *less[:2], one.held_out)

@@ -19,13 +19,7 @@ from .candidates import Candidate
 from .contest import best_of, loss_without, removed
 from .joint_fit import refined
 from .screening import found_there, is_confused, score_pairs, screen
-from .search_state import (
-    Linearisation,
-    Scored,
-    Search,
-    best_per_family,
-    linearise,
-)
+from .search_state import Linearisation, Scored, Search, best_per_family, linearise
 
 __all__ = ["refit", "search", "without_effect"]
 

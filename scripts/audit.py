@@ -28,9 +28,10 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report import write_run_report
-from lhpost6_pin.show.tables import machine_rows, report_limits
+from lhpost6_pin.show.tables import machine_rows
 from lhpost6_pin.show.viewer import show_record
 from lhpost6_pin.simulation.energy import energy_audit
+from lhpost6_pin.simulation.limit_use import plant_limits
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulate import ClosedLoop, Run, simulate, simulate_many
 
@@ -107,7 +108,7 @@ def page_rows(machine) -> list[str]:
     part = record.isel(time=slice(0, 40 * SAMPLE_RATE))
     with tempfile.TemporaryDirectory() as folder:
         report, view = Path(folder) / "report.html", Path(folder) / "view.html"
-        write_run_report(part, report, limits=report_limits(run.plant), machine_table=machine_rows(machine))
+        write_run_report(part, report, limits=plant_limits(run.plant), machine_table=machine_rows(machine))
         show_record(machine, part).save(view)
         sizes = [path.stat().st_size / 1e6 for path in (report, view)]
     return [

@@ -18,8 +18,8 @@ from lhpost6_pin.data.signals import rrmse
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report import write_run_report
-from lhpost6_pin.show.tables import report_limits
 from lhpost6_pin.simulation.energy import energy_audit
+from lhpost6_pin.simulation.limit_use import plant_limits
 from lhpost6_pin.simulation.rehearse import rehearse
 
 
@@ -40,7 +40,7 @@ def main(
     save_record(test.record, out / "record.nc")
 
     # 4. The report: one HTML file
-    summary = write_run_report(test.record, out / "report.html", limits=report_limits(test.run.plant))
+    summary = write_run_report(test.record, out / "report.html", limits=plant_limits(test.run.plant))
 
     # 5. The same from the arrays: error of the platen displacement against the target
     errors = rrmse(test.record["reference_displacement"], test.record["platen_displacement"])

@@ -189,7 +189,7 @@ def save_run(
     from ..data.records import save_record
     from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
     from ..show.results import run_entries
-    from ..show.tables import compare, machine_rows, print_comparison, print_run, report_limits
+    from ..show.tables import compare, machine_rows, print_comparison, print_run
     from ..simulation.coupling import DOUBTFUL
     from ..simulation.trouble import run_doubts
 
@@ -204,13 +204,14 @@ def save_run(
     if against is None:
         from ..show.capacity_tables import judged, performance_loads
         from ..show.report import write_run_report
+        from ..simulation.limit_use import plant_limits
 
         demands, fits = judged(done.plant, record)
         files.append(folder / "report.html")
         summary = write_run_report(
             record,
             files[-1],
-            limits=report_limits(done.plant),
+            limits=plant_limits(done.plant),
             notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *doubts],
             command=repeating_command(),
             machine_table=machine_rows(done.plant.machine),

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from rich.text import Text
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..data.consistency import ConsistencyFinding
     from ..data.layout_faults import RecordFinding
     from ..effects.effect import Effect
-    from ..mechanics.plant import Plant
     from ..simulation.simulate import Run
     from .report.run_report import RunSummary
 
@@ -32,7 +31,6 @@ __all__ = [
     "print_motions",
     "print_run",
     "print_sensor_findings",
-    "report_limits",
 ]
 
 
@@ -46,27 +44,6 @@ def machine_rows(machine: Machine) -> list[tuple[str, str, str, str, bool]]:
         (path, _text(q.value), q.unit, f"{q.evidence}: {q.source}", q.assumed)
         for path, q in machine.parameters.quantities.items()
     ]
-
-
-def report_limits(plant: "Plant") -> dict[str, Any]:
-    """Limits for a run report: Table 2.2, strokes, velocities and forces of actuators, supply, strut areas."""
-    from ..mechanics.equilibrium import actuator_speeds
-
-    machine = plant.machine
-    area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
-    speeds = actuator_speeds(plant)
-    return {
-        "displacement": machine.limits.displacement,
-        "velocity": machine.limits.velocity,
-        "acceleration": machine.limits.acceleration,
-        "actuator_stroke": [a.stroke for a in machine.actuators],
-        "actuator_force": plant.supply.pressure * area_a - plant.supply.return_pressure * area_b,
-        "actuator_pull": np.maximum(0.0, plant.supply.pressure * area_b - plant.supply.return_pressure * area_a),
-        "actuator_extending": speeds[:, 0],
-        "actuator_retracting": speeds[:, 1],
-        "supply_pressure": plant.supply.pressure,
-        "strut_area": [s.area for s in machine.struts],
-    }
 
 
 def print_machine(machine: Machine) -> None:

@@ -3,12 +3,12 @@
 import numpy as np
 import xarray as xr
 
+from ...data.metrics import channel, commanded_axes, labels, sampling
 from ...motions.response_spectra import response_spectrum
 from ...tuning.interaction import Interaction
 from .charts import Curve, Panel, chart_figure, frequency_axis
 from .page import Block, Table, grid, number
 from .plots import palette
-from .run_metrics import channel, commanded_axes, labels, sampling
 from .scales import axis_scale, axis_title, decibels, percent, shown_as
 
 __all__ = ["interaction_blocks", "period_table"]

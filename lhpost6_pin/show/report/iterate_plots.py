@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.names import AXES, SAMPLE_RATE
+from ...data.metrics import peak_window
 from ...data.signals import align, lowpass_zero_phase
 from ...mechanics.pose import platen_motion
 from ...tuning.identify import tuning_numbers
@@ -15,7 +16,6 @@ from .charts import Curve, Panel, chart_figure, frequency_axis, matrix_figure, s
 from .control_blocks import AXIS_LINES
 from .page import Block, Figure, grid
 from .plots import ACHIEVED, AFTER, BEFORE, BUCKETS, RECORDED, TARGET, Row, Trace, time_figure
-from .run_metrics import peak_window
 from .scales import ROTATIONS, axis_scale, axis_title, milliseconds, percent, shown_as
 
 __all__ = ["AxisIteration", "compare", "drive_blocks", "motion_blocks", "spectrum_blocks", "table_blocks"]

@@ -15,12 +15,12 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
+from ...data.metrics import channel, commanded_axes, labels, sampling
 from ...mechanics.performance import QUANTITIES, AxisPerformance
 from ...motions.response_spectra import response_spectrum
 from .charts import Curve, Panel, chart_figure, frequency_axis
 from .page import Block, Figure, Table, grid, number
 from .plots import BLACK, BLUE, GREY, VERMILLION
-from .run_metrics import channel, commanded_axes, labels, sampling
 from .scales import Scale, axis_scale, axis_title
 
 __all__ = ["Load", "Peaks", "motion_peaks", "performance_blocks", "performance_table"]

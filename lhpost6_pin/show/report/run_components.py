@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from ...data.metrics import channel, kinds, labels, peaks, sampling
+from ...simulation.limit_use import TOLERANCE, Limits, force_use, shares_of_limit
 from .page import Block, Figure, Table, bar, missing, number
 from .plots import SUPPLY, Row, Trace, palette_traces, time_figure
-from .run_limits import TOLERANCE, Limits, force_use, shares_of_limit
-from .run_metrics import channel, kinds, labels, peaks, sampling
 from .scales import SCALES
 
 __all__ = ["draw_over_time", "force_blocks", "pressure_blocks", "specimen_blocks", "strut_blocks"]

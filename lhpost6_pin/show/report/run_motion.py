@@ -6,12 +6,12 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
+from ...data.metrics import QUANTITIES, Tracking, channel, commanded_axes, drift, labels, peak_window, peaks, sampling
 from ...motions.response_spectra import response_spectrum
 from .charts import Curve, Panel, XAxis, chart_figure
 from .page import Block, Figure, Table, details, grid, missing, number
 from .plots import ACHIEVED, RECORDED, TARGET, Row, Trace, palette_traces, time_figure
 from .run_components import draw_over_time
-from .run_metrics import QUANTITIES, Tracking, channel, commanded_axes, drift, labels, peak_window, peaks, sampling
 from .scales import SCALES, axis_scale, axis_title, milliseconds, percent
 
 __all__ = ["drift_blocks", "spectrum_blocks", "tracking_blocks"]

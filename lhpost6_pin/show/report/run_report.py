@@ -9,35 +9,30 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ...core.errors import UnknownNameError
+from ...data.metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
 from ...motions import Peak
+from ...simulation.limit_use import (
+    TOLERANCE,
+    LimitUse,
+    checked_limits,
+    governing_limits,
+    limit_uses,
+    uses_of_peaks,
+)
 from ...tuning.interaction import Interaction
 from .interaction_section import interaction_blocks
 from .page import Block, Headline, Level, Page, Section, Table, bar, details, missing, number, save_page
 from .performance_plots import Load, motion_peaks, performance_blocks
 from .run_components import force_blocks, pressure_blocks, strut_blocks
-from .run_limits import TOLERANCE, Limits, LimitUse, governing_limits, limit_blocks, limit_uses, uses_of_peaks
-from .run_metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
+from .run_limits import limit_blocks
 from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
 from .run_spools import spool_blocks
 from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
 from .specimen_section import response_blocks
 
-__all__ = ["LIMIT_NAMES", "RunSummary", "metrics_table", "write_run_report"]
+__all__ = ["RunSummary", "metrics_table", "write_run_report"]
 
-LIMIT_NAMES = (
-    "displacement",  # (n_axes,) [m, rad]
-    "velocity",  # (n_axes,) [m/s, rad/s]
-    "acceleration",  # (n_axes,) [m/s2, rad/s2]
-    "actuator_stroke",  # (n_act,) one-sided [m]
-    "actuator_force",  # (n_act,) largest force [N]; of pushing alone where actuator_pull is given
-    "actuator_pull",  # (n_act,) magnitude of the largest pulling force [N]; 0: it cannot pull
-    "actuator_extending",  # (n_act,) speed of the unloaded piston at full spool [m/s]
-    "actuator_retracting",  # (n_act,) the other way [m/s]
-    "supply_pressure",  # [Pa]
-    "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
-)
 EXPECTED = (
     *(f"platen_{q}" for q in QUANTITIES),
     *(f"reference_{q}" for q in QUANTITIES),
@@ -85,15 +80,14 @@ def write_run_report(
 ) -> RunSummary:
     """Write the self-contained HTML report of a test to `path` and return its summary.
 
-    `limits` maps names of `LIMIT_NAMES` to capacities (SI; not-a-number means no limit, as does 0
-    except for `actuator_pull`), `notes` are warnings of the run, `command` repeats it, `machine_table` has rows (name,
-    value, unit, source, assumed), `interaction` is that of table and specimen. `demands` are those of the motion on
-    forces and strengths, `loads` the performance of the table, with `fits` in words at what scale the motion would be
-    within it. Missing channels are named in their sections.
+    `limits` are capacities by name (`checked_limits`), `notes` warnings of the run, `command` repeats it,
+    `machine_table` has rows (name, value, unit, source, assumed), `interaction` is that of table and specimen.
+    `demands` are those of the motion on forces and strengths, `loads` the performance of the table, with `fits` in
+    words at what scale the motion would be within it. Missing channels are named in their sections.
     Raises `RecordError` without a uniform time of two samples or more, `UnknownNameError` for an unknown
     limit.
     """
-    bounds = _checked(limits or {})
+    bounds = checked_limits(limits or {})
     sampling(record)
     found = [row for quantity in QUANTITIES for row in track(record, quantity)]
     spools = spool_use(record)
@@ -141,20 +135,6 @@ def write_run_report(
     absent = tuple(name for name in EXPECTED if name not in record)
     lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), absent
     return RunSummary(save_page(page, path), verdict, level, *lists)
-
-
-def _interaction(record: xr.Dataset, found: Interaction) -> Section:
-    return Section("interaction", "Table and specimen", interaction_blocks(record, found))
-
-
-def _checked(limits: Mapping[str, ArrayLike]) -> Limits:
-    for name in limits:
-        if name not in LIMIT_NAMES:
-            raise UnknownNameError("limit", name, LIMIT_NAMES)
-    values = {name: np.atleast_1d(np.asarray(value, dtype=np.float64)) for name, value in limits.items()}
-    least = {"actuator_pull": 0.0}  # elsewhere 0 is no limit
-    tiny = np.finfo(float).tiny
-    return {name: np.where(value >= least.get(name, tiny), value, np.nan) for name, value in values.items()}
 
 
 def _gaps(record: xr.Dataset) -> list[str]:

@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array, Mask
+from ...data.metrics import SpoolUse, channel, kinds, labels, peak_window, peaks, sampling
 from ...data.signals import delay
 from .page import Block, Figure, Table, bar, grid, missing
 from .plots import ACHIEVED, ROW, TARGET, VERMILLION, Row, Trace, time_figure
-from .run_metrics import SpoolUse, channel, kinds, labels, peak_window, peaks, sampling
 from .scales import SCALES, milliseconds, percent
 
 __all__ = ["spool_blocks", "spool_figure"]

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from ...data.metrics import SpoolUse, Tracking, channel, labels
+from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
 from .page import Headline, Level, number
-from .run_limits import TOLERANCE, LimitUse, governing_limits
-from .run_metrics import SpoolUse, Tracking, channel, labels
 from .scales import SCALES, axis_scale, milliseconds, percent, shown_as
 
 __all__ = ["headlines", "verdict_of_run"]

@@ -2,10 +2,10 @@
 
 import xarray as xr
 
+from ...data.metrics import channel, labels
 from .page import Block
 from .plots import Row, palette_traces
 from .run_components import draw_over_time
-from .run_metrics import channel, labels
 from .scales import SCALES
 
 __all__ = ["point_blocks"]

@@ -3,11 +3,11 @@
 import numpy as np
 import xarray as xr
 
+from ...data.metrics import channel, sampling
 from ...mechanics.interface_wrench import INTERFACE_AXES
 from .page import Block, Table, number
 from .plots import Row, Trace, palette
 from .run_components import draw_over_time, specimen_blocks
-from .run_metrics import channel, sampling
 from .scales import Scale
 from .specimen_points import point_blocks
 

@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...core.arrays import Array
+from ...data.metrics import kinds
 from ...identification.validation import ComparedQuantity, Phase, Valves
 from ...identification.validation.phase_agreement import MOTIONS
 from .charts import Curve, Panel, XAxis, chart_figure, spectra_figure
 from .force_grid import FORCES, SIX_ROWS, force_grid
 from .page import Block, Figure, Markup, grid, number
 from .plots import ACHIEVED, TARGET, Row, Trace, palette, time_figure
-from .run_metrics import kinds
 from .scales import SCALES, Scale, axis_scale, axis_title, force_scale, percent
 
 __all__ = ["actuator_blocks", "force_figure", "motion_blocks", "scale_of", "spectrum_blocks", "valve_figures"]

@@ -12,9 +12,9 @@ from itertools import groupby
 import numpy as np
 import xarray as xr
 
-from ...core.arrays import Array
-from ...core.errors import RecordError
-from ...data.signals import align, delay, lowpass_zero_phase, rrmse
+from ..core.arrays import Array
+from ..core.errors import RecordError
+from .signals import align, delay, lowpass_zero_phase, rrmse
 
 __all__ = [
     "QUANTITIES",

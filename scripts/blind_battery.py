@@ -1,7 +1,7 @@
 """A blind battery: cases of another simulator with sealed labels, searched, then unsealed and scored.
 
     python scripts/blind_battery.py [--cases 20] [--seed 1] [--fast | --brief] [--anew] [--fewer] [--jobs 2]
-                                    [--out FOLDER] [--baselines] [--dask] [--publish] [--check]
+                                    [--out FOLDER] [--baselines] [--dask ADDRESS] [--publish] [--check]
 
 Labels are sealed before any search: `seals.txt` holds one salted hash a case. Cases that have a verdict already are not
 searched again, so that an interrupted battery goes on where it stopped. --fast takes short campaigns of five tests,
@@ -9,7 +9,7 @@ searched again, so that an interrupted battery goes on where it stopped. --fast 
 size, valves, oil and friction than the LHPOST6; --fewer leaves out a third of the sensors. --check exits with 1 where a
 campaign that lacks nothing got a name, or too few a right one: a smoke test, which `scripts/checks.py` runs.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the first 60 cases. --dask runs the
-cases on a Dask cluster on this machine (pip install "dask[distributed]") in place of processes. --publish writes the
+cases on a Dask cluster, at an address or `local`, in place of processes. --publish writes the
 scores to scripts/battery/results.md, too; of batteries of another variety to results_anew.md and the like.
 """
 
@@ -17,7 +17,6 @@ import argparse
 import json
 import sys
 import tomllib
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -27,13 +26,13 @@ from battery.machines import changed_values
 from battery.reach import measured_label
 from battery.reporting import answers, publish, report, search, wrong
 from battery.scoring import score
-from joblib import Parallel, delayed, parallel_config
 
 from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.machine.machine_toml import save_machine_toml
+from lhpost6_pin.studies.workers import results_of, workers
 
 MACHINE = "machine.toml"
 """In the folder of a case: its table as its lab knows it; the LHPOST6 where there is none."""
@@ -109,27 +108,19 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out") / "battery")
     parser.add_argument("--baselines", action="store_true")
-    parser.add_argument("--dask", action="store_true")
+    parser.add_argument("--dask")
     parser.add_argument("--publish", action="store_true")
     asked = parser.parse_args()
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
     cases = draw_cases(asked.cases, asked.seed, asked.campaign, Variety(asked.anew, asked.fewer))
     phases = (1,) if asked.campaign == "brief" else (1, 2)
-    cluster = nullcontext()
-    if asked.dask:
-        from dask.distributed import Client, LocalCluster
-
-        cluster = Client(LocalCluster(n_workers=asked.jobs, threads_per_worker=1))
-    with cluster, parallel_config("dask" if asked.dask else "loky", n_jobs=asked.jobs):
+    with workers(asked.jobs, asked.dask):
         if not (folder / "seals.txt").exists():
-            seal(Parallel()(delayed(make)(case, folder) for case in cases), folder)
+            seal(sorted(results_of(make, ((case, folder) for case in cases)), key=lambda label: label["id"]), folder)
             print(f"{len(cases)} labels sealed in {folder / 'seals.txt'}", flush=True)
-        searches = (
-            delayed(search_case)(case.id, folder, phases, asked.baselines and i < COMPARED)
-            for i, case in enumerate(cases)
-        )
-        for done, _ in enumerate(Parallel(return_as="generator_unordered")(searches), 1):
+        searches = ((case.id, folder, phases, asked.baselines and i < COMPARED) for i, case in enumerate(cases))
+        for done, _ in enumerate(results_of(search_case, searches), 1):
             print(f"searched {done} of {len(cases)}", flush=True)
     labels = unseal(folder)
     answered = answers(folder, labels)

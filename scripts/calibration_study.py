@@ -15,7 +15,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from joblib import Parallel, delayed
 from rich.console import Console
 from rich.table import Table
 
@@ -25,6 +24,7 @@ from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.calibration import calibrate, drawn_coordinates, machine_parameters, with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
+from lhpost6_pin.studies.workers import results_of, workers
 
 SIGMAS = 1.6448536269514722  # half width of a 90 % interval
 
@@ -52,11 +52,13 @@ def main(
     seeds: Annotated[int, typer.Option(min=1, help="Campaigns to calibrate by.")] = 50,
     first: Annotated[int, typer.Option(help="First seed.")] = 1,
     jobs: Annotated[int, typer.Option(help="Processes.")] = 2,
+    dask: Annotated[str | None, typer.Option(help="Dask cluster in place of them: its address, or local.")] = None,
     out: Annotated[Path, typer.Option(help="Where the deviations are kept.")] = Path("out/calibration_study.json"),
 ) -> None:
     """Calibrate by simulated campaigns whose truth is known, and count how often the intervals hold it."""
     out.parent.mkdir(parents=True, exist_ok=True)
-    cases = Parallel(n_jobs=jobs)(delayed(one_case)(seed) for seed in range(first, first + seeds))
+    with workers(jobs, dask):
+        cases = sorted(results_of(one_case, ((seed,) for seed in range(first, first + seeds))), key=lambda c: c["seed"])
     with write_whole(out) as beside:
         beside.write_text(json.dumps(cases, indent=1), encoding="utf-8")
     off = np.array([c["off"] for c in cases])

@@ -154,7 +154,7 @@ def test_the_stored_wait_of_a_newcomer_is_within_what_is_wanted(site):
 def test_every_example_is_on_its_page_with_its_code(site):
     page = (site / "tutorials" / "examples.html").read_text()
     assert all(path.name in page for path in (ROOT / "scripts").glob("example_*.py"))
-    assert page.count("find_missing_effect") >= 2 and "simulate_many" in page
+    assert page.count("find_missing_effect") >= 2 and "run_ensemble" in page
 
 
 def test_every_assumed_number_of_the_machine_is_on_its_page(site):

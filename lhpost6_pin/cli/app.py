@@ -27,7 +27,7 @@ __all__ = ["JOBS", "app", "command", "command_name", "main", "print_result", "pr
 __all__ += ["run_script", "stderr"]
 
 JOBS: Mapping[str, tuple[str, ...]] = {
-    "Rehearse": ("run", "open-loop", "campaign", "motions"),
+    "Rehearse": ("run", "open-loop", "campaign", "ensemble", "motions"),
     "Control": ("tune", "iterate", "replay", "sine"),
     "Measured data": ("import", "check", "export", "decompose", "validate", "calibrate"),
     "Discover": ("discover", "demo"),

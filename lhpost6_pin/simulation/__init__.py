@@ -1,1 +1,1 @@
-"""Loops around one step: runs, ensembles, the force ledger, the energy audit."""
+"""Loops around one step: runs, demand over capacity, the force ledger, the energy audit."""

@@ -1,0 +1,134 @@
+"""The command that runs an ensemble: motions, scales, specimens and controllers on machines of uncertain numbers."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..core.errors import ParameterError
+from ..core.names import ENGINES
+from . import options as opt
+from .app import command, print_result, progress_bar, repeating_command
+from .completion import complete_motion, completing
+
+if TYPE_CHECKING:
+    from ..studies.plan import EnsemblePlan
+
+__all__ = ["ensemble"]
+
+
+@command()
+def ensemble(
+    plan: Annotated[
+        list[str],
+        typer.Argument(
+            help="Plan (a TOML file with [[motion]]), or motions by name or file.", autocompletion=complete_motion
+        ),
+    ],
+    machines: Annotated[
+        int | None, typer.Option(min=1, help="Machines drawn from the stated uncertainties; 1, the default: as stated.")
+    ] = None,
+    scales: Annotated[str | None, typer.Option(help="Scales of every motion, such as 0.5,0.75,1; default: 1.")] = None,
+    specimen: Annotated[
+        list[str] | None,
+        typer.Option(help="Specimen, by name or file; none: the bare table, the default. May be repeated."),
+    ] = None,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(help="Controller settings, by name or file; default: the machine's. May be repeated."),
+    ] = None,
+    machine: Annotated[str | None, typer.Option(help="Shipped machine name, or a TOML file.")] = None,
+    override: Annotated[Path | None, typer.Option(help="TOML file with parameters to replace, effects to add.")] = None,
+    uncertain: Annotated[
+        list[str] | None,
+        typer.Option(help="Pattern of the numbers that are drawn, such as 'hydraulics.*'; may be repeated."),
+    ] = None,
+    draw: Annotated[
+        str | None,
+        typer.Option(
+            help="Design of the draws: lhs or sobol (a power of two machines).",
+            autocompletion=completing(lambda: ("lhs", "sobol")),
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the draws.")] = None,
+    quantities: Annotated[
+        str | None,
+        typer.Option(help="Groups of results kept: tracking, limits, strengths, forces, spectra, base."),
+    ] = None,
+    axes: Annotated[str | None, typer.Option(help="Axes of motions named here, such as xyz, x, or x=y.")] = None,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            help="fused or pinocchio; default: the fastest that can.", autocompletion=completing(lambda: ENGINES)
+        ),
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Processes; -1: one a core.")] = -1,
+    dask: Annotated[
+        str | None, typer.Option(help="Run on a Dask cluster: its address, or local for one on this computer.")
+    ] = None,
+    out: opt.Out = None,
+    json: opt.Json = False,
+) -> None:
+    """Run a plan of many runs: motions x scales x specimens x controllers x machines; writes ensemble.nc and a report.
+
+    Interrupted, the same command goes on where it stopped.
+    """
+    from ..show.ensemble_tables import ensemble_entries, print_ensemble
+    from ..show.report.ensemble_report import write_ensemble_report
+    from ..studies.ensemble import run_ensemble
+    from ..studies.store import open_results
+    from ..studies.summary import summarise
+
+    given = {
+        "machines": machines,
+        "scales": _numbers(scales),
+        "specimen": [{"name": name} for name in specimen or ()] or None,
+        "controller": [{"name": name} for name in controller or ()] or None,
+        "machine": machine,
+        "override": None if override is None else str(override.absolute()),
+        "uncertain": uncertain or None,
+        "draw": draw,
+        "seed": seed,
+        "quantities": [word.strip() for word in quantities.split(",")] if quantities is not None else None,
+        "engine": engine,
+    }
+    made = _plan(plan, axes, {key: value for key, value in given.items() if value is not None})
+    folder = opt.folder_for(out, made.name.replace("/", "_"))
+    count = len(made.blocks)
+    with progress_bar(f"{made.name}: {count} blocks of runs on {made.machine.name}") as progress:
+        path = run_ensemble(made, folder, jobs=_some(jobs), dask=dask, progress=progress)
+    with open_results(path) as results:
+        found = summarise(results, made.numbers)
+        files = [path, write_ensemble_report(results, found, folder / "report.html", repeating_command())]
+        print_result(json, lambda: ensemble_entries(found), lambda: print_ensemble(found), files)
+
+
+def _some(jobs: int) -> int:
+    if jobs == 0:
+        raise ParameterError("--jobs 0: give a number of processes, or -1 for as many as there are cores")
+    return jobs
+
+
+def _numbers(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise ParameterError(f"--scales {text}: write numbers with commas, such as 0.5,0.75,1") from None
+
+
+def _plan(words: list[str], axes: str | None, given: dict[str, Any]) -> "EnsemblePlan":
+    """The plan in a file, with the options given in place of its entries; or of motions with these options."""
+    from ..studies.plan_file import load_plan, plan_from
+
+    if Path(words[0]).suffix == ".toml":
+        if len(words) > 1:
+            raise ParameterError(f"one plan at a time; got {', '.join(words)}")
+        if axes is not None:
+            raise ParameterError("--axes is for motions named on the command line; a plan states axes of each")
+        return load_plan(Path(words[0]), given)
+    motions = [{"files": [word]} if Path(word).suffix else {"name": word} for word in words]
+    entries: dict[str, Any] = {"name": f"{'_'.join(Path(word).stem for word in words)}_ensemble", **given}
+    entries["motion"] = [one | ({"axes": axes} if axes else {}) for one in motions]
+    return plan_from(entries, Path(), "ensemble")

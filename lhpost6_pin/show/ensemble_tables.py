@@ -1,0 +1,130 @@
+"""Tables of an ensemble, for a terminal, a report and JSON."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ..studies.exceedance import Exceedance
+from ..studies.summary import EnsembleSummary, ImportanceOf, Spread
+from .report.page import Table, number
+from .report.scales import SCALES, Scale
+from .terminal import print_blocks
+
+__all__ = ["ensemble_entries", "ensemble_verdict", "importance_table", "print_ensemble", "risk_table", "spread_table"]
+
+_SCALES = {"N": SCALES["force"], "N m": SCALES["moment"]}
+
+
+def ensemble_verdict(found: EnsembleSummary) -> str:
+    """The outcome in a few sentences."""
+    words = [f"{found.runs} runs on {found.table}"]
+    failed = sum(found.failures.values())
+    words.append(f", {failed} of which could not be made" if failed else "")
+    words.append(f", {found.stopped} stopped on the way" if found.stopped else "")
+    sentences = ["".join(words) + "."]
+    for one in found.configurations:
+        any_limit = one.exceedances[0]
+        which = f" (specimen {one.specimen}, controller {one.controller})" if len(found.configurations) > 1 else ""
+        sentences.append(f"{_risk_words(any_limit, found)}{which}.")
+    return " ".join(sentences)
+
+
+def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
+    """The scale of the stated risk, or with one scale the share beyond a limit, in words."""
+    if math.isnan(one.risk_scale):
+        return f"{one.limit.capitalize()}: demand unknown"
+    if len(found.scales) == 1:
+        share = f"{_percent(one.share[0])} ({_percent(one.low[0])} to {_percent(one.high[0])})"
+        return f"At scale {found.scales[0]:g}, {share} of the runs reach {one.limit}"
+    risk = f"The risk of reaching {one.limit} is {_percent(found.level)}"
+    if math.isinf(one.risk_scale):
+        return f"{risk} beyond scale {found.scales[-1]:g}, the largest run"
+    if one.risk_scale <= found.scales[0]:
+        return f"{risk} or more at scale {found.scales[0]:g} already, the smallest run"
+    low = f"{one.risk_low:.3g} to " if one.risk_low else "too few machines for a lower bound; up to "
+    return f"{risk} at scale {one.risk_scale:.3g} ({low}{_end(one.risk_high)})"
+
+
+def _end(scale: float) -> str:
+    return "beyond the largest" if math.isinf(scale) else f"{scale:.3g}"
+
+
+def risk_table(found: EnsembleSummary) -> Table:
+    """Return, for each configuration and limit, the scale of the stated risk and the share beyond it at each scale."""
+    rows, many = [], len(found.configurations) > 1
+    for own in found.configurations:
+        for one in own.exceedances:
+            shares = (
+                f"{_percent(s)} ({_percent(a)} to {_percent(b)})"
+                for s, a, b in zip(one.share, one.low, one.high, strict=True)
+            )
+            scale = _end(one.risk_scale) if not math.isnan(one.risk_scale) else "–"
+            rows.append((one.limit, *((own.specimen, own.controller) if many else ()), scale, *shares))
+    header = ("Limit", *(("Specimen", "Controller") if many else ()), f"Scale of {_percent(found.level)} risk")
+    return Table("Exceedance of limits", (*header, *(f"Scale {s:g}" for s in found.scales)), rows)
+
+
+def _percent(share: float) -> str:
+    """A probability to a tenth of a per cent."""
+    return f"{100.0 * float(share):.3g} %" if math.isfinite(share) else "–"
+
+
+def spread_table(found: EnsembleSummary, wanted: tuple[Spread, ...] | None = None) -> Table:
+    """Return quantiles of each result by motion, scale, specimen and controller."""
+    rows, wanted = [], found.spreads if wanted is None else wanted
+    shown = _varying(wanted)
+    for one in wanted:
+        scale = _SCALES.get(one.units, Scale(1.0, one.units))
+        low, middle, high = (_shown(float(q), scale) for q in one.quantiles)
+        unit = "–" if scale.unit == "1" else scale.unit
+        ends = f"{low} to {high}", _shown(one.most, scale)
+        rows.append((one.result, *_where(one, shown), unit, middle, *ends, one.runs))
+    header = ("Result", *shown, "Unit", "Median", "5 to 95 %", "Largest", "Runs")
+    return Table("Results", header, rows)
+
+
+def _varying(rows: Sequence[Spread | ImportanceOf]) -> list[str]:
+    """Which of motion, scale, specimen and controller differ between rows: the others need no column."""
+    names = ("Motion", "Scale", "Specimen", "Controller")
+    return [name for k, name in enumerate(names) if len({row[k] for row in rows}) > 1]
+
+
+def _where(row: Spread | ImportanceOf, shown: Sequence[str]) -> list[str]:
+    values = [getattr(row, name.lower()) for name in shown]
+    return [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
+
+
+def _shown(value: float, scale: Scale) -> str:
+    return "∞" if math.isinf(value) else number(value * scale.factor)
+
+
+def importance_table(found: EnsembleSummary) -> Table:
+    """Return the three numbers that each result follows from most."""
+    rows, shown = [], _varying(found.importance)
+    for one in found.importance:
+        first = [f"{i.parameter} {i.first_order:.2f} ± {i.half_width:.2f}" for i in one.indices[:3] if i.sure]
+        words = ", ".join(first) or "none beyond chance"
+        rows.append((one.result, *_where(one, shown), words))
+    return Table("Which uncertain numbers matter", ("Result", *shown, "Share of variance explained alone"), rows)
+
+
+def print_ensemble(found: EnsembleSummary) -> None:
+    """Print the verdict, exceedance, results, what they follow from, and failures."""
+    print_blocks(
+        spread_table(found, tuple(one for one in found.spreads if one.scale == found.shown_scale)),
+        *([risk_table(found)] if found.configurations else []),
+        importance_table(found) if found.importance else found.no_importance,
+        *(f"{count} runs: {why}" for why, count in (*found.failures.items(), *found.troubles.items())),
+        ensemble_verdict(found),
+    )
+
+
+def ensemble_entries(found: EnsembleSummary) -> dict[str, Any]:
+    """The summary as plain data; critical scales of single machines are in the file."""
+    entries = found._asdict()
+    entries["verdict"] = ensemble_verdict(found)
+    entries["configurations"] = [
+        {**own._asdict(), "exceedances": [{k: v for k, v in e._asdict().items() if k != "critical"} for e in own[2]]}
+        for own in found.configurations
+    ]
+    return entries

@@ -1,0 +1,145 @@
+"""Figures of an ensemble: exceedance against scale, demand over capacity, spectra, and what results follow from."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...studies.exceedance import Exceedance
+from ...studies.quantities import DECIDING
+from ...studies.summary import QUANTILES, Configuration, ImportanceOf
+from .charts import Curve, Panel, XAxis, chart_figure
+from .layout import line_on, on_row, stacked_layout
+from .page import Figure, number
+from .plots import ACHIEVED, BLACK, TARGET, packed, palette
+from .run_motion import PERIOD_AXIS
+from .scales import SCALES, axis_title
+
+__all__ = ["demand_figure", "exceedance_figure", "importance_figure", "spectra_figures"]
+
+BAND = {**ACHIEVED, "width": 0.9, "dash": "dot"}
+MOST_LIMITS = 6  # drawn beside that of any limit
+MOST_NUMBERS = 12  # of the numbers that results follow from
+MOST_MOTIONS = 6
+ROW = 250  # [CSS px]
+CELL = 30  # [CSS px] height of a box or of a cell
+
+
+def exceedance_figure(name: str, found: Configuration, scales: np.ndarray, level: float) -> Figure:
+    """Return the probability of exceeding each limit against the scale of the motions."""
+    any_limit, *limits = found.exceedances
+    shown = [one for one in limits if one.share.max(initial=0.0) > 0.0][:MOST_LIMITS]
+    curves = [_curve(any_limit, scales, {"color": BLACK, "width": 2.2})]
+    curves += [_curve(one, scales, line) for one, line in zip(shown, palette(len(shown)), strict=True)]
+    panel = Panel("Probability of exceedance", curves, span=(-0.02, 1.04), lines={f"{100 * level:g} %": level})
+    words = (
+        "Share of motions and machines whose demand has reached a limit, between the scales that were run by linear "
+        "interpolation of each demand; points: any limit at the scales run, with its interval."
+    )
+    margin = 0.04 * (scales[-1] - scales[0])
+    axis = XAxis("Scale of the motion", span=(scales[0] - margin, scales[-1] + margin))
+    title = f"Risk against scale: specimen {found.specimen}, controller {found.controller}"
+    figure = chart_figure(name, title, words, [panel], axis, row_height=300)
+    ends = {"array": any_limit.high - any_limit.share, "arrayminus": any_limit.share - any_limit.low}
+    bars = {"type": "data", "symmetric": False, "thickness": 1.4, **{k: x.tolist() for k, x in ends.items()}}
+    points = {"x": packed(scales), "y": packed(any_limit.share), "marker": {"color": BLACK, "size": 7}}
+    whiskers = {"type": "scatter", "mode": "markers", "name": "at the scales run", "error_y": bars, **points}
+    return replace(figure, traces=[*figure.traces, {**whiskers, **on_row(0)}])
+
+
+def _curve(one: Exceedance, scales: np.ndarray, line: dict[str, Any]) -> Curve:
+    """Distribution of critical scales, a step at each."""
+    reached = one.critical[np.isfinite(one.critical)]
+    n = max(len(one.critical), 1)
+    x = np.concatenate([[scales[0]], np.repeat(reached, 2), [scales[-1]]])
+    y = np.concatenate([[0.0], np.repeat(np.arange(len(reached) + 1), 2)[1:-1] / n, [len(reached) / n]])
+    return Curve(one.limit, x, y, line)
+
+
+def demand_figure(results: xr.Dataset, scale: int) -> Figure:
+    """Return boxes of demand over capacity of all runs at one scale, by deciding limit."""
+    limits = [str(limit) for limit in results["limit"].values]
+    values = {limit: results["limit_use"].values[:, scale, ..., k].ravel() for k, limit in enumerate(limits)}
+    known = {limit: x[np.isfinite(x)] for limit, x in values.items() if limit in DECIDING and np.isfinite(x).any()}
+    order = sorted(known, key=lambda limit: float(np.median(known[limit])))
+    layout = stacked_layout(["Demand over capacity"], "Demand over capacity", row_height=CELL * len(order) + 20)
+    layout["shapes"].append(line_on(0, x=1.0))
+    layout |= {"showlegend": False, "hovermode": "closest"}
+    layout["margin"]["l"] = 170
+    layout["xaxis"]["rangemode"] = "tozero"
+    layout["yaxis"] |= {"type": "category", "dtick": 1}
+    box = {"type": "box", "orientation": "h", "boxpoints": "outliers", "line": {"width": 1.2}, "marker": {"size": 3}}
+    traces = [
+        {**box, "name": limit, "x": packed(known[limit]), "marker": {"size": 3, "color": line["color"]}}
+        for limit, line in zip(order, palette(len(order)), strict=True)
+    ]
+    words = (
+        f"All runs at scale {float(results['scale'][scale]):g}: quartiles and range (points: beyond 1.5 times "
+        "the quartiles' distance). Dotted: capacity."
+    )
+    return Figure("demand", "Demand over capacity", words, traces, layout, layout["height"])
+
+
+def spectra_figures(results: xr.Dataset, scale: int) -> list[Figure]:
+    """Return response spectra of the first motions at one scale: target, and quantiles of what machines achieved."""
+    figures, periods = [], results["period"].values
+    unit = SCALES["acceleration"]
+    for m, motion in enumerate(results["motion"].values[:MOST_MOTIONS]):
+        target, achieved = results["target_psa"][m, scale, 0].values, results["psa"][m, scale, 0, 0].values
+        panels = []
+        for k, axis in enumerate(map(str, results["direction"].values)):
+            own = achieved[:, k][np.isfinite(achieved[:, k]).all(axis=-1)]
+            if not own.size or not np.nanmax(target[k], initial=0.0) > 0.0:
+                continue
+            low, middle, high = unit.factor * np.quantile(own, QUANTILES, axis=0)
+            curves = [Curve("target", periods, unit.factor * target[k], TARGET)]
+            curves += [Curve("median", periods, middle, ACHIEVED)]
+            curves += [Curve(_between(), periods, x, BAND) for x in (low, high)]
+            panels.append(Panel(f"{axis_title(axis)}: PSA [{unit.unit}]", curves, from_zero=True))
+        if panels:
+            words = f"Pseudo-spectral acceleration, 5 % damping, at scale {float(results['scale'][scale]):g}."
+            figures.append(chart_figure(f"psa-{m}", str(motion), words, panels, PERIOD_AXIS, row_height=ROW - 60))
+    return figures
+
+
+def importance_figure(name: str, found: Sequence[ImportanceOf]) -> Figure:
+    """Return first-order indices of the numbers that matter most (rows) for each result (columns)."""
+    most: dict[str, float] = {}
+    for one in found:
+        for index in filter(lambda index: index.sure, one.indices):
+            most[index.parameter] = max(most.get(index.parameter, 0.0), index.first_order)
+    rows = sorted(most, key=lambda parameter: most[parameter])[-MOST_NUMBERS:]
+    tables = [{index.parameter: index.first_order for index in one.indices if index.sure} for one in found]
+    z = [[max(0.0, table.get(parameter, 0.0)) for table in tables] for parameter in rows]
+    layout = stacked_layout([""], "", row_height=CELL * len(rows))
+    layout |= {"showlegend": False, "hovermode": "closest"}
+    layout["margin"] |= {"l": 190, "b": 110}
+    layout["height"] += 70
+    layout["xaxis"] |= {"type": "category", "tickangle": -25, "automargin": True}
+    layout["yaxis"] |= {"type": "category", "dtick": 1}
+    trace = {
+        "type": "heatmap",
+        "x": [one.result.replace("demand over capacity, ", "use: ") for one in found],
+        "y": rows,
+        "z": z,
+        "zmin": 0.0,
+        "zmax": 1.0,
+        "colorscale": [[0.0, "#ffffff"], [1.0, "#0072b2"]],
+        "text": [[number(value, 2) if value > 0.0 else "" for value in row] for row in z],
+        "texttemplate": "%{text}",
+        "xgap": 2,
+        "ygap": 2,
+        "colorbar": {"title": {"text": "share"}, "thickness": 10},
+    }
+    one = found[0]
+    words = (
+        f"Share of each result's variance that a number explains alone (first-order Sobol index), {one.motion} at "
+        f"scale {one.scale:g}, specimen {one.specimen}, controller {one.controller}."
+    )
+    return Figure(name, "Which uncertain number matters most", words, [trace], layout, layout["height"], 640)
+
+
+def _between() -> str:
+    return f"{100 * QUANTILES[0]:g} and {100 * QUANTILES[-1]:g} %"

@@ -1,0 +1,97 @@
+"""Probability of exceeding a limit against the scale of a motion, and the scale at which it reaches a stated risk.
+
+Every machine (and motion) of an ensemble runs at every scale; its demand over capacity reaches one at its critical
+scale, interpolated linearly between the two about it. Their distribution is a fragility curve: the share of critical
+scales up to a scale estimates the probability of exceedance there (Wilson intervals), and their quantiles are the
+scales of given risk (distribution-free intervals of order statistics).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.arrays import Array
+from .quantities import DECIDING
+
+__all__ = ["ANY", "Exceedance", "critical_scales", "exceedance", "exceedances"]
+
+ANY = "any limit"
+"""Of the deciding limits, or a run that stopped on the way."""
+
+
+class Exceedance(NamedTuple):
+    """Exceedance of one limit."""
+
+    limit: str
+    critical: Array  # (n,) scale at which each machine reaches it, rising; infinity: beyond the largest run
+    share: Array  # (s,) of machines at or beyond it at each scale
+    low: Array  # (s,) of its interval
+    high: Array  # (s,)
+    risk_scale: float  # at which the share is `level`; infinity: beyond the largest run
+    risk_low: float  # of its interval; 0: with so few machines it has no lower bound
+    risk_high: float
+
+
+def critical_scales(use: Array, scales: Array) -> Array:
+    """Scales (n,) at which demand over capacity `use` (s, n) at `scales` (s,), rising, first reaches one.
+
+    The first scale where that is beyond already; infinity where none is; not-a-number where a run before is missing.
+    """
+    beyond = use >= 1.0
+    first = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(scales))
+    found = np.full(use.shape[1], np.inf)
+    for i, k in enumerate(first):
+        if np.isnan(use[:k, i]).any():
+            found[i] = np.nan
+        elif k == 0:
+            found[i] = scales[0]
+        elif k < len(scales):
+            before, after = use[k - 1, i], use[k, i]
+            part = (1.0 - before) / (after - before) if np.isfinite(after) else 1.0
+            found[i] = scales[k - 1] + part * (scales[k] - scales[k - 1])
+    return found
+
+
+def exceedance(limit: str, use: Array, scales: Array, *, level: float, confidence: float) -> Exceedance:
+    """Exceedance of one limit by demand over capacity `use` (s, n); machines with a missing run are left out."""
+    from scipy.stats import binom, binomtest
+
+    critical = np.sort(critical_scales(use, scales))
+    critical = critical[~np.isnan(critical)]
+    n = len(critical)
+    if n == 0:
+        blank = np.full(len(scales), np.nan)
+        return Exceedance(limit, critical, blank, blank, blank, np.nan, np.nan, np.nan)
+    counts = np.array([int(np.sum(critical <= scale)) for scale in scales])
+    ends = [binomtest(int(k), n).proportion_ci(confidence, method="wilson") for k in counts]
+    tail = 0.5 * (1.0 - confidence)
+    rank = max(1, int(np.ceil(level * n)))
+    first, last = int(binom.ppf(tail, n, level)), int(binom.ppf(1.0 - tail, n, level)) + 1
+    return Exceedance(
+        limit,
+        critical,
+        counts / n,
+        np.array([one.low for one in ends]),
+        np.array([one.high for one in ends]),
+        float(critical[rank - 1]),
+        float(critical[first - 1]) if first >= 1 else 0.0,
+        float(critical[last - 1]) if last <= n else float("inf"),
+    )
+
+
+def exceedances(
+    use: Array, stopped: Array, limits: tuple[str, ...], scales: Array, *, level: float, confidence: float
+) -> tuple[Exceedance, ...]:
+    """Exceedance of any limit, then of each deciding one that some run has, by falling risk.
+
+    use (s, n, limits); stopped (s, n) are runs that stopped on the way: beyond some limit, whatever they had reached.
+    """
+    deciding = [k for k, limit in enumerate(limits) if limit in DECIDING]
+    known = [k for k in deciding if np.isfinite(use[..., k]).any()]
+    stated = {"level": level, "confidence": confidence}
+    found = [exceedance(limits[k], use[..., k], scales, **stated) for k in known]
+    with np.errstate(invalid="ignore"):
+        most = np.max(np.where(np.isnan(use[..., known]), -np.inf, use[..., known]), axis=-1, initial=-np.inf)
+    most = np.where(stopped, np.inf, np.where(np.isneginf(most), np.nan, most))
+    found.sort(key=lambda one: (one.risk_scale, -float(np.nansum(one.share))))
+    return exceedance(ANY, most, scales, **stated), *found

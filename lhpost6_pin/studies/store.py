@@ -1,0 +1,166 @@
+"""Results of an ensemble on disk: a file for each block while it runs, then one netCDF file of labelled dimensions.
+
+Blocks are written whole or not at all, so that an ensemble that was interrupted goes on with those that are missing.
+The netCDF file is put together block by block: memory does not grow with the number of runs.
+"""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import h5py
+import numpy as np
+import xarray as xr
+
+from ..core.arrays import Array
+from ..core.errors import ParameterError, RecordError
+from ..core.files import write_whole
+from .plan import DIMENSIONS, Block, EnsemblePlan
+from .quantities import Variable, variables_of
+from .runs import labels_of
+
+__all__ = ["BlockStore", "RESULTS", "open_results"]
+
+RESULTS = "ensemble.nc"
+"""File of an ensemble's results in its folder."""
+
+_BLOCKS, _PLAN = "blocks", "plan.txt"
+
+_TARGET = {
+    "duration": (("motion",), Variable((), "s", "duration of the target")),
+    "target_psa": (
+        ("motion", "scale", "specimen"),
+        Variable(("direction", "period"), "m/s2", "pseudo-spectral acceleration, target"),
+    ),
+}
+"""Variables of targets, with the dimensions of an ensemble that they have."""
+
+_FACTS = {
+    "seconds": Variable((), "s", "simulated time"),
+    "trouble": Variable((), "1", "trouble of a run, empty without any"),
+    "failure": Variable((), "1", "why a run could not be made, empty if it could"),
+}
+
+
+class BlockStore:
+    """Blocks of an ensemble in a folder."""
+
+    def __init__(self, folder: Path, plan: EnsemblePlan) -> None:
+        """Raise ParameterError if the folder holds another ensemble, begun or whole."""
+        self.folder, self.plan, self.digest = folder, plan, plan.digest
+        own = folder / _BLOCKS / _PLAN
+        stated = own.read_text(encoding="utf-8").strip() if own.is_file() else None
+        if stated is None and self.whole:
+            with h5netcdf.File(self.results) as file:
+                stated = str(file.attrs.get("plan", ""))
+        if stated not in (None, self.digest):
+            raise ParameterError(
+                f"{folder}: holds an ensemble of another plan, or of another version; name another folder with --out, "
+                "or delete it"
+            )
+
+    @property
+    def results(self) -> Path:
+        """File of the results."""
+        return self.folder / RESULTS
+
+    @property
+    def whole(self) -> bool:
+        """Whether the results are there."""
+        return self.results.is_file()
+
+    def missing(self) -> list[Block]:
+        """Blocks that are not there yet."""
+        return [block for block in self.plan.blocks if not self._path(block).is_file()]
+
+    def write(self, block: Block, values: Mapping[str, Array]) -> None:
+        """Write a block's results."""
+        own = self.folder / _BLOCKS / _PLAN
+        if not own.is_file():
+            with write_whole(own) as beside:
+                beside.write_text(self.digest + "\n", encoding="utf-8")
+        with write_whole(self._path(block)) as beside, beside.open("wb") as file:
+            np.savez(file, **values)  # type: ignore[arg-type]
+
+    def assemble(self) -> Path:
+        """Write the results of all blocks as one file, and remove the blocks; the path."""
+        with write_whole(self.results) as beside:
+            with h5netcdf.File(beside, "w") as file:
+                _describe(file, self.plan, self.digest)
+                for block in self.plan.blocks:
+                    with np.load(self._path(block)) as values:
+                        _put(file, block, values)
+        shutil.rmtree(self.folder / _BLOCKS)
+        return self.results
+
+    def _path(self, block: Block) -> Path:
+        return self.folder / _BLOCKS / f"{block.number:06d}.npz"
+
+
+def open_results(path: Path) -> xr.Dataset:
+    """Results of an ensemble, read as they are used; close it, or use it in a `with` statement.
+
+    Raises RecordError if the file is missing or no such results.
+    """
+    try:
+        found = xr.open_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{path}: cannot be read as results of an ensemble: {error}") from error
+    if "plan" not in found.attrs:
+        found.close()
+        raise RecordError(f"{path}: no results of an ensemble; `lhpost6 ensemble` writes them as {RESULTS}")
+    return found
+
+
+def _describe(file: Any, plan: EnsemblePlan, digest: str) -> None:
+    """Dimensions, coordinates and empty variables of a plan's results."""
+    labels: dict[str, Any] = {
+        "motion": list(plan.motions),
+        "scale": np.array(plan.scales),
+        "specimen": list(plan.specimens),
+        "controller": list(plan.controllers),
+        "machine": np.arange(plan.shape[-1]),
+        "parameter": [parameter.name for parameter in plan.draws.parameters],
+        **labels_of(plan.machine, plan.numbers),
+    }
+    file.attrs.update(name=plan.name, table=plan.machine.name, plan=digest)
+    file.dimensions = {name: len(values) for name, values in labels.items() if len(values)}
+    for name, values in labels.items():
+        if len(values):
+            _variable(file, name, (name,), values, {"period": "s"}.get(name, "1"), name)
+    for name, variable in {**variables_of(plan.groups), **_FACTS}.items():
+        kind = h5py.string_dtype() if name in ("trouble", "failure") else np.dtype("f8")
+        made = file.create_variable(name, (*DIMENSIONS, *variable.dims), kind)
+        made.attrs.update(units=variable.units, long_name=variable.long_name)
+    for name, (dims, variable) in _TARGET.items():
+        if name == "duration" or "psa" in file.variables:
+            made = file.create_variable(name, (*dims, *variable.dims), "f8")
+            made.attrs.update(units=variable.units, long_name=variable.long_name)
+    if plan.draws.parameters:
+        about = {"coordinate": plan.draws.coordinates, "value": plan.draws.values}
+        for name, values in about.items():
+            _variable(file, name, ("machine", "parameter"), values, "1", f"{name} of an uncertain number")
+        _variable(file, "unit", ("parameter",), [p.unit for p in plan.draws.parameters], "1", "unit of its value")
+        _variable(file, "sd", ("parameter",), [p.sd for p in plan.draws.parameters], "1", "deviation of its coordinate")
+
+
+def _variable(file: Any, name: str, dims: Sequence[str], values: Any, units: str, long_name: str) -> None:
+    data = np.asarray(values)
+    if data.dtype.kind == "U":
+        data = data.astype(object)
+        made = file.create_variable(name, dims, h5py.string_dtype(), data=data)
+    else:
+        made = file.create_variable(name, dims, data=data)
+    made.attrs.update(units=units, long_name=long_name)
+
+
+def _put(file: Any, block: Block, values: Mapping[str, Array]) -> None:
+    """Put a block's results in their place."""
+    for name in values:
+        if name in _TARGET:
+            file.variables[name][block.place[: len(_TARGET[name][0])]] = values[name]
+            continue
+        data = values[name].astype(object) if values[name].dtype.kind == "U" else values[name]
+        file.variables[name][(*block.place, slice(block.first, block.last))] = data

@@ -1,0 +1,328 @@
+"""Ensembles: draws, plans, runs over workers, interruption, and what results show."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from machine_cases import machine_named
+from scipy.stats import binom, truncnorm
+
+from lhpost6_pin.core.errors import LhpostError, MotionError, ParameterError, RecordError, UnknownNameError
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.data.signals import rrmse
+from lhpost6_pin.identification.calibration import with_parameters
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.parameters import load_parameters
+from lhpost6_pin.motions import response_spectrum
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.studies import ensemble
+from lhpost6_pin.studies.draws import draw_machines
+from lhpost6_pin.studies.ensemble import run_ensemble
+from lhpost6_pin.studies.exceedance import ANY, critical_scales, exceedance, exceedances
+from lhpost6_pin.studies.importance import importances
+from lhpost6_pin.studies.plan_file import load_plan, plan_from
+from lhpost6_pin.studies.quantities import LIMITS
+from lhpost6_pin.studies.store import open_results
+from lhpost6_pin.studies.summary import summarise
+
+NUMBERS = load_parameters(models_folder() / "procedures" / "ensemble.toml")
+SINE = {"name": "sine", "options": {"amplitude": 0.05, "cycles": 1.0, "ramp_cycles": 0.5}}
+
+
+def plan(**entries):
+    """Two scales of a sine on some machines."""
+    return plan_from(
+        {"name": "sines", "machines": 6, "scales": [0.5, 1.0], "motion": [SINE], **entries}, Path(), "test"
+    )
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+# ------------------------------------------------------------------------------------------------ draws
+def test_a_latin_hypercube_has_one_machine_in_every_stratum_of_each_prior():
+    drawn = draw_machines(load_machine(), 40, design="lhs", seed=3, reach=3.0)
+    for k, parameter in enumerate(drawn.parameters):
+        low = max(-3.0, parameter.lowest / parameter.sd)
+        share = truncnorm.cdf(drawn.coordinates[:, k] / parameter.sd, low, min(3.0, parameter.highest / parameter.sd))
+        assert sorted(np.floor(40 * share).astype(int)) == list(range(40)), parameter.name
+
+
+def test_some_numbers_are_drawn_and_all_others_stay_as_stated():
+    machine = load_machine()
+    drawn = draw_machines(machine, 8, design="sobol", seed=0, reach=3.0, uncertain=["hydraulics.*"])
+    assert {p.name.partition(".")[0] for p in drawn.parameters} == {"hydraulics"}
+    other = with_parameters(machine, drawn.parameters, drawn.coordinates[3]).parameters
+    changed = {path for path, q in machine.parameters.items() if other[path].value != q.value}
+    assert changed == {path for p in drawn.parameters for path, _ in p.paths}
+
+
+def test_one_machine_is_the_machine_as_stated():
+    assert not draw_machines(load_machine(), 1, design="lhs", seed=5, reach=3.0).coordinates.any()
+
+
+def test_draws_that_cannot_be_are_refused_with_what_can():
+    def draw(**options):
+        return draw_machines(load_machine(), **{"count": 12, "design": "lhs", "seed": 0, "reach": 3.0, **options})
+
+    with pytest.raises(ParameterError, match="8 or 16, not 12"):
+        draw(design="sobol")
+    with pytest.raises(UnknownNameError, match=r"no design of an ensemble named 'lsh'; did you mean 'lhs'"):
+        draw(design="lsh")
+    with pytest.raises(ParameterError, match=r"no uncertain number matches 'oil\.\*'; there are platen"):
+        draw(uncertain=["hydraulics.*", "oil.*"])
+
+
+# ------------------------------------------------------------------------------------------- exceedance
+@given(
+    st.lists(st.floats(0.06, 3.0), min_size=1, max_size=30),
+    st.lists(st.floats(0.05, 2.5), min_size=2, max_size=6, unique=True),
+)
+def test_demand_proportional_to_scale_reaches_capacity_at_its_own_scale(capacity, scales):
+    """Linear interpolation is exact for it; capacities below the lowest scale are reached there."""
+    scales, capacity = np.sort(scales), np.array(capacity)
+    found = critical_scales(scales[:, None] / capacity, scales)
+    expected = np.where(capacity > scales[-1], np.inf, np.maximum(capacity, scales[0]))
+    near = np.abs(capacity - scales[-1]) < 1e-9  # a division may round to either side of capacity
+    np.testing.assert_allclose(found[~near], expected[~near], rtol=1e-9)
+
+
+def test_a_missing_run_before_a_limit_is_reached_leaves_its_machine_out():
+    use = np.array([[0.2, np.nan, 0.2, 0.2], [0.8, 1.2, np.nan, 1.5], [1.2, 1.5, 1.5, np.inf]])
+    found = critical_scales(use, np.array([1.0, 2.0, 3.0]))
+    assert found[0] == pytest.approx(2.5) and np.isnan(found[1:3]).all() and 1.0 < found[3] < 2.0
+    assert critical_scales(np.array([[0.5], [np.inf]]), np.array([1.0, 2.0])) == [2.0]
+
+
+def test_the_scale_of_a_risk_is_a_quantile_and_its_interval_holds_it_as_often_as_stated():
+    """Order statistics: the interval of the 5 % quantile of 200 exponential capacities holds it in 95 % of samples."""
+    rng, scales = np.random.default_rng(0), np.array([0.02, 1.0, 10.0])
+    inside, true = 0, -np.log(0.95)
+    for _ in range(200):
+        capacity = np.maximum(rng.exponential(size=200), 0.0201)
+        found = exceedance("spool", scales[:, None] / capacity, scales, level=0.05, confidence=0.95)
+        inside += found.risk_low <= true <= found.risk_high
+        assert np.all((found.low <= found.share) & (found.share <= found.high))
+    # at least 95 % as ranks are whole numbers; five deviations of a binomial count below that
+    assert inside >= binom.ppf(3e-7, 200, 0.95)
+
+
+def test_any_limit_is_the_first_of_the_deciding_ones_and_a_run_that_stopped_counts():
+    scales, limits = np.array([1.0, 2.0]), ("displacement", "push", "payload")
+    use = np.array([[[0.6, 0.2, 3.0], [0.3, 0.1, 3.0]], [[1.4, 0.4, 3.0], [0.6, 0.2, 3.0]]])  # (s, n, limits)
+    stopped = np.array([[False, False], [False, True]])
+    found = exceedances(use, stopped, limits, scales, level=0.5, confidence=0.9)
+    assert [one.limit for one in found] == [ANY, "displacement", "push"]  # capacities for comparison do not decide
+    assert found[0].share.tolist() == [0.0, 1.0] and found[1].share.tolist() == [0.0, 0.5]
+    assert found[1].critical[0] == pytest.approx(1.5) and found[1].risk_scale == pytest.approx(1.5)
+    assert np.isinf(found[2].risk_scale)
+
+
+# ------------------------------------------------------------------------------------------- importance
+def test_indices_of_a_linear_result_are_its_squared_coefficients():
+    """Closed form: Var(c_i x_i) / Var(y); RBD-FAST is off by some hundredths with a thousand machines."""
+    pytest.importorskip("SALib")
+    rng = np.random.default_rng(2)
+    x = rng.standard_normal((1000, 6))
+    found = importances(list("abcdef"), x, x @ [3.0, -2.0, 1.0, 0.0, 0.0, 0.0], NUMBERS)
+    shares = {one.parameter: one for one in found}
+    for name, expected in (("a", 9 / 14), ("b", 4 / 14), ("c", 1 / 14), ("d", 0.0), ("e", 0.0), ("f", 0.0)):
+        assert shares[name].first_order == pytest.approx(expected, abs=0.06)
+    assert [one.parameter for one in found[:2]] == ["a", "b"]
+    assert shares["a"].sure and shares["b"].sure and not any(shares[name].sure for name in "def")
+
+
+def test_no_index_is_estimated_from_few_machines_or_of_a_result_that_does_not_vary():
+    pytest.importorskip("SALib")
+    x = np.random.default_rng(0).standard_normal((100, 2))
+    assert importances(["a", "b"], x[:20], x[:20, 0], NUMBERS) == ()
+    assert importances(["a", "b"], x, np.full(100, 0.3), NUMBERS) == ()
+
+
+# ------------------------------------------------------------------------------------------------- plans
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"motions": []}, r"no key 'motions'; did you mean 'motion'"),
+        ({"motion": []}, r"has no \[\[motion\]\]"),
+        ({"motion": [{"axes": "x"}]}, r"\[\[motion\]\]: give a name or files"),
+        ({"motion": [SINE, SINE]}, r"two of \[\[motion\]\] are 'sine'; give each a `label`"),
+        ({"motion": [{"name": "sine", "scales": [1.0]}]}, r"\[\[motion\]\]: no key 'scales'"),
+        ({"machines": 0}, "machines is 0; give one at least"),
+        ({"machines": True}, "machines is True; give int"),
+        ({"machines": 2.5}, "machines is 2.5; give int"),
+        ({"scales": [1.0, "x"]}, "scales is .* give numbers"),
+        ({"scales": [1.0, 0.5]}, "name each once, rising"),
+        ({"scales": [0.0]}, "each must be positive"),
+        ({"scales": []}, "an ensemble without scales"),
+        ({"quantities": ["tracks"]}, "no group of quantities named 'tracks'; did you mean 'tracking'"),
+        ({"specimen": [{"name": "block_4_9MN", "at": [0.0]}]}, "at and rpy are three numbers each"),
+        ({"specimen": [{"label": "x"}]}, "give a name or a file, or 'none'"),
+        ({"controller": [{"label": "x"}]}, r"\[\[controller\]\]: give a name or a file"),
+        ({"engine": "warp"}, "no engine named 'warp'"),
+        ({"rate": 5000}, "multiple"),
+        ({"motion": [3]}, "is 3; write a table"),
+    ],
+)
+def test_a_plan_that_cannot_be_names_its_key(entries, message):
+    with pytest.raises(LhpostError, match=message):
+        plan(**entries)
+
+
+def test_a_plan_file_names_itself_and_finds_files_beside_it(tmp_path):
+    (tmp_path / "suite.toml").write_text("machines = 3\n[[motion]]\nfiles = ['x.csv']\n")
+    with pytest.raises(MotionError, match=r"x\.csv"):
+        load_plan(tmp_path / "suite.toml")
+    (tmp_path / "x.csv").write_text("time [s],x [m/s2]\n" + "".join(f"{k / 50},{k % 3}\n" for k in range(100)))
+    (tmp_path / "wide.toml").write_text('[hydraulics.bulk_modulus]\nsd = 3e8\nevidence = "assumed"\nsource = "wide"\n')
+    found = load_plan(tmp_path / "suite.toml", {"machines": 5, "uncertain": ["hydraulics.*"]})
+    assert found.name == "suite" and found.shape == (1, 1, 1, 1, 5) and list(found.motions) == ["x"]
+    (tmp_path / "suite.toml").write_text("machines = \n")
+    with pytest.raises(ParameterError, match=r"suite\.toml: .*line 1"):
+        load_plan(tmp_path / "suite.toml")
+
+
+def test_everything_that_results_follow_from_is_in_the_digest_of_a_plan():
+    others = [{"seed": 1}, {"scales": [0.5]}, {"machines": 7}, {"quantities": ["limits"]}, {"engine": "pinocchio"}]
+    others += [{"motion": [{**SINE, "axes": "y=x"}]}, {"specimen": [{"name": "block_4_9MN"}]}, {"rate": 4096}]
+    digests = {plan(**entries).digest for entries in [{}, *others]}
+    assert plan().digest in digests and len(digests) == 1 + len(others)
+
+
+# ---------------------------------------------------------------------------------------------- results
+@pytest.fixture(scope="module")
+def sines(tmp_path_factory):
+    """Results of six machines at two scales, and their plan."""
+    made = plan()
+    return made, run_ensemble(made, tmp_path_factory.mktemp("sines"), jobs=1)
+
+
+@pytest.mark.long
+def test_every_run_is_the_rehearsal_of_its_machine(sines):
+    """Bit by bit: an ensemble adds nothing to `rehearse`."""
+    made, path = sines
+    machine = with_parameters(made.machine, made.draws.parameters, made.draws.coordinates[4])
+    target = made.motions["sine"].target(machine, 1.0)
+    settings = made.controllers["lhpost6"]
+    test = rehearse(machine, target, settings, attrs={}, engine="fused", scheme="semi_implicit")
+    with open_results(path) as results:
+        own = results.sel(motion="sine", scale=1.0, specimen="none", controller="lhpost6", machine=4)
+        x = [test.record[f"{who}_acceleration"].values[:, 0] for who in ("reference", "platen")]
+        assert float(own["rrmse_acceleration"].sel(axis="x")) == float(rrmse(*x))
+        assert np.isnan(own["rrmse_acceleration"].sel(axis="z"))  # uncommanded
+        force = np.abs(test.record["actuator_force"].values).max(axis=0)
+        assert own["peak_force"].values.tolist() == force.tolist()
+        every = 4  # 2048 Hz to the rate of spectra
+        expected = response_spectrum(x[1][::every], every / 2048, results["period"].values).pseudo_acceleration
+        assert own["psa"].sel(direction="x").values.tolist() == expected.tolist()
+        assert results["limit"].values.tolist() == list(LIMITS)
+        assert float(own["seconds"]) == len(target.time) / 2048
+        assert str(own["failure"].values) == "" and str(own["trouble"].values) == ""
+
+
+@pytest.mark.long
+def test_an_interrupted_ensemble_goes_on_to_the_same_file(sines, tmp_path):
+    made, path = sines
+
+    def stop(share):
+        if share >= 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_ensemble(made, tmp_path, jobs=1, progress=stop)
+    blocks = sorted(tmp_path.glob("blocks/*.npz"))
+    assert 0 < len(blocks) < len(made.blocks) and not (tmp_path / "ensemble.nc").exists()
+    with pytest.raises(ParameterError, match="holds an ensemble of another plan"):
+        run_ensemble(plan(seed=9), tmp_path, jobs=1)
+    kept = {block.name: block.stat().st_mtime_ns for block in blocks}
+    shares = []
+    (tmp_path / "blocks" / ".000000.npz.half").write_bytes(b"PK")  # of a process that was killed while it wrote
+    run_ensemble(made, tmp_path, jobs=1, progress=shares.append)
+    assert len(shares) == len(made.blocks) - len(kept) and shares[-1] == 1.0
+    assert digest(tmp_path / "ensemble.nc") == digest(path) and not (tmp_path / "blocks").exists()
+    assert run_ensemble(made, tmp_path, jobs=1) == tmp_path / "ensemble.nc"  # whole: nothing is run
+
+
+@pytest.mark.long
+def test_processes_give_the_same_file(sines, tmp_path):
+    made, path = sines
+    assert digest(run_ensemble(made, tmp_path, jobs=2)) == digest(path)
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")  # of Dask's own event loop
+def test_a_dask_cluster_gives_the_same_file(sines, tmp_path):
+    pytest.importorskip("distributed")
+    made, path = sines
+    assert digest(run_ensemble(made, tmp_path, jobs=2, dask="local")) == digest(path)
+    with pytest.raises(ParameterError, match=r"no scheduler responds there"):
+        run_ensemble(plan(seed=2), tmp_path / "other", dask="tcp://127.0.0.1:9")
+
+
+@pytest.mark.long
+def test_runs_that_stop_or_fail_are_rows_with_their_reason(tmp_path, monkeypatch):
+    """A sine beyond the stroke stops on the way: its demand is kept up to there, its tracking is not."""
+    far = {"name": "sine", "label": "far", "options": {"amplitude": 0.9, "period": 6.0, "cycles": 1.0}}
+    made = plan(motion=[far], scales=[0.1, 1.5], machines=2)
+    path = run_ensemble(made, tmp_path / "far", jobs=1)
+    with open_results(path) as results:
+        own = results.squeeze()
+        assert own["trouble"].values[0].tolist() == ["", ""]
+        assert all("left its stroke" in word for word in own["trouble"].values[1])
+        assert np.isnan(own["rrmse_displacement"].sel(axis="x").values).tolist() == [[False] * 2, [True] * 2]
+        assert np.all(own["limit_use"].sel(limit="displacement").values[1] > 1.0)
+        found = summarise(results, NUMBERS)
+    assert found.stopped == 2 and sum(found.troubles.values()) == 2 and not found.failures
+    assert found.configurations[0].exceedances[0].share.tolist() == [0.0, 1.0]
+
+    def failing(*arguments, **options):
+        raise ValueError("no such valve")
+
+    monkeypatch.setattr("lhpost6_pin.studies.runs.rehearse", failing)
+    monkeypatch.setattr(ensemble, "results_of", lambda function, tasks: (function(*task) for task in tasks))
+    with open_results(run_ensemble(made, tmp_path / "failed", jobs=1)) as results:
+        assert set(results["failure"].values.ravel()) == {"ValueError: no such valve"}
+        assert summarise(results, NUMBERS).failures == {"ValueError: no such valve": 4}
+
+
+@pytest.mark.long
+def test_specimens_controllers_and_guided_machines_have_their_place(tmp_path):
+    made = plan(specimen=[{"name": "none"}, {"name": "block_4_9MN", "label": "block"}], machines=1, scales=[0.2])
+    with open_results(run_ensemble(made, tmp_path / "block", jobs=1)) as results:
+        shear = results["base_shear"].squeeze()
+        acceleration = float(results["peak_acceleration"].sel(axis="x", specimen="block").squeeze())
+        assert np.isnan(shear.sel(specimen="none"))
+        mass = 4.9e6 / made.machine.platen.gravity
+        # a rigid block: its shear is mass times acceleration of its mass centre, which also rocks a little
+        assert float(shear.sel(specimen="block")) == pytest.approx(mass * acceleration, rel=0.15)
+    one_axis = {"name": "uni", "machine": "uniaxial", "machines": 2, "motion": [SINE], "scales": [0.2]}
+    with open_results(run_ensemble(plan_from(one_axis, Path(), "test"), tmp_path / "uni", jobs=1)) as results:
+        assert results.sizes["actuator"] == len(machine_named("uniaxial").actuator_names)
+        assert np.isfinite(results["rrmse_displacement"].sel(axis="x")).all()
+
+
+def test_a_file_that_holds_no_ensemble_is_named(tmp_path):
+    with pytest.raises(RecordError, match=r"absent\.nc: cannot be read"):
+        open_results(tmp_path / "absent.nc")
+
+
+@pytest.mark.long
+def test_the_command_runs_a_plan_and_writes_results_and_a_report(lhpost6, tmp_path):
+    (tmp_path / "two.toml").write_text(
+        'machines = 4\nscales = [0.2, 0.4]\n[[motion]]\nname = "sine"\noptions = { cycles = 1.0, amplitude = 0.05 }\n'
+    )
+    ended = lhpost6("ensemble", "two.toml", "--jobs", 1, "--quantities", "tracking,limits,strengths,spectra")
+    assert ended.code == 0 and "8 runs on LHPOST6. The risk of reaching any limit is 5 % beyond scale 0.4" in ended.out
+    page = (tmp_path / "out" / "two" / "report.html").read_text()
+    assert "Risk against scale" in page and "reaction mass strength" in page
+    again = lhpost6("ensemble", "two.toml", "--jobs", 1, "--json", "--quantities", "tracking,limits,strengths,spectra")
+    found = json.loads(again.out)
+    assert found["runs"] == 8 and found["failures"] == {} and found["scales"] == [0.2, 0.4]
+    assert found["spreads"][0]["quantiles"][1] > 0.0
+    other = lhpost6("ensemble", "sine", "--machines", 4, "--draw", "sobol", "--scales", "0.1;0.2")
+    assert other.code == 2 and "write numbers with commas" in other.err

@@ -27,7 +27,7 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.show.report import write_run_report
+from lhpost6_pin.show.report.run_report import write_run_report
 from lhpost6_pin.show.tables import machine_rows
 from lhpost6_pin.show.viewer import show_record
 from lhpost6_pin.simulation.energy import energy_audit

@@ -17,7 +17,7 @@ from lhpost6_pin.data.records import save_record
 from lhpost6_pin.data.signals import rrmse
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.show.report import write_run_report
+from lhpost6_pin.show.report.run_report import write_run_report
 from lhpost6_pin.simulation.energy import energy_audit
 from lhpost6_pin.simulation.limit_use import plant_limits
 from lhpost6_pin.simulation.rehearse import rehearse

@@ -19,7 +19,7 @@ from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement, find_work, save_ledger
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.show.report import write_decompose_report
+from lhpost6_pin.show.report.decompose_report import write_decompose_report
 from lhpost6_pin.show.result_tables import print_agreement
 from lhpost6_pin.simulation.rehearse import rehearse
 

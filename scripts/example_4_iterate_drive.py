@@ -18,7 +18,7 @@ from lhpost6_pin.data.records import sample_interval
 from lhpost6_pin.data.signals import align, delay, rrmse
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.show.report import write_iterate_report
+from lhpost6_pin.show.report.iterate_report import write_iterate_report
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.tuning.drives import circumstances, save_drive
 from lhpost6_pin.tuning.iterate import identify_inverse, iterate

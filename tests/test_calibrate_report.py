@@ -27,7 +27,7 @@ from lhpost6_pin.identification.calibration.result import (
 from lhpost6_pin.identification.calibration.sensor_errors import RemovedDelay, SensorUnknown
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.show.report import write_calibrate_report
+from lhpost6_pin.show.report.calibrate_report import write_calibrate_report
 from lhpost6_pin.show.result_tables import print_calibration
 from lhpost6_pin.show.results import calibration_entries
 

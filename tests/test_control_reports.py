@@ -11,10 +11,12 @@ from lhpost6_pin.data.signals import rrmse
 from lhpost6_pin.data.transfer import Transfer
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.show.report import write_iterate_report, write_sine_report, write_tune_report
 from lhpost6_pin.show.report.charts import Curve, Panel, XAxis, chart_figure, matrix_figure
 from lhpost6_pin.show.report.iterate_plots import compare
+from lhpost6_pin.show.report.iterate_report import write_iterate_report
 from lhpost6_pin.show.report.scales import decibels, degrees
+from lhpost6_pin.show.report.sine_report import write_sine_report
+from lhpost6_pin.show.report.tune_report import write_tune_report
 from lhpost6_pin.tuning.iterate import identify_inverse, iterate
 from lhpost6_pin.tuning.margins import LoopModel, Margin
 from lhpost6_pin.tuning.sine import sine_test

@@ -14,7 +14,7 @@ from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement, find_work, save_ledger
 from lhpost6_pin.identification.decompose.dataset import delivered_by
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
-from lhpost6_pin.show.report import write_decompose_report
+from lhpost6_pin.show.report.decompose_report import write_decompose_report
 from lhpost6_pin.simulation.outputs import record_of_run
 
 pytestmark = pytest.mark.long

@@ -28,7 +28,7 @@ def tune(
 ) -> None:
     """Tune the three-variable controller for a machine and specimen; writes controller.toml and report.html."""
     from ..control import save_controller
-    from ..show.report import write_tune_report
+    from ..show.report.tune_report import write_tune_report
     from ..show.result_tables import print_tuning
     from ..show.results import tuning_entries
     from ..tuning.tune import tune as tune_controller
@@ -62,7 +62,7 @@ def iterate(
 ) -> None:
     """Iterate the drive of a motion until its tracking error is least; writes drive.nc, inverse.nc and report.html."""
     from ..control.inverse import save_inverse
-    from ..show.report import write_iterate_report
+    from ..show.report.iterate_report import write_iterate_report
     from ..show.result_tables import print_iterations
     from ..show.results import iteration_entries
     from ..tuning.drives import circumstances, save_drive
@@ -150,7 +150,7 @@ def sine(
 ) -> None:
     """Run a sine without and with amplitude-phase control and harmonic cancellation; writes report.html."""
     from ..mechanics.plant import make_plant
-    from ..show.report import write_sine_report
+    from ..show.report.sine_report import write_sine_report
     from ..show.result_tables import print_sine
     from ..show.results import sine_entries
     from ..simulation.motion_limits import check_motion_limits

@@ -84,7 +84,7 @@ def capacity(
 ) -> None:
     """Print what the table gives with what is mounted, beside Table 2.2, which limits govern, and its modes."""
     from ..show.capacity_tables import capacity_tables, machine_capacity
-    from ..show.report import write_capacity_report
+    from ..show.report.capacity_report import write_capacity_report
     from ..show.results import capacity_entries
     from ..show.tables import print_modes
     from ..show.terminal import print_blocks

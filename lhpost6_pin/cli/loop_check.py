@@ -62,7 +62,7 @@ def retuned(
     from dataclasses import replace
 
     from ..control import ControllerSettings, save_controller
-    from ..show.report import write_tune_report
+    from ..show.report.tune_report import write_tune_report
     from ..tuning.tune import tune
 
     if not isinstance(settings, ControllerSettings):

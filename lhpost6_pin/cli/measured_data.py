@@ -131,7 +131,7 @@ def decompose(
     from ..data.measured_sensors import find_sensors
     from ..data.records import is_measured, load_record
     from ..identification.decompose import decompose_record, find_agreement, find_work, save_ledger
-    from ..show.report import write_decompose_report
+    from ..show.report.decompose_report import write_decompose_report
     from ..show.result_tables import print_agreement
     from ..show.results import agreement_entries
 
@@ -204,7 +204,7 @@ def calibrate(
     from ..identification.calibration import calibrate as calibrate_machine
     from ..identification.calibration import usable_tests
     from ..identification.calibration.override import save_override
-    from ..show.report import write_calibrate_report
+    from ..show.report.calibrate_report import write_calibrate_report
     from ..show.result_tables import print_calibration
     from ..show.results import calibration_entries
 

@@ -1,7 +1,7 @@
 """Commands that run the virtual table: run, open-loop, campaign; and the motions that it can run."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +19,8 @@ from .motion_options import MotionOptions
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..motions import Target
+    from ..simulation.loops import ClosedLoop, PluggedLoop
     from ..simulation.rehearse import SimulatedTest
     from ..tuning.interaction import Interaction
 
@@ -51,8 +53,6 @@ def run(
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
     from ..simulation.rehearse import rehearse
-    from ..tuning.cancel import cancelling
-    from ..tuning.drives import check_circumstances
 
     if record_rate < 1 or SAMPLE_RATE % record_rate:
         raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
@@ -63,6 +63,8 @@ def run(
     if inverse is not None:
         if not isinstance(chosen, ControllerSettings):
             raise SimulationError(f"--aic is for the 469D's drive, which --controller {controller} does without")
+        from ..tuning.drives import check_circumstances
+
         check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
@@ -82,7 +84,7 @@ def run(
             chosen,
             attrs={"test": name, "title": title, **loop_facts(loop, machine)},
             inverse=inverse,
-            adapt=None if cancel is None else lambda loop: cancelling(loop, target, cancel),
+            adapt=_canceller(cancel, target),
             record_every=SAMPLE_RATE // record_rate,
             beyond_limits=True,
             progress=progress,
@@ -91,6 +93,15 @@ def run(
         )
     shown = interaction_of(table, given, chosen, inverse)
     save_run(test, folder, json, interaction=shown, more=more)
+
+
+def _canceller(cancel: str | None, target: "Target") -> "Callable[[ClosedLoop | PluggedLoop], ClosedLoop] | None":
+    """What adds the sine cancellers that are asked for to a loop."""
+    if cancel is None:
+        return None
+    from ..tuning.cancel import cancelling
+
+    return lambda loop: cancelling(loop, target, cancel)
 
 
 @command("open-loop")
@@ -203,7 +214,7 @@ def save_run(
     doubts = [exchanged.summary] if exchanged and abs(exchanged.energy_error) > DOUBTFUL else []
     if against is None:
         from ..show.capacity_tables import judged, performance_loads
-        from ..show.report import write_run_report
+        from ..show.report.run_report import write_run_report
         from ..simulation.limit_use import plant_limits
 
         demands, fits = judged(done.plant, record)

@@ -119,7 +119,25 @@ def _chain(a: Array, b: Array, corner: float) -> None:
 
 
 def _sampled(a: Array, b: Array, c: Array, d: Array, rate: float, method: str) -> Matrices:
-    from scipy import signal
+    """Matrices sampled by first-order hold ("foh") or by the bilinear transform.
 
-    a, b, c, d, _ = signal.cont2discrete((a, b, c, d), 1.0 / rate, method=method)
-    return a, b, c, d
+    As `scipy.signal.cont2discrete`, whose import takes longer than all else that a controller needs.
+    """
+    from scipy import linalg
+
+    n, inputs = b.shape
+    if method == "foh":  # exponential of the system extended by an input and its slope
+        whole = np.zeros((n + 2 * inputs, n + 2 * inputs))
+        whole[:n, :n], whole[:n, n : n + inputs] = a / rate, b / rate
+        whole[n : n + inputs, n + inputs :] = np.eye(inputs)
+        ends = linalg.expm(whole)[:n]
+        held, slope = ends[:, n : n + inputs], ends[:, n + inputs :]
+        return ends[:, :n], held - slope + ends[:, :n] @ slope, c, d + c @ slope
+    half = np.eye(n) - 0.5 / rate * a
+    sampled = linalg.solve(half, b / rate)
+    return (
+        linalg.solve(half, np.eye(n) + 0.5 / rate * a),
+        sampled,
+        linalg.solve(half.T, c.T).T,
+        d + 0.5 * c @ sampled,
+    )

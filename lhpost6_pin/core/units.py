@@ -1,13 +1,11 @@
 """Units as files spell them, `in`, `g`, `psi`, `kips`, `m_s2`, `deg/sec^2`, with their factors to SI by pint."""
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
 __all__ = ["SI_UNITS", "Unit", "parse_unit", "quantity_unit"]
-
-SI_UNITS = ("m", "m/s", "m/s2", "rad", "rad/s", "rad/s2", "N", "Pa", "1", "s")
-"""Units of records and motions."""
 
 _SPELLINGS = {  # by case-folded word; `g` is standard gravity, never gram
     **dict.fromkeys(("g", "gs"), "standard_gravity"),
@@ -32,8 +30,28 @@ class Unit(NamedTuple):
     """A unit by its factor to SI base units and its dimension."""
 
     factor: float
-    dimension: str
+    dimension: str  # powers of base dimensions, in the order of their names; empty: none
     angle: bool  # pint counts angles as plain numbers; here a rotation must name its angle
+
+
+_SI = {
+    "m": Unit(1.0, "length", False),
+    "m/s": Unit(1.0, "length time^-1", False),
+    "m/s2": Unit(1.0, "length time^-2", False),
+    "rad": Unit(1.0, "", True),
+    "rad/s": Unit(1.0, "time^-1", True),
+    "rad/s2": Unit(1.0, "time^-2", True),
+    "N": Unit(1.0, "length mass time^-2", False),
+    "Pa": Unit(1.0, "length^-1 mass time^-2", False),
+    "1": Unit(1.0, "", False),
+    "s": Unit(1.0, "time", False),
+}
+
+SI_UNITS = tuple(_SI)
+"""Units of records and motions."""
+
+_PLAIN = {**_SI, "g": Unit(9.80665, "length time^-2", False)}
+"""Units of most motions: a file with these need not wait for pint, which takes half a second."""
 
 
 def quantity_unit(unit: str | None) -> str | None:
@@ -47,28 +65,37 @@ def parse_unit(text: str) -> Unit | None:
     """Unit of a text from outside; None unless it is a product of powers of known units with a constant factor."""
     spelled = re.sub(r"\s*([*/^])\s*", r"\1", text.strip().rstrip(".").replace("·", "*"))
     spelled = spelled.translate(str.maketrans("²³µ⁻", "23μ-")).strip()
-    if spelled in ("1", "-"):
-        return Unit(1.0, "dimensionless", False)
+    spelled = "1" if spelled == "-" else spelled
     if re.fullmatch(r"[^\W\d_]+(_[^\W\d_]+[2-4]?)+", spelled):  # as in a column's name: m_s2
         spelled = spelled.replace("_", "/")
     spelled = re.sub(r"\s+", "*", spelled)
-    if not _UNIT.fullmatch(spelled):
-        return None
-    import pint  # takes 0.2 s
+    if spelled in _PLAIN:
+        return _PLAIN[spelled]
+    return _by_pint(spelled) if _UNIT.fullmatch(spelled) else None
+
+
+def _by_pint(spelled: str) -> Unit | None:
+    """Unit of a product of powers of units."""
+    import pint
 
     words = re.sub(r"[^\W\d_]+|[°%]", lambda m: m[0] if m[0] in _AS_WRITTEN else _known(m[0]), spelled)
     expression = re.sub(r"(?<=[^\W\d_)])(?:\^|\*\*)?(-?[1-4])(?![\d)])", r"**\1", words)
     registry = pint.get_application_registry()
     try:
         one, two = (registry.Quantity(n, expression).to_base_units() for n in (1.0, 2.0))
-        factor, twice, dimension = float(one.magnitude), float(two.magnitude), str(one.dimensionality)
+        factor, twice, dimension = float(one.magnitude), float(two.magnitude), _dimension(one.dimensionality)
     except Exception:  # pint raises many kinds on text that it cannot parse
         return None
     angle = bool(re.search(r"rad|degree|°|turn|revolution", words))
-    count = dimension == "dimensionless" and not angle and words not in ("percent", "dimensionless")
+    count = not dimension and not angle and words not in ("percent", "dimensionless")
     if count or twice != 2 * factor:  # bits, counts; decibel, degrees Celsius
         return None
     return Unit(factor, dimension, angle)
+
+
+def _dimension(powers: Mapping[str, float]) -> str:
+    """Powers of base dimensions by name, as text."""
+    return " ".join(name.strip("[]") + (f"^{power:g}" if power != 1 else "") for name, power in sorted(powers.items()))
 
 
 def _known(word: str) -> str:

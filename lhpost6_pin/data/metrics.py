@@ -14,7 +14,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import RecordError
-from .signals import align, delay, lowpass_zero_phase, rrmse
+from .signals import Band, align, delay, rrmse
 
 __all__ = [
     "QUANTITIES",
@@ -156,7 +156,7 @@ def drift(record: xr.Dataset) -> tuple[Array, float, Array] | None:
         return None
     cutoff = min(max(DRIFT_BAND, 2.0 / (len(error) * step)), 0.4 / step)  # two periods at least fit in the record
     offset = error[-max(int(END / step), 1) :].mean(axis=0)
-    return lowpass_zero_phase(error, step, cutoff, order=4), cutoff, offset
+    return Band(high=cutoff, order=4).apply(error, step), cutoff, offset
 
 
 def peaks(values: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ..core.arrays import Array
 from ..identification.calibration import FreeParameter
@@ -106,7 +106,7 @@ def deviations(found: Search) -> Array:
 
 def interval_reach(numbers: Parameters) -> float:
     """Half width of the intervals of `verdict.probability`, in standard deviations."""
-    return float(norm.ppf(0.5 + 0.5 * numbers.number("verdict.probability")))
+    return float(ndtri(0.5 + 0.5 * numbers.number("verdict.probability")))
 
 
 def estimates_of(found: Search, sd: Array) -> dict[str, Estimate]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ..machine.library import find_family
 from .estimates import Estimate
@@ -60,4 +60,4 @@ def alternatives_of(behind: Mapping[str, float], apart: float) -> tuple[Alternat
 
 def p_value_of(gain: float, numbers: int, tried: int) -> float:
     """Chance that one of `tried` candidates with so many numbers gains as much where nothing is there."""
-    return min(1.0, float(chi2.sf(2.0 * gain, numbers)) * tried)
+    return min(1.0, float(chdtrc(numbers, 2.0 * gain)) * tried)

@@ -11,7 +11,6 @@ from ..core.user_code import make_attribute
 from ..machine.machine import Machine
 from ..machine.user_specimen import UserSpecimen
 from .coupled import CoupledSpecimen
-from .opensees import OpenSeesSpecimen
 from .remote_specimen import RemoteSpecimen
 
 __all__ = ["coupled_specimen", "made_specimen"]
@@ -31,6 +30,8 @@ def made_specimen(described: UserSpecimen) -> CoupledSpecimen:
     if isinstance(maker, str):
         return RemoteSpecimen(maker)
     if inspect.isfunction(maker) and next(iter(inspect.signature(maker).parameters), "") == "ops":
+        from .opensees import OpenSeesSpecimen
+
         return OpenSeesSpecimen(maker, described.name)
     made = maker
     if inspect.isclass(maker) or inspect.isfunction(maker):

@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.compiled import compiled
+
 __all__ = ["ResponseSpectrum", "response_spectrum"]
 
 
@@ -26,13 +28,11 @@ def response_spectrum(
     """Response spectrum of a ground `acceleration` (n,) [m/s^2] at oscillator `periods` (m,) [s].
 
     Solves u'' + 2 D w u' + w^2 u = -a(t) from rest, exactly for `a` linear between samples (Nigam and
-    Jennings 1969). The two-state recurrence x[i+1] = A x[i] + b0 a[i] + b1 a[i+1] is run as a second-order
-    filter on u; peaks are taken at the samples, so keep the time step below a tenth of the shortest period.
+    Jennings 1969), by the two-state recurrence x[i+1] = A x[i] + b0 a[i] + b1 a[i+1]. Peaks are taken at the
+    samples, so keep the time step below a tenth of the shortest period.
 
     Raises ValueError for a time step that is not positive, a period below it, or damping outside [0, 1).
     """
-    from scipy.signal import lfilter
-
     acceleration = np.asarray(acceleration, dtype=float)
     periods = np.atleast_1d(np.asarray(periods, dtype=float))
     if acceleration.ndim != 1 or len(acceleration) < 2:
@@ -41,20 +41,27 @@ def response_spectrum(
         raise ValueError("time step must be positive, periods at least the time step, damping in [0, 1)")
     frequency = 2 * np.pi / periods
     peaks = np.empty_like(periods)
-    for i, (transition, before, after) in enumerate(zip(*_recurrence(frequency * time_step, damping), strict=True)):
-        (a11, a12), (a21, a22) = transition
-        poles = [1.0, -(a11 + a22), a11 * a22 - a12 * a21]
-        zeros = [
-            after[0],
-            before[0] - a22 * after[0] + a12 * after[1],
-            a12 * before[1] - a22 * before[0],
-        ]
-        # filter memory that makes u[0] = 0 and u'[0] = 0 whatever a[0] is
-        memory = [-after[0] * acceleration[0], (before[0] - zeros[1]) * acceleration[0]]
-        response, _ = lfilter(zeros, poles, acceleration, zi=memory)
-        peaks[i] = max(response.max(), -response.min())
+    _fill_peaks(np.ascontiguousarray(acceleration), *_recurrence(frequency * time_step, damping), peaks)
     displacement = peaks * time_step**2
     return ResponseSpectrum(periods, displacement, displacement * frequency, displacement * frequency**2)
+
+
+@compiled
+def _fill_peaks(acceleration, transition, before, after, peaks):  # type: ignore[no-untyped-def]
+    """Largest |u| (m,) of each oscillator, from rest: u[0] = u'[0] = 0 whatever a[0] is."""
+    m = peaks.size
+    a11, a12 = transition[:, 0, 0].copy(), transition[:, 0, 1].copy()
+    a21, a22 = transition[:, 1, 0].copy(), transition[:, 1, 1].copy()
+    b0, b1, c0, c1 = before[:, 0].copy(), before[:, 1].copy(), after[:, 0].copy(), after[:, 1].copy()
+    u, v = np.zeros(m), np.zeros(m)
+    peaks[:] = 0.0
+    for k in range(acceleration.size - 1):
+        first, second = acceleration[k], acceleration[k + 1]
+        for i in range(m):  # several oscillators at once
+            moved = a11[i] * u[i] + a12[i] * v[i] + b0[i] * first + c0[i] * second
+            v[i] = a21[i] * u[i] + a22[i] * v[i] + b1[i] * first + c1[i] * second
+            u[i] = moved
+            peaks[i] = max(peaks[i], abs(moved))
 
 
 def _recurrence(angle: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,20 +9,16 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.names import AXES
 from ..data.layout_faults import RecordFinding
-from ..identification.calibration import Calibration
-from ..identification.calibration.result import verdict_on
-from ..identification.calibration.scale import scale_summary
-from ..identification.decompose import Decomposed, WrenchAgreement
-from ..identification.decompose.interface import InterfaceWrench
-from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
-from ..simulation.simulate import Run
-from ..tuning.iterate import Iterated
-from ..tuning.sine import SineTest
-from ..tuning.tune import Tuning
-from . import capacity_tables
 
 if TYPE_CHECKING:
+    from ..identification.calibration import Calibration
+    from ..identification.decompose import Decomposed, WrenchAgreement
+    from ..identification.decompose.interface import InterfaceWrench
+    from ..simulation.simulate import Run
+    from ..tuning.iterate import Iterated
+    from ..tuning.sine import SineTest
+    from ..tuning.tune import Tuning
     from .capacity_tables import MachineCapacity
     from .report.run_report import RunSummary
 
@@ -62,6 +58,7 @@ def machine_entries(machine: Machine) -> Entries:
 def capacity_entries(found: "MachineCapacity") -> Entries:
     """Capacity with what is mounted, limits by axis, and the oil-column modes of the bare table."""
     from ..mechanics.linearize import oil_column_modes
+    from . import capacity_tables
 
     machine = found.machine
     return {
@@ -92,7 +89,7 @@ def finding_entries(found: Mapping[str, Sequence[RecordFinding]]) -> Entries:
     }
 
 
-def run_entries(run: Run, summary: "RunSummary | None") -> Entries:
+def run_entries(run: "Run", summary: "RunSummary | None") -> Entries:
     """Outcome of a run and, with a summary, its tracking and demand over capacity."""
     entries = {
         "seconds": run.time[-1] + 1 / run.rate,
@@ -115,7 +112,7 @@ def run_entries(run: Run, summary: "RunSummary | None") -> Entries:
     }
 
 
-def tuning_entries(found: Tuning) -> Entries:
+def tuning_entries(found: "Tuning") -> Entries:
     """Bands, delays, margins and gains of every axis before and after."""
     gains = ("displacement_gain", "force_damping", *(f"{n}_feedforward" for n in ("velocity", "acceleration", "jerk")))
 
@@ -133,7 +130,7 @@ def tuning_entries(found: Tuning) -> Entries:
     }
 
 
-def iteration_entries(found: Iterated) -> Entries:
+def iteration_entries(found: "Iterated") -> Entries:
     """Errors of every iteration by axis, the best iteration, and the stopping criterion."""
     history = []
     for one in found.history:
@@ -146,7 +143,7 @@ def iteration_entries(found: Iterated) -> Entries:
     return {"iterations": history, "best": found.best, "stopped": found.reason}
 
 
-def sine_entries(found: SineTest) -> Entries:
+def sine_entries(found: "SineTest") -> Entries:
     """Amplitude, phase and distortion without and with the cancellers."""
     names = ("amplitude_error", "phase_error", "distortion", "distortion_displacement", "peak_spool")
 
@@ -155,7 +152,7 @@ def sine_entries(found: SineTest) -> Entries:
     return _picked(found, "axis", "amplitude", "frequency") | both
 
 
-def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
+def agreement_entries(found: "Decomposed", agreement: "WrenchAgreement") -> Entries:
     """Modelled against measured forces, and the residual with its expected levels, by axis."""
     matches = _picked(agreement, "actuators", "struts", "dissipative")
     residual: dict[str, Sequence[Any] | Array] = {
@@ -179,7 +176,7 @@ def agreement_entries(found: Decomposed, agreement: WrenchAgreement) -> Entries:
     return {"compared_up_to_hz": found.comparison.band.high, "axes": axes, "interface": interface}
 
 
-def _interface_entries(found: InterfaceWrench) -> Entries:
+def _interface_entries(found: "InterfaceWrench") -> Entries:
     """Peaks of a specimen's wrench on the platen at the interface, with half of their intervals."""
     sources = _picked(found, "noise", "sensors", "parameters")
     rms = {
@@ -203,7 +200,7 @@ def _interface_entries(found: InterfaceWrench) -> Entries:
     }
 
 
-def _friction_entries(found: Calibration) -> Entries | None:
+def _friction_entries(found: "Calibration") -> Entries | None:
     """Forms of friction with their errors on held-out tests."""
     if found.friction is None:
         return None
@@ -220,8 +217,12 @@ def _friction_entries(found: Calibration) -> Entries | None:
     return {"preferred": found.friction.best.name, "suffices": found.friction.suffices, "forms": forms}
 
 
-def calibration_entries(found: Calibration) -> Entries:
+def calibration_entries(found: "Calibration") -> Entries:
     """Parameters with intervals and verdicts, sensor errors, misfits of every test."""
+    from ..identification.calibration.result import verdict_on
+    from ..identification.calibration.scale import scale_summary
+    from ..identification.residuals import RESIDUALS
+
     parameters, first = {}, len(found.parameters)
     for i, parameter in enumerate(found.parameters):
         parameters[parameter.name] = {

@@ -15,8 +15,9 @@ from ..mechanics.forward_dynamics import platen_acceleration
 from ..mechanics.moving_parts import bodies_acceleration
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
 from ..mechanics.spatial import integrate
+from ..mechanics.workspace import unpack_workspace
 
-__all__ = ["Log", "Signals", "Span", "run_fused"]
+__all__ = ["Log", "Signals", "Span", "log_packed", "run_fused"]
 
 
 class Span(NamedTuple):
@@ -127,6 +128,30 @@ def _rk4_step(dt, tables, ws, spool):
     return 0
 
 
+@compiled_inline
+def _log_sample(at, ws, window, log):
+    """Fill row `at` of the log from the workspace and the window (steps, n_actuators) of a sample's spools."""
+    motion, steps = ws.motion, window.shape[0]
+    for k in range(ws.q.size):
+        log.q[at, k] = ws.q[k]
+    for k in range(motion.shape[1]):
+        log.v[at, k] = motion[V, k]
+        log.a[at, k] = motion[A, k]
+    for k in range(ws.z.size):
+        log.z[at, k] = ws.z[k]
+    for i in range(window.shape[1]):
+        total = 0.0
+        for j in range(steps):
+            total += window[j, i]
+        log.spool[at, i] = total / steps
+
+
+@compiled
+def log_packed(at, buffer, window, q, v, a, z, spool):
+    """`_log_sample` with workspace packed and the log as arrays, which are cheaper to pass from Python."""
+    _log_sample(at, unpack_workspace(buffer), window, Log(q, v, a, z, spool))
+
+
 @compiled
 def run_fused(span, tables, ws, control, signals, log):
     """Run the samples of a span with tables and workspace of the plant and tables of the controller.
@@ -156,13 +181,7 @@ def run_fused(span, tables, ws, control, signals, log):
                 for i in range(nu):
                     window[j, i] = signals.spool[row, i]
         if sample % span.every == 0:
-            at = sample // span.every
-            log.q[at] = q
-            log.v[at] = motion[V]
-            log.a[at] = motion[A]
-            log.z[at] = ws.z
-            for i in range(nu):
-                log.spool[at, i] = window[:, i].sum() / steps
+            _log_sample(sample // span.every, ws, window, log)
         status = 0
         for j in range(steps):
             if span.scheme == 0:

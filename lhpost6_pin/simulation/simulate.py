@@ -28,7 +28,7 @@ from ..mechanics.schemes import A, V
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import Workspace, make_workspace
 from .coupling import Coupling, CouplingOptions, CouplingResult, make_coupling
-from .engine_fused import Log, Signals, Span, run_fused
+from .engine_fused import Log, Signals, Span, log_packed, run_fused
 from .engine_pinocchio import make_stepper
 from .loops import ClosedLoop, Loop, OpenLoop, PluggedLoop, check_closed_loop, check_options, check_run
 from .snapshot import EVERY, Watch, take_snapshot
@@ -188,7 +188,7 @@ class _Job(NamedTuple):
 
 def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     """Run all samples step by step; returns (status, samples done, commands clipped)."""
-    plant, ws, span = job.plant, job.ws, job.span
+    plant, ws, span, buffer = job.plant, job.ws, job.span, job.ws.buffer
     coupled = job.coupled
     advance = coupled.advance if coupled else make_stepper(plant, SCHEMES[span.scheme], span.dt)
     evaluated = coupled.evaluate if coupled else partial(evaluate_derivatives, plant)
@@ -201,9 +201,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
             evaluated(ws, window[0])  # the other schemes leave the ports of their last stage
         clipped += spools(sample, window)
         if sample % span.every == 0:
-            row = ws.q, ws.motion[V], ws.motion[A], ws.z, window.sum(axis=0) / span.steps
-            for values, value in zip(job.log, row, strict=True):
-                values[sample // span.every] = value
+            log_packed(sample // span.every, buffer, window, *job.log)
         job.look(sample)
         status = advance(ws, window)
         if status:

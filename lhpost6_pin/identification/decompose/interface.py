@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ...core.arrays import Array
 from ...mechanics.interface_wrench import INTERFACE_AXES, at_interface, wrenches_at_b
@@ -61,7 +61,7 @@ class InterfaceWrench:
     @property
     def half_width(self) -> Array:
         """Half of the interval (n, 6)."""
-        return float(norm.ppf(0.5 + 0.5 * self.confidence)) * self.sd
+        return float(ndtri(0.5 + 0.5 * self.confidence)) * self.sd
 
     def at(self, sample: int) -> pin.Force:
         """Force of the specimen on the platen at one sample."""

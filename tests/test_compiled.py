@@ -8,11 +8,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import lhpost6_pin
+from lhpost6_pin.control import controlled, load_controller
 from lhpost6_pin.core import compiled as module
 from lhpost6_pin.core.compiled import cache_folder, compiled
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.simulation.compile_ahead import SIGNATURES
+from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
 
 pytestmark = pytest.mark.long
 
@@ -162,3 +167,12 @@ def test_where_nothing_can_be_written_functions_compile_in_memory_and_a_warning_
 
 def _twice(x: float) -> float:
     return 2.0 * x
+
+
+def test_what_is_compiled_ahead_of_a_run_is_what_its_steps_call():
+    """Another signature would be compiled for nothing, and the right one again."""
+    plant, rest, controller = controlled(load_machine(), load_controller("lhpost6"))
+    drive = np.zeros((4, controller.columns))
+    simulate(plant, ClosedLoop(controller, drive, rest), samples=4)
+    for function, signature in SIGNATURES.items():
+        assert signature in function.signatures, function.__name__

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
+from lhpost6_pin.control import filters
 from lhpost6_pin.control.filters import (
     MODES,
     drive_for,
@@ -210,3 +211,20 @@ def test_a_valve_driven_beyond_full_stroke_counts_as_fully_open():
     commands[0] = 1.0
     assert np.array_equal(beyond, per_actuator(commands, COUNTS, CURVES))
     assert 0.5 < beyond[0] < 1.0 and not beyond[1:].any()
+
+
+@pytest.mark.parametrize(("sampling", "method"), [("acceleration", "foh"), ("velocity", "bilinear")])
+def test_generators_are_sampled_as_scipy_samples_them(sampling, method, monkeypatch):
+    """`scipy.signal.cont2discrete` is the oracle; to rounding of matrices whose largest entries are about 1e4."""
+    given = {}
+
+    def oracle(a, b, c, d, rate, found):
+        given["method"] = found
+        return signal.cont2discrete((a, b, c, d), 1.0 / rate, method=found)[:4]
+
+    arguments = (sampling, 0.05, 0.7, 80.0, 2048.0)
+    own = filters.reference_generator.__wrapped__(*arguments)
+    monkeypatch.setattr(filters, "_sampled", oracle)
+    for one, other in zip(own, filters.reference_generator.__wrapped__(*arguments), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
+    assert given["method"] == method

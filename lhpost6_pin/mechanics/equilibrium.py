@@ -14,11 +14,12 @@ from ..effects.supply import steady_supply, supply_pressures
 from ..laws.hydraulic import Hydraulic, leak_flows, valve_flows
 from ..laws.orifice import opening, spool_for_opening
 from ..laws.supply import varies
+from .derivatives import evaluate
 from .modes import rest_of_modes
 from .plant import Plant, State
 from .pose import PlantMotion
 from .required_wrench import moving_wrenches
-from .schemes import TAU, forces_stage, pose_stage
+from .schemes import TAU
 from .workspace import make_workspace
 
 __all__ = ["Equilibrium", "actuator_speeds", "find_equilibrium", "rest_pressures", "specimen_at_rest"]
@@ -51,8 +52,7 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     """
     start = specimen_at_rest(plant)
     ws = make_workspace(plant, start)
-    pose_stage(ws.q, plant.tables, ws)
-    forces_stage(plant.tables, ws, ws.z)
+    evaluate(plant, ws, np.zeros(plant.spools))
     free = plant.axes.size
     gravity = pin.rnea(
         plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)
@@ -128,7 +128,8 @@ def _fill(plant: Plant, force: Array, supply: Pressures, z: Array, spool: Array)
                 f"{name} must give {force[i]:.4g} N at rest, {what}: {said} MPa is not between {low / 1e6:.3g} and "
                 f"{high / 1e6:.3g} MPa; {hint}"
             )
-        start_line(row, spool[i], pressures[0], pressures[-1], high, low, z)
+        if row["modified"]:
+            start_line(row, spool[i], pressures[0], pressures[-1], high, low, z)
 
 
 def _rest_of_modified(p: Hydraulic, force: float, supply: Pressures) -> tuple[tuple[float, ...], float]:

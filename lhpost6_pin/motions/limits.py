@@ -17,6 +17,7 @@ __all__ += ["limit_peaks", "peak_of_demand"]
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
 _CLOSE = 1e-4  # relative width to which the largest scale is bracketed
+_GOVERNING = 0.5  # of the largest share: with less, no sample governs at another scale, where demands are nearly linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,20 +119,22 @@ def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | Non
     """Largest scale of the target's motion within all limits, rounded down to three digits.
 
     Infinity for a target at rest (or below floating-point resolution). Actuator lengths and forces are not linear in
-    the motion: with `check` the scale is bracketed below that of the axes, guided by the share of each trial.
+    the motion: with `check` the scale is bracketed below that of the axes, guided by the share of each trial. They are
+    nearly so: after the first trial only samples are looked at whose demand was a good part of the largest.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
+    low, high = 0.0, 1 / highest
+    shares = _deciding(target, check, high) if check else np.zeros(len(target.time))
+    share = float(shares.max())
+    if check is None or share <= _FULL:
+        return _round_down(high * abs(target.reference.scale))
+    governing = shares >= _GOVERNING * share
 
     def used(trial: float) -> float:
-        peaks = _peaks(target, check, trial) if check else []
-        return max((peak.utilisation for peak in peaks if peak.decides), default=0.0)
+        return float(_deciding(target, check, trial, governing).max())
 
-    low, high = 0.0, 1 / highest
-    share = used(high)
-    if share <= _FULL:
-        return _round_down(high * abs(target.reference.scale))
     trial = high
     while high - low > _CLOSE * high:
         # demands are nearly proportional to the scale: just below where the last share would be one, else halfway
@@ -198,6 +201,14 @@ def _peaks(target: Motion, check: MotionCheck, factor: float) -> list[Peak]:
     with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
         demands = check(*(factor * x for x in (target.displacement, target.velocity, target.acceleration)))
     return [peak for demand in demands for peak in peak_of_demand(demand)]
+
+
+def _deciding(target: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
+    """Largest share (n,) of the deciding demands at each of some samples of a motion, scaled."""
+    motion = (factor * x[some] for x in (target.displacement, target.velocity, target.acceleration))
+    with np.errstate(all="ignore"):
+        shares = [np.abs(demand.share).max(axis=1) for demand in check(*motion) if demand.decides]
+    return np.nan_to_num(np.max(shares, axis=0), nan=np.inf, posinf=np.inf)
 
 
 def _round_down(value: float) -> float:

@@ -19,7 +19,7 @@ from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_
 from ..mechanics.tables import unpack_tables
 from ..mechanics.workspace import Workspace, unpack_workspace
 
-__all__ = ["Stepper", "make_stepper"]
+__all__ = ["Stepper", "make_stepper", "staggered_packed"]
 
 Stepper = Callable[[Workspace, Array], int]
 """Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
@@ -35,7 +35,7 @@ def make_stepper(plant: Plant, scheme: str, dt: float, forward: Dynamics | None 
 
 
 @compiled
-def _staggered(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
+def staggered_packed(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
     """`staggered_stage` with tables and workspace packed, which are cheaper to pass."""
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
@@ -50,7 +50,7 @@ def _semi_implicit(plant: Plant, dt: float, accelerate: Dynamics) -> Stepper:
         q, status = ws.q, 0
         for held in spool:
             q = integrate(model, q, dq)
-            status = _staggered(q, dt, packed, buffer, held)
+            status = staggered_packed(q, dt, packed, buffer, held)
             if status:
                 break
             kick(motion, accelerate(q, v_seen, tau), dt)

@@ -249,7 +249,7 @@ def packed_plotly() -> str:
     """plotly.js as shipped with the plotly package: deflated, then base64 (a third of its plain size)."""
     from plotly.offline import get_plotlyjs
 
-    return base64.b64encode(zlib.compress(get_plotlyjs().encode(), 6)).decode()
+    return base64.b64encode(zlib.compress(get_plotlyjs().encode(), 4)).decode()
 
 
 def beside(name: str) -> str:

@@ -236,6 +236,32 @@ def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
     assert check_limits(with_scale(target, fits), WIDE, leg_across).utilisation["actuator stroke"]["H1"] <= 1
 
 
+@pytest.mark.parametrize("weight", [0.0, 0.5, 0.9])
+def test_a_demand_with_a_static_part_limits_the_scale_although_another_one_is_larger_at_first(weight):
+    """Closed form: |x| s <= 1 and weight + |v| s / 9 <= 1, whose samples are others; rounded down to three digits."""
+    target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
+
+    def check(displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[Demand]:
+        lifted = weight + np.abs(velocity[:, :1]) / 9.0
+        return [Demand("actuator stroke", ("H1",), displacement[:, :1], ""), Demand("lift", ("V1",), lifted, "")]
+
+    peak = np.abs(target.displacement[:, 0]).max(), np.abs(target.velocity[:, 0]).max()
+    expected = min(1.0 / peak[0], 9.0 * (1.0 - weight) / peak[1])
+    found = largest_scale(target, limited(displacement=("x", 5.0)), check)
+    assert 0.989 * expected < found <= expected * (1 + 1e-6)
+
+
+def test_a_demand_that_is_infinite_at_the_first_trial_does_not_hide_the_others():
+    target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
+
+    def check(displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[Demand]:
+        reached = np.where(np.abs(displacement[:, :1]) < 4.0, 0.0, np.inf)
+        return [Demand("actuator stroke", ("H1",), reached, ""), Demand("speed", ("H1",), velocity[:, :1] / 2.0, "")]
+
+    expected = 2.0 / np.abs(target.velocity[:, 0]).max()
+    assert 0.989 * expected < largest_scale(target, limited(displacement=("x", 5.0)), check) <= expected * (1 + 1e-6)
+
+
 def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_legs_by_quantity():
     motion = find_motion("sfu-like")
     limits = MotionLimits(np.full(6, 1e-3), np.full(6, 1e-3), np.full(6, 1e-3))  # all 18 exceeded

@@ -22,7 +22,8 @@ def ensemble(
     plan: Annotated[
         list[str],
         typer.Argument(
-            help="Plan (a TOML file with [[motion]]), or motions by name or file.", autocompletion=complete_motion
+            help="Plan (a TOML file with [[motion]]), or motions, each by name or from one file.",
+            autocompletion=complete_motion,
         ),
     ],
     machines: Annotated[
@@ -82,9 +83,9 @@ def ensemble(
     given = {
         "machines": machines,
         "scales": _numbers(scales),
-        "specimen": [{"name": name} for name in specimen or ()] or None,
-        "controller": [{"name": name} for name in controller or ()] or None,
-        "machine": machine,
+        "specimen": [{"name": _here(name)} for name in specimen or ()] or None,
+        "controller": [{"name": _here(name)} for name in controller or ()] or None,
+        "machine": None if machine is None else _here(machine),
         "override": None if override is None else str(override.absolute()),
         "uncertain": uncertain or None,
         "draw": draw,
@@ -101,6 +102,14 @@ def ensemble(
         found = summarise(results, made.numbers)
         files = [path, write_ensemble_report(results, found, folder / "report.html", repeating_command())]
         print_result(json, lambda: ensemble_entries(found), lambda: print_ensemble(found), files)
+    if found.failures or found.stopped:
+        raise typer.Exit(1)
+
+
+def _here(name: str) -> str:
+    """A shipped name as it is, a file (with what follows a colon) with its whole path."""
+    file, colon, rest = name.partition(":")
+    return f"{Path(file).absolute()}{colon}{rest}" if Path(file).suffix else name
 
 
 def _some(jobs: int) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..core.errors import ParameterError, RecordError, SimulationError
-from ..core.names import ENGINES, SAMPLE_RATE
+from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
@@ -52,15 +52,17 @@ def run(
     """Run a motion in closed loop on the virtual table; writes record.nc and report.html."""
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
-    from ..simulation.compile_ahead import compile_ahead
+    from ..simulation.compile_ahead import compile_ahead, wait_for
     from ..simulation.rehearse import rehearse
 
-    compiling = compile_ahead() if steps.engine == ENGINES[0] else None
     if record_rate < 1 or SAMPLE_RATE % record_rate:
         raise SimulationError(f"--record-rate {record_rate} does not divide {SAMPLE_RATE}")
     table = machine.load(valves)
     chosen = opt.find_controller(controller, table)
-    options = steps.checked(table, own_controller=not isinstance(chosen, ControllerSettings))
+    own = not isinstance(chosen, ControllerSettings)
+    options = steps.checked(table, own_controller=own)
+    usual = (steps.engine, steps.scheme) == (ENGINES[0], SCHEMES[0]) and not own and options["coupling"] is None
+    compiling = compile_ahead() if usual else None
     inverse = load_inverse(aic) if aic else None
     if inverse is not None:
         if not isinstance(chosen, ControllerSettings):
@@ -79,8 +81,7 @@ def run(
         chosen, _, more = retuned(table, chosen, folder)
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{name} at scale {motion.scale:g} on {table.name}"
-    if compiling is not None:
-        compiling.wait()
+    wait_for(compiling)
     with watched(view, table, title, err=json) as watch, progress_bar(f"{name} on {table.name}") as progress:
         test = rehearse(
             table,

@@ -1,18 +1,20 @@
 """Shipped data, reading TOML, and atomic writing of files."""
 
 import errno
+import hashlib
 import os
 import tempfile
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from .errors import UnknownNameError
 
 __all__ = ["find_shipped", "models_folder", "read_toml", "reason_of", "refuse_folder", "shipped"]
-__all__ += ["shipped_specimens", "write_whole"]
+__all__ += ["shipped_specimens", "sources_digest", "write_whole"]
 
 
 _SPECIMENS = (".urdf", ".toml", ".npz", ".mat")
@@ -24,6 +26,18 @@ def models_folder() -> Path:
     package = Path(__file__).parents[1]
     installed = package / "models"
     return installed if installed.is_dir() else package.parent / "models"
+
+
+@cache
+def sources_digest() -> str:
+    """Digest of the package's modules and data files: what was made by another state of it may differ."""
+    digest = hashlib.sha256()
+    for pattern in ("*.py", "*.toml"):
+        for source in sorted(
+            one for folder in (Path(__file__).parents[1], models_folder()) for one in folder.rglob(pattern)
+        ):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()
 
 
 def shipped(folder: str = "", suffix: str = ".toml") -> dict[str, Path]:

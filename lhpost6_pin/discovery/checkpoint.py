@@ -4,11 +4,10 @@ import hashlib
 import logging
 import pickle
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core.files import models_folder, write_whole
+from ..core.files import sources_digest, write_whole
 from ..identification.calibration.problem import Problem
 from ..machine.machine import Machine
 from ..machine.machine_toml import machine_toml
@@ -63,16 +62,5 @@ def make_checkpoint(folder: Path | None, machine: Machine, *inputs: object) -> C
     """
     if folder is None or machine.own_effects:
         return Checkpoint(None)
-    sources = _sources(Path(__file__).parents[1], models_folder())
-    known = repr((sources, machine_toml(machine), machine.specimen, *inputs))
+    known = repr((sources_digest(), machine_toml(machine), machine.specimen, *inputs))
     return Checkpoint(folder / f".unfinished-{hashlib.sha256(known.encode()).hexdigest()[:16]}.pickle")
-
-
-@cache
-def _sources(*folders: Path) -> str:
-    """Digest of the modules and the data files in some folders."""
-    digest = hashlib.sha256()
-    for pattern in ("*.py", "*.toml"):
-        for source in sorted(one for folder in folders for one in folder.rglob(pattern)):
-            digest.update(source.read_bytes())
-    return digest.hexdigest()

@@ -52,7 +52,8 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     """
     start = specimen_at_rest(plant)
     ws = make_workspace(plant, start)
-    evaluate(plant, ws, np.zeros(plant.spools))
+    if evaluate(plant, ws, np.zeros(plant.spools)):
+        raise SimulationError(f"{plant.machine.name}: a leg is out of its stroke in the zero-position")
     free = plant.axes.size
     gravity = pin.rnea(
         plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)

@@ -120,31 +120,37 @@ def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | Non
 
     Infinity for a target at rest (or below floating-point resolution). Actuator lengths and forces are not linear in
     the motion: with `check` the scale is bracketed below that of the axes, guided by the share of each trial. They are
-    nearly so: after the first trial only samples are looked at whose demand was a good part of the largest.
+    nearly so: after the first trial only samples are looked at whose demand was a good part of the largest, and what
+    is found is looked at in all.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
-    low, high = 0.0, 1 / highest
+    high = 1 / highest
     shares = _deciding(target, check, high) if check else np.zeros(len(target.time))
-    share = float(shares.max())
-    if check is None or share <= _FULL:
+    if check is None or shares.max() <= _FULL:
         return _round_down(high * abs(target.reference.scale))
-    governing = shares >= _GOVERNING * share
+    governing = shares >= (_GOVERNING * shares.max() if np.isfinite(shares.max()) else 0.0)
+    while True:
+        found = _bracketed(target, check, high, float(shares.max()), governing)
+        beyond = _deciding(target, check, found, slice(None)) > _FULL if found > 0.0 else np.zeros(len(shares), bool)
+        if not (beyond & ~governing).any():
+            return _round_down(found * abs(target.reference.scale))
+        governing = governing | beyond
 
-    def used(trial: float) -> float:
-        return float(_deciding(target, check, trial, governing).max())
 
-    trial = high
+def _bracketed(target: Target, check: MotionCheck, high: float, share: float, governing: np.ndarray) -> float:
+    """Scale below `high`, at which the demand is `share`, with which the governing samples (n,) are within."""
+    low, trial = 0.0, high
     while high - low > _CLOSE * high:
         # demands are nearly proportional to the scale: just below where the last share would be one, else halfway
         guess = (1.0 - 0.5 * _CLOSE) * trial / share if 0.0 < share < np.inf else 0.0
         trial = guess if low < guess < high else (low + high) / 2
-        share = used(trial)
+        share = float(_deciding(target, check, trial, governing).max())
         low, high = (low, trial) if share > _FULL else (trial, high)
         if 1.0 - _CLOSE < share <= _FULL:
             break
-    return _round_down(low * abs(target.reference.scale))
+    return low
 
 
 def peak_of_demand(demand: Demand) -> list[Peak]:
@@ -208,6 +214,8 @@ def _deciding(target: Motion, check: MotionCheck, factor: float, some: np.ndarra
     motion = (factor * x[some] for x in (target.displacement, target.velocity, target.acceleration))
     with np.errstate(all="ignore"):
         shares = [np.abs(demand.share).max(axis=1) for demand in check(*motion) if demand.decides]
+    if not shares:
+        return np.zeros(1)
     return np.nan_to_num(np.max(shares, axis=0), nan=np.inf, posinf=np.inf)
 
 

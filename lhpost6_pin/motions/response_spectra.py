@@ -40,8 +40,9 @@ def response_spectrum(
     if not (time_step > 0 and (periods >= time_step).all() and 0 <= damping < 1):
         raise ValueError("time step must be positive, periods at least the time step, damping in [0, 1)")
     frequency = 2 * np.pi / periods
-    peaks = np.empty_like(periods)
-    _fill_peaks(np.ascontiguousarray(acceleration), *_recurrence(frequency * time_step, damping), peaks)
+    peaks = np.full_like(periods, np.nan)  # of an acceleration with gaps
+    if np.isfinite(acceleration).all():
+        _fill_peaks(np.ascontiguousarray(acceleration), *_recurrence(frequency * time_step, damping), peaks)
     displacement = peaks * time_step**2
     return ResponseSpectrum(periods, displacement, displacement * frequency, displacement * frequency**2)
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..studies.exceedance import Exceedance
+from ..studies.quantities import OF_LIMITS
 from ..studies.summary import EnsembleSummary, ImportanceOf, Spread
 from .report.page import Table, number
 from .report.scales import SCALES, Scale
@@ -22,10 +23,17 @@ def ensemble_verdict(found: EnsembleSummary) -> str:
     words.append(f", {failed} of which could not be made" if failed else "")
     words.append(f", {found.stopped} stopped on the way" if found.stopped else "")
     sentences = ["".join(words) + "."]
-    for one in found.configurations:
-        any_limit = one.exceedances[0]
-        which = f" (specimen {one.specimen}, controller {one.controller})" if len(found.configurations) > 1 else ""
-        sentences.append(f"{_risk_words(any_limit, found)}{which}.")
+    many = len(found.configurations) > 1
+    if many:
+        sentences.append(f"Of {len(found.configurations)} motions with a specimen and a controller, the worst:")
+    worst = sorted(
+        found.configurations, key=lambda own: (own.exceedances[0].risk_scale, -own.exceedances[0].share.max())
+    )
+    for one in worst[:1]:
+        which = f" ({one.motion}, specimen {one.specimen}, controller {one.controller})" if many else ""
+        sentences.append(f"{_risk_words(one.exceedances[0], found)}{which}.")
+    if found.configurations:
+        sentences.append(f"Limits evaluated: {', '.join(g for g in found.groups if g in OF_LIMITS)}.")
     return " ".join(sentences)
 
 
@@ -37,9 +45,9 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
         share = f"{_percent(one.share[0])} ({_percent(one.low[0])} to {_percent(one.high[0])})"
         return f"At scale {found.scales[0]:g}, {share} of the runs reach {one.limit}"
     risk = f"The risk of reaching {one.limit} is {_percent(found.level)}"
-    if math.isinf(one.risk_scale):
+    if one.where == "beyond the largest run":
         return f"{risk} beyond scale {found.scales[-1]:g}, the largest run"
-    if one.risk_scale <= found.scales[0]:
+    if one.where == "at or below the smallest run":
         return f"{risk} or more at scale {found.scales[0]:g} already, the smallest run"
     low = f"{one.risk_low:.3g} to " if one.risk_low else "too few machines for a lower bound; up to "
     return f"{risk} at scale {one.risk_scale:.3g} ({low}{_end(one.risk_high)})"
@@ -51,16 +59,18 @@ def _end(scale: float) -> str:
 
 def risk_table(found: EnsembleSummary) -> Table:
     """Return, for each configuration and limit, the scale of the stated risk and the share beyond it at each scale."""
-    rows, many = [], len(found.configurations) > 1
+    rows, varying = [], [k for k in range(3) if len({own[k] for own in found.configurations}) > 1]
     for own in found.configurations:
         for one in own.exceedances:
             shares = (
                 f"{_percent(s)} ({_percent(a)} to {_percent(b)})"
                 for s, a, b in zip(one.share, one.low, one.high, strict=True)
             )
-            scale = _end(one.risk_scale) if not math.isnan(one.risk_scale) else "–"
-            rows.append((one.limit, *((own.specimen, own.controller) if many else ()), scale, *shares))
-    header = ("Limit", *(("Specimen", "Controller") if many else ()), f"Scale of {_percent(found.level)} risk")
+            below = "≤ " if one.where == "at or below the smallest run" else ""
+            scale = below + _end(one.risk_scale) if one.where != "unknown" else "–"
+            rows.append((one.limit, *(str(own[k]) for k in varying), scale, len(one.critical), *shares))
+    names = ("Motion", "Specimen", "Controller")
+    header = ("Limit", *(names[k] for k in varying), f"Scale of {_percent(found.level)} risk", "Machines")
     return Table("Exceedance of limits", (*header, *(f"Scale {s:g}" for s in found.scales)), rows)
 
 
@@ -102,10 +112,11 @@ def importance_table(found: EnsembleSummary) -> Table:
     """Return the three numbers that each result follows from most."""
     rows, shown = [], _varying(found.importance)
     for one in found.importance:
-        first = [f"{i.parameter} {i.first_order:.2f} ± {i.half_width:.2f}" for i in one.indices[:3] if i.sure]
+        first = [f"{i.parameter} {i.first_order:.2f}" for i in one.indices[:3] if i.sure]
         words = ", ".join(first) or "none beyond chance"
-        rows.append((one.result, *_where(one, shown), words))
-    return Table("Which uncertain numbers matter", ("Result", *shown, "Share of variance explained alone"), rows)
+        rows.append((one.result, *_where(one, shown), words, f"{one.indices[0].chance:.2f}"))
+    header = ("Result", *shown, "Share of variance explained alone", "Chance")
+    return Table("Which uncertain numbers matter", header, rows)
 
 
 def print_ensemble(found: EnsembleSummary) -> None:
@@ -124,7 +135,11 @@ def ensemble_entries(found: EnsembleSummary) -> dict[str, Any]:
     entries = found._asdict()
     entries["verdict"] = ensemble_verdict(found)
     entries["configurations"] = [
-        {**own._asdict(), "exceedances": [{k: v for k, v in e._asdict().items() if k != "critical"} for e in own[2]]}
+        own._asdict() | {"exceedances": [_without_critical(one) for one in own.exceedances]}
         for own in found.configurations
     ]
     return entries
+
+
+def _without_critical(one: Exceedance) -> dict[str, Any]:
+    return {key: value for key, value in one._asdict().items() if key != "critical"}

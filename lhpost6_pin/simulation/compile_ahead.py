@@ -7,6 +7,7 @@ step on is compiled beside what its limits and its linear model need; both leave
 import os
 import subprocess
 import sys
+from contextlib import suppress
 
 from numba import types
 from numba.core.types import Type
@@ -16,7 +17,10 @@ from ..core.compiled import cache_folder
 from .engine_fused import log_packed
 from .engine_pinocchio import staggered_packed
 
-__all__ = ["SIGNATURES", "compile_ahead", "compile_step"]
+__all__ = ["SIGNATURES", "compile_ahead", "compile_step", "wait_for"]
+
+LONGEST = 300.0
+"""Time that the step is waited for [s]: several times what it takes on a slow machine."""
 
 
 def _arrays(*dimensions: int) -> tuple[Type, ...]:
@@ -34,13 +38,20 @@ SIGNATURES = {
 def compile_ahead() -> "subprocess.Popen[bytes] | None":
     """Start to compile the step beside this process; None if that is done, or there is no second core or no cache.
 
-    Wait for its end before the first step. It goes on if this process ends: the next run finds the code.
+    Wait for its end (`wait_for`) before the first step. It goes on if this process ends: the next run finds the code.
     """
     folder = cache_folder()
     if folder is None or (os.cpu_count() or 1) < 2 or any(folder.rglob(f"*.{log_packed.__name__}-*.nbi")):
         return None
     code = f"from {__name__} import compile_step; compile_step()"
-    return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return subprocess.Popen([sys.executable, "-P", "-c", code], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def wait_for(compiling: "subprocess.Popen[bytes] | None") -> None:
+    """Wait for the second process; after `LONGEST` this one compiles itself what it lacks."""
+    if compiling is not None:
+        with suppress(subprocess.TimeoutExpired):
+            compiling.wait(LONGEST)
 
 
 def compile_step() -> None:

@@ -57,7 +57,10 @@ class ForceUse(NamedTuple):
 
 
 def plant_limits(plant: Plant) -> Limits:
-    """Limits of a plant: Table 2.2, strokes, velocities and forces of actuators, supply, strut areas."""
+    """Limits of a plant: Table 2.2, strokes, velocities and forces of actuators, supply, strut areas.
+
+    Raises SimulationError if the actuators cannot hold what is mounted.
+    """
     machine, supply = plant.machine, plant.supply
     area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
     speeds = actuator_speeds(plant)

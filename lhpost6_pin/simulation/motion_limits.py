@@ -22,6 +22,7 @@ from ..mechanics.pose import PlatenMotion
 from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
 
 __all__ = ["Judgement", "check_motion_limits", "fitting_scale", "judge_motion", "judge_record"]
+__all__ += ["refuse_blocked_axes"]
 
 
 def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
@@ -31,14 +32,7 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
     exceeded, also the scale by the other reading of Eq. 4-2. For a guided machine also where the target moves an axis
     that is not free.
     """
-    machine, axes = plant.machine, plant.axes
-    blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
-    if blocked:
-        free = ",".join(AXES[k] for k in axes)
-        raise OutOfRangeError(
-            f"{target.reference.motion}: {machine.name} cannot move in {', '.join(blocked)}; choose with --axes {free}"
-        )
-
+    refuse_blocked_axes(plant, target)
     bounds = _axis_limits(plant)
     try:
         return check_limits(target, bounds, make_motion_check(plant))
@@ -48,6 +42,18 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
         raise OutOfRangeError(
             f"{error}{_by_other_reading(plant, target, error.largest_scale)}", error.largest_scale, error.exceeded
         ) from None
+
+
+def refuse_blocked_axes(plant: Plant, target: Target) -> None:
+    """Raise OutOfRangeError for a target that moves an axis which is not free."""
+    axes = plant.axes
+    blocked = [AXES[k] for k in range(6) if k not in axes and np.any(target.displacement[:, k] != 0.0)]
+    if blocked:
+        free = ",".join(AXES[k] for k in axes)
+        raise OutOfRangeError(
+            f"{target.reference.motion}: {plant.machine.name} cannot move in {', '.join(blocked)}; choose with --axes "
+            f"{free}"
+        )
 
 
 def fitting_scale(plant: Plant, target: Target) -> float:
@@ -74,8 +80,8 @@ def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = Non
     return Judgement(limit_peaks(motion, bounds, check), fits)
 
 
-def judge_record(plant: Plant, record: xr.Dataset) -> Judgement | None:
-    """Judgement of a record's achieved motion and of its target; None without motion, or where it is not finite.
+def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:
+    """Judgement of a record's achieved motion and, with `fits`, of its target; None without motion or with gaps.
 
     Raises OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
@@ -83,7 +89,7 @@ def judge_record(plant: Plant, record: xr.Dataset) -> Judgement | None:
     if achieved is None:
         return None
     wanted, target = _motion_of(record, "reference"), None
-    if wanted is not None and "scale" in record.attrs:
+    if fits and wanted is not None and "scale" in record.attrs:
         attrs = record.attrs
         made = Reference(str(attrs.get("motion", "motion")), "record", float(attrs["scale"]), (), 0.0, 0.0, 0.0)
         target = Target(record["time"].values, *wanted, made)

@@ -43,6 +43,8 @@ def draw_machines(
     Raises UnknownNameError for a design that does not exist, ParameterError for a pattern without a parameter or a
     number of machines that a Sobol sequence does not fill.
     """
+    if design not in DESIGNS:
+        raise UnknownNameError("design of an ensemble", design, DESIGNS)
     every = machine_parameters(machine)
     for pattern in uncertain:
         if not any(fnmatchcase(one.name, pattern) for one in every):
@@ -50,7 +52,11 @@ def draw_machines(
                 f"{machine.name}: no uncertain number matches {pattern!r}; there are {', '.join(p.name for p in every)}"
             )
     parameters = tuple(one for one in every if any(fnmatchcase(one.name, pattern) for pattern in uncertain))
-    if count == 1 or not parameters:
+    if count > 1 and not parameters:
+        raise ParameterError(
+            f"{machine.name}: {count} machines, but no number to draw; name patterns of uncertain ones"
+        )
+    if count == 1:
         return Draws(parameters, np.zeros((count, len(parameters))))
     uniform = _uniform(design, count, len(parameters), seed)
     from scipy.stats import truncnorm
@@ -68,8 +74,6 @@ def _uniform(design: str, count: int, dimensions: int, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     if design == "lhs":
         return np.asarray(qmc.LatinHypercube(dimensions, seed=rng).random(count), float)
-    if design != "sobol":
-        raise UnknownNameError("design of an ensemble", design, DESIGNS)
     power = round(np.log2(count))
     if 2**power != count:
         below = 2 ** int(np.log2(count))

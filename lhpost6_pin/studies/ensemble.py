@@ -20,20 +20,20 @@ def run_ensemble(
     Results are the same bit by bit for any number of `jobs` (processes, -1: one a core), on a Dask cluster (address,
     or `workers.LOCAL`), and after an interruption. A run that fails is a row with its reason.
 
-    Raises ParameterError if the folder holds another ensemble, or the cluster does not respond.
+    Raises ParameterError if the folder holds another ensemble, or is being written, or the cluster does not respond.
     """
     store, report = BlockStore(folder, plan), progress or (lambda share: None)
     if store.whole:
         report(1.0)
         return store.results
-    missing, every = store.missing(), len(plan.blocks)
-    with workers(jobs, dask):
+    with store.locked(), workers(jobs, dask):
+        missing, every = store.missing(), len(plan.blocks)
         for done, (block, values) in enumerate(
             results_of(_numbered, ((block, block_inputs(plan, block)) for block in missing)), every - len(missing) + 1
         ):
             store.write(block, values)
             report(done / every)
-    return store.assemble()
+        return store.assemble()
 
 
 def _numbered(block: Block, inputs: BlockInputs) -> tuple[Block, dict[str, Array]]:

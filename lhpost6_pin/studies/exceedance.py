@@ -1,12 +1,13 @@
 """Probability of exceeding a limit against the scale of a motion, and the scale at which it reaches a stated risk.
 
-Every machine (and motion) of an ensemble runs at every scale; its demand over capacity reaches one at its critical
-scale, interpolated linearly between the two about it. Their distribution is a fragility curve: the share of critical
-scales up to a scale estimates the probability of exceedance there (Wilson intervals), and their quantiles are the
-scales of given risk (distribution-free intervals of order statistics).
+Every machine of an ensemble runs at every scale; its demand over capacity reaches one at its critical scale,
+interpolated linearly between the two about it. Their distribution is a fragility curve: the share of critical scales up
+to a scale estimates the probability of exceedance there (Wilson intervals), and their quantiles are the scales of given
+risk (distribution-free intervals of order statistics). Intervals are those of independent draws; of a Latin hypercube
+or a Sobol sequence they are somewhat too wide.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,10 @@ from .quantities import DECIDING
 __all__ = ["ANY", "Exceedance", "critical_scales", "exceedance", "exceedances"]
 
 ANY = "any limit"
-"""Of the deciding limits, or a run that stopped on the way."""
+"""The first of the deciding limits that were evaluated, or a run in trouble, such as one that stopped on the way."""
+
+Where = Literal["within", "at or below the smallest run", "beyond the largest run", "unknown"]
+"""Where the scale of a risk is, of those that were run."""
 
 
 class Exceedance(NamedTuple):
@@ -30,12 +34,13 @@ class Exceedance(NamedTuple):
     risk_scale: float  # at which the share is `level`; infinity: beyond the largest run
     risk_low: float  # of its interval; 0: with so few machines it has no lower bound
     risk_high: float
+    where: Where  # the scale of that share
 
 
 def critical_scales(use: Array, scales: Array) -> Array:
     """Scales (n,) at which demand over capacity `use` (s, n) at `scales` (s,), rising, first reaches one.
 
-    The first scale where that is beyond already; infinity where none is; not-a-number where a run before is missing.
+    The first scale where that is beyond already; infinity where none is; not-a-number where a demand before is missing.
     """
     beyond = use >= 1.0
     first = np.where(beyond.any(axis=0), beyond.argmax(axis=0), len(scales))
@@ -52,46 +57,47 @@ def critical_scales(use: Array, scales: Array) -> Array:
     return found
 
 
-def exceedance(limit: str, use: Array, scales: Array, *, level: float, confidence: float) -> Exceedance:
-    """Exceedance of one limit by demand over capacity `use` (s, n); machines with a missing run are left out."""
+def exceedance(limit: str, critical: Array, scales: Array, *, level: float, confidence: float) -> Exceedance:
+    """Exceedance of one limit by critical scales (n,) at `scales` (s,), rising; machines without one are left out."""
     from scipy.stats import binom, binomtest
 
-    critical = np.sort(critical_scales(use, scales))
-    critical = critical[~np.isnan(critical)]
+    critical = np.sort(critical[~np.isnan(critical)])
     n = len(critical)
     if n == 0:
         blank = np.full(len(scales), np.nan)
-        return Exceedance(limit, critical, blank, blank, blank, np.nan, np.nan, np.nan)
+        return Exceedance(limit, critical, blank, blank, blank, np.nan, np.nan, np.nan, "unknown")
     counts = np.array([int(np.sum(critical <= scale)) for scale in scales])
     ends = [binomtest(int(k), n).proportion_ci(confidence, method="wilson") for k in counts]
     tail = 0.5 * (1.0 - confidence)
-    rank = max(1, int(np.ceil(level * n)))
+    at = float(critical[max(1, int(np.ceil(level * n))) - 1])
     first, last = int(binom.ppf(tail, n, level)), int(binom.ppf(1.0 - tail, n, level)) + 1
+    where: Where = "beyond the largest run" if np.isinf(at) else "within"
     return Exceedance(
         limit,
         critical,
         counts / n,
         np.array([one.low for one in ends]),
         np.array([one.high for one in ends]),
-        float(critical[rank - 1]),
+        at,
         float(critical[first - 1]) if first >= 1 else 0.0,
         float(critical[last - 1]) if last <= n else float("inf"),
+        "at or below the smallest run" if at <= scales[0] else where,
     )
 
 
 def exceedances(
-    use: Array, stopped: Array, limits: tuple[str, ...], scales: Array, *, level: float, confidence: float
+    use: Array, trouble: Array, limits: tuple[str, ...], scales: Array, *, level: float, confidence: float
 ) -> tuple[Exceedance, ...]:
-    """Exceedance of any limit, then of each deciding one that some run has, by falling risk.
+    """Exceedance of any limit, then of each deciding one that some run has, by rising scale of that risk.
 
-    use (s, n, limits); stopped (s, n) are runs that stopped on the way: beyond some limit, whatever they had reached.
+    use (s, n, limits) at `scales` (s,), rising; trouble (s, n): runs with trouble are beyond some limit. The critical
+    scale of any limit is the least of a machine's, trouble counting from the scale at which it was found.
     """
     deciding = [k for k, limit in enumerate(limits) if limit in DECIDING]
-    known = [k for k in deciding if np.isfinite(use[..., k]).any()]
-    stated = {"level": level, "confidence": confidence}
-    found = [exceedance(limits[k], use[..., k], scales, **stated) for k in known]
-    with np.errstate(invalid="ignore"):
-        most = np.max(np.where(np.isnan(use[..., known]), -np.inf, use[..., known]), axis=-1, initial=-np.inf)
-    most = np.where(stopped, np.inf, np.where(np.isneginf(most), np.nan, most))
+    known = [k for k in deciding if not np.isnan(use[..., k]).all()]
+    critical = {limits[k]: critical_scales(use[..., k], scales) for k in known}
+    found = [exceedance(limit, own, scales, level=level, confidence=confidence) for limit, own in critical.items()]
+    troubled = np.where(trouble.any(axis=0), scales[trouble.argmax(axis=0)], np.nan)
+    first = np.fmin.reduce([*critical.values(), troubled])  # not-a-number only where nothing is known
     found.sort(key=lambda one: (one.risk_scale, -float(np.nansum(one.share))))
-    return exceedance(ANY, most, scales, **stated), *found
+    return exceedance(ANY, first, scales, level=level, confidence=confidence), *found

@@ -24,17 +24,22 @@ class Importance(NamedTuple):
 
     parameter: str
     first_order: float  # share of the result's variance
-    half_width: float  # of its interval
+    chance: float  # what the largest of all indices exceeds by chance alone, as rarely as intervals err
 
     @property
     def sure(self) -> bool:
-        """Whether its interval is above zero."""
-        return self.first_order > self.half_width
+        """Whether it is beyond chance."""
+        return self.first_order > self.chance
+
+
+FEWEST = 60
+"""Machines below which no index is estimated: chance alone would exceed a third of the variance."""
 
 
 def importances(names: list[str], coordinates: Array, result: Array, numbers: Parameters) -> tuple[Importance, ...]:
     """Indices of all numbers for a result (n,) of machines at `coordinates` (n, k), the largest first.
 
+    The level of chance is that of the largest index after permutations of the result, which follows from nothing then.
     Empty with too few finite results, or a result that does not vary. Raises ParameterError if SALib is not installed.
     """
     try:
@@ -45,17 +50,14 @@ def importances(names: list[str], coordinates: Array, result: Array, numbers: Pa
     y, x = result[some], coordinates[some]
     if len(y) < FEWEST or np.ptp(y) <= 1e-12 * np.abs(y).max():
         return ()
-    n = numbers.number
-    harmonics = min(int(n("importance.harmonics")), len(y) // 4 - 1)
+    harmonics = min(int(numbers.number("importance.harmonics")), len(y) // 4 - 1)
     problem = {"num_vars": len(names), "names": names, "bounds": np.stack([x.min(axis=0), x.max(axis=0)], 1).tolist()}
-    found = rbd_fast.analyze(
-        problem,
-        x,
-        y,
-        M=harmonics,
-        num_resamples=int(n("importance.resamples")),
-        conf_level=n("risk.confidence"),
-        seed=0,
-    )
-    rows = zip(names, found["S1"], found["S1_conf"], strict=True)
-    return tuple(sorted((Importance(a, float(b), float(c)) for a, b, c in rows), key=lambda one: -one.first_order))
+
+    def first_order(values: Array) -> Array:
+        return np.asarray(rbd_fast.analyze(problem, x, values, M=harmonics, num_resamples=2, seed=0)["S1"], float)
+
+    rng = np.random.default_rng(0)
+    largest = [first_order(rng.permutation(y)).max() for _ in range(int(numbers.number("importance.permutations")))]
+    chance = float(np.quantile(largest, numbers.number("risk.confidence")))
+    rows = zip(names, first_order(y).tolist(), strict=True)
+    return tuple(sorted((Importance(name, share, chance) for name, share in rows), key=lambda one: -one.first_order))

@@ -2,18 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
 
 import joblib
 
-from .. import __version__
 from ..control import ControllerSettings
 from ..core.errors import ParameterError
+from ..core.files import sources_digest
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
+from ..machine.user_specimen import UserSpecimen
 from ..mechanics.plant import make_plant
 from ..motions import GroundMotion, Target, make_target
+from ..simulation.motion_limits import refuse_blocked_axes
 from ..simulation.simulate import check_options, fastest_engine
 from .draws import Draws
 from .quantities import check_groups
@@ -52,7 +55,7 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class EnsemblePlan:
-    """What an ensemble runs; raises LhpostError for anything that no run could have.
+    """What an ensemble runs; raises LhpostError for what no run could have, such as a motion along axes that are held.
 
     Runs beyond the limits of the table are run all the same: at which scale they are exceeded is what is sought.
     """
@@ -80,13 +83,24 @@ class EnsemblePlan:
             raise ParameterError(f"{self.name}: scales {list(self.scales)}: each must be positive")
         if list(self.scales) != sorted(set(self.scales)):
             raise ParameterError(f"{self.name}: scales {list(self.scales)}: name each once, rising")
-        for machine in self.specimens.values():
-            check_options(make_plant(machine), plugged=False, **self.options(machine))
+        for label, machine in self.specimens.items():
+            if isinstance(machine.specimen, UserSpecimen):
+                raise ParameterError(
+                    f"{self.name}: specimen {label} is a program, which runs with one table at a time: `lhpost6 run`"
+                )
+            plant = make_plant(machine)
+            check_options(plant, plugged=False, **self.options[label])
+            for motion in self.motions.values():
+                refuse_blocked_axes(plant, motion.target(machine, self.scales[0]))
 
-    def options(self, machine: Machine) -> dict[str, Any]:
-        """Options of `simulate` for the machine with one of the specimens."""
-        engine = self.engine or fastest_engine(make_plant(machine))
-        return {"scheme": self.scheme, "steps_per_second": self.steps_per_second, "engine": engine}
+    @cached_property
+    def options(self) -> dict[str, dict[str, Any]]:
+        """Options of `simulate` by specimen."""
+        usual = {"scheme": self.scheme, "steps_per_second": self.steps_per_second}
+        engines = {
+            label: self.engine or fastest_engine(make_plant(machine)) for label, machine in self.specimens.items()
+        }
+        return {label: {**usual, "engine": engine} for label, engine in engines.items()}
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -107,8 +121,11 @@ class EnsemblePlan:
 
     @property
     def digest(self) -> str:
-        """Hash of everything that results follow from."""
+        """Hash of everything that results follow from, the package's own code among it."""
         stated = [getattr(self, name) for name in self.__dataclass_fields__]
+        ordered = [
+            list(one.items()) if isinstance(one, dict) else one for one in stated
+        ]  # hashes of dicts have no order
         mounted = (machine.specimen for machine in self.specimens.values() if machine.specimen is not None)
         files = [path.read_bytes() for one in mounted for path in one.files]
-        return str(joblib.hash((__version__, stated, files)))
+        return str(joblib.hash((sources_digest(), ordered, files)))

@@ -82,9 +82,9 @@ def plan_from(entries: Mapping[str, Any], folder: Path, source: str) -> Ensemble
     machine = load_machine(_place(entries.get("machine", "lhpost6"), folder), override and folder / override)
     draws = draw_machines(
         machine,
-        _positive(entries, "machines", 1, source),
+        _at_least(1, entries, "machines", 1, source),
         design=entries.get("draw", DESIGNS[0]),
-        seed=entries.get("seed", 0),
+        seed=_at_least(0, entries, "seed", 0, source),
         reach=numbers.number("draw.reach"),
         uncertain=entries.get("uncertain", ["*"]),
     )
@@ -105,7 +105,7 @@ def plan_from(entries: Mapping[str, Any], folder: Path, source: str) -> Ensemble
         groups=tuple(entries.get("quantities", DEFAULT)),
         numbers=numbers,
         scheme=entries.get("scheme", SCHEMES[0]),
-        steps_per_second=_positive(entries, "rate", 4 * SAMPLE_RATE, source),
+        steps_per_second=_at_least(1, entries, "rate", 4 * SAMPLE_RATE, source),
         engine=entries.get("engine"),
     )
 
@@ -122,18 +122,22 @@ def _check(entries: Mapping[str, Any], kinds: Mapping[str, tuple[type, ...]], wh
     for key in ("scales", "at", "rpy"):
         if any(isinstance(x, bool) or not isinstance(x, int | float) for x in entries.get(key, [])):
             raise ParameterError(f"{where}: {key} is {entries[key]!r}; give numbers")
+    for key in ("uncertain", "quantities", "files"):
+        if not all(isinstance(x, str) for x in entries.get(key, [])):
+            raise ParameterError(f"{where}: {key} is {entries[key]!r}; give texts")
 
 
-def _positive(entries: Mapping[str, Any], key: str, default: int, source: str) -> int:
+def _at_least(least: int, entries: Mapping[str, Any], key: str, default: int, source: str) -> int:
     value: int = entries.get(key, default)
-    if value < 1:
-        raise ParameterError(f"{source}: {key} is {value}; give one at least")
+    if value < least:
+        raise ParameterError(f"{source}: {key} is {value}; give {least} at least")
     return value
 
 
 def _place(name: str, folder: Path) -> str:
-    """A shipped name as it is, a file beside the plan with its folder."""
-    return str(folder / name) if Path(name).suffix else name
+    """A shipped name as it is, a file (with what follows a colon) beside the plan with its folder."""
+    file, colon, rest = name.partition(":")
+    return f"{folder / file}{colon}{rest}" if Path(file).suffix else name
 
 
 def _labelled(pairs: Sequence[tuple[str, Any]], kind: str, source: str) -> dict[str, Any]:

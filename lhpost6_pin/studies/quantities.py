@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
-from ..core.errors import LhpostError, UnknownNameError
+from ..core.errors import OutOfRangeError, UnknownNameError
 from ..core.names import AXES
 from ..data.metrics import QUANTITIES, channel, peaks, sampling, spool_use, track
 from ..machine.parameters import Parameters
@@ -17,7 +17,18 @@ from ..simulation.motion_limits import judge_record
 from ..simulation.simulate import Run
 from ..simulation.specimen_response import base_wrench
 
-__all__ = ["DECIDING", "DEFAULT", "GROUPS", "LIMITS", "Variable", "check_groups", "evaluate", "periods_of", "psa"]
+__all__ = [
+    "DECIDING",
+    "DEFAULT",
+    "GROUPS",
+    "LIMITS",
+    "OF_LIMITS",
+    "Variable",
+    "check_groups",
+    "evaluate",
+    "periods_of",
+    "psa",
+]
 __all__ += ["variables_of"]
 
 _RECORDED = (*QUANTITIES, "actuator stroke", "actuator velocity", "push", "pull", "spool")
@@ -79,9 +90,9 @@ def _shares(uses: Sequence[LimitUse]) -> Array:
 
 def _strengths(one: Evaluated) -> dict[str, Array]:
     try:
-        found = judge_record(one.run.plant, one.record)
-    except LhpostError:  # the table cannot hold what is mounted at rest
-        found = None
+        found = judge_record(one.run.plant, one.record, fits=False)
+    except OutOfRangeError as error:  # beyond it at rest already
+        return {"limit_use": _shares([LimitUse(limit, "", np.inf, np.inf) for limit in error.exceeded])}
     return {"limit_use": _shares([] if found is None else uses_of_peaks(found.peaks))}
 
 
@@ -138,8 +149,11 @@ GROUPS: Mapping[str, tuple[Callable[[Evaluated], dict[str, Array]], Mapping[str,
 }
 """Groups of quantities: how they are evaluated, and their variables."""
 
+OF_LIMITS = ("limits", "strengths")
+"""Groups of demand over capacity."""
+
 DEFAULT = ("tracking", "limits", "forces", "spectra", "base")
-"""Groups kept unless others are named: `strengths`, by inverse dynamics, takes half as long as the run."""
+"""Groups kept unless others are named: `strengths`, by inverse dynamics of the achieved motion, takes longest."""
 
 
 def check_groups(groups: Sequence[str]) -> None:

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy.linalg  # noqa: F401  loaded before its threads are limited
+from threadpoolctl import threadpool_limits
 
 from ..control import ControllerSettings
 from ..core.arrays import Array
@@ -18,7 +20,7 @@ from ..machine.parameters import Parameters
 from ..motions import Target
 from ..simulation.rehearse import rehearse
 from .plan import Block, EnsemblePlan, PlannedMotion
-from .quantities import LIMITS, evaluate, periods_of, psa, variables_of
+from .quantities import LIMITS, OF_LIMITS, evaluate, periods_of, psa, variables_of
 
 __all__ = ["BlockInputs", "block_inputs", "labels_of", "run_block"]
 
@@ -52,7 +54,7 @@ def block_inputs(plan: EnsemblePlan, block: Block) -> BlockInputs:
         plan.draws.coordinates[block.first : block.last],
         plan.groups,
         plan.numbers,
-        plan.options(machine),
+        plan.options[list(plan.specimens)[specimen]],
     )
 
 
@@ -66,7 +68,7 @@ def run_block(inputs: BlockInputs) -> dict[str, Array]:
     """Quantities (k, ...) of the k runs of a block by name.
 
     Beside them `seconds` simulated, and in words `trouble` of a run and `failure` of one that could not be made; what
-    these lack is not-a-number. Of a run that stopped on the way only the demand on limits is kept, up to there. Of the
+    these lack is not-a-number. Of a run that stopped on the way only limits that it had reached are kept. Of the
     target, its `duration` [s] and, with spectra, `target_psa` (directions, periods).
     """
     sizes = {name: len(labels) for name, labels in labels_of(inputs.machine, inputs.numbers).items()}
@@ -77,7 +79,7 @@ def run_block(inputs: BlockInputs) -> dict[str, Array]:
         target = inputs.motion.target(inputs.machine, inputs.scale)
     except LhpostError as error:
         failure = str(error)
-    with _quiet():
+    with _quiet(), threadpool_limits(1):  # with another number of threads sums of linear algebra round otherwise
         for coordinates in inputs.coordinates:
             found = {"failure": failure} if target is None else _run(inputs, target, coordinates)
             blank = {name: np.full(shape, np.nan) for name, shape in wanted.items()}
@@ -96,11 +98,13 @@ def _run(inputs: BlockInputs, target: Target, coordinates: Array) -> dict[str, A
     try:
         machine = with_parameters(inputs.machine, inputs.parameters, coordinates)
         test = rehearse(machine, target, inputs.settings, attrs={}, beyond_limits=True, **inputs.options)
-        found: dict[str, Any] = dict(evaluate(inputs.groups, test.run, test.record, inputs.numbers))
-    except (LhpostError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+        stopped = len(test.run.time) < len(target.time)
+        groups = [group for group in inputs.groups if not stopped or group in OF_LIMITS]
+        found: dict[str, Any] = dict(evaluate(groups, test.run, test.record, inputs.numbers))
+    except Exception as error:  # whatever one of many runs ends with is its row, and ends no other
         return {"failure": f"{type(error).__name__}: {error}"}
-    if len(test.run.time) < len(target.time):  # metrics of a part are not those of the motion
-        found = {name: values for name, values in found.items() if name == "limit_use"}
+    if stopped and "limit_use" in found:  # what was within its limit so far might not have stayed so
+        found["limit_use"] = np.where(found["limit_use"] >= 1.0, found["limit_use"], np.nan)
     return {**found, "seconds": len(test.run.time) / test.run.rate, "trouble": test.run.trouble or ""}
 
 

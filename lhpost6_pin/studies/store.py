@@ -4,8 +4,11 @@ Blocks are written whole or not at all, so that an ensemble that was interrupted
 The netCDF file is put together block by block: memory does not grow with the number of runs.
 """
 
+import fcntl
 import shutil
-from collections.abc import Mapping, Sequence
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +29,7 @@ __all__ = ["BlockStore", "RESULTS", "open_results"]
 RESULTS = "ensemble.nc"
 """File of an ensemble's results in its folder."""
 
-_BLOCKS, _PLAN = "blocks", "plan.txt"
+_BLOCKS, _LOCK = "blocks", "lock"
 
 _TARGET = {
     "duration": (("motion",), Variable((), "s", "duration of the target")),
@@ -50,12 +53,13 @@ class BlockStore:
     def __init__(self, folder: Path, plan: EnsemblePlan) -> None:
         """Raise ParameterError if the folder holds another ensemble, begun or whole."""
         self.folder, self.plan, self.digest = folder, plan, plan.digest
-        own = folder / _BLOCKS / _PLAN
-        stated = own.read_text(encoding="utf-8").strip() if own.is_file() else None
-        if stated is None and self.whole:
+        self.blocks = folder / f"{_BLOCKS}-{self.digest[:16]}"
+        begun = (other for other in folder.glob(f"{_BLOCKS}-*") if other != self.blocks)
+        others = [other for other in begun if any(other.glob("*.npz"))]
+        if self.whole:
             with h5netcdf.File(self.results) as file:
-                stated = str(file.attrs.get("plan", ""))
-        if stated not in (None, self.digest):
+                others += [self.results] * (str(file.attrs.get("plan", "")) != self.digest)
+        if others:
             raise ParameterError(
                 f"{folder}: holds an ensemble of another plan, or of another version; name another folder with --out, "
                 "or delete it"
@@ -73,14 +77,29 @@ class BlockStore:
 
     def missing(self) -> list[Block]:
         """Blocks that are not there yet."""
-        return [block for block in self.plan.blocks if not self._path(block).is_file()]
+        return [block for block in self.plan.blocks if not self._readable(block)]
+
+    def _readable(self, block: Block) -> bool:
+        """Whether a block is there, and not damaged."""
+        try:
+            with np.load(self._path(block)) as values:
+                return "failure" in values
+        except (OSError, EOFError, ValueError, zipfile.BadZipFile):
+            return False
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Alone in the folder; raises ParameterError if another command writes there."""
+        self.blocks.mkdir(parents=True, exist_ok=True)
+        with (self.blocks / _LOCK).open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise ParameterError(f"{self.folder}: another command writes this ensemble; wait for its end") from None
+            yield
 
     def write(self, block: Block, values: Mapping[str, Array]) -> None:
         """Write a block's results."""
-        own = self.folder / _BLOCKS / _PLAN
-        if not own.is_file():
-            with write_whole(own) as beside:
-                beside.write_text(self.digest + "\n", encoding="utf-8")
         with write_whole(self._path(block)) as beside, beside.open("wb") as file:
             np.savez(file, **values)  # type: ignore[arg-type]
 
@@ -92,11 +111,11 @@ class BlockStore:
                 for block in self.plan.blocks:
                     with np.load(self._path(block)) as values:
                         _put(file, block, values)
-        shutil.rmtree(self.folder / _BLOCKS)
+        shutil.rmtree(self.blocks)
         return self.results
 
     def _path(self, block: Block) -> Path:
-        return self.folder / _BLOCKS / f"{block.number:06d}.npz"
+        return self.blocks / f"{block.number:06d}.npz"
 
 
 def open_results(path: Path) -> xr.Dataset:
@@ -125,7 +144,8 @@ def _describe(file: Any, plan: EnsemblePlan, digest: str) -> None:
         "parameter": [parameter.name for parameter in plan.draws.parameters],
         **labels_of(plan.machine, plan.numbers),
     }
-    file.attrs.update(name=plan.name, table=plan.machine.name, plan=digest)
+    file.attrs.update(name=plan.name, table=plan.machine.name, plan=digest, groups=" ".join(plan.groups))
+    file.attrs["damping"] = plan.numbers.number("spectrum.damping")
     file.dimensions = {name: len(values) for name, values in labels.items() if len(values)}
     for name, values in labels.items():
         if len(values):
@@ -136,12 +156,12 @@ def _describe(file: Any, plan: EnsemblePlan, digest: str) -> None:
         made.attrs.update(units=variable.units, long_name=variable.long_name)
     for name, (dims, variable) in _TARGET.items():
         if name == "duration" or "psa" in file.variables:
-            made = file.create_variable(name, (*dims, *variable.dims), "f8")
+            made = file.create_variable(name, (*dims, *variable.dims), "f8", fillvalue=np.nan)
             made.attrs.update(units=variable.units, long_name=variable.long_name)
     if plan.draws.parameters:
-        about = {"coordinate": plan.draws.coordinates, "value": plan.draws.values}
-        for name, values in about.items():
-            _variable(file, name, ("machine", "parameter"), values, "1", f"{name} of an uncertain number")
+        own, words = ("machine", "parameter"), "of an uncertain number"
+        _variable(file, "value", own, plan.draws.values, "as `unit` says", f"value {words}")
+        _variable(file, "coordinate", own, plan.draws.coordinates, "as `unit` says, or relative", f"coordinate {words}")
         _variable(file, "unit", ("parameter",), [p.unit for p in plan.draws.parameters], "1", "unit of its value")
         _variable(file, "sd", ("parameter",), [p.sd for p in plan.draws.parameters], "1", "deviation of its coordinate")
 

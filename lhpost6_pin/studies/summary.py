@@ -58,8 +58,9 @@ class ImportanceOf(NamedTuple):
 
 
 class Configuration(NamedTuple):
-    """Exceedance of limits with one specimen and controller, all motions and machines together."""
+    """Exceedance of limits by a motion, with one specimen and controller, over machines."""
 
+    motion: str
     specimen: str
     controller: str
     exceedances: tuple[Exceedance, ...]  # of any limit, then of each
@@ -73,6 +74,7 @@ class EnsembleSummary(NamedTuple):
     runs: int
     failures: Mapping[str, int]  # runs that could not be made, by reason
     troubles: Mapping[str, int]  # runs with trouble, likewise
+    groups: tuple[str, ...]  # of quantities that were evaluated
     stopped: int  # runs that stopped on the way
     scales: Array
     spreads: tuple[Spread, ...]
@@ -108,6 +110,7 @@ def summarise(results: xr.Dataset, numbers: Parameters) -> EnsembleSummary:
         runs=int(results["seconds"].size),
         failures=failures,
         troubles=troubles,
+        groups=tuple(str(results.attrs["groups"]).split()),
         stopped=int(_stopped(results).sum()),
         scales=scales,
         spreads=tuple(spreads),
@@ -144,7 +147,7 @@ def _results(results: xr.Dataset) -> Iterator[tuple[str, str, Array]]:
     if "limit_use" in results:
         values, limits = results["limit_use"].values, list(map(str, results["limit"].values))
         for k, limit in enumerate(limits):
-            if np.isfinite(values[..., k]).any():
+            if not np.isnan(values[..., k]).all():
                 yield f"demand over capacity, {limit}", "1", values[..., k]
 
 
@@ -176,18 +179,16 @@ def _spreads(results: xr.Dataset, result: str, units: str, values: Array) -> Ite
 def _configurations(results: xr.Dataset, numbers: Parameters) -> tuple[Configuration, ...]:
     if "limit_use" not in results:
         return ()
-    use, stopped = results["limit_use"].values, _stopped(results)
-    limits = tuple(map(str, results["limit"].values))
+    use, trouble = results["limit_use"].values, _stopped(results) | (results["trouble"].values.astype(str) != "")
+    limits, found = tuple(map(str, results["limit"].values)), []
     scales = results["scale"].values.astype(float)
     level, confidence = numbers.number("risk.level"), numbers.number("risk.confidence")
-    found = []
-    for s, specimen in enumerate(results["specimen"].values):
-        for c, controller in enumerate(results["controller"].values):
-            # motions and machines together: (scale, motion, machine, ...) to (scale, n, ...)
-            own, ends = (np.moveaxis(x[:, :, s, c], 1, 0) for x in (use, stopped))
-            together = own.reshape(len(scales), -1, len(limits)), ends.reshape(len(scales), -1)
-            risks = exceedances(*together, limits, scales, level=level, confidence=confidence)
-            found.append(Configuration(str(specimen), str(controller), risks))
+    for m, motion in enumerate(results["motion"].values):
+        for s, specimen in enumerate(results["specimen"].values):
+            for c, controller in enumerate(results["controller"].values):
+                own = use[m, :, s, c], trouble[m, :, s, c]
+                risks = exceedances(*own, limits, scales, level=level, confidence=confidence)
+                found.append(Configuration(str(motion), str(specimen), str(controller), risks))
     return tuple(found)
 
 

@@ -23,14 +23,13 @@ LOCAL = "local"
 def workers(jobs: int = -1, dask: str | None = None) -> Iterator[None]:
     """Where `results_of` computes: `jobs` processes (-1: one a core), or the Dask cluster at an address or `LOCAL`.
 
-    Libraries of linear algebra get one thread in every worker: with another number, sums are rounded otherwise. Raises
-    ParameterError where Dask is not installed or nothing responds at the address.
+    Raises ParameterError where Dask is not installed or nothing responds at the address.
     """
     if dask is None:
         with parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
             yield
         return
-    with _client(jobs, dask), parallel_config("dask"):  # a worker of Dask has one such thread as it is
+    with _client(jobs, dask), parallel_config("dask"):
         yield
 
 

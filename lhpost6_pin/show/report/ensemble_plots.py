@@ -35,12 +35,12 @@ def exceedance_figure(name: str, found: Configuration, scales: np.ndarray, level
     curves += [_curve(one, scales, line) for one, line in zip(shown, palette(len(shown)), strict=True)]
     panel = Panel("Probability of exceedance", curves, span=(-0.02, 1.04), lines={f"{100 * level:g} %": level})
     words = (
-        "Share of motions and machines whose demand has reached a limit, between the scales that were run by linear "
+        "Share of machines whose demand has reached a limit, between the scales that were run by linear "
         "interpolation of each demand; points: any limit at the scales run, with its interval."
     )
     margin = 0.04 * (scales[-1] - scales[0])
     axis = XAxis("Scale of the motion", span=(scales[0] - margin, scales[-1] + margin))
-    title = f"Risk against scale: specimen {found.specimen}, controller {found.controller}"
+    title = f"Risk against scale: {found.motion}, specimen {found.specimen}, controller {found.controller}"
     figure = chart_figure(name, title, words, [panel], axis, row_height=300)
     ends = {"array": any_limit.high - any_limit.share, "arrayminus": any_limit.share - any_limit.low}
     bars = {"type": "data", "symmetric": False, "thickness": 1.4, **{k: x.tolist() for k, x in ends.items()}}
@@ -76,31 +76,37 @@ def demand_figure(results: xr.Dataset, scale: int) -> Figure:
         for limit, line in zip(order, palette(len(order)), strict=True)
     ]
     words = (
-        f"All runs at scale {float(results['scale'][scale]):g}: quartiles and range (points: beyond 1.5 times "
-        "the quartiles' distance). Dotted: capacity."
+        f"All runs at scale {float(results['scale'][scale]):g}, of all motions, specimens and controllers: "
+        "quartiles and range (points: beyond 1.5 times the quartiles' distance). Dotted: capacity."
     )
     return Figure("demand", "Demand over capacity", words, traces, layout, layout["height"])
 
 
 def spectra_figures(results: xr.Dataset, scale: int) -> list[Figure]:
-    """Return response spectra of the first motions at one scale: target, and quantiles of what machines achieved."""
+    """Return response spectra at one scale, of the first motions, specimens and controllers.
+
+    Target, and quantiles of what machines achieved.
+    """
     figures, periods = [], results["period"].values
-    unit = SCALES["acceleration"]
-    for m, motion in enumerate(results["motion"].values[:MOST_MOTIONS]):
-        target, achieved = results["target_psa"][m, scale, 0].values, results["psa"][m, scale, 0, 0].values
+    unit, names = SCALES["acceleration"], ("motion", "specimen", "controller")
+    labels = [list(map(str, results[name].values)) for name in names]
+    for k, (m, s, c) in enumerate(list(np.ndindex(*map(len, labels)))[:MOST_MOTIONS]):
+        target, achieved = results["target_psa"][m, scale, s].values, results["psa"][m, scale, s, c].values
         panels = []
-        for k, axis in enumerate(map(str, results["direction"].values)):
-            own = achieved[:, k][np.isfinite(achieved[:, k]).all(axis=-1)]
-            if not own.size or not np.nanmax(target[k], initial=0.0) > 0.0:
+        for d, axis in enumerate(map(str, results["direction"].values)):
+            own = achieved[:, d][np.isfinite(achieved[:, d]).all(axis=-1)]
+            if not own.size or not np.nanmax(target[d], initial=0.0) > 0.0:
                 continue
             low, middle, high = unit.factor * np.quantile(own, QUANTILES, axis=0)
-            curves = [Curve("target", periods, unit.factor * target[k], TARGET)]
+            curves = [Curve("target", periods, unit.factor * target[d], TARGET)]
             curves += [Curve("median", periods, middle, ACHIEVED)]
             curves += [Curve(_between(), periods, x, BAND) for x in (low, high)]
             panels.append(Panel(f"{axis_title(axis)}: PSA [{unit.unit}]", curves, from_zero=True))
         if panels:
-            words = f"Pseudo-spectral acceleration, 5 % damping, at scale {float(results['scale'][scale]):g}."
-            figures.append(chart_figure(f"psa-{m}", str(motion), words, panels, PERIOD_AXIS, row_height=ROW - 60))
+            damping = f"{100 * float(results.attrs['damping']):g} % damping"
+            words = f"Pseudo-spectral acceleration, {damping}, at scale {float(results['scale'][scale]):g}."
+            title = f"{labels[0][m]}, specimen {labels[1][s]}, controller {labels[2][c]}"
+            figures.append(chart_figure(f"psa-{k}", title, words, panels, PERIOD_AXIS, row_height=ROW - 60))
     return figures
 
 

@@ -13,7 +13,7 @@ from .scales import percent
 
 __all__ = ["write_ensemble_report"]
 
-MOST = 6  # specimens and controllers whose risk is drawn; all are in the table
+MOST = 6  # motions, specimens and controllers whose risk is drawn; all are in the table
 TRACKED = "acceleration RRMSE, delay removed, worst axis"
 
 
@@ -54,12 +54,11 @@ def _count(number: int, name: str) -> str:
 def _headlines(found: EnsembleSummary, scale: int, failed: int) -> list[Headline]:
     whole: Level = "bad" if failed else "attention" if found.stopped else "good"
     headlines = [Headline(f"{found.runs - failed - found.stopped}", "whole runs", f"of {found.runs}", whole)]
-    for own in found.configurations[:2]:
+    for own in found.configurations[:1]:
         one = own.exceedances[0]
         level: Level = "good" if not one.share[scale] > found.level else "attention"
-        note = (
-            f"{percent(float(one.low[scale]))} to {percent(float(one.high[scale]))}; {own.specimen}, {own.controller}"
-        )
+        ends = " to ".join(percent(float(end[scale])) for end in (one.low, one.high))
+        note = f"{ends}; {own.motion}, specimen {own.specimen}, controller {own.controller}"
         label = f"probability of reaching any limit at scale {found.scales[scale]:g}"
         headlines.append(Headline(percent(float(one.share[scale])), label, note, level))
     at = [s for s in found.spreads if s.result == TRACKED and s.scale == found.scales[scale]]
@@ -105,7 +104,8 @@ def _importance_blocks(found: EnsembleSummary) -> list[Block]:
         cells.setdefault(one[:4], []).append(one)
     words = (
         "First-order Sobol indices by random balance designs (RBD-FAST), at the scale nearest to "
-        "one; ± is the half width of the bootstrap interval. Numbers whose index is within it are not named."
+        "one. Chance is what the largest index of a permuted result exceeds in one case of twenty; smaller ones are "
+        "not named."
     )
     figures = [importance_figure(f"importance-{k}", own) for k, own in enumerate(list(cells.values())[:4])]
     return [*figures, words, importance_table(found)]

@@ -16,7 +16,7 @@ from scipy.stats import multivariate_normal
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ParameterError, RecordError, UnknownNameError
-from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.core.files import models_folder, sources_digest
 from lhpost6_pin.data.campaign import Campaign, save_campaign
 from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.records import FULL_SCALE
@@ -25,7 +25,7 @@ from lhpost6_pin.discovery import Discovery, discover, verdict_entries, withdraw
 from lhpost6_pin.discovery.acceptance import Lowered, refusal, share_explained
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
-from lhpost6_pin.discovery.checkpoint import _sources, make_checkpoint
+from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.contest import _complexity, loss_without
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed
@@ -908,13 +908,13 @@ def test_another_state_of_the_package_does_not_go_on_from_there(machine, tmp_pat
     """Its machine may lack an attribute that the code reads since: a search of small_table ended in a traceback."""
     before = make_checkpoint(tmp_path, machine).path
     assert make_checkpoint(tmp_path, machine).path == before
-    monkeypatch.setattr("lhpost6_pin.discovery.checkpoint._sources", lambda *folders: "as edited")
+    monkeypatch.setattr("lhpost6_pin.discovery.checkpoint.sources_digest", lambda: "as edited")
     assert make_checkpoint(tmp_path, machine).path != before
     digests = set()
     for name, text in product(("module.py", "numbers.toml"), ("a = 1", "a = 2")):
         (tmp_path / name).write_text(text)
-        _sources.cache_clear()
-        digests.add(_sources(tmp_path))
+        sources_digest.cache_clear()
+        digests.add(sources_digest(tmp_path))
     assert len(digests) == 4
 
 

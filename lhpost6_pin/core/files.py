@@ -29,13 +29,12 @@ def models_folder() -> Path:
 
 
 @cache
-def sources_digest() -> str:
-    """Digest of the package's modules and data files: what was made by another state of it may differ."""
+def sources_digest(*folders: Path) -> str:
+    """Digest of modules and data files in folders, the package's by default: another state of it may make others."""
     digest = hashlib.sha256()
+    folders = folders or (Path(__file__).parents[1], models_folder())
     for pattern in ("*.py", "*.toml"):
-        for source in sorted(
-            one for folder in (Path(__file__).parents[1], models_folder()) for one in folder.rglob(pattern)
-        ):
+        for source in sorted(one for folder in folders for one in folder.rglob(pattern)):
             digest.update(source.read_bytes())
     return digest.hexdigest()
 

@@ -22,7 +22,7 @@ def ensemble(
     plan: Annotated[
         list[str],
         typer.Argument(
-            help="Plan (a TOML file with [[motion]]), or motions, each by name or from one file.",
+            help=r"Plan (a TOML file with \[\[motion]]), or motions, each by name or from one file.",
             autocompletion=complete_motion,
         ),
     ],

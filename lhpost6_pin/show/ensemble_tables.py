@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..studies.exceedance import Exceedance
-from ..studies.quantities import OF_LIMITS
 from ..studies.summary import EnsembleSummary, ImportanceOf, Spread
 from .report.page import Table, number
 from .report.scales import SCALES, Scale
@@ -25,15 +24,15 @@ def ensemble_verdict(found: EnsembleSummary) -> str:
     sentences = ["".join(words) + "."]
     many = len(found.configurations) > 1
     if many:
-        sentences.append(f"Of {len(found.configurations)} motions with a specimen and a controller, the worst:")
+        sentences.append(f"The worst of {len(found.configurations)} configurations:")
     worst = sorted(
         found.configurations, key=lambda own: (own.exceedances[0].risk_scale, -own.exceedances[0].share.max())
     )
     for one in worst[:1]:
         which = f" ({one.motion}, specimen {one.specimen}, controller {one.controller})" if many else ""
         sentences.append(f"{_risk_words(one.exceedances[0], found)}{which}.")
-    if found.configurations:
-        sentences.append(f"Limits evaluated: {', '.join(g for g in found.groups if g in OF_LIMITS)}.")
+    if found.configurations and "strengths" not in found.groups:
+        sentences.append("Strengths and the unloading of actuators were not evaluated (group strengths).")
     return " ".join(sentences)
 
 
@@ -46,7 +45,9 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
         return f"At scale {found.scales[0]:g}, {share} of the runs reach {one.limit}"
     risk = f"The risk of reaching {one.limit} is {_percent(found.level)}"
     if one.where == "beyond the largest run":
-        return f"{risk} beyond scale {found.scales[-1]:g}, the largest run"
+        n = len(one.critical)
+        few = f"{round(float(one.share[-1]) * n)} of {n} machines reach {one.limit} up to scale {found.scales[-1]:g}"
+        return f"{few}, the largest run: the risk there is at most {_percent(one.high[-1])}"
     if one.where == "at or below the smallest run":
         return f"{risk} or more at scale {found.scales[0]:g} already, the smallest run"
     low = f"{one.risk_low:.3g} to " if one.risk_low else "too few machines for a lower bound; up to "

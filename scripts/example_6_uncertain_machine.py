@@ -16,7 +16,7 @@ from rich.table import Table
 
 from lhpost6_pin.cli import run_script
 from lhpost6_pin.studies.ensemble import run_ensemble
-from lhpost6_pin.studies.exceedance import exceedance
+from lhpost6_pin.studies.exceedance import critical_scales, exceedance
 from lhpost6_pin.studies.importance import importances
 from lhpost6_pin.studies.plan_file import plan_from
 from lhpost6_pin.studies.store import open_results
@@ -50,8 +50,8 @@ def main(
         Console(width=120).print(table)
 
         # 4. The risk of a saturated valve: demand over capacity (scale, machine) of the limit called spool
-        use = runs["limit_use"].sel(limit="spool").values
-        spool = exceedance("spool", use, runs["scale"].values, level=0.05, confidence=0.95)
+        critical = critical_scales(runs["limit_use"].sel(limit="spool").values, runs["scale"].values)
+        spool = exceedance("spool", critical, runs["scale"].values, level=0.05, confidence=0.95)
         for scale, share in zip(runs["scale"].values, spool.share, strict=True):
             print(f"probability of a saturated valve at scale {scale:g}: {share:.0%}")
 
@@ -59,7 +59,7 @@ def main(
         names = [str(name) for name in runs["parameter"].values] if "parameter" in runs else []
         found = importances(names, runs["coordinate"].values, force.values[-1], plan.numbers)
         for one in found[:3]:
-            print(f"{one.parameter} explains {one.first_order:.2f} of the variance, +- {one.half_width:.2f}")
+            print(f"{one.parameter} explains {one.first_order:.2f} of the variance; by chance up to {one.chance:.2f}")
 
         # 6. Anything else with xarray, such as a table for another program
         np.savetxt(out / "forces.csv", force.values.T, "%.9g", ",", header=scales, comments="")

@@ -130,13 +130,13 @@ def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | Non
     shares = _deciding(target, check, high) if check else np.zeros(len(target.time))
     if check is None or shares.max() <= _FULL:
         return _round_down(high * abs(target.reference.scale))
-    governing = shares >= (_GOVERNING * shares.max() if np.isfinite(shares.max()) else 0.0)
+    share, governing = float(shares.max()), np.zeros(len(shares), bool)
     while True:
-        found = _bracketed(target, check, high, float(shares.max()), governing)
-        beyond = _deciding(target, check, found, slice(None)) > _FULL if found > 0.0 else np.zeros(len(shares), bool)
-        if not (beyond & ~governing).any():
+        governing |= shares >= (_GOVERNING * shares.max() if np.isfinite(shares.max()) else 0.0)
+        found = _bracketed(target, check, high, share, governing)
+        shares = _deciding(target, check, found) if found > 0.0 else np.zeros(len(shares))
+        if not ((shares > _FULL) & ~governing).any():
             return _round_down(found * abs(target.reference.scale))
-        governing = governing | beyond
 
 
 def _bracketed(target: Target, check: MotionCheck, high: float, share: float, governing: np.ndarray) -> float:

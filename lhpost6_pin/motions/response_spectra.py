@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.compiled import compiled
-
 __all__ = ["ResponseSpectrum", "response_spectrum"]
 
 
@@ -33,6 +31,8 @@ def response_spectrum(
 
     Raises ValueError for a time step that is not positive, a period below it, or damping outside [0, 1).
     """
+    from .oscillators import fill_peaks  # compiled: motions that need no spectrum need no compiler
+
     acceleration = np.asarray(acceleration, dtype=float)
     periods = np.atleast_1d(np.asarray(periods, dtype=float))
     if acceleration.ndim != 1 or len(acceleration) < 2:
@@ -42,27 +42,9 @@ def response_spectrum(
     frequency = 2 * np.pi / periods
     peaks = np.full_like(periods, np.nan)  # of an acceleration with gaps
     if np.isfinite(acceleration).all():
-        _fill_peaks(np.ascontiguousarray(acceleration), *_recurrence(frequency * time_step, damping), peaks)
+        fill_peaks(np.ascontiguousarray(acceleration), *_recurrence(frequency * time_step, damping), peaks)
     displacement = peaks * time_step**2
     return ResponseSpectrum(periods, displacement, displacement * frequency, displacement * frequency**2)
-
-
-@compiled
-def _fill_peaks(acceleration, transition, before, after, peaks):  # type: ignore[no-untyped-def]
-    """Largest |u| (m,) of each oscillator, from rest: u[0] = u'[0] = 0 whatever a[0] is."""
-    m = peaks.size
-    a11, a12 = transition[:, 0, 0].copy(), transition[:, 0, 1].copy()
-    a21, a22 = transition[:, 1, 0].copy(), transition[:, 1, 1].copy()
-    b0, b1, c0, c1 = before[:, 0].copy(), before[:, 1].copy(), after[:, 0].copy(), after[:, 1].copy()
-    u, v = np.zeros(m), np.zeros(m)
-    peaks[:] = 0.0
-    for k in range(acceleration.size - 1):
-        first, second = acceleration[k], acceleration[k + 1]
-        for i in range(m):  # several oscillators at once
-            moved = a11[i] * u[i] + a12[i] * v[i] + b0[i] * first + c0[i] * second
-            v[i] = a21[i] * u[i] + a22[i] * v[i] + b1[i] * first + c1[i] * second
-            u[i] = moved
-            peaks[i] = max(peaks[i], abs(moved))
 
 
 def _recurrence(angle: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,6 +2,10 @@
 
 import hashlib
 import json
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -284,6 +288,19 @@ def test_an_interrupted_ensemble_goes_on_to_the_same_file(sines, tmp_path):
     assert len(shares) == len(made.blocks) - len(blocks) + 1 and shares[-1] == 1.0
     assert digest(tmp_path / "ensemble.nc") == digest(path) and not store.blocks.exists()
     assert run_ensemble(made, tmp_path, jobs=1) == tmp_path / "ensemble.nc"  # whole: nothing is run
+
+
+@pytest.mark.long
+def test_a_killed_ensemble_goes_on_to_the_same_file(sines, tmp_path):
+    made, path = sines
+    code = "import sys; from test_ensemble import *; run_ensemble(plan(), Path(sys.argv[1]), jobs=1)"
+    killed = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], cwd=Path(__file__).parent)
+    while killed.poll() is None and not any(tmp_path.glob("blocks-*/0*.npz")):
+        time.sleep(0.01)
+    killed.kill()
+    assert killed.wait() == -signal.SIGKILL
+    assert 0 < len(list(tmp_path.glob("blocks-*/0*.npz"))) < len(made.blocks)
+    assert digest(run_ensemble(made, tmp_path, jobs=1)) == digest(path)
 
 
 @pytest.mark.long

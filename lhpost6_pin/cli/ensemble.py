@@ -1,5 +1,6 @@
 """The command that runs an ensemble: motions, scales, specimens and controllers on machines of uncertain numbers."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,7 +64,7 @@ def ensemble(
             help="fused or pinocchio; default: the fastest that can.", autocompletion=completing(lambda: ENGINES)
         ),
     ] = None,
-    jobs: Annotated[int, typer.Option(help="Processes; -1: one a core.")] = -1,
+    jobs: opt.Processes = -1,
     dask: Annotated[
         str | None, typer.Option(help="Run on a Dask cluster: its address, or local for one on this computer.")
     ] = None,
@@ -77,15 +78,17 @@ def ensemble(
     from ..show.ensemble_tables import ensemble_entries, print_ensemble
     from ..show.report.ensemble_report import write_ensemble_report
     from ..studies.ensemble import run_ensemble
+    from ..studies.plan_file import beside
     from ..studies.store import open_results
     from ..studies.summary import summarise
 
+    here = partial(beside, Path.cwd())
     given = {
         "machines": machines,
         "scales": _numbers(scales),
-        "specimen": [{"name": _here(name)} for name in specimen or ()] or None,
-        "controller": [{"name": _here(name)} for name in controller or ()] or None,
-        "machine": None if machine is None else _here(machine),
+        "specimen": [{"name": here(name)} for name in specimen or ()] or None,
+        "controller": [{"name": here(name)} for name in controller or ()] or None,
+        "machine": None if machine is None else here(machine),
         "override": None if override is None else str(override.absolute()),
         "uncertain": uncertain or None,
         "draw": draw,
@@ -97,25 +100,13 @@ def ensemble(
     folder = opt.folder_for(out, made.name.replace("/", "_"))
     count = len(made.blocks)
     with progress_bar(f"{made.name}: {count} blocks of runs on {made.machine.name}") as progress:
-        path = run_ensemble(made, folder, jobs=_some(jobs), dask=dask, progress=progress)
+        path = run_ensemble(made, folder, jobs=jobs, dask=dask, progress=progress)
     with open_results(path) as results:
         found = summarise(results, made.numbers)
         files = [path, write_ensemble_report(results, found, folder / "report.html", repeating_command())]
         print_result(json, lambda: ensemble_entries(found), lambda: print_ensemble(found), files)
     if found.failures or found.stopped:
         raise typer.Exit(1)
-
-
-def _here(name: str) -> str:
-    """A shipped name as it is, a file (with what follows a colon) with its whole path."""
-    file, colon, rest = name.partition(":")
-    return f"{Path(file).absolute()}{colon}{rest}" if Path(file).suffix else name
-
-
-def _some(jobs: int) -> int:
-    if jobs == 0:
-        raise ParameterError("--jobs 0: give a number of processes, or -1 for as many as there are cores")
-    return jobs
 
 
 def _numbers(text: str | None) -> list[float] | None:

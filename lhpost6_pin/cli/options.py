@@ -27,15 +27,20 @@ EXCHANGES = ("sample", "step")
 """How often a specimen that is a program exchanges motion and wrench."""
 
 __all__ = ["Beyond", "CampaignFolder", "Cancel", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
-__all__ += ["ExchangeOptions", "MountOptions", "Out", "PhaseSettingsName", "SensorsName", "SettingsName"]
+__all__ += ["ExchangeOptions", "MountOptions", "Out", "PhaseSettingsName", "Processes", "SensorsName", "SettingsName"]
 __all__ += ["SpecimenOptions", "StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring"]
 __all__ += ["record_name"]
 
 
-def _refuse_no_jobs(jobs: int) -> int:
-    if jobs == 0:
-        raise ParameterError("--jobs 0: give a number of threads, or -1 for as many as there are cores")
-    return jobs
+def _jobs(what: str, help: str) -> Any:
+    """The option --jobs, a number of `what`."""
+
+    def refuse_none(jobs: int) -> int:
+        if jobs == 0:
+            raise ParameterError(f"--jobs 0: give a number of {what}, or -1 for as many as there are cores")
+        return jobs
+
+    return typer.Option(help=help, callback=refuse_none)
 
 
 _settings = completing(lambda: shipped("controllers"))
@@ -43,7 +48,8 @@ _settings = completing(lambda: shipped("controllers"))
 CampaignFolder = Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
 Out = Annotated[Path | None, typer.Option(help="Directory of the results; default: out/NAME.")]
-Jobs = Annotated[int, typer.Option(help="Threads; -1: all cores.", callback=_refuse_no_jobs)]
+Jobs = Annotated[int, _jobs("threads", "Threads; -1: all cores.")]
+Processes = Annotated[int, _jobs("processes", "Processes; -1: one a core.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
 Valves = Annotated[
     int, typer.Option(min=0, max=2, help="Open servovalves per horizontal actuator; 0: as in the machine file.")

@@ -110,7 +110,7 @@ def commanded_axes(record: xr.Dataset) -> list[str]:
 def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tracking]:
     """Return the tracking of `quantity` on every axis; empty if the record has no such motion.
 
-    Without `errors` only peaks are evaluated: RRMSE and delay take a hundred times as long.
+    Without `errors` only peaks are evaluated, not RRMSE and delay, which take far longer.
     """
     if f"platen_{quantity}" not in record:
         return []

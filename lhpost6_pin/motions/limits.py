@@ -17,7 +17,7 @@ __all__ += ["limit_peaks", "peak_of_demand"]
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
 _CLOSE = 1e-4  # relative width to which the largest scale is bracketed
-_GOVERNING = 0.5  # of the largest share: with less, no sample governs at another scale, where demands are nearly linear
+_GOVERNING = 0.5  # of the largest share: samples with as much are looked at first, as demands are nearly linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +170,8 @@ def peak_of_demand(demand: Demand) -> list[Peak]:
 
 def limit_peaks(motion: Motion, limits: MotionLimits, check: MotionCheck | None = None) -> tuple[Peak, ...]:
     """Largest demand of a motion on every limit, axes before actuators and parts; nothing is refused."""
-    return (*_axis_peaks(motion, limits), *(_peaks(motion, check, 1.0) if check else []))
+    demands = _demands(motion, check) if check else ()
+    return (*_axis_peaks(motion, limits), *(peak for demand in demands for peak in peak_of_demand(demand)))
 
 
 def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
@@ -203,17 +204,18 @@ def _axis_peaks(target: Motion, limits: MotionLimits) -> list[Peak]:
     return peaks
 
 
-def _peaks(target: Motion, check: MotionCheck, factor: float) -> list[Peak]:
+def _demands(
+    motion: Motion, check: MotionCheck, factor: float = 1.0, some: np.ndarray | slice = slice(None)
+) -> Sequence[Demand]:
+    """Demands of some samples of a motion, scaled."""
     with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
-        demands = check(*(factor * x for x in (target.displacement, target.velocity, target.acceleration)))
-    return [peak for demand in demands for peak in peak_of_demand(demand)]
+        return check(*(factor * x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)))
 
 
 def _deciding(target: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
     """Largest share (n,) of the deciding demands at each of some samples of a motion, scaled."""
-    motion = (factor * x[some] for x in (target.displacement, target.velocity, target.acceleration))
-    with np.errstate(all="ignore"):
-        shares = [np.abs(demand.share).max(axis=1) for demand in check(*motion) if demand.decides]
+    demands = _demands(target, check, factor, some)
+    shares = [np.abs(demand.share).max(axis=1) for demand in demands if demand.decides]
     if not shares:
         return np.zeros(1)
     return np.nan_to_num(np.max(shares, axis=0), nan=np.inf, posinf=np.inf)

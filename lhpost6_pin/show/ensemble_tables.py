@@ -25,10 +25,10 @@ def ensemble_verdict(found: EnsembleSummary) -> str:
     many = len(found.configurations) > 1
     if many:
         sentences.append(f"The worst of {len(found.configurations)} configurations:")
-    worst = sorted(
-        found.configurations, key=lambda own: (own.exceedances[0].risk_scale, -own.exceedances[0].share.max())
-    )
-    for one in worst[:1]:
+    if found.configurations:
+        one = min(
+            found.configurations, key=lambda own: (own.exceedances[0].risk_scale, -own.exceedances[0].share.max())
+        )
         which = f" ({one.motion}, specimen {one.specimen}, controller {one.controller})" if many else ""
         sentences.append(f"{_risk_words(one.exceedances[0], found)}{which}.")
     if found.configurations and "strengths" not in found.groups:
@@ -80,11 +80,10 @@ def _percent(share: float) -> str:
     return f"{100.0 * float(share):.3g} %" if math.isfinite(share) else "–"
 
 
-def spread_table(found: EnsembleSummary, wanted: tuple[Spread, ...] | None = None) -> Table:
+def spread_table(spreads: Sequence[Spread]) -> Table:
     """Return quantiles of each result by motion, scale, specimen and controller."""
-    rows, wanted = [], found.spreads if wanted is None else wanted
-    shown = _varying(wanted)
-    for one in wanted:
+    rows, shown = [], _varying(spreads)
+    for one in spreads:
         scale = _SCALES.get(one.units, Scale(1.0, one.units))
         low, middle, high = (_shown(float(q), scale) for q in one.quantiles)
         unit = "–" if scale.unit == "1" else scale.unit
@@ -123,7 +122,7 @@ def importance_table(found: EnsembleSummary) -> Table:
 def print_ensemble(found: EnsembleSummary) -> None:
     """Print the verdict, exceedance, results, what they follow from, and failures."""
     print_blocks(
-        spread_table(found, tuple(one for one in found.spreads if one.scale == found.shown_scale)),
+        spread_table(found.shown_spreads),
         *([risk_table(found)] if found.configurations else []),
         importance_table(found) if found.importance else found.no_importance,
         *(f"{count} runs: {why}" for why, count in (*found.failures.items(), *found.troubles.items())),

@@ -88,10 +88,10 @@ class EnsemblePlan:
                 raise ParameterError(
                     f"{self.name}: specimen {label} is a program, which runs with one table at a time: `lhpost6 run`"
                 )
-            plant = make_plant(machine)
-            check_options(plant, plugged=False, **self.options[label])
-            for motion in self.motions.values():
-                refuse_blocked_axes(plant, motion.target(machine, self.scales[0]))
+            check_options(make_plant(machine), plugged=False, **self.options[label])
+        bare = make_plant(self.machine)
+        for motion in self.motions.values():
+            refuse_blocked_axes(bare, motion.target(self.machine, self.scales[0]))
 
     @cached_property
     def options(self) -> dict[str, dict[str, Any]]:
@@ -123,9 +123,8 @@ class EnsemblePlan:
     def digest(self) -> str:
         """Hash of everything that results follow from, the package's own code among it."""
         stated = [getattr(self, name) for name in self.__dataclass_fields__]
-        ordered = [
-            list(one.items()) if isinstance(one, dict) else one for one in stated
-        ]  # hashes of dicts have no order
+        # hashes of dicts have no order, and blocks are numbered by place
+        ordered = [list(one.items()) if isinstance(one, dict) else one for one in stated]
         mounted = (machine.specimen for machine in self.specimens.values() if machine.specimen is not None)
         files = [path.read_bytes() for one in mounted for path in one.files]
         return str(joblib.hash((sources_digest(), ordered, files)))

@@ -1,21 +1,23 @@
-"""A plan of an ensemble from a TOML file, or from the same entries as a mapping.
+"""A plan of an ensemble from a TOML file.
 
-name = "suite"
-machine = "lhpost6"                  # shipped name, or a file beside the plan; `override`, a file, on top
-machines = 200                       # drawn from the stated uncertainties; 1: as stated
-draw = "lhs"                         # or "sobol"; with `seed`
-uncertain = ["*"]                    # patterns of the numbers drawn
-scales = [0.5, 0.75, 1.0]
-quantities = ["tracking", "limits", "forces", "spectra", "base"]
+    name = "suite"
+    machine = "lhpost6"                  # shipped name, or a file beside the plan; `override`, a file, on top
+    machines = 200                       # drawn from the stated uncertainties; 1: as stated
+    draw = "lhs"                         # or "sobol"; with `seed`
+    uncertain = ["*"]                    # patterns of the numbers drawn
+    scales = [0.5, 0.75, 1.0]
+    quantities = ["tracking", "limits", "forces", "spectra", "base"]
 
-[[motion]]                           # name or files; label, axes, high_pass, low_pass, options
-name = "ridgecrest"
+    [[motion]]                           # name or files; label, axes, high_pass, low_pass, options
+    name = "ridgecrest"
 
-[[specimen]]                         # name or file ("none": bare table); label, at, rpy, locked
-name = "none"
+    [[specimen]]                         # name or file ("none": bare table); label, at, rpy, locked
+    name = "none"
 
-[[controller]]                       # name or file; label
-name = "lhpost6"
+    [[controller]]                       # name or file; label
+    name = "lhpost6"
+
+The command line makes a mapping of the same entries from its options.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,7 +35,7 @@ from .draws import DESIGNS, draw_machines
 from .plan import EnsemblePlan, PlannedMotion
 from .quantities import DEFAULT
 
-__all__ = ["NONE", "load_plan", "plan_from"]
+__all__ = ["NONE", "beside", "load_plan", "plan_from"]
 
 NONE = "none"
 """Name of the specimen of a bare table."""
@@ -79,7 +81,7 @@ def plan_from(entries: Mapping[str, Any], folder: Path, source: str) -> Ensemble
         raise ParameterError(f"{source}: has no [[motion]]; name one at least")
     numbers = load_parameters(models_folder() / "procedures" / "ensemble.toml")
     override = entries.get("override")
-    machine = load_machine(_place(entries.get("machine", "lhpost6"), folder), override and folder / override)
+    machine = load_machine(beside(folder, entries.get("machine", "lhpost6")), override and folder / override)
     draws = draw_machines(
         machine,
         _at_least(1, entries, "machines", 1, source),
@@ -110,6 +112,12 @@ def plan_from(entries: Mapping[str, Any], folder: Path, source: str) -> Ensemble
     )
 
 
+def beside(folder: Path, name: str) -> str:
+    """A shipped name as it is, a file (with what follows a colon) with a folder before it."""
+    file, colon, rest = name.partition(":")
+    return f"{folder / file}{colon}{rest}" if Path(file).suffix else name
+
+
 def _check(entries: Mapping[str, Any], kinds: Mapping[str, tuple[type, ...]], where: str) -> None:
     """Raise ParameterError for an unknown key, or a value that is not of its kind."""
     if not isinstance(entries, Mapping):
@@ -132,12 +140,6 @@ def _at_least(least: int, entries: Mapping[str, Any], key: str, default: int, so
     if value < least:
         raise ParameterError(f"{source}: {key} is {value}; give {least} at least")
     return value
-
-
-def _place(name: str, folder: Path) -> str:
-    """A shipped name as it is, a file (with what follows a colon) beside the plan with its folder."""
-    file, colon, rest = name.partition(":")
-    return f"{folder / file}{colon}{rest}" if Path(file).suffix else name
 
 
 def _labelled(pairs: Sequence[tuple[str, Any]], kind: str, source: str) -> dict[str, Any]:
@@ -175,11 +177,11 @@ def _specimen(machine: Machine, entry: Mapping[str, Any], folder: Path, source: 
         raise ParameterError(f"{source}: [[specimen]] {label}: at and rpy are three numbers each")
     (x, y, z), (roll, pitch, yaw) = (map(float, three) for three in place)
     locked = entry.get("locked", False)
-    return label, machine.with_specimen(_place(name, folder), (x, y, z), (roll, pitch, yaw), locked=locked)
+    return label, machine.with_specimen(beside(folder, name), (x, y, z), (roll, pitch, yaw), locked=locked)
 
 
 def _controller(entry: Mapping[str, Any], folder: Path, source: str) -> tuple[str, Any]:
     _check(entry, _CONTROLLER, f"{source}: [[controller]]")
     if "name" not in entry:
         raise ParameterError(f"{source}: [[controller]]: give a name or a file")
-    return entry.get("label", Path(entry["name"]).stem), load_controller(_place(entry["name"], folder))
+    return entry.get("label", Path(entry["name"]).stem), load_controller(beside(folder, entry["name"]))

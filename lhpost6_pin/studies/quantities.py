@@ -17,19 +17,8 @@ from ..simulation.motion_limits import judge_record
 from ..simulation.simulate import Run
 from ..simulation.specimen_response import base_wrench
 
-__all__ = [
-    "DECIDING",
-    "DEFAULT",
-    "GROUPS",
-    "LIMITS",
-    "OF_LIMITS",
-    "Variable",
-    "check_groups",
-    "evaluate",
-    "periods_of",
-    "psa",
-]
-__all__ += ["variables_of"]
+__all__ = ["DECIDING", "DEFAULT", "GROUPS", "LIMITS", "OF_LIMITS", "Variable", "check_groups", "evaluate"]
+__all__ += ["periods_of", "psa", "variables_of"]
 
 _RECORDED = (*QUANTITIES, "actuator stroke", "actuator velocity", "push", "pull", "spool")
 _STRENGTHS = ("actuator unloading", "reaction mass strength", "reaction mass moment", "platen strength", "piston tilt")

@@ -20,11 +20,16 @@ from ..machine.parameters import Parameters
 from ..motions import Target
 from ..simulation.rehearse import rehearse
 from .plan import Block, EnsemblePlan, PlannedMotion
-from .quantities import LIMITS, OF_LIMITS, evaluate, periods_of, psa, variables_of
+from .quantities import LIMITS, OF_LIMITS, Variable, evaluate, periods_of, psa, variables_of
 
-__all__ = ["BlockInputs", "block_inputs", "labels_of", "run_block"]
+__all__ = ["FACTS", "BlockInputs", "block_inputs", "labels_of", "run_block"]
 
-_FACTS = ("trouble", "failure")
+FACTS: Mapping[str, tuple[Variable, float | str]] = {
+    "seconds": (Variable((), "s", "simulated time"), np.nan),
+    "trouble": (Variable((), "1", "trouble of a run, empty without any"), ""),
+    "failure": (Variable((), "1", "why a run could not be made, empty if it could"), ""),
+}
+"""Facts of a run beside its quantities, with what they are without one."""
 
 
 class BlockInputs(NamedTuple):
@@ -80,12 +85,12 @@ def run_block(inputs: BlockInputs) -> dict[str, Array]:
     except LhpostError as error:
         failure = str(error)
     with _quiet(), threadpool_limits(1):  # with another number of threads sums of linear algebra round otherwise
+        blank: dict[str, Any] = {name: np.full(shape, np.nan) for name, shape in wanted.items()}
+        blank |= {name: nothing for name, (_, nothing) in FACTS.items()}
         for coordinates in inputs.coordinates:
             found = {"failure": failure} if target is None else _run(inputs, target, coordinates)
-            blank = {name: np.full(shape, np.nan) for name, shape in wanted.items()}
-            rows.append({**blank, "seconds": np.nan, "trouble": "", "failure": "", **found})
-    names = (*wanted, "seconds", *_FACTS)
-    block = {name: np.array([row[name] for row in rows]) for name in names}
+            rows.append(blank | found)
+    block = {name: np.array([row[name] for row in rows]) for name in blank}
     if target is not None:
         block["duration"] = np.array(len(target.time) * target.time_step)
         if "psa" in wanted:

@@ -22,7 +22,7 @@ from ..core.errors import ParameterError, RecordError
 from ..core.files import write_whole
 from .plan import DIMENSIONS, Block, EnsemblePlan
 from .quantities import Variable, variables_of
-from .runs import labels_of
+from .runs import FACTS, labels_of
 
 __all__ = ["BlockStore", "RESULTS", "open_results"]
 
@@ -30,6 +30,7 @@ RESULTS = "ensemble.nc"
 """File of an ensemble's results in its folder."""
 
 _BLOCKS, _LOCK = "blocks", "lock"
+_TEXT = h5py.string_dtype()
 
 _TARGET = {
     "duration": (("motion",), Variable((), "s", "duration of the target")),
@@ -39,12 +40,6 @@ _TARGET = {
     ),
 }
 """Variables of targets, with the dimensions of an ensemble that they have."""
-
-_FACTS = {
-    "seconds": Variable((), "s", "simulated time"),
-    "trouble": Variable((), "1", "trouble of a run, empty without any"),
-    "failure": Variable((), "1", "why a run could not be made, empty if it could"),
-}
 
 
 class BlockStore:
@@ -149,31 +144,39 @@ def _describe(file: Any, plan: EnsemblePlan, digest: str) -> None:
     file.dimensions = {name: len(values) for name, values in labels.items() if len(values)}
     for name, values in labels.items():
         if len(values):
-            _variable(file, name, (name,), values, {"period": "s"}.get(name, "1"), name)
-    for name, variable in {**variables_of(plan.groups), **_FACTS}.items():
-        kind = h5py.string_dtype() if name in ("trouble", "failure") else np.dtype("f8")
-        made = file.create_variable(name, (*DIMENSIONS, *variable.dims), kind)
-        made.attrs.update(units=variable.units, long_name=variable.long_name)
+            about = Variable((), "s" if name == "period" else "1", name)
+            _variable(file, name, (name,), about, **_as_data(values))
+    for name, variable in variables_of(plan.groups).items():
+        _variable(file, name, (*DIMENSIONS, *variable.dims), variable, dtype="f8")
+    for name, (variable, nothing) in FACTS.items():
+        _variable(file, name, DIMENSIONS, variable, dtype=_TEXT if isinstance(nothing, str) else "f8")
     for name, (dims, variable) in _TARGET.items():
         if name == "duration" or "psa" in file.variables:
-            made = file.create_variable(name, (*dims, *variable.dims), "f8", fillvalue=np.nan)
-            made.attrs.update(units=variable.units, long_name=variable.long_name)
-    if plan.draws.parameters:
-        own, words = ("machine", "parameter"), "of an uncertain number"
-        _variable(file, "value", own, plan.draws.values, "as `unit` says", f"value {words}")
-        _variable(file, "coordinate", own, plan.draws.coordinates, "as `unit` says, or relative", f"coordinate {words}")
-        _variable(file, "unit", ("parameter",), [p.unit for p in plan.draws.parameters], "1", "unit of its value")
-        _variable(file, "sd", ("parameter",), [p.sd for p in plan.draws.parameters], "1", "deviation of its coordinate")
+            _variable(file, name, (*dims, *variable.dims), variable, dtype="f8", fillvalue=np.nan)
+    parameters = plan.draws.parameters
+    if not parameters:
+        return
+    drawn: dict[str, tuple[Any, str, str]] = {
+        "value": (plan.draws.values, "as `unit` says", "value of an uncertain number"),
+        "coordinate": (plan.draws.coordinates, "as `unit` says, or relative", "coordinate of an uncertain number"),
+        "unit": ([p.unit for p in parameters], "1", "unit of its value"),
+        "sd": ([p.sd for p in parameters], "1", "deviation of its coordinate"),
+    }
+    for name, (values, units, meaning) in drawn.items():
+        own = ("machine", "parameter") if np.ndim(values) == 2 else ("parameter",)
+        _variable(file, name, own, Variable((), units, meaning), **_as_data(values))
 
 
-def _variable(file: Any, name: str, dims: Sequence[str], values: Any, units: str, long_name: str) -> None:
+def _variable(file: Any, name: str, dims: Sequence[str], about: Variable, **content: Any) -> None:
+    """A variable with its unit and meaning; content: its data, or type and fill value of what is still empty."""
+    made = file.create_variable(name, dims, **content)
+    made.attrs.update(units=about.units, long_name=about.long_name)
+
+
+def _as_data(values: Any) -> dict[str, Any]:
+    """Numbers or texts as data of a variable."""
     data = np.asarray(values)
-    if data.dtype.kind == "U":
-        data = data.astype(object)
-        made = file.create_variable(name, dims, h5py.string_dtype(), data=data)
-    else:
-        made = file.create_variable(name, dims, data=data)
-    made.attrs.update(units=units, long_name=long_name)
+    return {"dtype": _TEXT, "data": data.astype(object)} if data.dtype.kind == "U" else {"data": data}
 
 
 def _put(file: Any, block: Block, values: Mapping[str, Array]) -> None:
@@ -182,5 +185,4 @@ def _put(file: Any, block: Block, values: Mapping[str, Array]) -> None:
         if name in _TARGET:
             file.variables[name][block.place[: len(_TARGET[name][0])]] = values[name]
             continue
-        data = values[name].astype(object) if values[name].dtype.kind == "U" else values[name]
-        file.variables[name][(*block.place, slice(block.first, block.last))] = data
+        file.variables[name][(*block.place, slice(block.first, block.last))] = _as_data(values[name])["data"]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -12,9 +12,14 @@ from ..core.errors import ParameterError
 from ..machine.parameters import Parameters
 from .exceedance import Exceedance, exceedances
 from .importance import Importance, importances
+from .plan import DIMENSIONS
 from .quantities import DECIDING
 
-__all__ = ["QUANTILES", "Configuration", "EnsembleSummary", "ImportanceOf", "Spread", "summarise"]
+__all__ = ["CONFIGURATION", "QUANTILES", "Configuration", "EnsembleSummary", "ImportanceOf", "Spread", "places_of"]
+__all__ += ["summarise"]
+
+CONFIGURATION = ("motion", "specimen", "controller")
+"""Dimensions of a configuration, whose risk is over scales and machines."""
 
 QUANTILES = (0.05, 0.5, 0.95)
 """Shares at which results are stated."""
@@ -88,6 +93,11 @@ class EnsembleSummary(NamedTuple):
         """The scale whose results are shown first."""
         return shown_scale(self.scales)
 
+    @property
+    def shown_spreads(self) -> tuple[Spread, ...]:
+        """Results at that scale."""
+        return tuple(one for one in self.spreads if one.scale == self.shown_scale)
+
 
 def shown_scale(scales: Array) -> float:
     """The scale nearest to that of the motions as they are."""
@@ -157,23 +167,22 @@ def _largest(values: Array) -> Array:
     return np.where(np.isneginf(top), np.nan, top)
 
 
-def _cells(results: xr.Dataset) -> Iterator[tuple[tuple[int, ...], tuple[str, float, str, str]]]:
-    """Places of motion, scale, specimen and controller, with their labels."""
-    names = ("motion", "scale", "specimen", "controller")
+def places_of(results: xr.Dataset, *names: str) -> Iterator[tuple[tuple[int, ...], tuple[Any, ...]]]:
+    """Places along some dimensions, every one with every other, with their labels."""
     labels = [results[name].values.tolist() for name in names]
-    for place in np.ndindex(*(len(one) for one in labels)):
-        motion, scale, specimen, controller = (one[k] for one, k in zip(labels, place, strict=True))
-        yield place, (str(motion), float(scale), str(specimen), str(controller))
+    for place in np.ndindex(*map(len, labels)):
+        yield place, tuple(one[k] for one, k in zip(labels, place, strict=True))
 
 
 def _spreads(results: xr.Dataset, result: str, units: str, values: Array) -> Iterator[Spread]:
-    for place, labels in _cells(results):
+    for place, (motion, scale, specimen, controller) in places_of(results, *DIMENSIONS[:-1]):
         own = values[place]
         own = own[~np.isnan(own)]
         if own.size:
             with np.errstate(invalid="ignore"):  # of infinite demands
                 quantiles = np.quantile(own, QUANTILES, method="inverted_cdf")
-            yield Spread(*labels, result, units, quantiles, float(own.min()), float(own.max()), len(own))
+            where, ends = (motion, scale, specimen, controller), (float(own.min()), float(own.max()))
+            yield Spread(*where, result, units, quantiles, *ends, len(own))
 
 
 def _configurations(results: xr.Dataset, numbers: Parameters) -> tuple[Configuration, ...]:
@@ -183,12 +192,10 @@ def _configurations(results: xr.Dataset, numbers: Parameters) -> tuple[Configura
     limits, found = tuple(map(str, results["limit"].values)), []
     scales = results["scale"].values.astype(float)
     level, confidence = numbers.number("risk.level"), numbers.number("risk.confidence")
-    for m, motion in enumerate(results["motion"].values):
-        for s, specimen in enumerate(results["specimen"].values):
-            for c, controller in enumerate(results["controller"].values):
-                own = use[m, :, s, c], trouble[m, :, s, c]
-                risks = exceedances(*own, limits, scales, level=level, confidence=confidence)
-                found.append(Configuration(str(motion), str(specimen), str(controller), risks))
+    for (m, s, c), (motion, specimen, controller) in places_of(results, *CONFIGURATION):
+        own = use[m, :, s, c], trouble[m, :, s, c]
+        risks = exceedances(*own, limits, scales, level=level, confidence=confidence)
+        found.append(Configuration(motion, specimen, controller, risks))
     return tuple(found)
 
 
@@ -202,12 +209,12 @@ def _importance(
     wanted = {result: values for result, values in columns.items() if _matters(result)}
     found = []
     try:
-        for place, labels in _cells(results):
-            if labels[1] != scale:
+        for place, (motion, at, specimen, controller) in places_of(results, *DIMENSIONS[:-1]):
+            if at != scale:
                 continue
             for result, values in wanted.items():
                 if indices := importances(names, coordinates, values[place], numbers):
-                    found.append(ImportanceOf(*labels, result, indices))
+                    found.append(ImportanceOf(motion, at, specimen, controller, result, indices))
     except ParameterError as error:
         return (), f"{error}."
     return tuple(found), "" if found else "Too few machines for indices, or no result varies between them."

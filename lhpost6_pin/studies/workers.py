@@ -1,8 +1,10 @@
 """Workers of a study: processes on this machine, or a Dask cluster; joblib is the door to both.
 
-with workers(jobs, dask):
-for result in results_of(function, tasks):
-...
+    with workers(jobs, dask):
+        for result in results_of(function, tasks):
+            ...
+
+Results come in the order in which they end.
 """
 
 from collections.abc import Callable, Iterable, Iterator

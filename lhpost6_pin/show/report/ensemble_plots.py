@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import xarray as xr
 
 from ...studies.exceedance import Exceedance
 from ...studies.quantities import DECIDING
-from ...studies.summary import QUANTILES, Configuration, ImportanceOf
+from ...studies.summary import CONFIGURATION, QUANTILES, Configuration, ImportanceOf, places_of
 from .charts import Curve, Panel, XAxis, chart_figure
 from .layout import line_on, on_row, stacked_layout
 from .page import Figure, number
@@ -60,8 +61,8 @@ def _curve(one: Exceedance, scales: np.ndarray, line: dict[str, Any]) -> Curve:
 
 def demand_figure(results: xr.Dataset, scale: int) -> Figure:
     """Return boxes of demand over capacity of all runs at one scale, by deciding limit."""
-    limits = [str(limit) for limit in results["limit"].values]
-    values = {limit: results["limit_use"].values[:, scale, ..., k].ravel() for k, limit in enumerate(limits)}
+    limits, use = map(str, results["limit"].values), results["limit_use"].values[:, scale]
+    values = {limit: use[..., k].ravel() for k, limit in enumerate(limits)}
     known = {limit: x[np.isfinite(x)] for limit, x in values.items() if limit in DECIDING and np.isfinite(x).any()}
     order = sorted(known, key=lambda limit: float(np.median(known[limit])))
     layout = stacked_layout(["Demand over capacity"], "Demand over capacity", row_height=CELL * len(order) + 20)
@@ -70,7 +71,7 @@ def demand_figure(results: xr.Dataset, scale: int) -> Figure:
     layout["margin"]["l"] = 170
     layout["xaxis"]["rangemode"] = "tozero"
     layout["yaxis"] |= {"type": "category", "dtick": 1}
-    box = {"type": "box", "orientation": "h", "boxpoints": "outliers", "line": {"width": 1.2}, "marker": {"size": 3}}
+    box = {"type": "box", "orientation": "h", "boxpoints": "outliers", "line": {"width": 1.2}}
     traces = [
         {**box, "name": limit, "x": packed(known[limit]), "marker": {"size": 3, "color": line["color"]}}
         for limit, line in zip(order, palette(len(order)), strict=True)
@@ -87,10 +88,9 @@ def spectra_figures(results: xr.Dataset, scale: int) -> list[Figure]:
 
     Target, and quantiles of what machines achieved.
     """
-    figures, periods = [], results["period"].values
-    unit, names = SCALES["acceleration"], ("motion", "specimen", "controller")
-    labels = [list(map(str, results[name].values)) for name in names]
-    for k, (m, s, c) in enumerate(list(np.ndindex(*map(len, labels)))[:MOST_MOTIONS]):
+    figures, periods, unit = [], results["period"].values, SCALES["acceleration"]
+    first = islice(places_of(results, *CONFIGURATION), MOST_MOTIONS)
+    for k, ((m, s, c), (motion, specimen, controller)) in enumerate(first):
         target, achieved = results["target_psa"][m, scale, s].values, results["psa"][m, scale, s, c].values
         panels = []
         for d, axis in enumerate(map(str, results["direction"].values)):
@@ -105,19 +105,18 @@ def spectra_figures(results: xr.Dataset, scale: int) -> list[Figure]:
         if panels:
             damping = f"{100 * float(results.attrs['damping']):g} % damping"
             words = f"Pseudo-spectral acceleration, {damping}, at scale {float(results['scale'][scale]):g}."
-            title = f"{labels[0][m]}, specimen {labels[1][s]}, controller {labels[2][c]}"
+            title = f"{motion}, specimen {specimen}, controller {controller}"
             figures.append(chart_figure(f"psa-{k}", title, words, panels, PERIOD_AXIS, row_height=ROW - 60))
     return figures
 
 
 def importance_figure(name: str, found: Sequence[ImportanceOf]) -> Figure:
     """Return first-order indices of the numbers that matter most (rows) for each result (columns)."""
-    most: dict[str, float] = {}
-    for one in found:
-        for index in filter(lambda index: index.sure, one.indices):
-            most[index.parameter] = max(most.get(index.parameter, 0.0), index.first_order)
-    rows = sorted(most, key=lambda parameter: most[parameter])[-MOST_NUMBERS:]
     tables = [{index.parameter: index.first_order for index in one.indices if index.sure} for one in found]
+    most: dict[str, float] = {}
+    for table in tables:
+        most |= {parameter: max(most.get(parameter, 0.0), share) for parameter, share in table.items()}
+    rows = sorted(most, key=lambda parameter: most[parameter])[-MOST_NUMBERS:]
     z = [[max(0.0, table.get(parameter, 0.0)) for table in tables] for parameter in rows]
     layout = stacked_layout([""], "", row_height=CELL * len(rows))
     layout |= {"showlegend": False, "hovermode": "closest"}

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from ...studies.summary import EnsembleSummary, ImportanceOf
+from ...studies.summary import QUANTILES, EnsembleSummary, ImportanceOf
 from ..ensemble_tables import ensemble_verdict, importance_table, risk_table, spread_table
 from .ensemble_plots import demand_figure, exceedance_figure, importance_figure, spectra_figures
 from .page import Block, Headline, Level, Page, Section, Table, details, number, save_page
@@ -24,7 +24,7 @@ def write_ensemble_report(results: xr.Dataset, found: EnsembleSummary, path: Pat
     scale = int(np.flatnonzero(found.scales == found.shown_scale)[0])
     sections = [
         Section("risk", "Risk of reaching a limit", _risk_blocks(results, found, scale)),
-        Section("results", "Results", _result_blocks(found, scale)),
+        Section("results", "Results", _result_blocks(found)),
         Section("importance", "Which uncertain numbers matter", _importance_blocks(found)),
     ]
     if "psa" in results:
@@ -61,7 +61,7 @@ def _headlines(found: EnsembleSummary, scale: int, failed: int) -> list[Headline
         note = f"{ends}; {own.motion}, specimen {own.specimen}, controller {own.controller}"
         label = f"probability of reaching any limit at scale {found.scales[scale]:g}"
         headlines.append(Headline(percent(float(one.share[scale])), label, note, level))
-    at = [s for s in found.spreads if s.result == TRACKED and s.scale == found.scales[scale]]
+    at = [s for s in found.shown_spreads if s.result == TRACKED]
     if at:
         worst_of = max(at, key=lambda s: float(s.quantiles[1]))
         low, middle, high = (percent(float(q)) for q in worst_of.quantiles)
@@ -88,11 +88,10 @@ def _risk_blocks(results: xr.Dataset, found: EnsembleSummary, scale: int) -> lis
     ]
 
 
-def _result_blocks(found: EnsembleSummary, scale: int) -> list[Block]:
-    own = tuple(s for s in found.spreads if s.scale == found.scales[scale])
-    blocks: list[Block] = [spread_table(found, own)]
+def _result_blocks(found: EnsembleSummary) -> list[Block]:
+    blocks: list[Block] = [spread_table(found.shown_spreads)]
     if len(found.scales) > 1:
-        blocks.append(details("All scales", spread_table(found)))
+        blocks.append(details("All scales", spread_table(found.spreads)))
     return blocks
 
 
@@ -114,12 +113,10 @@ def _importance_blocks(found: EnsembleSummary) -> list[Block]:
 def _machine_blocks(results: xr.Dataset) -> list[Block]:
     if "value" not in results or results.sizes["machine"] == 1:
         return ["The machine is as stated; no number was drawn."]
-    rows = []
-    for k, name in enumerate(results["parameter"].values):
-        values = results["value"].values[:, k]
-        low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
-        interval = f"{number(low, 4)} to {number(high, 4)}"
-        rows.append((str(name), str(results["unit"].values[k]), number(middle, 4), interval))
+    rows, quantiles = [], np.quantile(results["value"].values, QUANTILES, axis=0)
+    columns = (results["parameter"].values, results["unit"].values, *quantiles)
+    for name, unit, low, middle, high in zip(*columns, strict=True):
+        rows.append((str(name), str(unit), number(middle, 4), f"{number(low, 4)} to {number(high, 4)}"))
     header = ("Number", "Unit", "Median", "5 to 95 %")
     return ["Drawn from the standard deviations that the machine file states.", Table("Drawn numbers", header, rows)]
 

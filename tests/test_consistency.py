@@ -14,7 +14,7 @@ from lhpost6_pin.data.records import make_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.lost_motion import LostMotion, _groups, lost_motion
+from lhpost6_pin.discovery.lost_motion import LostMotion, _groups, lost_motion, with_contact_sides
 from lhpost6_pin.discovery.sensor_findings import correct_records, find_sensor_faults
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
@@ -240,6 +240,14 @@ def test_the_play_of_a_pin_shows_in_its_length_and_nowhere_else(plant, redundant
     assert found.component == "H3"
     assert found.half_play == pytest.approx(5e-5, rel=0.2)  # skews of force and length blunt the turn: `lengths.form`
     assert found.gain > 100.0
+    with_sides = with_contact_sides(loose, [found], machine)
+    for record, sided in zip(loose, with_sides, strict=True):
+        side = sided["contact_side"].sel(actuator="H3").values
+        force = record["actuator_force"].sel(actuator="H3").values
+        closed = np.abs(force) > 3e4  # ten times the closing force: the pin stands on one side
+        assert np.mean(np.sign(side[closed]) == np.sign(force[closed])) > 0.95  # noise of lengths and poses
+        assert np.median(np.abs(side[closed])) == pytest.approx(1.0, abs=0.25)  # that of the estimate, and noise
+        assert np.isnan(sided["contact_side"].sel(actuator="H1").values).all()
     assert not any(f.kind == "offset" for f in find_sensor_faults(plant, loose, SENSORS, ["H3"]))
 
 

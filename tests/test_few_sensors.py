@@ -66,6 +66,27 @@ def test_the_mean_pressure_follows_from_the_difference_by_continuity(table, test
     assert left < 0.3 * whole, (left, whole)
 
 
+def test_a_pin_changes_sides_when_its_length_shows_it(table, test):
+    """Not when the oil's force does, which friction and inertia of the rod delay: closed form of what that draws."""
+    half_play, (actuator,) = 1e-4, table.actuators
+    loose = make_plant(table.with_effect("swivel_play", (actuator.name,), half_play=half_play, closing_force=1e3))
+    time = test.dt * np.arange(test.samples)[:, None]
+    side, rate = np.sin(30.0 * time), 30.0 * np.cos(30.0 * time)
+    rigid = evaluate_residuals(make_plant(table), test, ("flow",)).flow
+    shown = evaluate_residuals(loose, replace(test, side=np.stack([side, rate])), ("flow",)).flow
+    unknown = evaluate_residuals(loose, replace(test, side=np.full((2, test.samples, 1), np.nan)), ("flow",)).flow
+    by_force = evaluate_residuals(loose, test, ("flow",)).flow
+    np.testing.assert_array_equal(unknown, by_force)
+    assert np.abs(by_force - shown).max() > 0.1 * np.abs(shown - rigid).max()  # the force has another rhythm
+    bulk = table.hydraulics.bulk_modulus
+    for k, (sign, area, name) in enumerate(((1, actuator.area_a, "a"), (-1, actuator.area_b, "b"))):
+        pressed = test.rates[f"chamber_pressure_{name}"][:, 0] * area / bulk
+        drawn = sign * half_play * (area * rate[:, 0] + pressed * side[:, 0])
+        np.testing.assert_allclose(
+            shown[:, k] - rigid[:, k], drawn, atol=1e-12 + 1e-9 * np.abs(drawn).max()
+        )  # rounding
+
+
 def test_a_force_on_equal_areas_is_a_pressure_difference_and_on_others_none(table, test):
     force = {"actuator_force": np.full((3, 1), 600.0)}
     pressure = chamber_pressures(table, force)

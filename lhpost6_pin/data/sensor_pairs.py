@@ -5,7 +5,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -24,7 +24,7 @@ from .sensor_view import BAND, RecordView, Regressor, SensorComparison
 from .sensors import SensorSet
 from .signals import Band, differentiate
 
-__all__ = ["comparisons", "loose_lengths"]
+__all__ = ["LooseLength", "comparisons", "loose_lengths"]
 
 FAST = 0.3  # of the sampling rate: above it a command is fast
 
@@ -36,12 +36,25 @@ def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterato
         yield from compare(view)
 
 
-def loose_lengths(
-    plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: float
-) -> Iterator[tuple[str, SensorComparison, Array]]:
-    """Lengths of double-acting actuators against the platen's pose, each with the contact side (n,) of a loose pin.
+class LooseLength(NamedTuple):
+    """Length of an actuator against the platen's pose in one record, and on which side of its play the pin stands."""
 
-    The side, -1 to 1, follows from the force, measured or of pressures; `closing` [N] of it closes most of the play.
+    name: str
+    comparison: SensorComparison
+    side: Array  # (n,) -1 to 1, of the force
+    ahead: Array  # (samples,) length less that of the pose, with all sensor errors, at the record's rate [m]
+    place: Array  # (n,) samples of the record that are compared
+
+    def travel(self, rest: Array) -> Array:
+        """Rod ahead of the platen (samples,) [m]: the length less the `rest` (n,) that pose and errors explain [m]."""
+        slow = rest - self.comparison.terms[0].column
+        return self.ahead - np.interp(np.arange(len(self.ahead)), self.place, slow)
+
+
+def loose_lengths(plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: float) -> Iterator[LooseLength]:
+    """Lengths of double-acting actuators against the platen's pose, each with the contact side of a loose pin.
+
+    The side follows from the force, measured or of pressures; `closing` [N] of it closes most of the play.
     """
     view = RecordView(plant, record, sensors)
     measured = view.has("actuator_force")
@@ -49,8 +62,15 @@ def loose_lengths(
         return
     force = view.values("actuator_force") if measured else hydraulic_force(plant.machine, record)
     side = view.signal(force / np.sqrt(force**2 + closing**2))
-    each = zip(plant.machine.actuator_names, _lengths(view), side.T, strict=False)  # none without lengths
-    yield from (one for one in each if one[0] in plant.machine.double_acting)
+    compared = list(_lengths(view))  # none without lengths
+    if not compared:
+        return
+    place = view.step * (view.trim + np.arange(len(side), dtype=np.float64))
+    legs, _ = leg_displacements(plant, view.values("platen_displacement"))
+    ahead = view.values("actuator_displacement") - legs[:, : plant.spools]
+    for i, name in enumerate(plant.machine.actuator_names):
+        if name in plant.machine.double_acting:
+            yield LooseLength(name, compared[i], side[:, i], ahead[:, i], place)
 
 
 def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Regressor:

@@ -33,8 +33,8 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion
 from ..mechanics.strokes import stroke_ends
 
-__all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy", "align_records"]
-__all__ += ["actuator_forces", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
+__all__ = ["AS_RECORDED", "CALIBRATION", "CONTACT_SIDE", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy"]
+__all__ += ["actuator_forces", "align_records", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
 __all__ += ["prepare_test", "source_of"]
 
 
@@ -57,6 +57,9 @@ class Policy(NamedTuple):
 PRESSURE_ORDER = 16
 """Order of the low-pass of differentiated channels: at half its cutoff it takes less than 2e-5."""
 
+CONTACT_SIDE = "contact_side"
+"""Variable (time, actuator) that discovery adds to a record: the side of its play on which a loose pin stands [1]."""
+
 AS_RECORDED = Policy(align=False)
 EACH_TEST = Policy(align=True)
 SIGNIFICANT = Policy(align=True, significance=3.0)
@@ -75,6 +78,7 @@ class MeasuredTest:
     path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
+    side: Array | None = None  # (2, n, n_actuators) `CONTACT_SIDE` and its rate [1/s], NaN where it is not known
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
     weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
     substeps: int = 1  # in which friction is marched between samples
@@ -194,15 +198,19 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     if cutoff is not None:
         derived = {n: x for n, x in channels.items() if LAYOUT[n].differentiated}
         rates = {n: differentiate(x, dt, cutoff, PRESSURE_ORDER) for n, x in derived.items()}
+    side = None
+    if CONTACT_SIDE in record:
+        pins = record[CONTACT_SIDE].values
+        side = np.stack([pins, differentiate(pins, dt, cutoff, PRESSURE_ORDER)])
     name = str(record.attrs.get("test", "test"))
     if sensors is None or (not is_measured(record) and set(MOTION) <= set(record.data_vars)):
         motion = PlatenMotion(*(record[channel].values.astype(float) for channel in MOTION))
         _warn_of_strokes(plant, name, record, motion)
-        return MeasuredTest(name, dt, motion, channels, rates, record=record)
+        return MeasuredTest(name, dt, motion, channels, rates, side=side, record=record)
     band = None if "platen_acceleration" in record else policy.band
     fused = fuse_motion(plant, record, sensors, band=band, shares=policy.shares)
     _warn_of_strokes(plant, name, record, fused.motion)
-    return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, record)
+    return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, side, record)
 
 
 def _warn_of_strokes(plant: Plant, test: str, record: xr.Dataset, motion: PlatenMotion) -> None:

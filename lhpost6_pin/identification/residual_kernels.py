@@ -86,6 +86,8 @@ class MeasuredOil(NamedTuple):
     pressure: Array  # (n, n_chambers) [Pa]
     pressure_rate: Array  # (n, n_chambers) [Pa/s]
     spool: Array  # (n, n_actuators) [1]
+    side: Array  # (n, n_actuators) side of its play on which a loose pin stands [1]; NaN: that of the oil's force
+    side_rate: Array  # (n, n_actuators) [1/s]
     dt: float  # [s]
 
 
@@ -181,8 +183,12 @@ def _flow_residuals(k, row, oil, supply, rod, z, filled):
         advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)
     flow_a, flow_b, _, _ = supplied(row, True, x, pressure_a, pressure_b, high, low, z)
     across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
-    at += rod_travel(p, True, pressure_a, pressure_b)
-    speed += rod_velocity(p, True, pressure_a, pressure_b, rate_a, rate_b)
+    if math.isnan(oil.side[k, i]):
+        at += rod_travel(p, True, pressure_a, pressure_b)
+        speed += rod_velocity(p, True, pressure_a, pressure_b, rate_a, rate_b)
+    else:
+        at += p.play * oil.side[k, i]
+        speed += p.play * oil.side_rate[k, i]
     bulk, left = oil_modulus(p, True, pressure_a)
     net = flow_a - across - out_a
     flow[at_a] = rate_a * p.area_a * (p.chamber_a + at) / bulk - left * (net - p.area_a * speed)

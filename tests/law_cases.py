@@ -163,7 +163,7 @@ _ROWS = (
     _case("ball", *_RUB, z=(-0.3, -0.4, 0.2), port="leg.x leg.y", cycle=0.005),
     _case("smooth_ball", 9e3, 0.01, port=_THREE, passive=True, cycle=0.005),
     _case("smooth_ball", 9e3, 0.01, port="leg.x leg.y", passive=True, cycle=0.005),
-    _case("warm_up", *_RUB, 0.3, z=(0.3, 0.01), cycle=0.005),
+    _case("warm_up", *_RUB, 0.3, 0.02, z=(0.3, 0.01), cycle=0.005),
     _case("backlash", 9e3, 2e-4, 5e-4, z=(1e-4,), passive=True, cycle=0.005),
     _case("backlash_instead", *_RUB, 4e-4, 5e-4, z=(0.3, 1e-4)),
     _case("drag", 9e3, 1.7, passive=True, cycle=0.005),

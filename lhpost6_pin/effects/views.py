@@ -221,4 +221,4 @@ def view_stribeck_lag(numbers):
 @compiled_inline
 def view_warm_up(numbers):
     """Parameters of `warm_up`."""
-    return warm_up.WarmUp(numbers[0], numbers[1], numbers[2], numbers[3])
+    return warm_up.WarmUp(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])

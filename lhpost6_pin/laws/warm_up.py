@@ -1,9 +1,10 @@
 """Friction that grows (a < 0: shrinks) with the mean speed of the last while, as seals warm up.
 
-    f = -a h Z,  T dh/dt = |v| - h
+    f = -a h / (1 + h / h_s) Z,  T dh/dt = |v| - h
 
-a [N s/m], h [m/s] mean speed, T [s] memory; Z [1] the hysteresis of `bouc_wen`. Stored energy: none is declared, all
-work counts as dissipated. Source: the simplest form that is linear in its amplitude.
+a [N s/m], h [m/s] mean speed, T [s] memory; h_s [m/s] mean speed from which friction changes no more, since it falls
+by no more than its own size: then it is a h_s; Z [1] the hysteresis of `bouc_wen`. Stored energy: none is declared,
+all work counts as dissipated. Source: the simplest form that is linear in its amplitude, and its saturation.
 """
 
 import math
@@ -23,6 +24,7 @@ class WarmUp(NamedTuple):
     yield_slip: Annotated[float, "m"]
     shape: Annotated[float, "1"]
     memory: Annotated[float, "s"]
+    saturation: Annotated[float, "m/s"]  # h_s
 
 
 LAW = Law(WarmUp, states=("z", "mean_speed"), amplitude=("growth",))
@@ -30,8 +32,8 @@ LAW = Law(WarmUp, states=("z", "mean_speed"), amplitude=("growth",))
 
 @compiled
 def force(p: WarmUp, z: float, mean_speed: float) -> float:
-    """Friction [N] in proportion to the mean speed."""
-    return -p.growth * mean_speed * z
+    """Friction [N] in proportion to the mean speed, up to its saturation."""
+    return -p.growth * mean_speed / (1.0 + mean_speed / p.saturation) * z
 
 
 @compiled

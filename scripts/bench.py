@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -33,6 +33,9 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate, simulate_many
+
+if TYPE_CHECKING:
+    from plain_loop import PlainPlant
 
 FIRST_RESULT = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {args!r}; main()"
 
@@ -187,6 +190,33 @@ class Bench:
             fast = best(lambda e=engine: ours(e), self.repeats)
             self.add(f"plain loop over {engine} engine, euler", slow / fast, "x")
         self._solve_ivp(drive, samples)
+        self._c_step(plain)
+
+    def _c_step(self, plain: "PlainPlant", samples: int = 2 * SAMPLE_RATE) -> None:
+        """Open-loop step of the fused engine over forward Euler in C, in turns; the machine stays near its rest."""
+        from c_step import FLAGS, CPlant, compiler
+
+        if compiler() is None:
+            print("no C step: no C compiler (cc, gcc or clang) on the PATH")
+            return
+        z = self.rest.state.z
+        pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
+        state = (self.rest.state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2)))
+        phase = np.arange(samples)[:, None] / SAMPLE_RATE * 2.0 * np.pi * np.arange(1, 11)
+        spool = self.rest.spool + 0.02 * np.sin(phase) * np.minimum(1.0, phase[:, :1])
+        drive, steps = OpenLoop(spool, self.rest.state), 4 * samples
+        short = 0.01 / (4 * SAMPLE_RATE)  # forward Euler is stable; its time does not depend on the step
+        plants = {more: CPlant(plain, *more) for more in ((), ("-march=native",))}
+        times = {more: np.inf for more in plants}
+        ours = np.inf
+        for _ in range(4 * self.repeats):
+            for more, plant in plants.items():
+                times[more] = min(times[more], best(lambda p=plant: p.run(state, spool, 4, short), 1))
+            ours = min(ours, best(lambda: simulate(self.plant, drive, samples=samples, engine="fused"), 1))
+        for more, took in times.items():
+            name = f"C step, {' '.join((*FLAGS, *more))}"
+            self.add(name, 1e6 * took / steps, "us/step")
+            self.add(f"fused semi_implicit open loop over {name}", ours / took, "x")
 
     def _solve_ivp(self, drive: OpenLoop, samples: int) -> None:
         """SciPy's LSODA on the compiled right-hand side, sample by sample as the spool is held."""

@@ -28,7 +28,7 @@ from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_re
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.contest import _complexity, loss_without
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed
+from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed, moved_together
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_strength, fit_from_rival, fit_jointly, refined, with_candidate
@@ -400,6 +400,21 @@ def test_what_parameters_at_their_bounds_have_absorbed_need_not_be_beyond_noise(
     there = replace(search.added[0], candidate=candidate("stribeck_friction", "V1"))
     left = absorbing(with_bounds("V1.pad_friction", added=(there,)))
     assert not any("V1" in e.components for e in left)  # it takes up what that form leaves
+
+
+def test_masses_that_move_together_are_a_reason_to_look_for_one_on_the_platen(found):
+    """6.2 t were taken up by masses 3 deviations off along x, y and z, within their bounds, and by their centre."""
+
+    def moved(**deviations: float) -> list[tuple[str, frozenset[str]]]:
+        x = found.search.solution.x.copy()
+        for name, index in ((n, i) for i, n in enumerate(found.search.problem.names) if n.startswith("platen.")):
+            x[index] = deviations.get(name[-2], 0.0) * found.search.problem.prior[index] * ("mass" in name)
+        search = replace(found.search, solution=found.search.solution._replace(x=x), added=())
+        return [(one.family, one.components) for one in moved_together(search)]
+
+    mass = ("added_mass", frozenset({"platen"}))
+    assert moved(x=3.0, y=2.5, z=2.1) == [mass] == moved(x=-3.0, y=-2.5, z=-2.1)
+    assert moved(x=3.0, y=2.5, z=1.9) == [] == moved(x=3.0, y=-2.5, z=2.1)
 
 
 def test_of_two_effects_that_pass_for_each_other_one_stays(found, monkeypatch):

@@ -18,7 +18,7 @@ from .search_state import AddedEffect, Search
 
 __all__ = [
     *("Absorbing", "Estimate", "absorbing", "amplitude_of", "at_bounds", "covariance_of", "deviations"),
-    *("estimates_of", "interval_reach", "is_absorbed", "owns", "sums_of"),
+    *("estimates_of", "interval_reach", "is_absorbed", "moved_together", "owns", "sums_of"),
 ]
 
 AT_BOUND = 1e-6
@@ -57,7 +57,7 @@ def at_bounds(found: Search) -> tuple[str, ...]:
 
 
 class Absorbing(NamedTuple):
-    """A parameter at its bound, which may have taken up a part of an effect."""
+    """A parameter at its bound, or one moved with its like, which may have taken up a part of an effect."""
 
     components: frozenset[str]  # that it is of
     family: str  # that it is attributed to; empty for a component's own number, which takes up what its residuals show
@@ -65,7 +65,7 @@ class Absorbing(NamedTuple):
 
 
 def absorbing(found: Search) -> tuple[Absorbing, ...]:
-    """Parameters of the machine at a bound: a reason to look for an effect there.
+    """Parameters of the machine at a bound, or moved together: a reason to look for an effect there.
 
     Not of components on which an effect was added: these take up what its form leaves.
     """
@@ -75,7 +75,30 @@ def absorbing(found: Search) -> tuple[Absorbing, ...]:
         family, where = attributed(parameter, machine)
         if (parameter.of or family) and occupied.isdisjoint(where):
             ends.append(Absorbing(frozenset(where), family, frozenset(parameter.shows_in)))
-    return tuple(ends)
+    return (*ends, *moved_together(found))
+
+
+def moved_together(found: Search) -> tuple[Absorbing, ...]:
+    """Numbers of one kind along several axes of the platen, all well off their stated values in one direction.
+
+    By chance independent ones hardly are: masses along x, y and z that all grow are one mass on the platen, of which
+    the fit of small changes has taken up what it could.
+    """
+    far = found.numbers.number("accept.moved")
+    moved: dict[str, list[tuple[float, FreeParameter]]] = {}
+    for parameter, x, prior in zip(found.problem.parameters, found.solution.x, found.problem.prior, strict=False):
+        vector, bracket, _ = parameter.name.partition("[")
+        if bracket and vector.startswith("platen.") and attributed(parameter, found.problem.machine)[0]:
+            moved.setdefault(vector, []).append((float(x / prior), parameter))
+    if any("platen" in one.candidate.components for one in found.added):
+        return ()
+    together = []
+    for ones in moved.values():
+        least = min((x for x, _ in ones), key=abs)
+        if len(ones) > 1 and abs(least) >= far and len({x > 0.0 for x, _ in ones}) == 1:
+            family, where = attributed(ones[0][1], found.problem.machine)
+            together.append(Absorbing(frozenset(where), family, frozenset(ones[0][1].shows_in)))
+    return tuple(together)
 
 
 def is_absorbed(candidate: Candidate, ends: Sequence[Absorbing]) -> bool:

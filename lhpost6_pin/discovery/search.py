@@ -17,6 +17,7 @@ from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained
 from .candidates import Candidate
 from .contest import best_of, loss_without, removed
+from .estimates import is_absorbed, moved_together
 from .joint_fit import refined
 from .screening import found_there, is_confused, score_pairs, screen
 from .search_state import Linearisation, Scored, Search, best_per_family, linearise
@@ -120,6 +121,8 @@ def _more_effects(found: Search, linear: Linearisation, progress: Progress) -> S
     more = _add(found, passed, between(progress, 0.0, 0.6)) if passed else None
     if more is None and (leading := _leading(found)) is not None:
         more = _proven_in_full(found, leading, between(progress, 0.6, 0.7))
+    if more is None and (taken_up := _taken_up(found)) is not None:
+        more = best_of(found, _with_confused(found, [taken_up]), between(progress, 0.6, 0.7))
     strong = [one for one in scored if one.score.gain >= n("accept.look") and not one.candidate.release]
     few = best_per_family(strong, named=True)[: int(n("accept.paired"))]
     beyond = sorted((one.gain - gate(one.candidate.family, found.numbers) for one in few), reverse=True)
@@ -167,6 +170,13 @@ def _leading(found: Search) -> Scored | None:
     second = others[0].score.held_out.sum() if others else 0.0
     least = max(n("accept.lead") * gate(family, found.numbers), n("accept.ahead") * second)
     return first if first.score.held_out.sum() > least else None
+
+
+def _taken_up(found: Search) -> Scored | None:
+    """The best candidate that numbers moved together may have taken up (`moved_together`), if it gains anything."""
+    moved, least = moved_together(found), found.numbers.number("accept.look")
+    some = (one for one in found.rounds[-1].scored if not one.candidate.release and one.gain >= least)
+    return next((one for one in some if is_absorbed(one.candidate, moved)), None)
 
 
 def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | None:

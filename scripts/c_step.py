@@ -29,8 +29,10 @@ def _library(flags: Sequence[str]) -> ctypes.CDLL:
         raise RuntimeError("no C compiler (cc, gcc or clang) on the PATH; install one, for example gcc")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "c_step.so"
-        source = Path(__file__).with_name("c_step.c")
-        subprocess.run([found, *flags, "-shared", "-fPIC", "-o", path, source, "-lm"], check=True)
+        source, made = Path(__file__).with_name("c_step.c"), path.with_suffix(".o")
+        subprocess.run([found, *flags, "-fPIC", "-c", "-o", made, source], check=True)
+        # linked without -ffast-math, with which loading it would have this process round small numbers to zero
+        subprocess.run([found, "-shared", "-o", path, made, "-lm"], check=True)
         return ctypes.CDLL(str(path))
 
 

@@ -16,6 +16,7 @@ from lhpost6_pin.machine.library import families
 from lhpost6_pin.machine.machine import load_machine
 
 pytestmark = pytest.mark.long
+on_site = pytest.mark.slow  # to build the site takes a minute
 
 BY_HAND = sorted(PAGES.rglob("*.md"))
 RUN = ("bash", "python")
@@ -44,6 +45,7 @@ def pages(site: Path) -> dict[Path, Links]:
     return {path: Links(path) for path in sorted(site.rglob("*.html"))}
 
 
+@on_site
 def test_no_page_loads_anything_from_elsewhere(site, pages):
     for path, page in pages.items():
         for source in page.loads:
@@ -54,6 +56,7 @@ def test_no_page_loads_anything_from_elsewhere(site, pages):
     assert "unpkg" not in "".join(path.read_text(encoding="utf-8") for path in pages)
 
 
+@on_site
 def test_every_link_and_anchor_leads_somewhere(site, pages):
     for path, page in pages.items():
         if path.name == "404.html":  # served at any address, so that its links are absolute
@@ -69,6 +72,7 @@ def test_every_link_and_anchor_leads_somewhere(site, pages):
                 assert anchor in pages[site / target.relative_to(site.resolve())].ids, f"{path.name}: {link}"
 
 
+@on_site
 def test_every_page_by_hand_is_there_and_frames_in_braces_are_not_taken_for_markup(site):
     for page in BY_HAND:
         assert (site / page.relative_to(PAGES)).with_suffix(".html").is_file()
@@ -76,12 +80,14 @@ def test_every_page_by_hand_is_there_and_frames_in_braces_are_not_taken_for_mark
     assert "<td>those of {s}</td>" in text and "<td>{n_i}</td>" in text
 
 
+@on_site
 def test_every_image_says_what_it_shows(site):
     for path in site.rglob("*.html"):
         for image in re.findall(r"<img [^>]*>", path.read_text(encoding="utf-8")):
             assert len(re.search(r'alt="([^"]*)"', image).group(1)) > 30, f"{path.name}: {image}"
 
 
+@on_site
 def test_every_command_has_its_section_and_options(site):
     text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
     for command in app.registered_commands:
@@ -91,6 +97,7 @@ def test_every_command_has_its_section_and_options(site):
     assert "--no-locked" not in text  # flags with a name of their own have no opposite
 
 
+@on_site
 def test_every_family_has_its_section_with_its_numbers(site, pages):
     ids = pages[site / "reference" / "library.html"].ids
     text = (site / "reference" / "library.html").read_text(encoding="utf-8")
@@ -99,6 +106,7 @@ def test_every_family_has_its_section_with_its_numbers(site, pages):
         assert all(f"<code>{s.name}</code>" in text for s in family.shapes if not re.search(r"_\d+$", s.name))
 
 
+@on_site
 def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site):
     from docs import theory
 
@@ -114,6 +122,7 @@ def test_every_law_module_has_its_page_with_equation_code_use_and_tests(site):
         assert re.search(r"\*\*Sign\.\*\*", by_hand) and re.search(r"\*\*In a record\.\*\*", by_hand)
 
 
+@on_site
 def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site):
     from docs import controller
 
@@ -133,6 +142,7 @@ def test_the_pages_of_the_controller_have_its_settings_code_and_tests(site):
     assert " dB at " in pages["stability"]
 
 
+@on_site
 def test_the_stored_audit_is_a_whole_one_that_found_nothing_amiss(site):
     stored = (ROOT / "scripts" / "docs" / "audit.md").read_text()
     assert "`python scripts/audit.py --seconds 60`" in stored
@@ -142,6 +152,7 @@ def test_the_stored_audit_is_a_whole_one_that_found_nothing_amiss(site):
     assert len(titles) == 3 and all(title in page for title in titles)
 
 
+@on_site
 def test_the_stored_wait_of_a_newcomer_is_within_what_is_wanted(site):
     stored = (ROOT / "scripts" / "docs" / "fresh.md").read_text()
     rows = re.findall(r"^\| .+ \| (\d+) \| (\d+) \|$", stored, re.MULTILINE)
@@ -151,12 +162,14 @@ def test_the_stored_wait_of_a_newcomer_is_within_what_is_wanted(site):
     assert "Time to the first result" in (site / "results" / "audit.html").read_text()
 
 
+@on_site
 def test_every_example_is_on_its_page_with_its_code(site):
     page = (site / "tutorials" / "examples.html").read_text()
     assert all(path.name in page for path in (ROOT / "scripts").glob("example_*.py"))
     assert page.count("find_missing_effect") >= 2 and "run_ensemble" in page
 
 
+@on_site
 def test_every_assumed_number_of_the_machine_is_on_its_page(site):
     text = (site / "assumptions.html").read_text(encoding="utf-8")
     for path, quantity in load_machine().parameters.items():

@@ -27,7 +27,7 @@ class WarmUp(NamedTuple):
     saturation: Annotated[float, "m/s"]  # h_s
 
 
-LAW = Law(WarmUp, states=("z", "mean_speed"), amplitude=("growth",))
+LAW = Law(WarmUp, states=("z", "mean_speed"), amplitude=("growth", "saturation"))
 
 
 @compiled

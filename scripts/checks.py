@@ -3,7 +3,8 @@
     python scripts/checks.py [--fast | --slow]
 
 --fast leaves out the batteries and all tests marked `long`: under two minutes, between two edits. --slow runs the long
-studies that the ordinary run leaves out, and builds the documentation site. The batteries are of a few brief cases, made anew.
+studies that the ordinary run leaves out, and builds the documentation site. The batteries are of a few brief cases, made
+anew.
 """
 
 import os

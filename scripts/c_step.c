@@ -141,6 +141,9 @@ static void step(const Plant *p, State *x, const double spool[N], double dt) {
     for (int k = 0; k < 6; k++) x->v[k] += dt * a[k];
 }
 
+/* How many numbers a plant has. */
+long plant_numbers(void) { return sizeof(Plant) / sizeof(double); }
+
 /* `samples` rows of spools, `steps` steps of dt each; the platen's position after every sample goes to `log`. */
 void run(const Plant *p, State *x, const double *spool, long samples, long steps, double dt, double *log) {
     for (long k = 0; k < samples; k++) {

@@ -55,6 +55,8 @@ class CPlant:
             *(oil.supply_pressure, oil.return_pressure, oil.bulk_modulus),
         )
         self.numbers = np.concatenate([np.ravel(part) for part in parts]).astype(np.float64)
+        if self.numbers.size != self.library.plant_numbers():
+            raise ValueError("c_step.c is of four swivel actuators, six bearing actuators and three struts")
 
     def run(self, state: tuple[np.ndarray, ...], spool: np.ndarray, steps: int, dt: float) -> tuple[np.ndarray, ...]:
         """States of `PlainPlant.step` after rows (n, 10) of spools, each held for some steps of dt [s]."""

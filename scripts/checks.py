@@ -3,8 +3,8 @@
     python scripts/checks.py [--fast | --slow]
 
 --fast leaves out the batteries and all tests marked `long`: under two minutes, between two edits. --slow runs the long
-studies that the ordinary run leaves out, and builds the documentation site. The batteries are of a few brief cases, made
-anew.
+studies that the ordinary run leaves out, and builds the documentation site. The batteries are of a few brief cases,
+made anew.
 """
 
 import os
@@ -18,7 +18,7 @@ from typing import Any
 ROOT = Path(__file__).parent.parent
 TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
 BATTERY = ["scripts/blind_battery.py", "--cases", "3", "--brief", "--seed", "901", "--check"]
-"""One that lacks nothing, one with one effect, and one without a name."""
+"""One that lacks nothing, one with one effect, and one with two."""
 
 ONE_AXIS = ["scripts/one_axis_battery.py", "--cases", "4", "--brief", "--seed", "7", "--check"]
 """Two that lack nothing, one with each effect."""

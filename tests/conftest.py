@@ -29,7 +29,7 @@ settings.register_profile("long", max_examples=2000, deadline=None)
 settings.load_profile("fixed")
 
 
-FIRST = ("test_docs", "test_discover", "test_friction_forms", "test_link_served", "test_calibration", "test_cli")
+FIRST = ("test_discover", "test_ensemble", "test_friction_forms", "test_link_served", "test_calibration", "test_cli")
 """The files that take longest: begun first, they leave no worker alone at the end."""
 
 

@@ -14,8 +14,11 @@ from lhpost6_pin.data.records import make_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.lost_motion import LostMotion, _groups, lost_motion, with_contact_sides
+from lhpost6_pin.discovery.lost_motion import LostMotion, _groups, lost_motion, with_rod_lengths
 from lhpost6_pin.discovery.sensor_findings import correct_records, find_sensor_faults
+from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration.prepare import policy_of
+from lhpost6_pin.identification.prepare import align_records, prepare_test
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 
@@ -240,24 +243,26 @@ def test_the_play_of_a_pin_shows_in_its_length_and_nowhere_else(plant, redundant
     assert found.component == "H3"
     assert found.half_play == pytest.approx(5e-5, rel=0.2)  # skews of force and length blunt the turn: `lengths.form`
     assert found.gain > 100.0
-    with_sides = with_contact_sides(loose, [found], machine)
-    for record, sided in zip(loose, with_sides, strict=True):
-        side = sided["contact_side"].sel(actuator="H3").values
-        force = record["actuator_force"].sel(actuator="H3").values
+    policy = policy_of(calibration_numbers())
+    aligned, _ = align_records(plant, with_rod_lengths(loose, [found], machine), policy)
+    for record, longer in zip(loose, aligned, strict=True):
+        assert np.isnan(longer["rod_displacement"].sel(actuator=["H1", "V6"]).values).all()
+        side = prepare_test(plant, longer, SENSORS, policy).side[0, :, 2]
+        force = record["actuator_force"].sel(actuator="H3").values[:: len(record["time"]) // len(side)][: len(side)]
         closed = np.abs(force) > 3e4  # ten times the closing force: the pin stands on one side
-        assert np.mean(np.sign(side[closed]) == np.sign(force[closed])) > 0.95  # noise of lengths and poses
-        assert np.median(np.abs(side[closed])) == pytest.approx(1.0, abs=0.25)  # that of the estimate, and noise
-        assert np.isnan(sided["contact_side"].sel(actuator="H1").values).all()
+        side, force = side[closed], force[closed]
+        assert np.mean(np.sign(side) == np.sign(force)) > 0.95  # noise of lengths and poses
+        assert np.median(np.abs(side)) == pytest.approx(1.0, abs=0.25)  # that of the estimate, and noise
     assert not any(f.kind == "offset" for f in find_sensor_faults(plant, loose, SENSORS, ["H3"]))
 
 
 def test_play_is_one_effect_where_all_pins_have_about_as_much():
     names = ("H1", "H2", "H3", "H4")
-    search = SimpleNamespace(problem=SimpleNamespace(machine=SimpleNamespace(double_acting=names)))
+    machine = SimpleNamespace(double_acting=names)
 
     def grouped(**sizes: float) -> list[list[str]]:
         lost = [LostMotion(name, size, 1e-6) for name, size in sizes.items()]
-        return [[one.component for one in group] for group in _groups(lost, search)]
+        return [[one.component for one in group] for group in _groups(lost, machine)]
 
     assert grouped(H1=5e-5, H2=6e-5, H3=7e-5, H4=8e-5) == [list(names)]
     assert grouped(H1=5e-5, H2=6e-5, H3=7e-5, H4=2e-4) == [[name] for name in names]

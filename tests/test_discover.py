@@ -28,7 +28,7 @@ from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_re
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.contest import _complexity, loss_without
 from lhpost6_pin.discovery.discover import discovery_numbers
-from lhpost6_pin.discovery.estimates import absorbing, amplitude_of, at_bounds, is_absorbed, moved_together
+from lhpost6_pin.discovery.estimates import Absorbing, absorbing, amplitude_of, at_bounds, is_absorbed, moved_together
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_strength, fit_from_rival, fit_jointly, refined, with_candidate
@@ -43,7 +43,7 @@ from lhpost6_pin.discovery.residual_function import (
 )
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, found_there, score_pairs
-from lhpost6_pin.discovery.search import _pruned, _with_confused, without_effect
+from lhpost6_pin.discovery.search import _pruned, _taken_up, _with_confused, without_effect
 from lhpost6_pin.discovery.search_state import (
     AddedEffect,
     FittedCandidate,
@@ -404,17 +404,41 @@ def test_what_parameters_at_their_bounds_have_absorbed_need_not_be_beyond_noise(
 
 def test_masses_that_move_together_are_a_reason_to_look_for_one_on_the_platen(found):
     """6.2 t were taken up by masses 3 deviations off along x, y and z, within their bounds, and by their centre."""
+    problem, solution = found.search.problem, found.search.solution
 
-    def moved(**deviations: float) -> list[tuple[str, frozenset[str]]]:
-        x = found.search.solution.x.copy()
-        for name, index in ((n, i) for i, n in enumerate(found.search.problem.names) if n.startswith("platen.")):
-            x[index] = deviations.get(name[-2], 0.0) * found.search.problem.prior[index] * ("mass" in name)
-        search = replace(found.search, solution=found.search.solution._replace(x=x), added=())
-        return [(one.family, one.components) for one in moved_together(search)]
+    def moved(deviations: dict[str, float], quantity: str = "mass", added=(), alike: bool = False) -> list[str]:
+        x = solution.x.copy()
+        x[:] = 0.0
+        for axis, size in deviations.items():
+            place = problem.names.index(f"platen.{quantity}[{axis}]")
+            x[place] = size * problem.prior[place]
+        same = [replace(p, value=1.0) if p.name.startswith("platen.mass") else p for p in problem.parameters]
+        its = SimpleNamespace(
+            parameters=same if alike else problem.parameters, prior=problem.prior, machine=problem.machine
+        )
+        numbers = found.search.numbers
+        one = SimpleNamespace(problem=its, solution=SimpleNamespace(x=x), added=added, numbers=numbers)
+        return [end.family for end in moved_together(one)]
 
-    mass = ("added_mass", frozenset({"platen"}))
-    assert moved(x=3.0, y=2.5, z=2.1) == [mass] == moved(x=-3.0, y=-2.5, z=-2.1)
-    assert moved(x=3.0, y=2.5, z=1.9) == [] == moved(x=3.0, y=-2.5, z=2.1)
+    off = {"x": 2.9, "y": 2.5, "z": 2.1}
+    assert moved(off) == ["added_mass"] == moved({axis: -size for axis, size in off.items()})
+    assert moved({**off, "z": 1.9}) == [] == moved({**off, "y": -2.5})
+    assert moved(off, "inertia") == []  # which no family of the library has along the diagonal alone
+    assert moved(off, alike=True) == []  # one number with one error
+    sways = replace(found.search.added[0], candidate=candidate("structural_flexibility", "platen.x"))
+    assert moved(off, added=(sways,)) == []  # whose form they may take up
+
+
+def test_what_masses_have_taken_up_is_fitted_jointly_though_refused(found, monkeypatch):
+    mass = scored("added_mass", ("platen",), 20.0)
+    refused = replace(mass, refused="no gain in cross-validation")
+    weak = replace(refused, score=refused.score, gain=2.0)
+    taken = (Absorbing(frozenset({"platen"}), "added_mass", frozenset({"wrench"})),)
+    searched = lambda one: replace(found.search, rounds=(Round((one,)),))  # noqa: E731
+    assert _taken_up(searched(refused)) is None  # masses as stated
+    monkeypatch.setattr("lhpost6_pin.discovery.search.moved_together", lambda search: taken)
+    assert _taken_up(searched(refused)) is refused
+    assert _taken_up(searched(weak)) is None
 
 
 def test_of_two_effects_that_pass_for_each_other_one_stays(found, monkeypatch):

@@ -67,7 +67,7 @@ def test_the_mean_pressure_follows_from_the_difference_by_continuity(table, test
 
 
 def test_a_pin_changes_sides_when_its_length_shows_it(table, test):
-    """Not when the oil's force does, which friction and inertia of the rod delay: closed form of what that draws."""
+    """Not when the oil's force does: closed form of what an arbitrary side draws."""
     half_play, (actuator,) = 1e-4, table.actuators
     loose = make_plant(table.with_effect("swivel_play", (actuator.name,), half_play=half_play, closing_force=1e3))
     time = test.dt * np.arange(test.samples)[:, None]

@@ -8,7 +8,9 @@ import sys
 
 import numpy as np
 import pytest
+from c_step import CPlant, compiler
 from machine_cases import SCRIPTS, machine_named
+from plain_loop import PlainPlant
 from run_cases import at_rest
 
 from lhpost6_pin.core.files import models_folder
@@ -111,28 +113,43 @@ def test_cutting_records_without_the_wheel_says_which_wheel_to_give(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def shaken_for_the_plain_loop():
+    """Plant, rest, spools (160, 10), the plain loop's state at rest, and steps a sample with their length [s]."""
+    plant, rest = at_rest(machine_named("lhpost6"))
+    samples, steps = 160, 16
+    rng = np.random.default_rng(1)
+    t = np.arange(samples) / SAMPLE_RATE
+    size = np.r_[np.full(4, 0.1), np.full(6, 0.02)]
+    spool = rest.spool + size * np.sin(2 * np.pi * np.outer(t, rng.uniform(3, 12, 10)) + rng.uniform(0, 6, 10))
+    z = rest.state.z
+    # our hidden states: A and B of H1..H4 in turn, A of V1..V6, seals, pads
+    pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
+    state = rest.state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2))
+    return plant, rest, spool, state, (steps, 1.0 / (steps * SAMPLE_RATE))
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_the_step_in_c_is_that_of_the_plain_loop():
+    """The yardstick of time does the whole work: to rounding, a hundred times that of one step and one compiler."""
+    plant, _, spool, state, (steps, dt) = shaken_for_the_plain_loop()
+    plain = PlainPlant(plant.machine)
+    found, wanted = CPlant(plain).run(state, spool[:40], steps, dt), state
+    for row in spool[:40]:
+        for _ in range(steps):
+            wanted = plain.step(*wanted, row, dt)
+    for ours, theirs, near in zip(found, wanted, ROUNDING, strict=True):
+        assert np.abs(ours - theirs).max() < 100.0 * near
+
+
 def test_the_plain_loop_is_the_fused_engines_euler_to_rounding():
     """NumPy over components, written from the equations: it shares no law, port or stage with the package.
 
     Sixteen steps a sample, every actuator driven by a sine of its own; the pads and seals slide, no orifice's drop
     comes below the 500 Pa at which ours rounds the root off (theirs does not).
     """
-    from c_step import CPlant, compiler
-    from plain_loop import PlainPlant
-
-    plant, rest = at_rest(machine_named("lhpost6"))
-    samples, steps = 160, 16
-    dt = 1.0 / (steps * SAMPLE_RATE)
-    rng = np.random.default_rng(1)
-    t = np.arange(samples) / SAMPLE_RATE
-    size = np.r_[np.full(4, 0.1), np.full(6, 0.02)]
-    spool = rest.spool + size * np.sin(2 * np.pi * np.outer(t, rng.uniform(3, 12, 10)) + rng.uniform(0, 6, 10))
-
-    z = rest.state.z
-    # our hidden states: A and B of H1..H4 in turn, A of V1..V6, seals, pads
-    pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
-    state = rest.state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2))
-    plain, supply, begun = PlainPlant(plant.machine), plant.supply, state
+    plant, rest, spool, state, (steps, dt) = shaken_for_the_plain_loop()
+    samples = len(spool)
+    plain, supply = PlainPlant(plant.machine), plant.supply
     least, slid = np.inf, np.zeros(2)
     for row in spool:
         for _ in range(steps):
@@ -141,10 +158,6 @@ def test_the_plain_loop_is_the_fused_engines_euler_to_rounding():
         least = min(least, (supply[0] - pressures).min(), (pressures - supply[1]).min())
         slid = np.maximum(slid, [np.abs(state[4]).max(), np.linalg.norm(state[5], axis=1).max()])
     assert least > 500.0 and slid.min() > 0.9
-    if compiler() is not None:  # the yardstick of time takes the same steps: to rounding, as below
-        for ours, theirs, near in zip(CPlant(plain).run(begun, spool, steps, dt), state, ROUNDING, strict=True):
-            assert np.abs(ours - theirs).max() < near
-
     drive = OpenLoop(np.vstack([spool, spool[-1:]]), rest.state)  # a run records the start of each sample
     run = simulate(
         plant, drive, samples=samples + 1, scheme="euler", steps_per_second=steps * SAMPLE_RATE, engine="fused"

@@ -3,7 +3,7 @@
 `comparisons` turns a record into regressions y = X theta + noise, filtered by one band, for `consistency` to solve.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -41,36 +41,36 @@ class LooseLength(NamedTuple):
 
     name: str
     comparison: SensorComparison
-    side: Array  # (n,) -1 to 1, of the force
-    ahead: Array  # (samples,) length less that of the pose, with all sensor errors, at the record's rate [m]
+    sides: Array  # (c, n) of the force by each closing force, -1 to 1
+    measured: Array  # (samples,) length at the record's rate [m]
     place: Array  # (n,) samples of the record that are compared
 
-    def travel(self, rest: Array) -> Array:
-        """Rod ahead of the platen (samples,) [m]: the length less the `rest` (n,) that pose and errors explain [m]."""
-        slow = rest - self.comparison.terms[0].column
-        return self.ahead - np.interp(np.arange(len(self.ahead)), self.place, slow)
+    def without(self, errors: Array) -> Array:
+        """The length (samples,) [m] less the `errors` (n,) [m] of sensors and geometry at the samples compared."""
+        return self.measured - np.interp(np.arange(len(self.measured)), self.place, errors)
 
 
-def loose_lengths(plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: float) -> Iterator[LooseLength]:
+def loose_lengths(
+    plant: Plant, record: xr.Dataset, sensors: SensorSet, closing: Sequence[float]
+) -> Iterator[LooseLength]:
     """Lengths of double-acting actuators against the platen's pose, each with the contact side of a loose pin.
 
-    The side follows from the force, measured or of pressures; `closing` [N] of it closes most of the play.
+    The side follows from the force, measured or of pressures; each of `closing` (c,) [N] may close most of the play.
     """
     view = RecordView(plant, record, sensors)
-    measured = view.has("actuator_force")
-    if not (measured or view.has("chamber_pressure_a", "chamber_pressure_b")):
+    by_cell = view.has("actuator_force")
+    if not (by_cell or view.has("chamber_pressure_a", "chamber_pressure_b")):
         return
-    force = view.values("actuator_force") if measured else hydraulic_force(plant.machine, record)
-    side = view.signal(force / np.sqrt(force**2 + closing**2))
+    force = view.values("actuator_force") if by_cell else hydraulic_force(plant.machine, record)
+    sides = np.stack([view.signal(force / np.sqrt(force**2 + one**2)) for one in closing])
     compared = list(_lengths(view))  # none without lengths
     if not compared:
         return
-    place = view.step * (view.trim + np.arange(len(side), dtype=np.float64))
-    legs, _ = leg_displacements(plant, view.values("platen_displacement"))
-    ahead = view.values("actuator_displacement") - legs[:, : plant.spools]
+    place = view.step * (view.trim + np.arange(sides.shape[1], dtype=np.float64))
+    measured = view.values("actuator_displacement")
     for i, name in enumerate(plant.machine.actuator_names):
         if name in plant.machine.double_acting:
-            yield LooseLength(name, compared[i], side[:, i], ahead[:, i], place)
+            yield LooseLength(name, compared[i], sides[:, :, i], measured[:, i], place)
 
 
 def _delay_term(rate: Array, variance: float, nominal: float = 0.0) -> Regressor:

@@ -24,7 +24,10 @@ from .conditioning import resolution
 from .records import sample_interval
 from .signals import Band
 
-__all__ = ["SensorSet", "add_noise", "load_sensors", "make_sensors", "recorded_spectrum", "spectrum"]
+__all__ = ["SENSOR", "SensorSet", "add_noise", "load_sensors", "make_sensors", "recorded_spectrum", "spectrum"]
+
+SENSOR = "lhpost6_sensors_of"
+"""Attribute of a variable that is none of the layout: the channel whose sensors it comes from."""
 
 SAMPLING = {"rate": "Hz", "low_pass": "Hz", "low_pass_order": "1", "bits": "1", "noise_range": "1"}
 
@@ -151,6 +154,8 @@ def recorded_spectrum(sensors: SensorSet, channel: str, f: ArrayLike, rate: floa
 
 def _source(sensors: SensorSet, variable: xr.DataArray) -> tuple[str, Array]:
     """Channel whose sensors a variable comes from, and its noise (1,) or (6,) over theirs."""
+    if SENSOR in variable.attrs:
+        return str(variable.attrs[SENSOR]), np.ones(1)
     gain = variable.attrs.get(WEIGHTS)
     if gain is None or "point_acceleration" not in sensors.noise:
         return str(variable.name), np.ones(1)
@@ -165,7 +170,7 @@ def add_noise(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) 
     rate, whatever that is; what lies above half of it is folded down, as sampling does.
     """
     channels = {}
-    for name in sensors.noise:
+    for name in (*sensors.noise, *(name for name, variable in record.items() if SENSOR in variable.attrs)):
         if name in record:
             values, (sensor, gain) = columns_of(record[name]), _source(sensors, record[name])
             noisy = values + gain * _draw(sensors, sensor, values.shape, 1 / sample_interval(record), rng)

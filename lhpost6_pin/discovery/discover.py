@@ -32,7 +32,7 @@ from .effect_loops import EffectLoop, effect_loops
 from .estimates import deviations, estimates_of
 from .friction_form import with_friction_form
 from .held_out import Proof, prove
-from .lost_motion import LostMotion, lost_motion, with_contact_sides, with_lost_motion
+from .lost_motion import LostMotion, lost_motion, with_lost_motion, with_rod_lengths
 from .next_test import NextTest, next_tests
 from .residual_function import ResidualFunction, fit_residual_functions, with_residual_function
 from .residual_records import residual_records
@@ -104,7 +104,10 @@ def discover(
     plant = make_plant(machine)
     lost = lost_motion(plant, campaign.records, sensors, numbers)
     faults = find_sensor_faults(plant, campaign.records, sensors, [one.component for one in lost])
-    records = with_contact_sides(correct_records(campaign.records, faults), lost, machine)
+    records = correct_records(campaign.records, faults)
+    if lost and faults:  # lengths are compared with the pose that the search has
+        lost = lost_motion(plant, records, sensors, numbers)
+    records = with_rod_lengths(records, lost, machine)
     hashes = {name: _hash(record) for name, record in zip(names, campaign.records, strict=True)}
     held = _held_out(names, hold_out, campaign.skipped)
     records, held = in_blocks(records, held, numbers, calibration)

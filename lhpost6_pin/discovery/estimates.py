@@ -57,7 +57,7 @@ def at_bounds(found: Search) -> tuple[str, ...]:
 
 
 class Absorbing(NamedTuple):
-    """A parameter at its bound, or one moved with its like, which may have taken up a part of an effect."""
+    """A parameter at its bound, or masses shifted in common, which may have taken up a part of an effect."""
 
     components: frozenset[str]  # that it is of
     family: str  # that it is attributed to; empty for a component's own number, which takes up what its residuals show
@@ -65,7 +65,7 @@ class Absorbing(NamedTuple):
 
 
 def absorbing(found: Search) -> tuple[Absorbing, ...]:
-    """Parameters of the machine at a bound, or moved together: a reason to look for an effect there.
+    """Parameters of the machine at a bound, or masses shifted in common: a reason to look for an effect there.
 
     Not of components on which an effect was added: these take up what its form leaves.
     """
@@ -79,26 +79,23 @@ def absorbing(found: Search) -> tuple[Absorbing, ...]:
 
 
 def moved_together(found: Search) -> tuple[Absorbing, ...]:
-    """Numbers of one kind along several axes of the platen, all well off their stated values in one direction.
+    """Masses of the platen along several axes, all far from their stated values in one direction.
 
-    By chance independent ones hardly are: masses along x, y and z that all grow are one mass on the platen, of which
-    the fit of small changes has taken up what it could.
+    Independent errors seldom agree so: they indicate a mass on the platen. Masses stated alike along all axes are one
+    number with one error, which must be farther off. None beside an effect on the platen, whose form masses take up.
     """
-    far = found.numbers.number("accept.moved")
-    moved: dict[str, list[tuple[float, FreeParameter]]] = {}
-    for parameter, x, prior in zip(found.problem.parameters, found.solution.x, found.problem.prior, strict=False):
-        vector, bracket, _ = parameter.name.partition("[")
-        if bracket and vector.startswith("platen.") and attributed(parameter, found.problem.machine)[0]:
-            moved.setdefault(vector, []).append((float(x / prior), parameter))
-    if any("platen" in one.candidate.components for one in found.added):
+    parameters = found.problem.parameters
+    moved = [(p, float(x / s)) for p, x, s in zip(parameters, found.solution.x, found.problem.prior, strict=False)]
+    masses = [(p, x) for p, x in moved if p.name.startswith("platen.mass[")]
+    if len(masses) < 2 or any(c.startswith("platen") for one in found.added for c in one.candidate.components):
         return ()
-    together = []
-    for ones in moved.values():
-        least = min((x for x, _ in ones), key=abs)
-        if len(ones) > 1 and abs(least) >= far and len({x > 0.0 for x, _ in ones}) == 1:
-            family, where = attributed(ones[0][1], found.problem.machine)
-            together.append(Absorbing(frozenset(where), family, frozenset(ones[0][1].shows_in)))
-    return tuple(together)
+    alike = len({p.value for p, _ in masses}) == 1
+    far = found.numbers.number("outlying.far" if alike else "accept.moved")
+    if min(abs(x) for _, x in masses) < far or len({x > 0.0 for _, x in masses}) > 1:
+        return ()
+    first = masses[0][0]
+    family, where = attributed(first, found.problem.machine)
+    return (Absorbing(frozenset(where), family, frozenset(first.shows_in)),)
 
 
 def is_absorbed(candidate: Candidate, ends: Sequence[Absorbing]) -> bool:

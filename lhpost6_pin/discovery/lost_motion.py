@@ -2,8 +2,8 @@
 
 Play is clearest in a length sensor on the rod, compared with the platen's pose: the rod changes sides with the sign of
 its force. Lengths are regressed on that sign jointly with the errors of sensors and geometry, each with its prior. The
-estimate is the prior of the play in the search. The oil's balance then takes the side of the pin from the lengths, not
-from the oil's force: friction and inertia of the rod, which that lacks, shift the moments at which it changes sides.
+estimate is the prior of the play in the search. The contact side in the oil's balance is taken from the lengths:
+friction and inertia of the rod shift the reversals predicted from the force of the oil.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,22 +15,26 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.progress import Progress, split
+from ..data.alignment import align_record, group_delays
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import LooseLength, loose_lengths
-from ..data.sensors import SensorSet
-from ..identification.prepare import CONTACT_SIDE
+from ..data.sensors import SENSOR, SensorSet
+from ..identification.calibration.fit import solve
+from ..identification.prepare import HALF_PLAY, ROD_LENGTH
 from ..machine.library import find_family, in_size_of
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.plant import Plant
 from .acceptance import squares_by_column
-from .candidates import Candidate, first_shape
+from .candidates import Candidate
 from .joint_fit import with_candidate
 from .search_state import AddedEffect, FittedCandidate, Search, fitted_machine
 
-__all__ = ["LostMotion", "lost_motion", "with_contact_sides", "with_lost_motion"]
+__all__ = ["LostMotion", "lost_motion", "with_lost_motion", "with_rod_lengths"]
 
 
+_CLOSING = 4
+"""Closing forces tried, between those from which a search starts."""
 _REWEIGHED = 3
 """Times that the residual is reweighted by its own power."""
 
@@ -41,7 +45,9 @@ class LostMotion(NamedTuple):
     component: str
     half_play: float  # [m]
     deviation: float  # standard
-    travel: tuple[Array | None, ...] = ()  # of each record (samples,): rod ahead of the platen, from its length [m]
+    closing_force: float = 0.0  # [N] that with which the lengths agree best
+    misfit: float = 0.0  # variance that it leaves of the lengths [m2]
+    length: tuple[Array | None, ...] = ()  # of each record (samples,): of the rod, less the errors of its sensor [m]
 
     @property
     def gain(self) -> float:
@@ -53,24 +59,33 @@ def lost_motion(
     plant: Plant, records: Sequence[xr.Dataset], sensors: SensorSet, numbers: Parameters
 ) -> tuple[LostMotion, ...]:
     """Significant play from the lengths of all records; numbers are those of `models/procedures/discovery.toml`."""
-    closing = dict(first_shape(find_family("swivel_play")))["closing_force"]
+    starts = next(s.start for s in find_family("swivel_play").shapes if s.name == "closing_force")
+    closing = np.geomspace(min(starts), max(starts), _CLOSING).tolist()
+    late = group_delays(plant, records)
+    late = {group: delay for group, delay in late.items() if group == "actuator_displacement"}
     parts: dict[str, dict[int, LooseLength]] = {}
     for i, record in enumerate(records):
-        for one in loose_lengths(plant, record, sensors, closing):
+        for one in loose_lengths(plant, align_record(record, late), sensors, closing):
             parts.setdefault(one.name, {})[i] = one
-    found = [_of_lengths(name, some, len(records)) for name, some in parts.items()]
+    each = (
+        [_of_lengths(name, some, len(records), k, f) for k, f in enumerate(closing)] for name, some in parts.items()
+    )
+    found = [min(ones, key=lambda one: one.misfit) for ones in each]
     least, size = numbers.number("accept.confusable"), numbers.number("lengths.play")
     return tuple(one for one in found if one.half_play >= size and one.gain >= least)
 
 
-def _of_lengths(name: str, parts: Mapping[int, LooseLength], count: int) -> LostMotion:
-    """Half the play by least squares of the lengths of some of `count` records, with errors of sensors and geometry."""
+def _of_lengths(name: str, parts: Mapping[int, LooseLength], count: int, k: int, closing: float) -> LostMotion:
+    """Half the play by least squares of the lengths of some of `count` records, with errors of sensors and geometry.
+
+    closing [N] is the k-th force by which sides are known.
+    """
     comparisons = [one.comparison for one in parts.values()]
     due = np.array([term.due for term in comparisons[0].terms])
     rows, explained = [], []
     for one in parts.values():
         terms = np.stack([term.column for term in one.comparison.terms], axis=1)
-        rows.append(np.hstack([one.side[:, None], terms, one.comparison.errors]))
+        rows.append(np.hstack([one.sides[k][:, None], terms, one.comparison.errors]))
         explained.append(terms @ due)
     x, y = np.vstack(rows), np.concatenate([c.y - known for c, known in zip(comparisons, explained, strict=True)])
     prior = np.zeros(x.shape[1])
@@ -83,56 +98,79 @@ def _of_lengths(name: str, parts: Mapping[int, LooseLength], count: int) -> Lost
         inverse = scaled_inverse(matrix, np.diag(matrix))
         theta = inverse @ (x.T @ y) / (variance * thinned)
         variance = max(stated, float(np.mean((y - x @ theta) ** 2)))
-    travel: list[Array | None] = [None] * count
+    length: list[Array | None] = [None] * count
     for (i, one), row, known in zip(parts.items(), rows, explained, strict=True):
-        travel[i] = one.travel(known + row[:, 1:] @ theta[1:])
-    return LostMotion(name, float(theta[0]), float(np.sqrt(inverse[0, 0])), tuple(travel))
+        errors = known + row[:, 1:] @ theta[1:] - one.comparison.terms[0].column
+        length[i] = one.without(errors)
+    return LostMotion(name, float(theta[0]), float(np.sqrt(inverse[0, 0])), closing, variance, tuple(length))
 
 
-def with_contact_sides(records: Sequence[xr.Dataset], lost: Sequence[LostMotion], machine: Machine) -> list[xr.Dataset]:
-    """Records with the side of the play on which each loose pin stands, `contact_side` (time, actuator) [1].
+def with_rod_lengths(records: Sequence[xr.Dataset], lost: Sequence[LostMotion], machine: Machine) -> list[xr.Dataset]:
+    """Records with the lengths of loose rods [m], less the errors of their sensors, as `rod_displacement`.
 
-    It is the rod's travel in units of half the play; NaN for a pin that is not loose or whose length is not measured.
+    It is (time, actuator), and NaN for a rod that is not loose or whose length is not measured.
     """
+    play = {one.component: _common(group)[0] for group in _groups(lost, machine) for one in group}
+    attributes = {
+        "units": "m",
+        SENSOR: "actuator_displacement",
+        HALF_PLAY: [play.get(name, np.nan) for name in machine.actuator_names],
+    }
     out = []
     for i, record in enumerate(records):
-        each = ((one, one.travel[i]) for one in lost)
-        known = {one.component: travel / one.half_play for one, travel in each if travel is not None}
+        lengths = {one.component: one.length[i] for one in lost if i < len(one.length)}
         none = np.full(record.sizes["time"], np.nan)
-        columns = np.stack([known.get(name, none) for name in machine.actuator_names], axis=1)
-        out.append(record.assign({CONTACT_SIDE: (("time", "actuator"), columns)}) if known else record)
+        columns = [none if (rod := lengths.get(name)) is None else rod for name in machine.actuator_names]
+        rods = xr.Variable(("time", "actuator"), np.stack(columns, axis=1), attributes)
+        out.append(record if all(column is none for column in columns) else record.assign({ROD_LENGTH: rods}))
     return out
 
 
 def with_lost_motion(found: Search, lost: Sequence[LostMotion], progress: Progress) -> Search:
     """The search with the play identified from lengths; one common value where all actuators have similar play."""
-    groups = _groups(lost, found)
-    for group, part in zip(groups, split(progress, len(groups)), strict=True):
+    groups = _groups(lost, found.problem.machine)
+    before, (*parts, last) = found, split(progress, len(groups) + 1)
+    for group, part in zip(groups, parts, strict=True):
         found = _with_play(found, group, part)
+    if groups:
+        found = _reweighed(before, found, last)
     progress(1.0)
     return found
 
 
-def _groups(lost: Sequence[LostMotion], found: Search) -> list[tuple[LostMotion, ...]]:
+def _reweighed(before: Search, found: Search, progress: Progress) -> Search:
+    """The search weighed by its noise: with play, that of lengths and poses is in the flows."""
+    noise = [one.problem.noise_at(one.solution.x) for one in (before, found)]
+    normal = found.solution.normal.reweighed(*noise)
+    rest = found.calibration, found.solution.x, progress, normal
+    return replace(found, problem=normal.problem, solution=solve(normal.problem, *rest, frugal=True, settled=True))
+
+
+def _groups(lost: Sequence[LostMotion], machine: Machine) -> list[tuple[LostMotion, ...]]:
     """All together if all double-acting actuators have play, none twice as much as another."""
-    if {one.component for one in lost} == set(found.problem.machine.double_acting):
+    if {one.component for one in lost} == set(machine.double_acting):
         sizes = np.array([one.half_play for one in lost])
         if len(sizes) > 1 and sizes.max() < 2.0 * sizes.min():
             return [tuple(lost)]
     return [(one,) for one in lost]
 
 
+def _common(group: Sequence[LostMotion]) -> tuple[float, float]:
+    """Half the play that a group shares, and its standard deviation [m]."""
+    weight = np.array([one.deviation**-2.0 for one in group])
+    return float(weight @ [one.half_play for one in group] / weight.sum()), float(weight.sum() ** -0.5)
+
+
 def _with_play(found: Search, group: Sequence[LostMotion], progress: Progress) -> Search:
     family = in_size_of(find_family("swivel_play"), found.problem.machine)
-    candidate = Candidate(family, tuple(one.component for one in group), first_shape(family))
-    weight = np.array([one.deviation**-2.0 for one in group])
-    size = float(weight @ [one.half_play for one in group] / weight.sum())
+    closing = max(group, key=lambda one: one.gain).closing_force
+    candidate = Candidate(family, tuple(one.component for one in group), (("closing_force", closing),))
+    size, deviation = _common(group)
     # hardly wider than its form may be off: impacts bias the estimate of play from the oil
-    sd = float(np.hypot(weight.sum() ** -0.5, found.numbers.number("lengths.form") * size))
-    own = tuple(
-        replace(parameter, sd=sd) if parameter.name.endswith(".half_play") else parameter
-        for parameter in candidate.fit_parameters((size,), found.numbers)
-    )
+    sd = float(np.hypot(deviation, found.numbers.number("lengths.form") * size))
+    # the oil's balance, with sides from lengths, does not depend on the closing force
+    every = candidate.fit_parameters((size,), found.numbers)
+    own = tuple(replace(parameter, sd=sd) for parameter in every if parameter.name.endswith(".half_play"))
     more = found.solved(*with_candidate(found.problem, candidate, (size,), own, found.solution.x), progress)
     gain = sum(one.gain for one in group)
     contest = (FittedCandidate(candidate, 0.0, fitted_machine(more.solution)),)

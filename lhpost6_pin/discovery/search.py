@@ -35,12 +35,10 @@ def refit(
     """
     zero = np.zeros(len(problem.prior))
     first = solve(problem, calibration, zero, between(progress, 0.0, 0.85), first=begin, frugal=True)
-    before, now = problem.noise_at(zero), problem.noise_at(first.x)
-    scale = 1.0 / np.sqrt(np.maximum(1.0 + now - before, 0.25))  # noise has other sources than the sensors
-    scaled = problem.scaled(scale)
-    rest = first.x, between(progress, 0.85, 1.0), first.normal.scaled(scaled, scale)
-    solution = solve(scaled, calibration, *rest, frugal=True, settled=True)
-    return Search(scaled, solution, solution, numbers, calibration)
+    normal = first.normal.reweighed(problem.noise_at(zero), problem.noise_at(first.x))
+    part = between(progress, 0.85, 1.0)
+    solution = solve(normal.problem, calibration, first.x, part, normal, frugal=True, settled=True)
+    return Search(normal.problem, solution, solution, numbers, calibration)
 
 
 def search(found: Search, keep: Callable[[Search], None], progress: Progress) -> tuple[Search, Linearisation]:
@@ -119,10 +117,9 @@ def _more_effects(found: Search, linear: Linearisation, progress: Progress) -> S
     n, scored = found.numbers.number, found.rounds[-1].scored
     passed = [one for one in scored if not one.refused]
     more = _add(found, passed, between(progress, 0.0, 0.6)) if passed else None
-    if more is None and (leading := _leading(found)) is not None:
-        more = _proven_in_full(found, leading, between(progress, 0.6, 0.7))
-    if more is None and (taken_up := _taken_up(found)) is not None:
-        more = best_of(found, _with_confused(found, [taken_up]), between(progress, 0.6, 0.7))
+    for one in (_leading(found), _taken_up(found)):
+        if more is None and one is not None:
+            more = _proven_in_full(found, one, between(progress, 0.6, 0.7))
     strong = [one for one in scored if one.score.gain >= n("accept.look") and not one.candidate.release]
     few = best_per_family(strong, named=True)[: int(n("accept.paired"))]
     beyond = sorted((one.gain - gate(one.candidate.family, found.numbers) for one in few), reverse=True)
@@ -173,7 +170,7 @@ def _leading(found: Search) -> Scored | None:
 
 
 def _taken_up(found: Search) -> Scored | None:
-    """The best candidate that numbers moved together may have taken up (`moved_together`), if it gains anything."""
+    """The best candidate that masses moved together may have taken up (`moved_together`), if it is worth a look."""
     moved, least = moved_together(found), found.numbers.number("accept.look")
     some = (one for one in found.rounds[-1].scored if not one.candidate.release and one.gain >= least)
     return next((one for one in some if is_absorbed(one.candidate, moved)), None)

@@ -30,10 +30,19 @@ from ..data.signals import Band, differentiate
 from ..data.valve_pairs import with_joint_spools
 from ..machine.machine import Machine
 from ..mechanics.plant import Plant
-from ..mechanics.pose import PlatenMotion
+from ..mechanics.pose import PlatenMotion, leg_displacements
 from ..mechanics.strokes import stroke_ends
 
-__all__ = ["AS_RECORDED", "CALIBRATION", "CONTACT_SIDE", "EACH_TEST", "SIGNIFICANT", "MeasuredTest", "Policy"]
+__all__ = [
+    "AS_RECORDED",
+    "CALIBRATION",
+    "EACH_TEST",
+    "HALF_PLAY",
+    "ROD_LENGTH",
+    "SIGNIFICANT",
+    "MeasuredTest",
+    "Policy",
+]
 __all__ += ["actuator_forces", "align_records", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
 __all__ += ["prepare_test", "source_of"]
 
@@ -57,8 +66,9 @@ class Policy(NamedTuple):
 PRESSURE_ORDER = 16
 """Order of the low-pass of differentiated channels: at half its cutoff it takes less than 2e-5."""
 
-CONTACT_SIDE = "contact_side"
-"""Variable (time, actuator) that discovery adds to a record: the side of its play on which a loose pin stands [1]."""
+ROD_LENGTH, HALF_PLAY = "rod_displacement", "half_play"
+"""Variable (time, actuator) that discovery adds to a record: lengths [m] of rods whose pin is loose, less the errors of
+their sensors, NaN for others; and its attribute: by how much each is loose, to either side [m]."""
 
 AS_RECORDED = Policy(align=False)
 EACH_TEST = Policy(align=True)
@@ -78,7 +88,9 @@ class MeasuredTest:
     path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
-    side: Array | None = None  # (2, n, n_actuators) `CONTACT_SIDE` and its rate [1/s], NaN where it is not known
+    side: Array | None = (
+        None  # (2, n, n_actuators) side, -1 to 1, of the play on which a pin stands, and its rate; NaN: not known
+    )
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
     weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
     substeps: int = 1  # in which friction is marched between samples
@@ -198,19 +210,26 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     if cutoff is not None:
         derived = {n: x for n, x in channels.items() if LAYOUT[n].differentiated}
         rates = {n: differentiate(x, dt, cutoff, PRESSURE_ORDER) for n, x in derived.items()}
-    side = None
-    if CONTACT_SIDE in record:
-        pins = record[CONTACT_SIDE].values
-        side = np.stack([pins, differentiate(pins, dt, cutoff, PRESSURE_ORDER)])
     name = str(record.attrs.get("test", "test"))
     if sensors is None or (not is_measured(record) and set(MOTION) <= set(record.data_vars)):
         motion = PlatenMotion(*(record[channel].values.astype(float) for channel in MOTION))
         _warn_of_strokes(plant, name, record, motion)
-        return MeasuredTest(name, dt, motion, channels, rates, side=side, record=record)
+        return MeasuredTest(name, dt, motion, channels, rates, record=record)
     band = None if "platen_acceleration" in record else policy.band
     fused = fuse_motion(plant, record, sensors, band=band, shares=policy.shares)
     _warn_of_strokes(plant, name, record, fused.motion)
+    side = _contact_side(plant, record, fused.motion, cutoff)
     return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, side, record)
+
+
+def _contact_side(plant: Plant, record: xr.Dataset, motion: PlatenMotion, cutoff: float | None) -> Array | None:
+    """Side of its play on which each loose pin stands, and its rate: the rod ahead of the platen over half the play."""
+    if ROD_LENGTH not in record:
+        return None
+    rods, dt = record[ROD_LENGTH], sample_interval(record)
+    legs, _ = leg_displacements(plant, motion.displacement)
+    side = (rods.values - legs[:, : plant.spools]) / np.asarray(rods.attrs[HALF_PLAY])
+    return np.stack([side, differentiate(side, dt, cutoff, PRESSURE_ORDER)])
 
 
 def _warn_of_strokes(plant: Plant, test: str, record: xr.Dataset, motion: PlatenMotion) -> None:

@@ -72,7 +72,7 @@ def draw_cases(count: int, seed: int, campaign: str = "full", variety: Variety =
     mix = numbers()["mix"]
     share = np.array(list(mix.values())) * count / sum(mix.values())
     whole = np.floor(share).astype(int)
-    for i in np.argsort(whole - share)[: count - whole.sum()]:
+    for i in np.argsort(whole - share, kind="stable")[: count - whole.sum()]:
         whole[i] += 1
     sorts = [str(sort) for sort in random.permutation(np.repeat(list(mix), whole))]
     piles = {"one": "effect", "more": "effect", "unknown": "unknown", "sensor": "sensor"}

@@ -67,6 +67,11 @@ class NormalEquations:
         other.slope = [[j.times(s) for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
         return other if self.bias is None else other.less(self.bias.scaled(times))
 
+    def reweighed(self, before: Array, now: Array) -> "NormalEquations":
+        """The same, weighed by noise whose mean squares (t, b, c) have changed since its weights were set."""
+        scale = 1.0 / np.sqrt(np.maximum(1.0 + now - before, 0.25))  # noise has other sources than the sensors
+        return self.scaled(self.problem.scaled(scale), scale)
+
     def less(self, bias: "NoiseBias") -> "NormalEquations":
         """Subtract the noise bias and weigh by the remaining power; call before `whole`, which is cached."""
         self.bias = bias

@@ -46,9 +46,10 @@ class JointFit(NamedTuple):
 def fit_jointly(found: Search, one: Scored, progress: Progress, best: JointFit | None = None) -> JointFit:
     """The search with a candidate fitted jointly with all parameters, from its linear estimate.
 
-    Where the residual stays large, it is fitted from the stated parameters, too, since a missing effect may have biased
-    them out of reach; and from other shapes that explain nearly as much. From as many starts as the `best` rival so far
-    required; then no more where that leaves little, and this one is far behind it.
+    Where that ends higher than without the candidate, all derivatives are evaluated at its steps. Where the residual
+    stays large, it is fitted from the stated parameters, too, since a missing effect may have biased them out of reach;
+    and from other shapes that explain nearly as much. From as many starts as the `best` rival so far required; then no
+    more where that leaves little, and this one is far behind it.
     """
     n = found.numbers.number
     near = [s for s in found.rounds[-1].scored if s.gain >= n("accept.near") * one.gain]
@@ -56,7 +57,10 @@ def fit_jointly(found: Search, one: Scored, progress: Progress, best: JointFit |
     starts = [(one, False), (one, True), *((other, False) for other in others[: int(n("accept.shapes"))])]
     fits: list[Search] = []
     for (start, afresh), part in zip(starts, split(progress, len(starts)), strict=True):
-        fits.append(_fit_from(found, start, part, afresh=afresh))
+        fit = _fit_from(found, start, part, afresh=afresh)
+        if fit.objective >= found.objective and not fits:  # derivatives reused are too far off
+            fit = min(fit, _fit_from(found, start, part, afresh=afresh, reused=False), key=lambda one: one.objective)
+        fits.append(fit)
         if best is not None and len(fits) < best.starts:
             continue
         if fits[-1].power < n("accept.settled"):
@@ -88,10 +92,10 @@ def fit_from_rival(found: Search, one: Scored, rival: Scored, fitted: Search, pr
     return found.solved(*start, progress, settled=True)
 
 
-def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -> Search:
+def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, reused: bool = True) -> Search:
     """The search with a candidate fitted jointly, from the present solution or from the stated parameters (`afresh`).
 
-    Derivatives by everything else are reused: accurate enough to compare candidates.
+    Derivatives by everything else are `reused`: mostly accurate enough to compare candidates.
     """
     problem, candidate, start = found.problem, one.candidate, found.solution.at
     if candidate.release:
@@ -106,7 +110,7 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool) -
     # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
     flows = [*(k.shows_in == ("flow",) for k in problem.parameters), *(u.alone[1] >= 0 for u in problem.unknowns)]
     near = np.array(flows) & ("flow" in candidate.family.shows_in)
-    return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=True, near=near)
+    return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=reused, near=near)
 
 
 def _best_strength(

@@ -16,8 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).parent.parent
-TESTS = ["-m", "pytest", "-n", str(os.cpu_count() or 1), "--dist", "loadfile", "--no-loadscope-reorder"]
-"""On every core: with psutil there, `auto` counts two threads of one core once."""
+TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
 BATTERY = ["scripts/blind_battery.py", "--cases", "3", "--brief", "--seed", "901", "--check"]
 """One that lacks nothing, one with one effect, and one with two."""
 

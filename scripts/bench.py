@@ -17,10 +17,12 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
+from c_step import FLAGS, CPlant, compiler
+from plain_loop import PlainPlant
 from rich.console import Console
 from rich.table import Table
 
@@ -34,9 +36,6 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, simulate, simulate_many
-
-if TYPE_CHECKING:
-    from plain_loop import PlainPlant
 
 FIRST_RESULT = "from lhpost6_pin.cli import main; import sys; sys.argv[1:] = {args!r}; main()"
 
@@ -162,17 +161,13 @@ class Bench:
 
     def against(self) -> None:
         """Ratios to a plain NumPy-and-Pinocchio loop and to SciPy's solve_ivp on the same work."""
-        from plain_loop import PlainPlant
-
         samples, steps = 256, 16
         dt = 1.0 / (steps * SAMPLE_RATE)
         drive = self.open(samples)
         plain = PlainPlant(self.plant.machine)
 
         def loop() -> np.ndarray:
-            z = self.rest.state.z
-            pressure_a, pressure_b = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
-            state = (self.rest.state.q.copy(), np.zeros(6), pressure_a, pressure_b, np.zeros(10), np.zeros((6, 2)))
+            state = plain.at_rest(self.rest.state)
             for k in range(samples):
                 for _ in range(steps):
                     state = plain.step(*state, drive.spool[k], dt)
@@ -193,16 +188,12 @@ class Bench:
         self._solve_ivp(drive, samples)
         self._c_step(plain)
 
-    def _c_step(self, plain: "PlainPlant", samples: int = 2 * SAMPLE_RATE) -> None:
+    def _c_step(self, plain: PlainPlant, samples: int = 2 * SAMPLE_RATE) -> None:
         """Open-loop step of the fused engine over forward Euler in C, in turns; the machine stays near its rest."""
-        from c_step import FLAGS, CPlant, compiler
-
         if compiler() is None:
             print("no C step: no C compiler (cc, gcc or clang) on the PATH")
             return
-        z = self.rest.state.z
-        pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
-        state = (self.rest.state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2)))
+        state = plain.at_rest(self.rest.state)
         phase = np.arange(samples)[:, None] / SAMPLE_RATE * 2.0 * np.pi * np.arange(1, 11)
         spool = self.rest.spool + 0.02 * np.sin(phase) * np.minimum(1.0, phase[:, :1])
         drive, steps = OpenLoop(spool, self.rest.state), 4 * samples

@@ -1,4 +1,4 @@
-/* The LHPOST6-like plant in plain C, forward Euler: a yardstick of time for `bench.py`, compiled by it with -O3 -ffast-math.
+/* The LHPOST6-like plant in plain C, forward Euler: a yardstick of time for `bench.py`, which compiles it.
  *
  * Equations and order of states are those of plain_loop.py, which it is compared with; four 4-way swivel actuators, six
  * 3-way bearing actuators, three struts. The platen's equations are solved in closed form in platen axes. SI units.
@@ -144,10 +144,8 @@ static void step(const Plant *p, State *x, const double spool[N], double dt) {
 /* How many numbers a plant has. */
 long plant_numbers(void) { return sizeof(Plant) / sizeof(double); }
 
-/* `samples` rows of spools, `steps` steps of dt each; the platen's position after every sample goes to `log`. */
-void run(const Plant *p, State *x, const double *spool, long samples, long steps, double dt, double *log) {
-    for (long k = 0; k < samples; k++) {
+/* `samples` rows of spools, `steps` steps of dt each. */
+void run(const Plant *p, State *x, const double *spool, long samples, long steps, double dt) {
+    for (long k = 0; k < samples; k++)
         for (long i = 0; i < steps; i++) step(p, x, spool + N * k, dt);
-        for (int i = 0; i < 3; i++) log[3 * k + i] = x->r[i];
-    }
 }

@@ -63,10 +63,9 @@ class CPlant:
         q, v, pressure_a, pressure_b, seal, pad = state
         turn = pin.Quaternion(q[3:7]).toRotationMatrix()
         packed = np.concatenate([np.ravel(x) for x in (q[:3], turn, v, pressure_a, pressure_b, seal, pad)])
-        rows, log = np.ascontiguousarray(spool, np.float64), np.empty((len(spool), 3))
-        pointers = [x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in (self.numbers, packed, rows, log)]
-        counts = ctypes.c_long(len(rows)), ctypes.c_long(steps), ctypes.c_double(dt)
-        self.library.run(*pointers[:3], *counts, pointers[3])
+        rows = np.ascontiguousarray(spool, np.float64)
+        pointers = [x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for x in (self.numbers, packed, rows)]
+        self.library.run(*pointers, ctypes.c_long(len(rows)), ctypes.c_long(steps), ctypes.c_double(dt))
         sizes = np.cumsum([3, 9, 6, pressure_a.size, pressure_b.size, seal.size])
         r, turn, v, *oil, seal, pad = np.split(packed, sizes)
         quaternion = pin.Quaternion(turn.reshape(3, 3)).coeffs()

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from lhpost6_pin.machine.machine import Machine
+from lhpost6_pin.mechanics.plant import State
 from lhpost6_pin.mechanics.rigid_body import make_model
 
 
@@ -39,6 +40,13 @@ class PlainPlant:
         self.chamber_b = np.array([a.chamber_b for a in self.h])
         self.k = np.array([a.flow * a.valves for a in acts]) / np.sqrt(oil.rated_pressure)
         self.pad = np.array([(a.pad_friction, a.pad_yield, a.pad_shape) for a in self.v]).T
+
+    @staticmethod
+    def at_rest(state: State) -> tuple[np.ndarray, ...]:
+        """State of `step` at rest: pose and pressures of the package's, whose chambers A and B of H1.. are in turn."""
+        z = state.z
+        pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
+        return state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2))
 
     def step(self, q, v, pa, pb, seal, pad, spool, dt):  # type: ignore[no-untyped-def]
         """One forward-Euler step; returns the state at its end."""

@@ -82,9 +82,8 @@ def test_a_pin_changes_sides_when_its_length_shows_it(table, test):
     for k, (sign, area, name) in enumerate(((1, actuator.area_a, "a"), (-1, actuator.area_b, "b"))):
         pressed = test.rates[f"chamber_pressure_{name}"][:, 0] * area / bulk
         drawn = sign * half_play * (area * rate[:, 0] + pressed * side[:, 0])
-        np.testing.assert_allclose(
-            shown[:, k] - rigid[:, k], drawn, atol=1e-12 + 1e-9 * np.abs(drawn).max()
-        )  # rounding
+        rounding = 1e-12 + 1e-9 * np.abs(drawn).max()
+        np.testing.assert_allclose(shown[:, k] - rigid[:, k], drawn, atol=rounding)
 
 
 def test_a_force_on_equal_areas_is_a_pressure_difference_and_on_others_none(table, test):

@@ -121,11 +121,7 @@ def shaken_for_the_plain_loop():
     t = np.arange(samples) / SAMPLE_RATE
     size = np.r_[np.full(4, 0.1), np.full(6, 0.02)]
     spool = rest.spool + size * np.sin(2 * np.pi * np.outer(t, rng.uniform(3, 12, 10)) + rng.uniform(0, 6, 10))
-    z = rest.state.z
-    # our hidden states: A and B of H1..H4 in turn, A of V1..V6, seals, pads
-    pressures = np.r_[z[0:8:2], z[8:14]], z[1:8:2].copy()
-    state = rest.state.q.copy(), np.zeros(6), *pressures, np.zeros(10), np.zeros((6, 2))
-    return plant, rest, spool, state, (steps, 1.0 / (steps * SAMPLE_RATE))
+    return plant, rest, spool, PlainPlant.at_rest(rest.state), (steps, 1.0 / (steps * SAMPLE_RATE))
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -164,6 +160,7 @@ def test_the_plain_loop_is_the_fused_engines_euler_to_rounding():
     )
     q, ours = state[0], run.z[-1]
     assert np.abs(q[:3] - rest.state.q[:3]).max() > 1e-3 and np.abs(q[3:6]).max() > 1e-4
+    # our hidden states: A and B of H1..H4 in turn, A of V1..V6, seals, pads
     pressures = np.r_[ours[0:8:2], ours[8:14]], ours[1:8:2]
     fused = run.q[-1], run.v[-1], *pressures, ours[14:24], ours[24:36].reshape(6, 2)
     for ours, theirs, near in zip(fused, state, ROUNDING, strict=True):

@@ -10,7 +10,7 @@ so delays come in two chains, motion and force. What joins them, forces and acce
 joins spools and pressures is flow; spools follow their commands by the valves' delay and dynamics.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -137,8 +137,8 @@ def combine_delays(delay: ArrayLike, error: ArrayLike) -> tuple[float, float]:
     return mean, float(max(scatter, 1.0) / np.sqrt(weight.sum()))
 
 
-def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay]:
-    """Delay of every group of `channels.sensor_groups` that has redundant channels, over all records.
+def group_delays(plant: Plant, records: Sequence[xr.Dataset], only: Collection[str] | None = None) -> dict[str, Delay]:
+    """Delay of every group of `channels.sensor_groups` with redundant channels, or of `only` some, over all records.
 
     Motion and struts are counted from `platen_displacement`, chamber pressures from `actuator_force`. A group that is
     missing here has no redundant channel in these records.
@@ -147,6 +147,8 @@ def group_delays(plant: Plant, records: Sequence[xr.Dataset]) -> dict[str, Delay
     for record in records:
         dt = sample_interval(record)
         for group, reference, ours, theirs in _pairs(plant, record, dt):
+            if only is not None and group not in only:
+                continue
             _, delays, errors = found.setdefault(group, (reference, [], []))
             measure = slow_delay if group == "strut_pressure" else phase_delay  # a gas spring moves with displacement
             for values, value in zip((delays, errors), measure(theirs, ours, dt), strict=True):

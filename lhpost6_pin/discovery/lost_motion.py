@@ -46,7 +46,6 @@ class LostMotion(NamedTuple):
     half_play: float  # [m]
     deviation: float  # standard
     closing_force: float = 0.0  # [N] that with which the lengths agree best
-    misfit: float = 0.0  # variance that it leaves of the lengths [m2]
     length: tuple[Array | None, ...] = ()  # of each record (samples,): of the rod, less the errors of its sensor [m]
 
     @property
@@ -61,48 +60,62 @@ def lost_motion(
     """Significant play from the lengths of all records; numbers are those of `models/procedures/discovery.toml`."""
     starts = next(s.start for s in find_family("swivel_play").shapes if s.name == "closing_force")
     closing = np.geomspace(min(starts), max(starts), _CLOSING).tolist()
-    late = group_delays(plant, records)
-    late = {group: delay for group, delay in late.items() if group == "actuator_displacement"}
+    late = group_delays(plant, records, only=("actuator_displacement",))
     parts: dict[str, dict[int, LooseLength]] = {}
     for i, record in enumerate(records):
         for one in loose_lengths(plant, align_record(record, late), sensors, closing):
             parts.setdefault(one.name, {})[i] = one
-    each = (
-        [_of_lengths(name, some, len(records), k, f) for k, f in enumerate(closing)] for name, some in parts.items()
-    )
-    found = [min(ones, key=lambda one: one.misfit) for ones in each]
+    found = [_of_lengths(name, some, len(records), closing) for name, some in parts.items()]
     least, size = numbers.number("accept.confusable"), numbers.number("lengths.play")
     return tuple(one for one in found if one.half_play >= size and one.gain >= least)
 
 
-def _of_lengths(name: str, parts: Mapping[int, LooseLength], count: int, k: int, closing: float) -> LostMotion:
+def _of_lengths(name: str, parts: Mapping[int, LooseLength], count: int, closing: Sequence[float]) -> LostMotion:
     """Half the play by least squares of the lengths of some of `count` records, with errors of sensors and geometry.
 
-    closing [N] is the k-th force by which sides are known.
+    Of the forces `closing` [N] by which sides are known, that with which the lengths agree best.
     """
     comparisons = [one.comparison for one in parts.values()]
     due = np.array([term.due for term in comparisons[0].terms])
     rows, explained = [], []
-    for one in parts.values():
-        terms = np.stack([term.column for term in one.comparison.terms], axis=1)
-        rows.append(np.hstack([one.sides[k][:, None], terms, one.comparison.errors]))
+    for c in comparisons:
+        terms = np.stack([term.column for term in c.terms], axis=1)
+        rows.append(np.hstack([terms, c.errors]))
         explained.append(terms @ due)
     x, y = np.vstack(rows), np.concatenate([c.y - known for c, known in zip(comparisons, explained, strict=True)])
-    prior = np.zeros(x.shape[1])
+    prior = np.zeros(1 + x.shape[1])
     prior[1 + len(due) :] = 1.0
-    thinned = len(y) / sum(c.independent for c in comparisons)
-    stated = float(np.mean([c.variance for c in comparisons]))
-    variance = stated
-    for _ in range(_REWEIGHED):
-        matrix = x.T @ x / (variance * thinned) + np.diag(prior)
-        inverse = scaled_inverse(matrix, np.diag(matrix))
-        theta = inverse @ (x.T @ y) / (variance * thinned)
-        variance = max(stated, float(np.mean((y - x @ theta) ** 2)))
+    stated = float(np.mean([c.variance for c in comparisons])), len(y) / sum(c.independent for c in comparisons)
+    sides = np.hstack([one.sides for one in parts.values()])
+    fits = [_fit(np.column_stack([side, x]), y, prior, *stated) for side in sides]
+    force, best = min(zip(closing, fits, strict=True), key=lambda pair: pair[1].variance)
     length: list[Array | None] = [None] * count
     for (i, one), row, known in zip(parts.items(), rows, explained, strict=True):
-        errors = known + row[:, 1:] @ theta[1:] - one.comparison.terms[0].column
-        length[i] = one.without(errors)
-    return LostMotion(name, float(theta[0]), float(np.sqrt(inverse[0, 0])), closing, variance, tuple(length))
+        length[i] = one.without(known + row @ best.theta[1:] - one.comparison.terms[0].column)
+    return LostMotion(name, float(best.theta[0]), best.deviation, force, tuple(length))
+
+
+class _Fit(NamedTuple):
+    """Coefficients (p,), the standard deviation of the first, and the variance of what they leave."""
+
+    theta: Array
+    deviation: float
+    variance: float
+
+
+def _fit(x: Array, y: Array, prior: Array, stated: float, thinned: float) -> _Fit:
+    """Least squares of y (n,) on x (n, p), weighed by its own residual, of which 1 in `thinned` samples counts.
+
+    prior (p,) are those of the coefficients, stated is the least variance of a sample.
+    """
+    squares, products, variance = x.T @ x, x.T @ y, stated
+    for _ in range(_REWEIGHED):
+        weight = variance * thinned
+        matrix = squares / weight + np.diag(prior)
+        inverse = scaled_inverse(matrix, np.diag(matrix))
+        theta = inverse @ products / weight
+        variance = max(stated, float(np.mean((y - x @ theta) ** 2)))
+    return _Fit(theta, float(np.sqrt(inverse[0, 0])), variance)
 
 
 def with_rod_lengths(records: Sequence[xr.Dataset], lost: Sequence[LostMotion], machine: Machine) -> list[xr.Dataset]:

@@ -33,18 +33,9 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, leg_displacements
 from ..mechanics.strokes import stroke_ends
 
-__all__ = [
-    "AS_RECORDED",
-    "CALIBRATION",
-    "EACH_TEST",
-    "HALF_PLAY",
-    "ROD_LENGTH",
-    "SIGNIFICANT",
-    "MeasuredTest",
-    "Policy",
-]
-__all__ += ["actuator_forces", "align_records", "find_delays", "oil_forces", "chamber_pressures", "check_usable"]
-__all__ += ["prepare_test", "source_of"]
+__all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "HALF_PLAY", "ROD_LENGTH", "SIGNIFICANT", "MeasuredTest"]
+__all__ += ["Policy", "actuator_forces", "align_records", "find_delays", "oil_forces", "chamber_pressures"]
+__all__ += ["check_usable", "prepare_test", "source_of"]
 
 
 log = logging.getLogger(__name__)
@@ -88,9 +79,7 @@ class MeasuredTest:
     path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
-    side: Array | None = (
-        None  # (2, n, n_actuators) side, -1 to 1, of the play on which a pin stands, and its rate; NaN: not known
-    )
+    side: Array | None = None  # (2, n, n_actuators) of its play on which a pin stands, -1 to 1, and rate; NaN: unknown
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
     weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
     substeps: int = 1  # in which friction is marched between samples
@@ -218,15 +207,17 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     band = None if "platen_acceleration" in record else policy.band
     fused = fuse_motion(plant, record, sensors, band=band, shares=policy.shares)
     _warn_of_strokes(plant, name, record, fused.motion)
-    side = _contact_side(plant, record, fused.motion, cutoff)
+    side = _contact_side(plant, record, fused.motion, dt, cutoff)
     return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, side, record)
 
 
-def _contact_side(plant: Plant, record: xr.Dataset, motion: PlatenMotion, cutoff: float | None) -> Array | None:
+def _contact_side(
+    plant: Plant, record: xr.Dataset, motion: PlatenMotion, dt: float, cutoff: float | None
+) -> Array | None:
     """Side of its play on which each loose pin stands, and its rate: the rod ahead of the platen over half the play."""
     if ROD_LENGTH not in record:
         return None
-    rods, dt = record[ROD_LENGTH], sample_interval(record)
+    rods = record[ROD_LENGTH]
     legs, _ = leg_displacements(plant, motion.displacement)
     side = (rods.values - legs[:, : plant.spools]) / np.asarray(rods.attrs[HALF_PLAY])
     return np.stack([side, differentiate(side, dt, cutoff, PRESSURE_ORDER)])

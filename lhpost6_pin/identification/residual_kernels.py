@@ -86,7 +86,7 @@ class MeasuredOil(NamedTuple):
     pressure: Array  # (n, n_chambers) [Pa]
     pressure_rate: Array  # (n, n_chambers) [Pa/s]
     spool: Array  # (n, n_actuators) [1]
-    side: Array  # (n, n_actuators) side of its play on which a loose pin stands [1]; NaN: that of the oil's force
+    side: Array  # (n, n_actuators) of its play on which a loose pin stands [1]; NaN or empty: that of the oil's force
     side_rate: Array  # (n, n_actuators) [1/s]
     dt: float  # [s]
 
@@ -183,7 +183,7 @@ def _flow_residuals(k, row, oil, supply, rod, z, filled):
         advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)
     flow_a, flow_b, _, _ = supplied(row, True, x, pressure_a, pressure_b, high, low, z)
     across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
-    if math.isnan(oil.side[k, i]):
+    if oil.side.size == 0 or math.isnan(oil.side[k, i]):
         at += rod_travel(p, True, pressure_a, pressure_b)
         speed += rod_velocity(p, True, pressure_a, pressure_b, rate_a, rate_b)
     else:

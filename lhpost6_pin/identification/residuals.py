@@ -209,7 +209,7 @@ def oil_balance(
     chamber[:, 0] = np.arange(plant.spools)
     chamber[double, 1] = plant.spools + np.arange(int(double.sum()))
     flow, valve = np.zeros((2, test.samples, int(chamber.max()) + 1 if flows else 0))
-    side, side_rate = np.full((2, *spool.shape), np.nan) if test.side is None else test.side
+    side, side_rate = np.zeros((2, 0, 0)) if test.side is None else test.side
     drooped, oil = np.zeros(test.samples), MeasuredOil(chamber, pressure, rate, spool, side, side_rate, test.dt)
     rows, z = plant.rows[actuator_rows(plant.rows)], np.zeros(len(plant.states))
     if some is not None:

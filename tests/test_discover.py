@@ -896,6 +896,7 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
     np.testing.assert_array_equal(clean["chamber_pressure_a"], record["chamber_pressure_a"])
 
 
+@pytest.mark.slow  # two whole searches
 def test_the_command_resumes_what_a_search_had_kept_to_the_same_verdict(lhpost6, rubbing, bookmarked, tmp_path, caplog):
     found, folder = bookmarked
     (kept,) = folder.iterdir()

@@ -16,7 +16,7 @@ from lhpost6_pin.machine.library import families
 from lhpost6_pin.machine.machine import load_machine
 
 pytestmark = pytest.mark.long
-on_site = pytest.mark.slow  # to build the site takes a minute
+on_site = pytest.mark.slow  # takes a minute, and what `pip install .[docs]` brings
 
 BY_HAND = sorted(PAGES.rglob("*.md"))
 RUN = ("bash", "python")
@@ -177,6 +177,7 @@ def test_every_assumed_number_of_the_machine_is_on_its_page(site):
             assert f"{path}</code>" in text
 
 
+@on_site
 def test_figures_are_the_same_however_often_they_are_drawn(tmp_path):
     from docs.figures import FIGURES, draw_all
 
@@ -187,6 +188,7 @@ def test_figures_are_the_same_however_often_they_are_drawn(tmp_path):
         assert first == second and b"<dc:date>" not in first
 
 
+@on_site
 def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     ended = script("build_docs.py", "--out", tmp_path)
@@ -248,6 +250,7 @@ def test_commands_on_a_page_have_options_that_exist(page):
     check_commands("".join(s.text for s in snippets(page) if s.language == "bash"))
 
 
+@pytest.mark.slow  # commands of the README, each in a process
 def test_the_snippets_of_the_first_page_run_in_order(tmp_path):
     run_page(PAGES / "start.md", tmp_path, slow=False)
 

@@ -290,7 +290,7 @@ def test_an_interrupted_ensemble_goes_on_to_the_same_file(sines, tmp_path):
     assert run_ensemble(made, tmp_path, jobs=1) == tmp_path / "ensemble.nc"  # whole: nothing is run
 
 
-@pytest.mark.long
+@pytest.mark.slow  # an interrupted one does in every run
 def test_a_killed_ensemble_goes_on_to_the_same_file(sines, tmp_path):
     made, path = sines
     code = "import sys; from test_ensemble import *; run_ensemble(plan(), Path(sys.argv[1]), jobs=1)"
@@ -309,7 +309,7 @@ def test_processes_give_the_same_file(sines, tmp_path):
     assert digest(run_ensemble(made, tmp_path, jobs=2)) == digest(path)
 
 
-@pytest.mark.long
+@pytest.mark.slow  # a cluster of processes, each of which loads the package
 @pytest.mark.filterwarnings("ignore")  # of Dask's own event loop
 def test_a_dask_cluster_gives_the_same_file(sines, tmp_path):
     pytest.importorskip("distributed")

@@ -96,6 +96,7 @@ def test_5_lqg_is_compared_with_the_469d(tmp_path):
     assert all(f'id="{name}"' in text for name in ("displacement-x", "acceleration-x", "peak-x"))
 
 
+@pytest.mark.slow  # an ensemble
 def test_6_uncertain_numbers_give_an_interval(tmp_path):
     said = run(6, "sine", "--scales", "0.1,0.2", "--machines", "4", "--out", tmp_path)
     assert "probability of a saturated valve at scale 0.2: 0%" in said

@@ -203,7 +203,7 @@ def test_guides_take_no_force_along_the_axes_that_they_leave_free(shaken):
 
 @pytest.mark.long
 @pytest.mark.parametrize("motion", ["xy", pytest.param("yz", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("scheme", ["semi_implicit", "rk4", "euler"])
+@pytest.mark.parametrize("scheme", ["semi_implicit", pytest.param("rk4", marks=pytest.mark.slow), "euler"])
 def test_both_engines_agree_on_guided_axes(motion, scheme):
     """ABA of Pinocchio's composite joint against the fused engine's inertia, in the same steps."""
     machine = guided(motion)

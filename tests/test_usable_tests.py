@@ -203,7 +203,7 @@ def test_the_gain_of_the_only_sensor_of_force_is_not_free(test, sensors):
     assert gains("pressure_difference", "actuator_force") == {"pressure_difference", "actuator_force"}
 
 
-@pytest.mark.long
+@pytest.mark.slow  # two campaigns
 def test_with_a_wrong_area_the_ratios_to_it_hold(tests, sensors):
     """Oracle: MASS over the shipped area, within 2 %: friction of the records is of another form than the model's."""
     area = TABLE.actuators[0].area_a

@@ -10,8 +10,7 @@ made anew.
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -35,8 +34,8 @@ for words in sys.argv[1:]:
         pass
 """
 SINE = "run sine --set amplitude=0.02 --set cycles=0.5 --set ramp_cycles=0.5 --rate 2048 --record-rate 512 --engine"
-COMPILED = ((f"{SINE} fused",), ("decompose tests/data/records/practice_a_TX.nc", f"{SINE} pinocchio"))
-"""Commands, by process, that compile nearly all there is: workers that begin without would each compile the same."""
+COMPILED = (f"{SINE} fused", f"{SINE} pinocchio", "decompose tests/data/records/practice_a_TX.nc")
+"""Commands that compile nearly all there is: workers that begin without would each compile the same."""
 
 
 def main() -> int:
@@ -44,11 +43,11 @@ def main() -> int:
     fast, slow = (option in sys.argv[1:] for option in ("--fast", "--slow"))
     chosen = ["-m", "fast"] if fast else ["-m", "slow"] if slow else []
     checks = {"lint": ["-m", "ruff", "check", "."], "format": ["-m", "ruff", "format", "--check", "."]}
-    with TemporaryDirectory() as folder, ThreadPoolExecutor(2) as beside:
-        failed = [name for name, command in checks.items() if not _passes(name, command)]
-        compiling = [beside.submit(_compile, commands) for commands in COMPILED]
+    with TemporaryDirectory() as folder, ThreadPoolExecutor() as beside:
         types = beside.submit(_run, ["-m", "mypy"], stdout=subprocess.PIPE, text=True)  # takes one core
-        wait(compiling)
+        failed = [name for name, command in checks.items() if not _passes(name, command)]
+        commands = [f"{words} --out {folder}" for words in COMPILED]
+        _run(["-c", COMPILE, *commands], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         checks = {"tests": [*TESTS, *chosen]}
         if not fast and not slow:
             for name, battery in (("battery", BATTERY), ("one-axis battery", ONE_AXIS)):
@@ -65,14 +64,8 @@ def _passes(name: str, command: list[str]) -> bool:
     return _run(command).returncode == 0
 
 
-def _compile(commands: Sequence[str]) -> None:
-    with TemporaryDirectory() as folder:
-        here = [f"{words} --out {folder}" for words in commands]
-        _run(["-c", COMPILE, *here], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
 def _run(command: list[str], **options: Any) -> "subprocess.CompletedProcess[str]":
-    # there is a worker on every core: more threads would only wait; and a command compiles no module again
+    # there is a worker on every core: more threads would only wait; and no process compiles the same modules again
     settings = {"OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": ""}
     return subprocess.run([sys.executable, *command], cwd=ROOT, check=False, env=os.environ | settings, **options)
 

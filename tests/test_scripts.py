@@ -44,7 +44,11 @@ def test_every_script_says_what_it_is_for_and_has_a_main(path):
 
 @pytest.mark.parametrize(
     "name",
-    sorted(p.name for p in SCRIPTS.glob("*.py") if p.name not in ("checks.py", *IMPORTED)),  # take no options
+    [
+        pytest.param(p.name, marks=pytest.mark.slow) if p.name == "build_docs.py" else p.name  # needs its packages
+        for p in sorted(SCRIPTS.glob("*.py"))
+        if p.name not in ("checks.py", *IMPORTED)  # take no options
+    ],
 )
 def test_every_script_explains_its_options(name, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [name, "--help"])

@@ -26,7 +26,7 @@ from lhpost6_pin.discovery.acceptance import Lowered, refusal, share_explained
 from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
-from lhpost6_pin.discovery.contest import _complexity, loss_without
+from lhpost6_pin.discovery.contest import _complexity, _needless, _settled, loss_without
 from lhpost6_pin.discovery.discover import discovery_numbers
 from lhpost6_pin.discovery.estimates import Absorbing, absorbing, amplitude_of, at_bounds, is_absorbed, moved_together
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
@@ -43,7 +43,14 @@ from lhpost6_pin.discovery.residual_function import (
 )
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
 from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, found_there, score_pairs
-from lhpost6_pin.discovery.search import _pruned, _taken_up, _with_confused, without_effect
+from lhpost6_pin.discovery.search import (
+    _as_well,
+    _on_more_components,
+    _pruned,
+    _taken_up,
+    _with_confused,
+    without_effect,
+)
 from lhpost6_pin.discovery.search_state import (
     AddedEffect,
     FittedCandidate,
@@ -347,6 +354,51 @@ def test_families_confused_with_a_rival_contest_on_its_components_though_refused
     ]
     search = replace(found.search, added=(), rounds=(Round((*refused, *rivals)),))
     assert _with_confused(search, rivals) == [refused[0], *rivals]
+
+
+def test_where_the_residual_is_large_a_family_contests_on_more_components_though_refused(found):
+    """The linear estimate of a mass that sways along x alone came before that along x and y, which a fit needed."""
+    one, other = scored("structural_flexibility", ("platen.x",), 735.0), scored("piston_leakage", ("H4",), 1700.0)
+    wider = replace(scored("structural_flexibility", ("platen.x", "platen.y"), 747.0), refused="explains too little")
+    weak = scored("piston_leakage", ("H1", "H2", "H3", "H4"), 400.0)  # a quarter of that on one
+    search = replace(found.search, added=(), rounds=(Round((other, weak, wider, one)),))
+    assert search.power < 1.6 and _on_more_components(search, [other, one]) == [other, one]
+    residual = [10.0 * r for r in search.residual]
+    large = replace(search, solution=search.solution._replace(residual=residual))
+    assert _on_more_components(large, [other, one]) == [other, one, wider]
+
+
+def test_more_components_are_needless_where_fewer_explain_as_much():
+    one, more = scored("stray_spring", ("H1",), 100.0), scored("stray_spring", ("H1", "H2"), 101.0)
+    beside = scored("end_stop_stiffening", ("H1", "H2"), 101.0)
+    assert _needless([one, more, beside], [50.0, 48.0, 48.0], 3.0) == {1}
+    assert _needless([one, more, beside], [50.0, 46.0, 48.0], 3.0) == set()
+
+
+def test_of_candidates_that_all_leave_much_a_hair_decides_nothing():
+    """Beside a leak, a lag left 48.36 times the noise and the dynamics of a line 48.31, though it explained less."""
+    assert _settled([48.36, 48.39, 48.31], 1.6) > 48.39
+    assert _settled([1.2, 48.3], 1.6) == 1.6  # one that leaves noise is there
+
+
+def test_a_pair_begins_with_the_single_effect_that_explains_as_much_as_its_first(found):
+    """It won a contest on all components: a lag of some valves, not an advance of all others."""
+    none = replace(found.search, added=())
+
+    def at(objective: float, *added: AddedEffect) -> Search:
+        class Fitted(Search):
+            @property
+            def objective(self) -> float:
+                return objective
+
+        return Fitted(**(vars(none) | {"added": added}))
+
+    (effect,) = found.search.added
+    first = at(100.0, replace(effect, apart=10.0))
+    assert _as_well(none, at(95.0, effect), first)
+    assert not _as_well(none, at(80.0, effect), first)  # of a wrong form, it may stand for both
+    assert not _as_well(none, at(105.0, effect), first)
+    assert not _as_well(none, at(95.0, effect), at(100.0))  # the first was not added
 
 
 def test_a_held_out_wrench_weighs_nothing_where_a_leg_is_farther_out_than_searched(found):

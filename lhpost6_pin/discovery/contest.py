@@ -15,7 +15,7 @@ from .estimates import at_bounds
 from .joint_fit import JointFit, fit_from_rival, fit_jointly, refined
 from .search_state import AddedEffect, FittedCandidate, Scored, Search, fitted_machine
 
-__all__ = ["best_of", "loss_without", "removed"]
+__all__ = ["best_of", "is_part", "loss_without", "removed"]
 
 
 def best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:
@@ -31,9 +31,9 @@ def best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: 
         return None
     lowest = min(left[i] for i in passed)
     apart = _apart(found, fitted[left.index(lowest)])
-    # nor is one alike that leaves much where another leaves noise, in however few bins
-    settled = max(numbers.number("accept.settled"), min(fitted[i].power for i in passed))
-    alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled]
+    settled = _settled([fitted[i].power for i in passed], numbers.number("accept.settled"))
+    needless = _needless(rivals, left, numbers.number("accept.simpler"))
+    alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled and i not in needless]
     alike = alike or [i for i in passed if left[i] == lowest]
     best = min(alike, key=lambda i: (_complexity(fitted[i], rivals[i].candidate), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
@@ -75,6 +75,28 @@ def _apart(found: Search, best: Search) -> float:
     """
     n = found.numbers.number
     return max(n("accept.apart"), n("accept.alike") * (found.objective - best.objective))
+
+
+def _settled(powers: Sequence[float], settled: float) -> float:
+    """Power of the residual up to which candidates that leave these powers are alike.
+
+    One that leaves much where another leaves noise (up to `settled`), in however few bins, is not like it; where each
+    leaves much, another effect being missing, one that leaves as many times more.
+    """
+    least = min(powers)
+    return settled if least <= settled else settled * least
+
+
+def _needless(rivals: Sequence[Scored], left: Sequence[float], simpler: float) -> set[int]:
+    """Places of candidates on more components than another of their family, but hardly a better fit."""
+    pairs = [(i, j) for i, one in enumerate(rivals) for j, other in enumerate(rivals) if is_part(other, one)]
+    return {i for i, j in pairs if left[j] - left[i] < simpler}
+
+
+def is_part(one: Scored, whole: Scored) -> bool:
+    """Whether a candidate is one of the same family on some of the components of another."""
+    part, other = one.candidate, whole.candidate
+    return part.family.name == other.family.name and set(part.components) < set(other.components)
 
 
 def _complexity(fit: Search, candidate: Candidate) -> tuple[bool, int, int]:

@@ -16,7 +16,7 @@ from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained
 from .candidates import Candidate
-from .contest import best_of, loss_without, removed
+from .contest import best_of, is_part, loss_without, removed
 from .estimates import is_absorbed, moved_together
 from .joint_fit import refined
 from .screening import found_there, is_confused, score_pairs, screen
@@ -146,6 +146,8 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
         there = {added.candidate.name for added in both.added}
         rivals = [o for o in (one, *_in_its_place(both, one)) if o.candidate.name not in there]
         both = (best_of(both, rivals, part, least=-np.inf) if rivals else None) or both
+        if more is not None and _as_well(found, more, both):
+            both = more
     gates, new = [gate(one.candidate.family, found.numbers) for one in two], both.added[len(found.added) :]
     new = tuple(replace(added, gain=loss_without(both, added.candidate)) for added in new)
     worth = all(added.gain >= gate(added.candidate.family, found.numbers) for added in new)
@@ -153,6 +155,12 @@ def _better(found: Search, more: Search | None, two: Sequence[Scored], progress:
         return more
     both = replace(both, added=(*found.added, *new))
     return both if more is None or more.objective - both.objective >= max(gates) else more
+
+
+def _as_well(found: Search, more: Search, first: Search) -> bool:
+    """Whether the best single effect explains as much as the first of a pair: it won a contest on all components."""
+    new = first.added[len(found.added) :]
+    return len(new) == 1 and more.objective < first.objective < more.objective + new[0].apart
 
 
 def _leading(found: Search) -> Scored | None:
@@ -234,7 +242,7 @@ def _add(found: Search, passed: Sequence[Scored], progress: Progress) -> Search 
         if not rivals:
             return None
         waiting = [one for one in waiting if one not in rivals]
-        rivals = _with_confused(found, rivals)
+        rivals = _on_more_components(found, _with_confused(found, rivals))
         if (best := best_of(found, rivals, part)) is not None:
             return best
     return None
@@ -257,3 +265,17 @@ def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
         every += [other for other in _in_its_place(found, one, confused=True) if other not in every]
     most = 2 * int(found.numbers.number("accept.rivals")) - 1
     return sorted(every, key=lambda one: -one.gain)[: max(most, len(rivals))]
+
+
+def _on_more_components(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
+    """Candidates, and each one's family on more components that gains nearly as much, where the residual is large.
+
+    Shapes at their starts are far off there: a mass that sways along one axis seems to explain as much as along two.
+    """
+    if found.power < found.numbers.number("accept.settled"):
+        return list(rivals)
+    every, near = list(rivals), found.numbers.number("accept.near")
+    for one in rivals:
+        wider = (o for o in found.rounds[-1].scored if is_part(one, o) and o.gain >= near * one.gain)
+        every += [o for o in [next(wider, None)] if o is not None and o not in every]
+    return every

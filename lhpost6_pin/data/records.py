@@ -11,6 +11,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import ArrayLike
 
@@ -133,9 +134,14 @@ def make_record(
                 raise RecordError(f"{name}: has shape {values.shape}; the layout has dimensions {channel.dims}")
             variables[name] = (channel.dims, values, {"units": channel.units, "long_name": channel.long_name})
     used = {dim for dims, *_ in variables.values() for dim in ([dims] if isinstance(dims, str) else dims)}
-    names = {dim: list(values) for dim, values in ({"axis": AXES} | dict(labels)).items() if dim in used}
+    # as indexes: to make them of arrays, xarray would import pint, which takes longer than all else here
+    names = {
+        dim: pd.Index(list(values), dtype=object)
+        for dim, values in ({"axis": AXES} | dict(labels)).items()
+        if dim in used
+    }
     try:
-        record = xr.Dataset(variables, {"time": ("time", time, {"units": "s", "long_name": "time"})} | names)
+        record = xr.Dataset(variables, {"time": ("time", pd.Index(time), {"units": "s", "long_name": "time"})} | names)
     except ValueError as error:
         raise RecordError(f"channels, labels and time do not fit together: {error}") from error
     if len(time) > 1 and time[-1] > time[0]:  # the rate to nine figures, so that 2048 Hz reads 2048

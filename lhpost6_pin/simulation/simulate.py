@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from ..control.loop import ACTUATOR, AXIS, CANCELLER, control_packed, pack_control, sense_packed
 from ..control.plug import Feedback, start_plugged
@@ -147,6 +146,8 @@ def simulate_many(jobs: Sequence[tuple[Plant, Loop]], *, samples: int, threads: 
     threads = -1 uses all cores. Compiled code releases the interpreter, and each run has its own arrays: results do not
     depend on the number of threads. Raises SimulationError as `simulate` does.
     """
+    from joblib import Parallel, delayed
+
     options = {"samples": samples, "engine": "fused", **options}
     return list(Parallel(n_jobs=threads, prefer="threads")(delayed(simulate)(*job, **options) for job in jobs))
 

@@ -10,7 +10,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from ..control import Controller
 from ..core.arrays import Array
@@ -103,6 +102,8 @@ def identify_axes(
 
     In parallel over threads; targets and runs of an axis are discarded before the next, since long ones fill memory.
     """
+    from joblib import Parallel, delayed
+
     plant = controllers[0].plant
 
     def one(axis: str) -> list[Transfer]:

@@ -72,6 +72,10 @@ class Candidate:
         """Whether only their shapes differ."""
         return replace(self, shape=()) == replace(other, shape=())
 
+    def is_part_of(self, whole: "Candidate") -> bool:
+        """Whether it is one of the same family on some of the components of another."""
+        return self.family.name == whole.family.name and set(self.components) < set(whole.components)
+
     def on(self, machine: Machine, amplitudes: tuple[float, ...], *, name: str = "") -> Machine:
         """The machine with this effect, amplitudes (q,) in order; by default with the name of the candidate."""
         values = dict(self.shape) | {s.name: a for s, a in zip(self.amplitudes, amplitudes, strict=True)}

@@ -15,7 +15,7 @@ from .estimates import at_bounds
 from .joint_fit import JointFit, fit_from_rival, fit_jointly, refined
 from .search_state import AddedEffect, FittedCandidate, Scored, Search, fitted_machine
 
-__all__ = ["best_of", "is_part", "loss_without", "removed"]
+__all__ = ["best_of", "loss_without", "removed"]
 
 
 def best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: float | None = None) -> Search | None:
@@ -89,14 +89,9 @@ def _settled(powers: Sequence[float], settled: float) -> float:
 
 def _needless(rivals: Sequence[Scored], left: Sequence[float], simpler: float) -> set[int]:
     """Places of candidates on more components than another of their family, but hardly a better fit."""
-    pairs = [(i, j) for i, one in enumerate(rivals) for j, other in enumerate(rivals) if is_part(other, one)]
+    every = list(enumerate(one.candidate for one in rivals))
+    pairs = [(i, j) for i, one in every for j, other in every if other.is_part_of(one)]
     return {i for i, j in pairs if left[j] - left[i] < simpler}
-
-
-def is_part(one: Scored, whole: Scored) -> bool:
-    """Whether a candidate is one of the same family on some of the components of another."""
-    part, other = one.candidate, whole.candidate
-    return part.family.name == other.family.name and set(part.components) < set(other.components)
 
 
 def _complexity(fit: Search, candidate: Candidate) -> tuple[bool, int, int]:

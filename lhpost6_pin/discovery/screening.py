@@ -96,10 +96,7 @@ def _without_parts(scored: Sequence[Scored]) -> list[Scored]:
     forms = [one for one in scored if one.refused == FORM]
 
     def is_part(one: Scored) -> bool:
-        there, name = set(one.candidate.components), one.candidate.family.name
-        return any(
-            o.candidate.family.name == name and there < {*o.candidate.components} and o.gain > one.gain for o in forms
-        )
+        return any(one.candidate.is_part_of(o.candidate) and o.gain > one.gain for o in forms)
 
     return [replace(one, refused=FORM) if not one.refused and is_part(one) else one for one in scored]
 

@@ -16,7 +16,7 @@ from ..identification.calibration.problem import Problem
 from ..machine.parameters import Parameters
 from .acceptance import gate, share_explained
 from .candidates import Candidate
-from .contest import best_of, is_part, loss_without, removed
+from .contest import best_of, loss_without, removed
 from .estimates import is_absorbed, moved_together
 from .joint_fit import refined
 from .screening import found_there, is_confused, score_pairs, screen
@@ -276,6 +276,8 @@ def _on_more_components(found: Search, rivals: Sequence[Scored]) -> list[Scored]
         return list(rivals)
     every, near = list(rivals), found.numbers.number("accept.near")
     for one in rivals:
-        wider = (o for o in found.rounds[-1].scored if is_part(one, o) and o.gain >= near * one.gain)
-        every += [o for o in [next(wider, None)] if o is not None and o not in every]
+        more = (o for o in found.rounds[-1].scored if one.candidate.is_part_of(o.candidate))
+        wider = next((o for o in more if o.gain >= near * one.gain), None)
+        if wider is not None and wider not in every:
+            every.append(wider)
     return every

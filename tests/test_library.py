@@ -24,6 +24,7 @@ MECHANICAL = {
     "asymmetric_friction": (("H1",), {}),
     "load_dependent_friction": ((), {}),
     "friction_warm_up": ((), {"memory": 0.5, "saturation": 0.02}),
+    "bearing_warm_up": (("V3",), {"memory": 0.5, "saturation": 0.02}),
     "backlash": (("H1", "S2"), {}),
     "swivel_friction": ((), {}),
     "smooth_swivel_friction": ((), {"slow": 0.02}),

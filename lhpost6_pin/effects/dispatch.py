@@ -115,7 +115,8 @@ def force_called(row, s, sd, z):
     if row.law == 24:
         return stribeck_lag.force(views.view_stribeck_lag(row.numbers), z[row.state]), 0.0, 0.0
     if row.law == 25:
-        return warm_up.force(views.view_warm_up(row.numbers), z[row.state], z[row.state + 1]), 0.0, 0.0
+        first, second = warm_up.force(views.view_warm_up(row.numbers), z[row.state], z[row.state + 1], z[row.state + 2])
+        return first, second, 0.0
     return 0.0, 0.0, 0.0
 
 
@@ -226,8 +227,15 @@ def advance_called(row, s, ds, dt, z):
     elif row.law == 24:
         z[row.state] = stribeck_lag.advance(views.view_stribeck_lag(row.numbers), ds[row.port], dt, z[row.state])
     elif row.law == 25:
-        z[row.state], z[row.state + 1] = warm_up.advance(
-            views.view_warm_up(row.numbers), ds[row.port], dt, z[row.state], z[row.state + 1]
+        z[row.state], z[row.state + 1], z[row.state + 2] = warm_up.advance(
+            views.view_warm_up(row.numbers),
+            ds[row.port],
+            (ds[row.port_2] if row.port_2 >= 0 else 0.0),
+            row.port_2 >= 0,
+            dt,
+            z[row.state],
+            z[row.state + 1],
+            z[row.state + 2],
         )
 
 
@@ -296,8 +304,13 @@ def rates(row, s, sd, z, zd):
     elif row.law == 24:
         zd[row.state] = stribeck_lag.rates(views.view_stribeck_lag(row.numbers), sd[row.port], z[row.state])
     elif row.law == 25:
-        zd[row.state], zd[row.state + 1] = warm_up.rates(
-            views.view_warm_up(row.numbers), sd[row.port], z[row.state], z[row.state + 1]
+        zd[row.state], zd[row.state + 1], zd[row.state + 2] = warm_up.rates(
+            views.view_warm_up(row.numbers),
+            sd[row.port],
+            (sd[row.port_2] if row.port_2 >= 0 else 0.0),
+            z[row.state],
+            z[row.state + 1],
+            z[row.state + 2],
         )
 
 

@@ -18,6 +18,7 @@ LEG_FIELDS = (
     *("asymmetry", "load_seal", "load_pad", "load_rest", "swivel_moment", "swivel_rate"),
     *("stop_stiffness", "stop_start", "stop_width", "gap", "gap_stiffness", "gap_damping", "gap_mass"),
     *("warm_fraction", "warm_energy", "warm_time", "damping", "damping_speed", "pad_extra", "seal_extra"),
+    *("pad_warm_fraction", "pad_warm_energy", "pad_warm_time"),
     *("leak", "leak_pressure", "jet", "jet_exponent", "external_a", "external_b", "air", "air_pressure", "dead"),
     *("overlap", "underlap", "underlap_width", "bias", "lag", "late", "port_asymmetry", "port_width", "bulge"),
     *("line_inertance", "line_frequency", "line_damping", "gas_rate", "gas_leak"),
@@ -75,9 +76,9 @@ def seal_plateau(leg, v, load, heat):
 
 @njit(cache=True)
 def pad_plateau(leg, load, heat):
-    """Friction force of a bearing pad under its thrust `load` [N]."""
+    """Friction force of a bearing pad under its thrust `load`, `heat` of its own warm-up [N]."""
     plateau = max(leg.pad * (1.0 + leg.pad_extra) + leg.load_pad * (load - leg.load_rest), 0.0)
-    return plateau * (1.0 - leg.warm_fraction * heat / (1.0 + heat))
+    return plateau * (1.0 - leg.pad_warm_fraction * heat / (1.0 + heat))
 
 
 @njit(cache=True)

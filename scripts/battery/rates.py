@@ -23,7 +23,8 @@ POSE, TWIST, PA, PB, SEAL, PAD = 0, 6, 12, 22, 26, 39
 SPOOL, SPOOL_RATE, GAS, SUPPLY, RETURN = 51, 61, 71, 74, 75
 LINE_P, LINE_Q, PISTON, PISTON_RATE = 76, 86, 96, 100
 SWAY, HEAT, PAST, CREEP, CREEPERS = 104, 116, 129, 142, 4  # two sprung masses; per leg: heat, memory, creep elements
-STATES = CREEP + 13 * CREEPERS
+PAD_HEAT = CREEP + 13 * CREEPERS  # of each bearing
+STATES = PAD_HEAT + 6
 # What `rates` also shows: extension as measured (13), hydraulic or gas pull (13), gas (3) and supply pressure (1).
 X, PULL, GAS_PRESSURE, SUPPLY_PRESSURE, SHOWN = 0, 13, 26, 29, 30
 RETURN_TIME = 0.005  # s, a return line this short follows the flow through it
@@ -167,7 +168,10 @@ def rates(t, y, command, surge, legs, platen, inverse, dy, shown):
             s2 = lean_s * tilt_s * vx + tilt_c * vy + lean_c * tilt_s * slide_z
             speed = math.sqrt(s1 * s1 + s2 * s2)
             j = PAD + 2 * (i - 4)
-            grip = pad_plateau(leg, pull, heat)
+            k = PAD_HEAT + i - 4
+            grip = pad_plateau(leg, pull, y[k])
+            if leg.pad_warm_fraction != 0.0:
+                dy[k] = grip * speed / leg.pad_warm_energy - y[k] / leg.pad_warm_time
             dy[j] = (s1 - speed * y[j]) / leg.pad_yield
             dy[j + 1] = (s2 - speed * y[j + 1]) / leg.pad_yield
             f1, f2 = -grip * y[j], -grip * y[j + 1]

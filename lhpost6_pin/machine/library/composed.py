@@ -72,6 +72,14 @@ def _bearing_presliding(machine: Structure, components: Sequence[str], values: V
     return "dahl_instead", components, _of_another_form(rubs, values)
 
 
+def _bearing_warm_up(machine: Structure, components: Sequence[str], values: Values) -> Any:
+    rows = [
+        (values["growth"], c.pad_yield, c.pad_shape, values["memory"], values["saturation"])
+        for c in _each(machine, components)
+    ]
+    return "warm_up", components, rows
+
+
 def _of_another_form(rubs: Sequence[tuple[float, float, float]], values: Values) -> list[tuple[float, ...]]:
     """Numbers of friction (force, yield, shape) of which a share is of Dahl's form."""
     return [(values["share"] * force, slip, shape, values["ratio"] * slip) for force, slip, shape in rubs]
@@ -159,6 +167,7 @@ COMPOSED = {
     "presliding": _presliding,
     "backlash_before_friction": _backlash_before,
     "bearing_presliding": _bearing_presliding,
+    "bearing_warm_up": _bearing_warm_up,
     "mounted_spring": _mounted_spring,
     "placed_spring": _placed_spring,
     "gravity_offset": _gravity,

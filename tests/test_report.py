@@ -114,7 +114,13 @@ def test_the_page_shows_all_that_a_run_is_judged_by(tmp_path):
     summary, page = report(tmp_path, make_record(), **given)
     reader = Reader(page)
     words = reader.words
-    titles = ("Target and achieved", "Response spectra", "Actuator forces", "Chamber pressures", "Servovalve spools")
+    titles = (
+        "Target and achieved",
+        "Intensity and response spectra",
+        "Actuator forces",
+        "Chamber pressures",
+        "Servovalve spools",
+    )
     for title in (*titles, "Hold-down struts", "Drift", "Table of metrics", "Assumptions and sources", "Versions and"):
         assert title in words
     for said in (*given_notes, "lhpost6 run burst", "dead volume not published", "Table 6.1", "numpy", "0.2, 0.1"):
@@ -527,7 +533,7 @@ SEEN = """(async () => {
   const until = async (true_) => { for (let k = 0; k < 5000 && !true_(); k++) await frame(); };
   const drawn = (plot) => Array.from(plot.querySelectorAll(".js-line")).some((l) => l.getTotalLength() > 100);
   const plots = Array.from(document.querySelectorAll(".plot"));
-  document.querySelector("details").open = true;
+  document.querySelectorAll("details").forEach((folded) => { folded.open = true; });
   await until(() => drawn(plots[0]));
   const found = { plots: plots.length, early: plots.filter(drawn).length, empty: 0 };
   for (const plot of plots) {
@@ -561,7 +567,7 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
 
     found, faults = browse(tmp_path, summary.path.as_uri(), look, (1400, 1000))
     assert faults == []
-    assert found["plots"] == 28  # 6 axes, 3 close-ups, 3 spectra, force, pressure, struts, drift, 10 spools and 2
+    assert found["plots"] == 31  # 6 axes, 3 close-ups, 6 of spectra, force, pressure, struts, drift, 10 spools and 2
     assert found["early"] < 6 and found["empty"] == 0  # those out of sight wait
     assert found["linked"] == [2, 4]
     assert found["moved"] == pytest.approx([2.4, 4.4])  # a fifth of the window

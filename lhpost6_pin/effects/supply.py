@@ -11,8 +11,16 @@ from .actuator import pressures_of, valve_pressure
 from .registry import HYDRAULIC
 from .views import view_hydraulic
 
-__all__ = ["close_supply", "flows_exchanged", "open_supply", "shared_states", "steady_supply", "supply_pressures"]
-__all__ += ["supply_rates"]
+__all__ = [
+    "close_supply",
+    "drawn_flows",
+    "flows_exchanged",
+    "open_supply",
+    "shared_states",
+    "steady_supply",
+    "supply_pressures",
+    "supply_rates",
+]
 
 _NEWTON = 3
 """Iterations: they start one step away from where they end."""
@@ -54,6 +62,13 @@ def flows_exchanged(rows, spool, supply, z):
         slope_drawn += weight * slope_out
         slope_returned += slope_back
     return drawn, returned, slope_drawn, slope_returned
+
+
+@compiled
+def drawn_flows(rows, spool, supply, z, out):
+    """Fill the flow (n,) [m3/s] that all actuators draw from the supply, with spools (n, a) and states (n, k)."""
+    for i in range(len(out)):
+        out[i] = flows_exchanged(rows, spool[i], supply, z[i])[0]
 
 
 @compiled

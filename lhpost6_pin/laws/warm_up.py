@@ -2,9 +2,10 @@
 
     f = -a h / (1 + h / h_s) Z,  T dh/dt = |v| - h
 
-a [N s/m], v [m/s] slip velocity, along a rod or in the plane of a pad, h [m/s] mean speed, T [s] memory; h_s [m/s] mean speed at which half of the whole change a h_s is reached;
-Z [1] the hysteresis of `bouc_wen`. Stored energy: none is declared, all work counts as dissipated. Source: the simplest
-form that is linear in its amplitude, with a saturation, since a seal loses no more than its own friction.
+a [N s/m], v [m/s] slip velocity, along a rod or in the plane of a pad, h [m/s] mean speed, T [s] memory; h_s [m/s]
+mean speed at which half of the whole change a h_s is reached; Z [1] the hysteresis of `bouc_wen`. Stored energy: none
+is declared, all work counts as dissipated. Source: the simplest form that is linear in its amplitude, with a
+saturation, since a seal loses no more than its own friction.
 """
 
 import math

@@ -10,7 +10,7 @@ from .structure import Structure
 
 __all__ = ["check_actuator", "check_machine", "check_names"]
 
-_COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
+_COMPARISONS = ("estimates", "power_supply", "table_2_2", "table_2_2_payload")
 """Sections of numbers to compare with; their keys are free."""
 
 

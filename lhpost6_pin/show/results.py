@@ -12,6 +12,7 @@ from ..data.layout_faults import RecordFinding
 from ..machine.machine import Machine
 
 if TYPE_CHECKING:
+    from ..data.motion_measures import MotionMeasures
     from ..identification.calibration import Calibration
     from ..identification.decompose import Decomposed, WrenchAgreement
     from ..identification.decompose.interface import InterfaceWrench
@@ -106,10 +107,16 @@ def run_entries(run: "Run", summary: "RunSummary | None") -> Entries:
     return entries | {
         **_picked(summary, "verdict", "level"),
         "tracking": [_picked(row, *names) for row in summary.tracking if row.peak_target],
+        "intensity": {one.axis: _intensity(one) for one in summary.measures if one.intensity},
         "spools": [_picked(spool, "actuator", "peak", "rms") for spool in summary.spools],
         "limits": [use._asdict() for use in summary.limits],
         "channels_missing": summary.missing,
     }
+
+
+def _intensity(one: "MotionMeasures") -> Entries:
+    """Intensity measures of target and achieved motion of an axis, and the error of its response spectrum."""
+    return {name: values._asdict() for name, values in one.intensity.items()} | {"spectrum_error": one.spectrum_error}
 
 
 def tuning_entries(found: "Tuning") -> Entries:

@@ -12,6 +12,8 @@ from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
+from ..effects.supply import drawn_flows
+from ..machine.power_supply import power_supply
 from ..machine.recorded_specimen import specimen_facts
 from ..machine.structure import BODIES
 from ..mechanics.accelerometers import accelerometer_rows
@@ -72,7 +74,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
             about = {"units": like.units, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
             channels[f"reference_{name}"] = (like.dims, values, about)
     channels |= {name: channels[c.same_as] for name, c in LAYOUT.items() if c.same_as in channels}
-    channels |= _hidden_states(run)
+    channels |= {"supply_flow": _supply_flow(run)} | _hidden_states(run)
     if machine.accelerometers:
         at = accelerometer_rows(machine.accelerometers)
         channels["point_acceleration"] = accelerometer_channel(at, accelerometer_signals(plant, motion, at))
@@ -122,6 +124,14 @@ def _supply_droop(run: Run) -> Array:
     """Fall of the supply pressure with the flow drawn (n,) [Pa]."""
     supply = run.plant.supply
     return supply.droop * run.z[:, int(supply.drawn)] if supply.drawn >= 0.0 else np.zeros(len(run.time))
+
+
+def _supply_flow(run: Run) -> Any:
+    """Flow drawn from the supply (n,) [m3/s], with what is known of pumps and accumulators."""
+    plant, flow = run.plant, np.empty(len(run.time))
+    drawn_flows(plant.rows, run.spool, plant.supply._replace(weight=1.0), run.z, flow)
+    about = {"units": "m3/s", "long_name": "oil that all valves draw from the supply"}
+    return ("time",), flow, about | power_supply(plant.machine)
 
 
 def _hidden_states(run: Run) -> dict[str, Any]:

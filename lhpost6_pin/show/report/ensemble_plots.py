@@ -15,7 +15,7 @@ from .charts import Curve, Panel, XAxis, chart_figure
 from .layout import line_on, on_row, stacked_layout
 from .page import Figure, number
 from .plots import ACHIEVED, BLACK, TARGET, packed, palette
-from .run_motion import PERIOD_AXIS
+from .run_spectra import PERIOD_AXIS
 from .scales import SCALES, axis_title
 
 __all__ = ["demand_figure", "exceedance_figure", "importance_figure", "spectra_figures"]

@@ -23,6 +23,7 @@ from typing import Any, Literal
 
 from ... import __version__
 from ...core.files import write_whole
+from .symbols import SYMBOLS
 
 __all__ = [
     "Block",
@@ -259,7 +260,8 @@ def beside(name: str) -> str:
 
 def render_page(page: Page) -> str:
     """Return the whole report as HTML text."""
-    ending = [Section("repeat", "Versions and command", _repeat(page))]
+    symbols = details("What the symbols mean", Table("Symbols", ("Symbol", "Meaning"), SYMBOLS))
+    ending = [Section("symbols", "Symbols", [symbols]), Section("repeat", "Versions and command", _repeat(page))]
     sections = [*page.sections, *ending]
     links = "".join(f'<li><a href="#{text(s.name)}">{text(s.title)}</a></li>' for s in sections)
     body = "".join(

@@ -1,4 +1,4 @@
-"""Sections of a run report on the platen's motion: target and achieved, response spectra, drift."""
+"""Sections of a run report on the platen's motion: target and achieved, drift."""
 
 from collections.abc import Sequence
 
@@ -7,18 +7,13 @@ import xarray as xr
 
 from ...core.arrays import Array
 from ...data.metrics import QUANTITIES, Tracking, channel, commanded_axes, drift, labels, peak_window, peaks, sampling
-from ...motions.response_spectra import response_spectrum
-from .charts import Curve, Panel, XAxis, chart_figure
-from .page import Block, Figure, Table, details, grid, missing, number
+from .page import Block, Figure, Table, details, missing, number
 from .plots import ACHIEVED, RECORDED, TARGET, Row, Trace, palette_traces, time_figure
 from .run_components import draw_over_time
 from .scales import SCALES, axis_scale, axis_title, milliseconds, percent
 
-__all__ = ["drift_blocks", "spectrum_blocks", "tracking_blocks"]
+__all__ = ["drift_blocks", "tracking_blocks"]
 
-PERIODS = np.geomspace(0.03, 10.0, 60)  # [s] of the response spectra
-PERIOD_AXIS = XAxis("Period [s]", log=True, ticks=(0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
-DAMPING = 0.05
 CLOSE_UP = 3.0  # [s] drawn at full rate around the peak
 CLOSE_UP_ROW = 210  # [CSS px]
 
@@ -49,30 +44,6 @@ def tracking_blocks(record: xr.Dataset, found: Sequence[Tracking]) -> list[Block
         drawings = [_axis_figure(record, found, axis, None, "uncommanded") for axis in uncommanded]
         blocks.append(details(f"Uncommanded axes (cross-coupling): {', '.join(uncommanded)}", *drawings))
     return blocks
-
-
-def spectrum_blocks(record: xr.Dataset) -> list[Block]:
-    """Return the response spectra of target and achieved acceleration of the commanded axes."""
-    names = ("reference_acceleration", "platen_acceleration")
-    absent = [name for name in names if name not in record]
-    blocks: list[Block] = [missing(absent, "Their response spectra are not drawn.")] if absent else []
-    if len(absent) == len(names):
-        return blocks
-    _, step = sampling(record)
-    periods = PERIODS[PERIODS >= 10.0 * step]  # peaks are taken at samples
-    words = f"Pseudo-spectral acceleration, {number(100 * DAMPING, 1)} % damping."
-    drawings = []
-    for axis in commanded_axes(record):
-        scale, curves = axis_scale(axis, "acceleration"), []
-        for name, label, line in zip(names, ("target", "achieved"), (TARGET, ACHIEVED), strict=True):
-            motion = _of_axis(record, name, axis) if name in record else np.array([np.nan])
-            if np.isfinite(motion).all():
-                spectrum = scale.factor * response_spectrum(motion, step, periods, DAMPING).pseudo_acceleration
-                curves.append(Curve(label, periods, spectrum, {**line, "width": line["width"] + 0.6}))
-        panel = Panel(f"PSA [{scale.unit}]", curves, from_zero=True)
-        name = f"spectrum-{axis}"
-        drawings.append(chart_figure(name, axis_title(axis), words, [panel], PERIOD_AXIS, row_height=230))
-    return [*blocks, grid(*drawings)]
 
 
 def drift_blocks(record: xr.Dataset) -> list[Block]:

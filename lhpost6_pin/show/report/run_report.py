@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ...data.metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
+from ...data.motion_measures import MotionMeasures, motion_measures
 from ...motions import Peak
 from ...simulation.limit_use import (
     TOLERANCE,
@@ -25,7 +26,9 @@ from .page import Block, Headline, Level, Page, Section, Table, bar, details, mi
 from .performance_plots import Load, motion_peaks, performance_blocks
 from .run_components import force_blocks, pressure_blocks, strut_blocks
 from .run_limits import limit_blocks
-from .run_motion import drift_blocks, spectrum_blocks, tracking_blocks
+from .run_motion import drift_blocks, tracking_blocks
+from .run_oil import oil_blocks
+from .run_spectra import spectrum_blocks
 from .run_spools import spool_blocks
 from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
@@ -57,6 +60,7 @@ class RunSummary:
     tracking: tuple[Tracking, ...]
     spools: tuple[SpoolUse, ...]
     limits: tuple[LimitUse, ...]  # of every axis and actuator whose limit is known
+    measures: tuple[MotionMeasures, ...]  # of every commanded axis
     missing: tuple[str, ...]  # variables of the record layout that the record lacks
 
     @property
@@ -90,7 +94,7 @@ def write_run_report(
     bounds = checked_limits(limits or {})
     sampling(record)
     found = [row for quantity in QUANTITIES for row in track(record, quantity)]
-    spools = spool_use(record)
+    spools, measures = spool_use(record), motion_measures(record)
     notes = [*(notes or ()), *_gaps(record)]
     uses = [*limit_uses(record, found, spools, bounds), *uses_of_peaks(demands)]
     paper = performance_blocks(loads, motion_peaks(record), fits, source="the target") if loads else []
@@ -99,19 +103,20 @@ def write_run_report(
     response = response_blocks(record)
     sections = [
         Section("tracking", "Target and achieved", tracking_blocks(record, found)),
+        Section("limits", "Demand over capacity", limit_blocks(uses)),
         *([Section("specimen", "Specimen response", response)] if response else []),
         *(
             [Section("interaction", "Table and specimen", interaction_blocks(record, interaction))]
             if interaction
             else []
         ),
-        Section("spectra", "Response spectra", spectrum_blocks(record)),
+        Section("spectra", "Intensity and response spectra", spectrum_blocks(measures)),
         Section("forces", "Actuator forces", force_blocks(record, bounds)),
         Section("pressures", "Chamber pressures", pressure_blocks(record, bounds)),
         Section("spools", "Servovalve spools", spool_blocks(record, spools)),
+        Section("oil", "Oil supply", oil_blocks(record)),
         Section("struts", "Hold-down struts", strut_blocks(record, bounds)),
         Section("drift", "Drift", drift_blocks(record)),
-        Section("limits", "Demand over capacity", limit_blocks(uses)),
         *([Section("performance", "Performance curves", paper)] if paper else []),
         Section(
             "metrics",
@@ -133,7 +138,7 @@ def write_run_report(
         command=command,
     )
     absent = tuple(name for name in EXPECTED if name not in record)
-    lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), absent
+    lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), tuple(measures), absent
     return RunSummary(save_page(page, path), verdict, level, *lists)
 
 

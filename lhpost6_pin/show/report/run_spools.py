@@ -8,7 +8,7 @@ import xarray as xr
 from ...core.arrays import Array, Mask
 from ...data.metrics import SpoolUse, channel, kinds, labels, peak_window, peaks, sampling
 from ...data.signals import delay
-from .page import Block, Figure, Table, bar, grid, missing
+from .page import Block, Figure, Table, bar, details, grid, missing
 from .plots import ACHIEVED, ROW, TARGET, VERMILLION, Row, Trace, time_figure
 from .scales import SCALES, milliseconds, percent
 
@@ -35,23 +35,26 @@ def spool_blocks(record: xr.Dataset, spools: Sequence[SpoolUse]) -> list[Block]:
     blocks.append(
         "Fourth-stage spools as a fraction of their stroke, on one scale for all actuators, with the limits ±1. Grey: "
         "command; blue: position, behind the command by the delay of the valve. Shaded: a command is at its limit. "
-        "Below, the largest command of each kind of actuator at the full rate."
+        "Shown: the spool of each kind of actuator that opens most; below, the same around its peak at the full rate."
     )
     start, step = sampling(record)
     spool = {who: channel(record, f"spool_{who}") for who in LINES if f"spool_{who}" in record}
     first, drawn = next(iter(spool.items()))
     actuators = labels(record, "actuator")
+    panels = {}
     for own in kinds(actuators):
-        panels = []
         for k in own:
             full = np.abs(drawn[:, k]) >= 1.0
             words = f"Largest {first} {percent(float(peaks(drawn[:, k])))} of the stroke"
             words += f", at its limit {percent(float(full.mean()))} of the time." if full.any() else "."
             name, traces = f"plot-spool-{k + 1}", _traces(spool, k)
-            panels.append(spool_figure(name, actuators[k], words, traces, full, start=start, step=step))
-        blocks.append(grid(*panels, pairs=True))
-    closest = (_close_up(spool, actuators, own, start, step) for own in kinds(actuators))
-    return [*blocks, grid(*(drawing for drawing in closest if drawing), pairs=True)]
+            panels[k] = spool_figure(name, actuators[k], words, traces, full, start=start, step=step)
+    most = [own[int(np.nan_to_num(peaks(drawn[:, own])).argmax())] for own in kinds(actuators)]
+    closest = [_close_up(actuators, k, _traces(spool, k), start, step) for k in most]
+    blocks.append(grid(*(panels.pop(k) for k in most), *(drawing for drawing in closest if drawing), pairs=True))
+    if panels:
+        blocks.append(details(f"The other {len(panels)} spools", grid(*panels.values(), pairs=True)))
+    return blocks
 
 
 def spool_figure(
@@ -86,16 +89,11 @@ def spool_figure(
     )
 
 
-def _close_up(
-    spool: Mapping[str, Array], actuators: Sequence[str], own: Sequence[int], start: float, step: float
-) -> Figure | None:
-    """Every sample around the largest command among the actuators `own`, on a scale of its own."""
-    values = next(iter(spool.values()))
-    k = own[int(np.nan_to_num(peaks(values[:, own])).argmax())]
-    window = peak_window(values[:, k], step, CLOSE_UP)
+def _close_up(actuators: Sequence[str], k: int, traces: Sequence[Trace], start: float, step: float) -> Figure | None:
+    """Every sample of a spool around the largest value of its first trace, on a scale of its own."""
+    window = peak_window(traces[0].values, step, CLOSE_UP)
     if window is None:
         return None
-    traces = _traces(spool, k)
     words = "Around its largest command, every sample."
     near = [trace.values[slice(*window)] for trace in traces]
     if len(near) == 2 and np.isfinite(near).all():

@@ -1,0 +1,47 @@
+"""Section of a run report on the oil that the valves draw from pumps and accumulators."""
+
+import numpy as np
+import xarray as xr
+
+from ...data.metrics import channel, sampling
+from ...simulation.oil_use import oil_use
+from .page import Block, Table, missing, number
+from .plots import ACHIEVED, Row, Trace
+from .run_components import draw_over_time
+from .scales import Scale, percent
+
+__all__ = ["oil_blocks"]
+
+FLOW = Scale(6e4, "l/min")
+VOLUME = Scale(1e3, "l")
+
+
+def oil_blocks(record: xr.Dataset) -> list[Block]:
+    """Return the flow drawn by all valves over time, and its use of pumps and accumulators where they are known."""
+    if "supply_flow" not in record:
+        return [missing(["supply_flow"], "The oil drawn from the supply is not shown.")]
+    flow, step = channel(record, "supply_flow"), sampling(record)[1]
+    known = record["supply_flow"].attrs
+    pumps, bank = (float(known.get(name, np.nan)) for name in ("pump_flow", "accumulators"))
+    use = oil_use(flow, step, pumps)
+    rows = [
+        ("peak flow", FLOW.unit, number(use.peak * FLOW.factor)),
+        ("mean flow", FLOW.unit, number(use.mean * FLOW.factor)),
+        ("volume drawn", VOLUME.unit, number(use.volume * VOLUME.factor)),
+    ]
+    if np.isfinite(pumps):
+        rows.append((f"flow of the pumps{_assumed(known, 'pump_flow')}", FLOW.unit, number(pumps * FLOW.factor)))
+        taken = use.from_accumulators
+        rows.append(("largest volume drawn from the accumulators", VOLUME.unit, number(taken * VOLUME.factor)))
+        if np.isfinite(bank):
+            name = f"the same over the volume of the accumulators{_assumed(known, 'accumulators')}"
+            rows.append((f"{name}, {number(bank)} m³", "", percent(taken / bank)))
+    words = "Flow that all valves draw from the supply, whose pressure the model takes as constant."
+    lines = {"pumps": pumps} if np.isfinite(pumps) else {}
+    row = Row("Flow", [Trace("drawn by all valves", flow, ACHIEVED)], FLOW, lines)
+    table = Table("Oil drawn, pumps and accumulators", ("Quantity", "Unit", "Value"), rows)
+    return [draw_over_time(record, "oil", "Oil drawn over time", words, [row]), table]
+
+
+def _assumed(known: dict, name: str) -> str:
+    return " (assumed)" if known.get(f"{name}_evidence") == "assumed" else ""

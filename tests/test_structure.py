@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -131,3 +133,13 @@ def test_no_function_without_reference_counts_returns_an_array():
         parts = [e for value in given for e in (value.elts if isinstance(value, ast.Tuple) else [value])]
         found += [f"{name}.{function.name}" for e in parts if ast.unparse(e) in arrays or "view(" in ast.unparse(e)]
     assert not found
+
+
+def test_what_a_script_needs_is_importable_from_the_top_and_loaded_where_it_is_used():
+    assert set(lhpost6_pin.__all__) == set(lhpost6_pin._MODULES) <= set(dir(lhpost6_pin))
+    for name in lhpost6_pin.__all__:
+        assert callable(getattr(lhpost6_pin, name))
+    assert not hasattr(lhpost6_pin, "load_machines")
+    code = "import sys, lhpost6_pin; print({'numpy', 'xarray', 'numba', 'pinocchio'} & {*sys.modules})"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from .data.campaign import load_campaign
     from .data.records import load_record, save_record
     from .data.sensors import load_sensors
-    from .discovery import discover
+    from .discovery.discover import discover
     from .identification.calibration import calibrate
     from .identification.decompose import decompose_record
-    from .identification.validation import validate
+    from .identification.validation.validate import validate
     from .machine.machine import load_machine
     from .motions import find_motion, make_target
     from .show.report.run_report import write_run_report
@@ -47,7 +47,7 @@ __all__ = [
 _MODULES = {
     "calibrate": "identification.calibration",
     "decompose_record": "identification.decompose",
-    "discover": "discovery",
+    "discover": "discovery.discover",
     "find_motion": "motions",
     "load_campaign": "data.campaign",
     "load_controller": "control",
@@ -58,7 +58,7 @@ _MODULES = {
     "rehearse": "simulation.rehearse",
     "save_record": "data.records",
     "show_record": "show.viewer",
-    "validate": "identification.validation",
+    "validate": "identification.validation.validate",
     "write_run_report": "show.report.run_report",
 }
 

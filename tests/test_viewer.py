@@ -1,6 +1,7 @@
 """A record to look at: frames, arrows and the commands that draw them; pages that load nothing, on loopback only."""
 
 import asyncio
+import base64
 import gc
 import html
 import logging
@@ -40,6 +41,7 @@ from lhpost6_pin.show.viewer import (
 from lhpost6_pin.show.viewer.animation import draw_animation
 from lhpost6_pin.show.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
 from lhpost6_pin.show.viewer.frames import Ghost
+from lhpost6_pin.show.viewer.histories import packed_histories, record_histories
 from lhpost6_pin.show.viewer.scene import draw_machine, draw_names
 
 RECORD = Path(__file__).parent / "data" / "records" / "practice_a_EQ_ridgecrest2019_ccc.nc"
@@ -275,7 +277,7 @@ def test_forty_seconds_at_30_frames_fit_in_four_megabytes_and_load_nothing(machi
     assert len(page) < 4e6
     assert "default-src 'none'" in page and not re.search(r'(src|href)="|@import|url\(', page.split("<script>")[0])
     assert "<script>alert" not in page
-    assert page.count("</script>") == 4  # meshcat, settings, commands, the page's own
+    assert page.count("</script>") == 5  # meshcat, settings, commands, histories, the page's own
 
 
 def test_the_export_starts_no_server_and_no_process(machine, record, tmp_path, monkeypatch):
@@ -399,3 +401,18 @@ def test_the_command_writes_one_file_and_says_what_it_cannot_show(lhpost6, recor
     ):
         assert refused(lhpost6("view", *wrong, "--export", tmp_path / "other.html"), why)
     assert not (tmp_path / "other.html").exists()
+
+
+def test_histories_keep_every_peak_and_leave_out_what_has_gaps(machine, record):
+    whole = record_histories(machine, record)
+    assert [h.title.split()[0] for h in whole] == ["Displacement", "Acceleration", "Force"]
+    np.testing.assert_array_equal(whole[0].curves["y"], 1e3 * record["platen_displacement"].values[:, 1])
+    assert set(whole[2].curves) == {leg.name for leg in (*machine.actuators, *machine.struts)}
+    (packed, *_) = packed_histories(whole, float(record["time"][0]))
+    drawn = np.frombuffer(base64.b64decode(packed["curves"][0]["y"]), "<f4")
+    x = whole[0].curves["x"].astype("<f4")  # values travel in single precision
+    assert drawn.max() == x.max() and drawn.min() == x.min() and len(drawn) <= 2 * 500 + 2
+    torn = record.copy(deep=True)
+    torn["actuator_force"][5, 2] = np.nan
+    assert set(whole[2].curves) - set(record_histories(machine, torn)[2].curves) == {machine.actuator_names[2]}
+    assert record_histories(machine, record[["platen_displacement"]])[0].title.startswith("Displacement")

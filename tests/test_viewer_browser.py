@@ -182,3 +182,34 @@ def test_a_live_view_follows_the_plant(plant, machine, tmp_path, apart):
     assert faults == [] and "largest force" in status
     centre = np.array(machine.platen.centre_of_gravity)
     assert np.linalg.norm(platen - centre) > 1e-3  # it has left its place
+
+
+def test_histories_move_with_the_animation_and_show_the_force_of_the_leg_pressed(page, tmp_path):
+    press = "(x, y) => { for (const type of ['pointerdown', 'pointerup']) document.elementFromPoint(x, y)"
+    press += ".dispatchEvent(new PointerEvent(type, { clientX: x, clientY: y, bubbles: true, pointerId: 1 })) }"
+    place = f"(name) => {{ const p = ({AT})(name).getWorldPosition(new MeshCat.THREE.Vector3()); "
+    place += "p.project(viewer.camera); return [(p.x + 1) / 2 * innerWidth, (1 - p.y) / 2 * innerHeight] }"
+
+    async def look(tab: Tab):
+        await tab.evaluate(f"animator.pause(), seek(3), {DRAWN}")
+        seen = {"line": await tab.evaluate("plots.map(({ line }) => parseFloat(line.style.left))")}
+        seen["inked"] = await tab.evaluate(
+            "plots.map(({ canvas: c }) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v))"
+        )
+        await tab.evaluate(
+            "(() => { HTMLElement.prototype.setPointerCapture = () => {}; const box = plots[0].field"
+            ".getBoundingClientRect(); plots[0].field.dispatchEvent(new PointerEvent('pointerdown', "
+            "{ clientX: box.left + box.width / 4, clientY: box.top + 5, pointerId: 1 })) })()"
+        )
+        seen["time"] = await tab.evaluate("[animator.time, known]")
+        seen["first"] = await tab.evaluate("forces.chosen")
+        await tab.evaluate(f"(([x, y]) => ({press})(x, y))(({place})('H4_barrel'))")
+        seen["pressed"] = await tab.evaluate("[forces.chosen, forces.choice.value]")
+        return tab.faults, seen
+
+    faults, seen = browse(tmp_path, page, look, (1280, 900))
+    assert faults == []
+    time, known = seen["time"]
+    assert time == pytest.approx(known / 4, abs=known / 200)  # a pixel of the plot
+    assert seen["line"] == pytest.approx([100.0 * 3.0 / known] * 3, abs=0.01) and all(seen["inked"])
+    assert seen["first"] == "H1" and seen["pressed"] == ["H4", "H4"]

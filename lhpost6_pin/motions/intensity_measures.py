@@ -35,12 +35,11 @@ def intensity_measures(
     a, b = acceleration[:-1], acceleration[1:]
     squares = np.concatenate([[0.0], np.cumsum((a * a + a * b + b * b) * (time_step / 3.0))])
     begin, end = (_time_at(squares, share * squares[-1], time_step) for share in SIGNIFICANT)
-    return IntensityMeasures(
-        *(float(np.max(np.abs(x))) for x in (acceleration, velocity, displacement)),
-        arias=float(np.pi / (2.0 * STANDARD_GRAVITY) * squares[-1]),
-        duration=end - begin if squares[-1] > 0.0 else np.nan,
-        cav=float(np.sum(np.abs(a) + np.abs(b)) * time_step / 2.0),
-    )
+    pga, pgv, pgd = (float(np.max(np.abs(x))) for x in (acceleration, velocity, displacement))
+    arias = float(np.pi / (2.0 * STANDARD_GRAVITY) * squares[-1])
+    duration = end - begin if squares[-1] > 0.0 else np.nan
+    cav = float(np.sum(np.abs(a) + np.abs(b)) * time_step / 2.0)
+    return IntensityMeasures(pga, pgv, pgd, arias, duration, cav)
 
 
 def _time_at(growing: Array, level: float, time_step: float) -> float:

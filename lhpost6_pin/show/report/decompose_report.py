@@ -58,10 +58,10 @@ def write_decompose_report(
         headlines=_headlines(found, agreement),
         sections=[
             *first,
+            Section("effects", "Forces by effect", effect_blocks(found, agreement)),
             Section("residual", "Residual", _residual_blocks(found, agreement)),
             Section("agreement", "Agreement by axis", [MATCH, *match_tables(found, agreement)]),
             Section("six-rows", "Modelled and measured forces", six_row_blocks(found)),
-            Section("effects", "Forces by effect", effect_blocks(found, agreement)),
             Section("components", "Measured forces of the components", [component_figure(found)]),
             Section("work", "Energy and power", [_work_table(work), work_figure(found, work)]),
             Section("assumptions", "Assumptions and sources", _assumptions(found)),

@@ -145,7 +145,7 @@ def _bar(name: str, color: str, sizes: Sequence[float], rows: Sequence[int], hov
 
 def _bars(names: Sequence[str], x_title: str, height: int, mark: float, most: float) -> dict[str, Any]:
     """Layout of rows of bars, `height` [CSS px] each, over a logarithmic axis to `most`; a line at `mark`."""
-    layout = stacked_layout([""], x_title, row_height=height * max(len(names), 1))
+    layout = stacked_layout([""], f"{x_title} (logarithmic axis)", row_height=height * max(len(names), 1))
     bare = {"showticklabels": False, "showgrid": False, "zeroline": False, "ticks": "", "fixedrange": True}
     layout["yaxis"] |= {"range": [len(names) - 0.5, -0.5]} | bare
     layout["xaxis"] |= {"type": "log"} | log_ticks(1.0, most)

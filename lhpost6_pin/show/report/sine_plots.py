@@ -56,7 +56,7 @@ def harmonic_blocks(test: SineTest) -> list[Block]:
             header.append(f"{quantity.capitalize()}, {name}")
             curves.append(Curve(name, np.arange(2, len(share) + 1), np.maximum(share[1:], FLOOR), line, "bar"))
         top = max(float(column[1:].max()) for column in columns[-2:])
-        title = f"{quantity.capitalize()} [% of the fundamental]"
+        title = f"{quantity.capitalize()} [% of the fundamental, logarithmic axis]"
         panels.append(Panel(title, curves, log=True, span=(FLOOR, max(2.0 * top, 1.0))))
     words = f"Amplitudes of the harmonics of {number(test.frequency)} Hz relative to the fundamental."
     title = "Harmonics relative to the fundamental"

@@ -15,7 +15,7 @@ from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import forward_kinematics
 
-__all__ = ["AS_IT_IS", "Frames", "Ghost", "Look", "make_frames", "record_frames", "record_title"]
+__all__ = ["AS_IT_IS", "Frames", "Ghost", "Look", "make_frames", "record_frames", "record_title", "recorded_forces"]
 
 
 OTHERS = ("first_other", "second_other")
@@ -120,7 +120,7 @@ def record_frames(
     for name, other in zip(OTHERS, others, strict=False):
         label = f"{record_title(other)}, {other.attrs.get('kind', 'record')}"
         ghosts.append(Ghost(name, label, other["time"].values, _motion(machine, other)))
-    frames = make_frames(time, _motion(machine, record), ghosts, _forces(machine, record), look)
+    frames = make_frames(time, _motion(machine, record), ghosts, recorded_forces(machine, record), look)
     scale = record.attrs.get(FULL_SCALE)
     return replace(frames, joints=_joints(record, frames), full_scale=None if scale is None else float(scale))
 
@@ -178,7 +178,7 @@ def _joints(record: xr.Dataset, frames: Frames) -> dict[str, Array]:
     return found
 
 
-def _forces(machine: Machine, record: xr.Dataset) -> Array | None:
+def recorded_forces(machine: Machine, record: xr.Dataset) -> Array | None:
     """Forces along actuators and struts (n, n_legs); a strut's gas pulls its ends together (Eq. 4-8)."""
     parts = []
     for name, legs in (("actuator_force", machine.actuators), ("strut_pressure", machine.struts)):

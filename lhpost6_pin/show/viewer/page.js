@@ -27,6 +27,7 @@ function adopt() { // an animation that has come: at once from a file, by and by
   part("time").max = known;
   animator.mixer.timeScale = Number(part("speed").value);
   repeat();
+  show_histories();
 }
 function repeat() {
   for (const action of animator.actions) action.repetitions = part("loop").checked ? Infinity : 1;
@@ -52,6 +53,7 @@ function draw(now) {
   if (viewer.camera !== camera) fit();
   if (animator.duration !== known) adopt();
   if (document.activeElement !== part("time") || animator.playing) part("time").value = animator.time;
+  mark();
   part("clock").textContent = `${shown(start + animator.time)} / ${shown(start + known)} s`;
   part("play").textContent = animator.playing ? "❚❚" : "▶";
   part("play").setAttribute("aria-label", animator.playing ? "Pause" : "Play");

@@ -10,6 +10,7 @@ from ..urdf import drawing_colour
 from .animation import draw_animation, leg_forces
 from .arrows import largest_force
 from .frames import AS_IT_IS, Frames, Look, record_frames, record_title
+from .histories import packed_histories, record_histories
 from .scene import ROOT, draw_arrows, draw_machine, draw_motion, draw_names, names_layer
 from .viewer_page import Caption, Picture, render_page
 from .window import LoopbackWindow, Recorder, Window
@@ -78,4 +79,6 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
         note += f"; longest arrow {most / 1e3:,.0f} kN" + " of change since the start" * look.change
         legend |= {"push": drawing_colour("force_push"), "pull": drawing_colour("force_pull")}
         layers["forces"] = [f"meshcat/{ROOT}/{name}_rod/force" for name in forces]
-    return Caption(record_title(record), note, legend, layers, float(frames.time[0]), 1.0 / look.rate)
+    start = float(frames.time[0])
+    histories = packed_histories(record_histories(machine, record), start)
+    return Caption(record_title(record), note, legend, layers, start, 1.0 / look.rate, histories)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from ...core.files import write_whole
 
@@ -23,6 +24,7 @@ class Caption:
     layers: Mapping[str, Sequence[str]] | None = None  # words and paths in the scene
     start: float = 0.0  # time of the first frame [s]
     step: float = 1.0 / 30.0  # of an arrow key [s]
+    histories: Sequence[Mapping[str, Any]] = ()  # of `packed_histories`
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,8 @@ def render_page(caption: Caption, commands: Sequence[bytes] = (), *, live: bool 
         library=library.read_text(encoding="utf-8").replace("</script", "<\\/script"),
         commands=json.dumps([base64.b64encode(command).decode("ascii") for command in commands]),
         settings=json.dumps({"start": caption.start, "step": caption.step, "live": live}),
-        script=_beside("page.js"),
+        histories=json.dumps(caption.histories).replace("<", "\\u003c"),
+        script=_beside("page.js") + _beside("histories.js"),
     )
 
 

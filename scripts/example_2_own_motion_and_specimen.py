@@ -1,6 +1,6 @@
 """A motion of your own and a specimen: the limits, and the effect of the specimen on the table.
 
-    python scripts/example_2_own_motion_and_specimen.py [FILE...] [--specimen pendulum] [--scale 1] [--out DIR]
+    python scripts/example_2_own_motion_and_specimen.py [FILE...] [--specimen shear_frame] [--scale 1] [--out DIR]
 
 FILE is a ground motion (PEER .AT2, COSMOS V1, CSV), or three of them for x, y and z. Without one a pulse is written
 as an example of a CSV file. The table runs it bare and loaded; an animation overlays both.
@@ -45,7 +45,7 @@ def print_demand(machine: Machine, target: Target) -> None:
 
 def main(
     files: Annotated[list[Path] | None, typer.Argument(help="Ground motion; default: a generated pulse.")] = None,
-    specimen: Annotated[str, typer.Option(help="URDF file, or the shipped pendulum.")] = "pendulum",
+    specimen: Annotated[str, typer.Option(help="URDF or TOML file, or a shipped specimen.")] = "shear_frame",
     scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0,
     out: Annotated[Path, typer.Option(help="Directory of records and animation.")] = Path("out/own"),
 ) -> None:
@@ -54,7 +54,7 @@ def main(
     motion = load_motion(files or [write_pulse(out / "pulse.csv")])
     target = make_target(motion, scale=scale)
 
-    # 2. The specimen stands at C with its joints locked; position, orientation and free joints are options
+    # 2. The specimen stands at C, locked: the shear frame as a rigid body of 65 t; place and free joints are options
     bare = load_machine("lhpost6")
     loaded = bare.with_specimen(specimen, position=(0.0, 0.0, 0.0), locked=True)
     print_demand(loaded, target)

@@ -7,8 +7,9 @@ import pytest
 import xarray as xr
 
 from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.records import open_record
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.motions import find_motion, make_target, with_time_scale
 from lhpost6_pin.tuning.drives import check_circumstances, circumstances, load_drive, save_drive
 
 
@@ -82,3 +83,13 @@ def test_another_machine_is_refused_and_another_load_warned_of(path, caplog):
     told = [record.getMessage() for record in caplog.records]
     assert len(told) == 2 and "made with specimen none, this run has pendulum" in told[0]
     assert "made with controller a panel, this run has another" in told[1]
+
+
+def test_a_drive_states_the_time_scale_of_its_motion_and_one_from_before_has_none(tmp_path):
+    target = make_target(with_time_scale(find_motion("sine", amplitude=0.01), 0.5), axes="x")
+    path = save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", {})
+    assert load_drive(path).target.reference.time_scale == 0.5
+    data = open_record(path)
+    del data.attrs["time_scale"]
+    data.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    assert load_drive(tmp_path / "old.nc").target.reference.time_scale == 1.0

@@ -18,7 +18,6 @@ from .options import (
     SpecimenOptions,
     Valves,
     find_controller,
-    folder_for,
 )
 
 __all__ = ["export_fmu", "link", "serve", "serve_specimen"]
@@ -126,7 +125,7 @@ def link(
     target = motion.target(table)
     moved = target.reference.motion
     name = moved.replace("/", "_") + "_link"
-    folder = folder_for(out, name)
+    folder = motion.folder(out, name)
     plant = make_plant(table)
     loop = loop_for(plant, find_equilibrium(plant), chosen, target)
     loop = loop if cancel is None else cancelling(loop, target, cancel)
@@ -135,7 +134,8 @@ def link(
         counts = dict(client.close())
     counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
     counts["unanswered"] = int((~done.answered).sum())
-    attrs = {"test": name, "title": f"{moved} at scale {motion.scale:g} over the link", "link_mode": client.mode.label}
+    attrs = {"test": name, "title": f"{target.reference.title} over the link", "link_mode": client.mode.label}
+    attrs |= target.reference.facts
     path = folder / "record.nc"
     save_record(record_of_link_run(done, plant, {**attrs, **counts}), path)
     times = {"command to sensors": client.round_trip}

@@ -11,6 +11,7 @@ from ..core.names import ENGINES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion, completing
+from .motion_options import MatchSpectrum, RotateBy, SpectrumDamping, TimeScale
 
 if TYPE_CHECKING:
     from ..studies.plan import EnsemblePlan
@@ -58,6 +59,10 @@ def ensemble(
         typer.Option(help="Groups of results kept: tracking, limits, strengths, forces, spectra, base."),
     ] = None,
     axes: Annotated[str | None, typer.Option(help="Axes of motions named here, such as xyz, x, or x=y.")] = None,
+    time_scale: TimeScale = None,
+    rotate_by: RotateBy = None,
+    match_spectrum: MatchSpectrum = None,
+    spectrum_damping: SpectrumDamping = None,
     engine: Annotated[
         str | None,
         typer.Option(
@@ -96,7 +101,10 @@ def ensemble(
         "quantities": [word.strip() for word in quantities.split(",")] if quantities is not None else None,
         "engine": engine,
     }
-    made = _plan(plan, axes, {key: value for key, value in given.items() if value is not None})
+    processing = {"axes": axes, "time_scale": time_scale, "rotate_by": rotate_by, "spectrum_damping": spectrum_damping}
+    processing["match_spectrum"] = None if match_spectrum is None else str(match_spectrum)
+    processing = {key: value for key, value in processing.items() if value is not None}
+    made = _plan(plan, processing, {key: value for key, value in given.items() if value is not None})
     folder = opt.folder_for(out, made.name.replace("/", "_"))
     count = len(made.blocks)
     with progress_bar(f"{made.name}: {count} blocks of runs on {made.machine.name}") as progress:
@@ -118,17 +126,20 @@ def _numbers(text: str | None) -> list[float] | None:
         raise ParameterError(f"--scales {text}: write numbers with commas, such as 0.5,0.75,1") from None
 
 
-def _plan(words: list[str], axes: str | None, given: dict[str, Any]) -> "EnsemblePlan":
+def _plan(words: list[str], processing: dict[str, Any], given: dict[str, Any]) -> "EnsemblePlan":
     """The plan in a file, with the options given in place of its entries; or of motions with these options."""
     from ..studies.plan_file import load_plan, plan_from
 
     if Path(words[0]).suffix == ".toml":
         if len(words) > 1:
             raise ParameterError(f"one plan at a time; got {', '.join(words)}")
-        if axes is not None:
-            raise ParameterError("--axes is for motions named on the command line; a plan states axes of each")
+        if processing:
+            flag = next(iter(processing))
+            raise ParameterError(
+                f"--{flag.replace('_', '-')} is for motions named on the command line; a plan states {flag} of each"
+            )
         return load_plan(Path(words[0]), given)
     motions = [{"files": [word]} if Path(word).suffix else {"name": word} for word in words]
     entries: dict[str, Any] = {"name": f"{'_'.join(Path(word).stem for word in words)}_ensemble", **given}
-    entries["motion"] = [one | ({"axes": axes} if axes else {}) for one in motions]
+    entries["motion"] = [one | processing for one in motions]
     return plan_from(entries, Path(), "ensemble")

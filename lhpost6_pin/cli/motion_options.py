@@ -6,15 +6,33 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import MotionError
+from ..core.errors import MotionError, RecordError
 from ..core.names import SAMPLE_RATE
+from .app import stderr
 from .completion import complete_motion
+from .options import folder_for
 
 if TYPE_CHECKING:
     from ..machine.machine import Machine
     from ..motions import GroundMotion, Target
 
 __all__ = ["MotionOptions"]
+
+TimeScale = Annotated[
+    float | None,
+    typer.Option(help="Factor of durations; accelerations stay, displacements follow with its square (similitude)."),
+]
+RotateBy = Annotated[
+    float | None,
+    typer.Option(help=r"Angle by which the horizontal components are turned, from x towards y \[deg]."),
+]
+MatchSpectrum = Annotated[
+    Path | None,
+    typer.Option(help="CSV of a response spectrum (period_s,sa_g) that the motion is adjusted to, at scale 1."),
+]
+SpectrumDamping = Annotated[
+    float | None, typer.Option(help="Damping of that spectrum, as share of critical; default: 0.05.")
+]
 
 
 @dataclass(frozen=True)
@@ -24,7 +42,8 @@ class MotionOptions:
     motion: Annotated[
         list[str],
         typer.Argument(
-            help="Name (see `lhpost6 motions`), file(s), or name and file(s).", autocompletion=complete_motion
+            help="Name (see `lhpost6 motions`), file(s) (a record, too), or name and file(s).",
+            autocompletion=complete_motion,
         ),
     ]
     scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0
@@ -33,6 +52,10 @@ class MotionOptions:
     ] = None
     high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None
     low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None
+    time_scale: TimeScale = None
+    rotate_by: RotateBy = None
+    match_spectrum: MatchSpectrum = None
+    spectrum_damping: SpectrumDamping = None
     set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None
     dt: Annotated[float | None, typer.Option(help="Time step of a motion file that does not say it [s].")] = None
     unit: Annotated[str | None, typer.Option(help="Unit of a motion file that does not say it, such as g.")] = None
@@ -52,11 +75,19 @@ class MotionOptions:
     def target(self, table: "Machine", beyond: bool = False) -> "Target":
         """Target of the motion at the controller's rate; raises OutOfRangeError beyond the limits, unless allowed."""
         from ..mechanics.plant import make_plant
-        from ..motions import make_target
+        from ..motions import adjust_motion, load_spectrum, make_target, match_spectrum
         from ..simulation.motion_limits import check_motion_limits
 
+        if self.spectrum_damping is not None and self.match_spectrum is None:
+            raise MotionError("--spectrum-damping is that of --match-spectrum; give both, or leave it out")
+        spectrum = load_spectrum(self.match_spectrum, self.spectrum_damping) if self.match_spectrum else None
+        motion = adjust_motion(self._ground(), rotate_by=self.rotate_by, time_scale=self.time_scale)
+        if spectrum is not None:
+            match = match_spectrum(motion, spectrum, high_pass=self.high_pass, low_pass=self.low_pass)
+            stderr().print(f"{motion.name}: {match.summary}", markup=False, highlight=False)
+            motion = match.motion
         target = make_target(
-            self._ground(),
+            motion,
             scale=self.scale,
             axes=self.axes or (None if table.motion == "free" else table.motion),
             high_pass=self.high_pass,
@@ -67,9 +98,17 @@ class MotionOptions:
             check_motion_limits(make_plant(table), target)
         return target
 
+    def folder(self, out: Path | None, name: str) -> Path:
+        """Directory of the results; raises RecordError where they would replace a record that is run."""
+        folder = folder_for(out, name)
+        for word in self.motion:
+            if Path(word).resolve() == (folder / "record.nc").resolve():
+                raise RecordError(f"{word} would be replaced by its own run; choose another folder with --out")
+        return folder
+
     def _ground(self) -> "GroundMotion":
         """Motion by name, from one file or three component files, or by name from such files."""
-        from ..motions import find_motion, load_motion
+        from ..data.motion_files import motion_of
 
         options: dict[str, Any] = {}
         for item in self.set_ or []:
@@ -77,18 +116,19 @@ class MotionOptions:
             if not equals:
                 raise MotionError(f"--set {item}: write key=value")
             options[key.strip()] = _number_or_text(value.strip())
-        about_file = {"time_step": self.dt, "units": self.unit, "channels": self.channels, "rotate": self.rotate}
-        about_file["rotation_factor"] = self.rotation_factor
-        about_file = {key: value for key, value in about_file.items() if value is not None}
+        stated = {"time_step": self.dt, "units": self.unit, "channels": self.channels}
+        stated |= {"rotate": self.rotate, "rotation_factor": self.rotation_factor}
+        about_file = {key: value for key, value in stated.items() if value is not None}
         first, *files = self.motion
         if not _is_file(first) and files and not any(map(_is_file, files)):
             raise MotionError(f"one motion at a time; got {', '.join(self.motion)}, none of which is a file")
         if about_file and not (files or _is_file(first)):
             raise MotionError(
-                f"{first}: --dt, --unit, --channels, --rotate and --rotation-factor are for motions from files"
+                f"{first}: --dt, --unit, --channels, --rotate and --rotation-factor are for motions from files; "
+                "--rotate-by turns any motion by an angle"
             )
-        options |= about_file
-        return load_motion(self.motion, **options) if _is_file(first) else find_motion(first, files, **options)
+        name = None if _is_file(first) else first
+        return motion_of(name, files if name else self.motion, **options, **about_file)
 
 
 def _is_file(name: str) -> bool:

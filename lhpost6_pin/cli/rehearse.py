@@ -72,7 +72,7 @@ def run(
         check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
-    folder = opt.folder_for(out, name)
+    folder = motion.folder(out, name)
     given = chosen
     more: list[Path] = []
     if retune:
@@ -80,7 +80,7 @@ def run(
             raise SimulationError("--aic is an inverse of the controller as it was; --retune changes it")
         chosen, _, more = retuned(table, chosen, folder)
     loop = checked_loop(table, chosen, machine, retune=not retune)
-    title = f"{name} at scale {motion.scale:g} on {table.name}"
+    title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)
     with watched(view, table, title, err=json) as watch, progress_bar(f"{name} on {table.name}") as progress:
         test = rehearse(

@@ -16,13 +16,13 @@ from ..core.errors import MotionError
 from .motion import GroundMotion, make_motion
 from .process import smooth_step
 from .response_spectra import response_spectrum
+from .spectral_match import rounded_peaks
 
 __all__ = ["ac156", "required_spectrum"]
 
 _log = logging.getLogger(__name__)
 _ITERATIONS = 12
 _DRAWS = 5
-_SHARPNESS = 12  # of the rounding of peaks: even, and high enough to leave the rest alone
 _MARGIN = 0.75  # part of the tolerance the match may use; the rest is for the processing that follows
 _PER_OCTAVE = 12  # matching frequencies: twice as dense as AC156's check at sixths of an octave
 
@@ -137,8 +137,7 @@ def _matched_noise(
         phases = np.exp(2j * np.pi * generator.random(len(frequency)))
         amplitude = np.interp(inside, np.log(matched), wanted / np.sqrt(matched)) * phases
         for _ in range(_ITERATIONS):
-            noise = envelope * np.fft.irfft(amplitude, count)[: len(time)]
-            noise /= (1 + (noise / wanted[-1]) ** _SHARPNESS) ** (1 / _SHARPNESS)
+            noise = rounded_peaks(envelope * np.fft.irfft(amplitude, count)[: len(time)], wanted[-1])
             motion = np.fft.irfft(gain * np.fft.rfft(noise, count), count)[: len(time)]
             found = response_spectrum(motion, step, 1 / matched, damping).pseudo_acceleration
             correction = wanted / found

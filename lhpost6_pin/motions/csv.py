@@ -16,7 +16,7 @@ from .motion_units import to_si
 from .text import read_text
 from .time_steps import uniform_step
 
-__all__ = ["is_csv", "load_csv", "read_csv"]
+__all__ = ["axis_in_name", "header_names", "is_csv", "load_csv", "read_csv"]
 
 _TIME = re.compile(r"(time|t)([\s_]*[\[(]?(?P<unit>s|sec|ms)[\])]?)?", re.I)
 _AXIS_NAMES = {"rx": "roll", "ry": "pitch", "rz": "yaw", **{axis: axis for axis in AXES}}
@@ -34,7 +34,7 @@ def is_csv(text: str) -> bool:
     rows = [line for _, line in without_comments(text[:20000])[:2]]
     if len(rows) < 2:
         return False
-    names, dialect = _names(rows[0])
+    names, dialect = header_names(rows[0])
     known = any(_TIME.fullmatch(name) or _COLUMN.fullmatch(name) for name in names)
     return known and dialect.count(rows[1]) == len(names)
 
@@ -61,7 +61,7 @@ def read_csv(text: str, where: str, **stated: Unpack[Stated]) -> list[Component]
     if not rows:
         raise MotionError(f"{where}: no header row; the first line that is no comment must name the columns")
     (start, header), rows = rows[0], rows[1:]
-    names, dialect = _names(header)
+    names, dialect = header_names(header)
     if len(set(names)) != len(names):
         twice = next(column for column in names if names.count(column) > 1)
         raise MotionError(f"{where}, line {start}: two columns named {twice!r}; rename one")
@@ -88,7 +88,8 @@ def read_csv(text: str, where: str, **stated: Unpack[Stated]) -> list[Component]
     return found
 
 
-def _names(header: str) -> tuple[list[str], Dialect]:
+def header_names(header: str) -> tuple[list[str], Dialect]:
+    """Names in a header row, and how its fields are separated."""
     dialect = Dialect(next((mark for mark in ";\t," if mark in header), " "))
     if dialect.separator == " " and _COLUMN.fullmatch(header.strip()):  # one column, a blank before its unit
         dialect = Dialect(",")
@@ -115,14 +116,20 @@ def _columns(names: list[str], clock: int | None, channels: Channels | None, whe
     return chosen
 
 
-def _axis_of(column: str, where: str) -> str:
+def axis_in_name(column: str) -> str | None:
+    """Axis that a column's name gives, as `x`, `ay_g`, `acc_z [g]` or `roll` do; None if it gives none."""
     match = _COLUMN.fullmatch(column)
-    if match is None:
+    return _AXIS_NAMES[match["axis"].lower()] if match else None
+
+
+def _axis_of(column: str, where: str) -> str:
+    axis = axis_in_name(column)
+    if axis is None:
         raise MotionError(
             f"{where}: column {column[:60]!r} names no axis; call it such as x_m_s2, ay_g, z_m, roll_rad, or choose "
             "columns, as in --channels x=2,y=3 (by number or name)"
         )
-    return _AXIS_NAMES[match["axis"].lower()]
+    return axis
 
 
 def _unit(match: "re.Match[str] | None", axis: str, units: "str | Mapping[str, str] | None") -> str:

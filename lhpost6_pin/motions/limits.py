@@ -104,7 +104,7 @@ def check_limits(target: Target, limits: MotionLimits, check: MotionCheck | None
     if over:
         fits = largest_scale(target, limits, check)
         raise OutOfRangeError(
-            f"{target.reference.motion} at scale {target.reference.scale:g} exceeds the capacity of the table. "
+            f"{target.reference.title} exceeds the capacity of the table. "
             f"The largest scale that fits is {fits:g}; exceeded: {'; '.join(_clauses(over, target.time))}",
             fits,
             tuple(dict.fromkeys(peak.quantity for peak in over)),

@@ -17,7 +17,7 @@ QUANTITIES = ("acceleration", "displacement")
 
 @dataclass(frozen=True, eq=False)
 class GroundMotion:
-    """A ground motion as recorded or generated, before any processing for the table.
+    """A ground motion as recorded or generated, perhaps adjusted (`adjust`), before any processing for the table.
 
     `samples` has shape (n, 6) in the order of `AXES`: accelerations [m/s^2, rad/s^2] or displacements
     [m, rad] according to `quantity`; rotations are Euler angles and their second derivatives. Sample j is at
@@ -31,6 +31,7 @@ class GroundMotion:
     samples: np.ndarray  # (n, 6)
     quantity: str  # one of QUANTITIES
     source: str
+    time_scale: float = 1.0  # its duration over that of the recorded motion
 
     def __post_init__(self) -> None:
         """Check quantity, time step and samples."""

@@ -11,6 +11,7 @@ the product rule, (w d)' and (w d)'', so they stay consistent.
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from ..core.files import models_folder
 from .motion import AXES, GroundMotion
 from .toml import load_toml, values_of
 
-__all__ = ["Reference", "Target", "axes_map", "make_target", "smooth_step", "with_scale"]
+__all__ = ["Reference", "Target", "axes_map", "make_target", "processing", "smooth_step", "with_scale"]
 
 _MOST = 2**24
 """Samples that a target may have: more than two hours at 2048 Hz, and 0.8 GB an array."""
@@ -36,6 +37,18 @@ class Reference:
     high_pass: float  # corner [Hz]; 0 is none
     low_pass: float  # corner [Hz]
     start: float  # time of the target's first sample on the motion's clock [s]
+    time_scale: float = 1.0  # of the motion (`adjust.with_time_scale`)
+
+    @property
+    def title(self) -> str:
+        """Motion and scales in words."""
+        compressed = f", time scale {self.time_scale:g}" if self.time_scale != 1.0 else ""
+        return f"{self.motion} at scale {self.scale:g}{compressed}"
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Attributes of a record of this motion."""
+        return {"scale": self.scale, "time_scale": self.time_scale, "motion": self.motion, "source": self.source}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +68,8 @@ class Target:
 
 
 @cache
-def _settings() -> dict[str, float]:
+def processing() -> dict[str, float]:
+    """Numbers of the processing of all motions, in SI."""
     table = load_toml(models_folder() / "ground_motions" / "tests.toml")
     return values_of(table, "processing")
 
@@ -99,16 +113,16 @@ def make_target(
 
     `scale` multiplies it, `axes` selects and permutes (see `axes_map`; all axes by default), `window`
     (begin, end) [s] cuts a part of it. Corners [Hz] of the zero-phase band-pass default to the values in
-    `models/ground_motions/tests.toml`; a displacement motion is not high-passed by default. The record is
-    extended by `pad` [s] at both ends, over which the target comes from and goes to rest. `rate` is the
-    controller's [1/s].
+    `models/ground_motions/tests.toml`, the high-pass over the motion's time scale; a displacement motion is not
+    high-passed by default. The record is extended by `pad` [s] at both ends, over which the target comes from and goes
+    to rest. `rate` is the controller's [1/s].
 
     Raises MotionError for a window, corner or scale that makes no sense, or numbers too large to compute with.
     """
-    settings = _settings()
+    settings = processing()
     integrated = motion.quantity == "acceleration"
     if high_pass is None:
-        high_pass = settings["high_pass"] if integrated else 0.0
+        high_pass = settings["high_pass"] / motion.time_scale if integrated else 0.0
     low_pass = settings["low_pass"] if low_pass is None else low_pass
     pad = settings["pad"] if pad is None else pad
     pairs = axes_map(",".join(AXES) if axes is None else axes)
@@ -165,7 +179,7 @@ def make_target(
     displacement, velocity, acceleration = (np.where(moved, x, 0.0) for x in products)
     _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
     start = first * motion.time_step - lead / rate
-    reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start)
+    reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start, motion.time_scale)
     return Target(np.arange(count) / rate, displacement, velocity, acceleration, reference)
 
 

@@ -1,7 +1,7 @@
 """Reading ground-motion files of any known kind, one for all axes or one for each component."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
@@ -12,14 +12,14 @@ import numpy as np
 from ..core.errors import MotionError, instead_of
 from .at2 import is_at2, read_at2
 from .columns import begins_with_numbers, read_columns
-from .components import Channels, Component, assemble
+from .components import Channels, Component, Stated, assemble
 from .cosmos import is_cosmos, read_cosmos
 from .csv import is_csv, read_csv
 from .knet import is_knet, read_knet
 from .motion import AXES, GroundMotion
 from .text import READABLE, read_text
 
-__all__ = ["MotionFiles", "load_motion"]
+__all__ = ["MotionFiles", "load_motion", "read_components", "refuse_stated"]
 
 MotionFiles = Path | str | Sequence[Path | str] | Mapping[str, Path | str]
 """One file, or files of the components; a mapping gives the axis of each."""
@@ -35,8 +35,41 @@ _OPTIONS: dict[str, tuple[Any, str]] = {
 """Options of `load_motion`: types in Python, and in words."""
 
 
-def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
+def read_components(path: Path, stated: Mapping[str, Any], channels: Channels | None) -> tuple[str, list[Component]]:
+    """Format and components of a text file; an incomplete one is refused by the reader of its suffix.
+
+    `stated` has its `time_step` [s] and `units` where given, `channels` those wanted of it.
+    """
+    text, suffix, where = read_text(path), path.suffix.lower(), str(path)
+    columns = Stated(time_step=stated.get("time_step"), units=stated.get("units"), channels=channels)
+    if not text.strip():
+        raise MotionError(f"{where}: is empty")
+    if is_at2(text) or suffix == ".at2":
+        form, found = "PEER", [read_at2(_alone(text, where, stated), where)]
+    elif is_knet(text):
+        form, found = "K-NET", [read_knet(_alone(text, where, stated), where)]
+    elif is_cosmos(text) or suffix in (".v1", ".v2", ".raw", ".v1c", ".v2c"):
+        form, found = "V2" if "2" in suffix else "V1", read_cosmos(_alone(text, where, stated), where)
+    elif begins_with_numbers(text):
+        form, found = "text", read_columns(text, where, **columns)
+    elif is_csv(text) or suffix == ".csv":
+        form, found = "CSV", read_csv(text, where, **columns)
+    elif "units" in stated:
+        form, found = "text", read_columns(text, where, **columns)
+    else:
+        raise MotionError(f"{where}: unknown format; known are {READABLE}")
+    return form, found
+
+
+def load_motion(
+    paths: MotionFiles,
+    *,
+    read: Callable[[Path, Mapping[str, Any], Channels | None], tuple[str, list[Component]]] = read_components,
+    **options: Any,
+) -> GroundMotion:
     """Read a motion from one file of any known format, or from one for each component; formats by their content.
+
+    Formats are those in text; `read` may know others, as `data.motion_files` does.
 
     Components go where their files say they point: 90 degrees or east to +x, 0 or 360 or north to +y, up to +z; those
     of PEER files and plain columns, unless vertical, to x, then y, in the order given. Options:
@@ -62,7 +95,7 @@ def load_motion(paths: MotionFiles, **options: Any) -> GroundMotion:
     if not paths:
         raise MotionError("no motion file given; give one, or one for each component")
     stated = {key: options[key] for key in ("time_step", "units") if options.get(key) is not None}
-    forms, found = zip(*(_read(Path(path), stated, None if together else channels) for path in paths), strict=True)
+    forms, found = zip(*(read(Path(path), stated, None if together else channels) for path in paths), strict=True)
     components = [component for file in found for component in file]
     if together:
         components = [c._replace(labels=(str(k),)) for k, c in enumerate(components, 1)]
@@ -84,34 +117,17 @@ def _with_rotations(motion: GroundMotion, factor: float) -> GroundMotion:
     return replace(motion, samples=samples, source=f"{motion.source}; rotations times {factor:g}")
 
 
-def _read(path: Path, stated: dict[str, Any], channels: Channels | None) -> tuple[str, list[Component]]:
-    """Format and components of a file; an incomplete one is refused by the reader of its suffix."""
-    text, suffix, where = read_text(path), path.suffix.lower(), str(path)
-    if not text.strip():
-        raise MotionError(f"{where}: is empty")
-    if is_at2(text) or suffix == ".at2":
-        form, found = "PEER", [read_at2(_alone(text, where, stated), where)]
-    elif is_knet(text):
-        form, found = "K-NET", [read_knet(_alone(text, where, stated), where)]
-    elif is_cosmos(text) or suffix in (".v1", ".v2", ".raw", ".v1c", ".v2c"):
-        form, found = "V2" if "2" in suffix else "V1", read_cosmos(_alone(text, where, stated), where)
-    elif begins_with_numbers(text):
-        form, found = "text", read_columns(text, where, **stated, channels=channels)
-    elif is_csv(text) or suffix == ".csv":
-        form, found = "CSV", read_csv(text, where, **stated, channels=channels)
-    elif "units" in stated:
-        form, found = "text", read_columns(text, where, **stated, channels=channels)
-    else:
-        raise MotionError(f"{where}: unknown format; known are {READABLE}")
-    return form, found
+def _alone(text: str, where: str, stated: Mapping[str, Any]) -> str:
+    """The text of a file that says time step and unit itself."""
+    refuse_stated(where, stated)
+    return text
 
 
-def _alone(text: str, where: str, stated: dict[str, Any]) -> str:
-    """The text of a file that says time step and unit itself; raises MotionError where they are stated again."""
+def refuse_stated(where: str, stated: Mapping[str, Any]) -> None:
+    """Raise MotionError if a time step or units are stated of a file that says them itself."""
     for key, flag in (("time_step", "--dt"), ("units", "--unit")):
         if key in stated:
             raise MotionError(f"{where}: this kind of file says its {key.replace('_', ' ')} itself; leave {flag} out")
-    return text
 
 
 def _channels(given: "str | Channels | None") -> Channels | None:

@@ -72,13 +72,7 @@ def rehearse(
     motion = (target.displacement, target.velocity, target.acceleration)
     reference = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
     name = settings.name if isinstance(settings, ControllerSettings) else type(settings).__name__
-    facts = {
-        "controller": name,
-        "scale": target.reference.scale,
-        "motion": target.reference.motion,
-        "source": target.reference.source,
-    }
-    record = record_of_run(run, {**facts, **attrs}, reference)
+    record = record_of_run(run, {"controller": name, **target.reference.facts, **attrs}, reference)
     if isinstance(settings, ControllerSettings) and isinstance(loop, ClosedLoop) and (drive is not None or inverse):
         name, driven = f"drive_{settings.mode}", loop.drive[::record_every, :6][: len(run.time)]
         about = {"units": LAYOUT[name].units, "long_name": LAYOUT[name].long_name}

@@ -9,7 +9,7 @@
     quantities = ["tracking", "limits", "forces", "spectra", "base"]
 
     [[motion]]                           # name or files; label, axes, high_pass, low_pass, options
-    name = "ridgecrest"
+    name = "ridgecrest"                  # rotate_by [deg], time_scale, match_spectrum (a file), spectrum_damping
 
     [[specimen]]                         # name or file ("none": bare table); label, at, rpy, locked
     name = "none"
@@ -28,9 +28,10 @@ from ..control import load_controller
 from ..core.errors import ParameterError, instead_of
 from ..core.files import models_folder, read_toml, reason_of
 from ..core.names import SAMPLE_RATE, SCHEMES
+from ..data.motion_files import motion_of
 from ..machine.machine import Machine, load_machine
 from ..machine.parameters import load_parameters
-from ..motions import find_motion, load_motion
+from ..motions import adjust_motion, load_spectrum
 from .draws import DESIGNS, draw_machines
 from .plan import EnsemblePlan, PlannedMotion
 from .quantities import DEFAULT
@@ -46,8 +47,8 @@ _KINDS: Mapping[str, tuple[type, ...]] = {
     **dict.fromkeys(("uncertain", "scales", "quantities", "motion", "specimen", "controller"), (list,)),
 }
 _MOTION: Mapping[str, tuple[type, ...]] = {
-    **dict.fromkeys(("name", "label", "axes"), (str,)),
-    **dict.fromkeys(("high_pass", "low_pass"), (float, int)),
+    **dict.fromkeys(("name", "label", "axes", "match_spectrum"), (str,)),
+    **dict.fromkeys(("high_pass", "low_pass", "rotate_by", "time_scale", "spectrum_damping"), (float, int)),
     "files": (list,),
     "options": (dict,),
 }
@@ -157,11 +158,19 @@ def _motion(entry: Mapping[str, Any], folder: Path, source: str) -> tuple[str, P
     files = [folder / str(name) for name in entry.get("files", [])]
     if "name" not in entry and not files:
         raise ParameterError(f"{source}: [[motion]]: give a name or files")
-    options = entry.get("options", {})
-    motion = find_motion(entry["name"], files, **options) if "name" in entry else load_motion(files, **options)
-    processing = (entry.get(key) for key in ("axes", "high_pass", "low_pass"))
+    spectrum = entry.get("match_spectrum")
+    if spectrum is None and "spectrum_damping" in entry:
+        raise ParameterError(f"{source}: [[motion]]: spectrum_damping is that of match_spectrum; give both")
+    corners = {key: entry.get(key) for key in ("high_pass", "low_pass")}
+    motion = adjust_motion(
+        motion_of(entry.get("name"), files, **entry.get("options", {})),
+        rotate_by=entry.get("rotate_by"),
+        time_scale=entry.get("time_scale"),
+        spectrum=load_spectrum(folder / spectrum, entry.get("spectrum_damping")) if spectrum else None,
+        **corners,
+    )
     label = entry.get("label", entry.get("name", motion.name))
-    return label, PlannedMotion(motion, *processing)
+    return label, PlannedMotion(motion, entry.get("axes"), **corners)
 
 
 def _specimen(machine: Machine, entry: Mapping[str, Any], folder: Path, source: str) -> tuple[str, Machine]:

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 _UNITS = {"acceleration": "m/s2, rad/s2", "velocity": "m/s, rad/s", "displacement": "m, rad"}
 _REFERENCE = {
-    **{name: name for name in ("motion", "source", "scale")},
+    **{name: name for name in ("motion", "source", "scale", "time_scale")},
     **{"high_pass": "high_pass_hz", "low_pass": "low_pass_hz", "start": "start_s"},
 }
 """Attributes of a drive file by the field of `Reference`; `axes` is another."""
@@ -104,11 +104,12 @@ def load_drive(path: Path | str) -> Drive:
         time = data["time"].values.astype(float, casting="safe")
         axes = [pair.split("=") for pair in str(data.attrs["axes"]).split(",")]
         kinds: dict[str, Any] = {"motion": str, "source": str}
-        stated = {name: kinds.get(name, float)(data.attrs[key]) for name, key in _REFERENCE.items()}
+        attrs = {"time_scale": 1.0, **data.attrs}  # earlier files have none
+        stated = {name: kinds.get(name, float)(attrs[key]) for name, key in _REFERENCE.items()}
         reference = Reference(**stated, axes=tuple((a, b) for a, b in axes))
     except Exception as error:  # xarray and pandas raise nearly anything for labels that repeat or are missing
         raise RecordError(f"{path}: is damaged or incomplete: {error}; make it again with `lhpost6 iterate`") from error
-    numbers = (reference.scale, reference.high_pass, reference.low_pass, reference.start)
+    numbers = (reference.scale, reference.time_scale, reference.high_pass, reference.low_pass, reference.start)
     if not (np.isfinite(numbers).all() and {name for pair in reference.axes for name in pair} <= set(AXES)):
         raise RecordError(f"{path}: invalid description of the motion: {reference}; make it again")
     if mode not in MODES:

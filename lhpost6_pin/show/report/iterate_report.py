@@ -40,7 +40,7 @@ def write_iterate_report(result: Iterated, path: Path | str, command: str = "") 
         title=f"{reference.motion}, iterated",
         purpose=(
             f"Find the drive with which {load_of(machine)}, under “{result.settings.name}”, reproduces "
-            f"{reference.motion} at scale {number(reference.scale)} on {', '.join(_moved(result))}: "
+            f"{reference.title} on {', '.join(_moved(result))}: "
             f"{number(float(result.target.time[-1]))} s, judged from 0 to {high:g} Hz with the delay removed."
         ),
         verdict=verdict,

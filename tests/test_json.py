@@ -70,6 +70,8 @@ def test_a_machine_its_capacity_and_motions_are_stated_with_units_sources_and_op
         assert line["deviation"] == pytest.approx(line["model"] / line["printed"] - 1, rel=1e-12)
     assert sum(line["printed"] is not None for line in entries["capacity"]) > 20
     assert entries["limits"]["bare table"]["z"]["acceleration"][0]["by"].startswith("unloading of V")
+    assert "x 36.3 m/s² (3.7 g, stated limit)" in entries["judged_by"]  # 62.5 m/s2 are the actuators' alone
+    assert machine.parameters["limits.acceleration"].source in entries["judged_by"]
     assert {mode["axis"] for mode in entries["modes"]} == {"x", "y", "z", "roll", "pitch", "yaw"}
     assert any(m["name"] == "ridgecrest-ccc" and m["available"] for m in said("motions")[0]["motions"])
     assert {"amplitude", "cycles"} <= {option["option"] for option in said("motions", "sine")[0]["options"]}

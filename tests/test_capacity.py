@@ -66,6 +66,15 @@ def test_modes_are_those_of_oil_stiffness_on_mass():
         assert abs(modes[axis].damping) < 1e-6  # nothing dissipates: valves closed, no leak, no friction
 
 
+def test_a_specimen_slows_the_oil_column_by_its_mass():
+    """4.9 MN in X and Y, low enough that the stiff vertical columns hardly let it rock."""
+    loaded = {m.axis: m for m in oil_column_modes(load_machine().with_specimen("block_4_9MN"), loaded=True)}
+    bare = {m.axis: m for m in oil_column_modes(load_machine())}
+    ratio = np.sqrt(168100.0 / (168100.0 + 499660.9))
+    for axis in "xy":
+        assert loaded[axis].frequency / bare[axis].frequency == pytest.approx(ratio, rel=0.05)
+
+
 def test_uniaxial_mode_is_the_textbook_one():
     """sqrt(beta (A_1/L_A + A_2/L_B) / m) / 2 pi."""
     (mode,) = oil_column_modes(load_machine("uniaxial"))

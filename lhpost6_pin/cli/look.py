@@ -95,8 +95,8 @@ def capacity(
     if out is not None:
         load = table.specimen.name if table.specimen else "bare"
         path = folder_for(out, "capacity") / "report.html"
-        blocks, title = [*tables[:-1], judged_by(found)], f"{table.name}, {load}"
-        files.append(write_capacity_report(path, title, found.loads, blocks, command=repeating_command()))
+        title, remark = f"{table.name}, {load}", judged_by(found)
+        files.append(write_capacity_report(path, title, found.loads, tables[:-1], remark, command=repeating_command()))
 
     def show() -> None:
         print_blocks(*tables, judged_by(found))

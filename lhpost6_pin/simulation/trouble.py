@@ -14,7 +14,7 @@ from ..mechanics.pose import platen_motion
 from ..mechanics.strokes import stroke_ends
 from .simulate import Run
 
-__all__ = ["EmptyChambers", "run_doubts", "with_pressure_trouble"]
+__all__ = ["EmptyChambers", "pressure_trouble", "run_doubts", "with_pressure_trouble"]
 
 log = logging.getLogger(__name__)
 
@@ -52,18 +52,21 @@ class _Low(NamedTuple):
 
 
 def with_pressure_trouble(run: Run) -> Run:
-    """The run, with trouble if a chamber's pressure fell below zero, which is logged: oil bears no tension.
-
-    It cavitates, and a bearing actuator with an empty chamber loses contact with the platen. The first such chamber is
-    stated, before trouble that the run has already.
-    """
-    found = _lowest(run, 0.0)
-    if not found:
+    """The run, with its `pressure_trouble`, which is logged; it stands before trouble that the run has already."""
+    trouble = pressure_trouble(run)
+    if not trouble:
         return run
-    first = min(found, key=lambda one: one.time)
-    trouble = _unphysical(first.chamber, first.time)
     log.warning("the run %s", trouble)
     return replace(run, trouble=trouble if run.trouble is None else f"{trouble}; then: {run.trouble}")
+
+
+def pressure_trouble(run: Run) -> str:
+    """From when on and why a run is not physical, as a chamber's pressure fell below zero; empty if none did.
+
+    Oil bears no tension: it cavitates, and a bearing actuator with an empty chamber loses contact with the platen.
+    """
+    first = min(_lowest(run, 0.0), key=lambda one: one.time, default=None)
+    return "" if first is None else _unphysical(first.chamber, first.time)
 
 
 class EmptyChambers:

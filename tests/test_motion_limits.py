@@ -8,8 +8,10 @@ import pinocchio as pin
 import pytest
 from machine_cases import plant_named
 
+from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import OutOfRangeError, SimulationError
 from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.machine.machine import build_machine, load_machine
 from lhpost6_pin.machine.strength import stated_strength
 from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, required_forces
@@ -25,6 +27,7 @@ from lhpost6_pin.mechanics.strokes import stroke_ends
 from lhpost6_pin.motions import find_motion, make_target, with_scale
 from lhpost6_pin.simulation.motion_limits import check_motion_limits, fitting_scale, judge_motion
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
+from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 from lhpost6_pin.simulation.trouble import run_doubts, with_pressure_trouble
 
 G = 9.80665
@@ -231,6 +234,15 @@ def test_an_empty_chamber_is_stated_before_the_stop_that_follows_it():
     trouble = with_pressure_trouble(run).trouble
     assert run.trouble is not None and trouble is not None and trouble.endswith(f"; then: {run.trouble}")
     assert trouble.startswith(f"became unphysical at {run.time[empty.argmax()]:.4f} s: chamber A of V")
+
+
+def test_a_simulated_test_of_a_campaign_that_is_not_physical_says_so_in_its_record():
+    machine, sensors = load_machine().with_specimen("block_4_9MN", (4.0, 1.5, 0.0)), load_sensors("lhpost6")
+    settings = load_controller("cautious")
+    for scale, sound in ((0.1, True), (3.0, False)):
+        made = simulate_campaign(machine, settings, sensors, seed=0, tests=("WN",), scale=scale)
+        trouble = made.records[0].attrs["trouble"]
+        assert trouble == "none" if sound else "chamber A of V6 fell below zero pressure" in trouble
 
 
 def test_voids_that_take_too_little_of_the_stiffness_do_not_excuse_a_chamber_below_zero():

@@ -115,7 +115,7 @@ def judged_by(found: MachineCapacity) -> str:
     bounds = [(one.axis, one.bound("acceleration")) for one in load.axes if one.axis in AXES[:3]]
     words = [f"{axis} {b.value:.3g} m/s² ({_shown(b.value, SHOWN['m/s2'])} g, {b.by})" for axis, b in bounds]
     return (
-        "Rows “peak acceleration X” and the like are what the forces of the actuators alone give. A motion is judged "
+        "Rows “peak acceleration X”, Y and Z are what the forces of the actuators alone give. A motion is judged "
         f"by the least of the limits of sinusoidal motion; {load.name}: {', '.join(words)}. The stated limit is "
         f"limits.acceleration of the machine file: {found.machine.parameters['limits.acceleration'].source}."
     )

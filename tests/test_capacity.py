@@ -1,5 +1,7 @@
 """What the model can give against Table 2.2, and the oil-column modes of the linearised plant."""
 
+import re
+
 import numpy as np
 import pytest
 from run_cases import driven
@@ -13,7 +15,8 @@ from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
 from lhpost6_pin.mechanics.motion_demands import make_motion_check
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import leg_displacements
-from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.motions import find_motion, make_target, with_scale
+from lhpost6_pin.show.capacity_tables import judged_by, machine_capacity
 from lhpost6_pin.simulation.motion_limits import check_motion_limits
 
 
@@ -61,6 +64,15 @@ def test_modes_are_those_of_oil_stiffness_on_mass():
     for axis, hertz in expected.items():
         assert modes[axis].frequency == pytest.approx(hertz, rel=0.015)
         assert abs(modes[axis].damping) < 1e-6  # nothing dissipates: valves closed, no leak, no friction
+
+
+def test_a_specimen_slows_the_oil_column_by_its_mass():
+    """4.9 MN in X and Y, low enough that the stiff vertical columns hardly let it rock."""
+    loaded = {m.axis: m for m in oil_column_modes(load_machine().with_specimen("block_4_9MN"), loaded=True)}
+    bare = {m.axis: m for m in oil_column_modes(load_machine())}
+    ratio = np.sqrt(168100.0 / (168100.0 + 499660.9))
+    for axis in "xy":
+        assert loaded[axis].frequency / bare[axis].frequency == pytest.approx(ratio, rel=0.05)
 
 
 def test_uniaxial_mode_is_the_textbook_one():
@@ -137,6 +149,23 @@ def test_angular_accelerations_are_moments_of_the_oil_over_inertia(table):
     assert table["peak acceleration pitch"].model == pytest.approx(down, rel=1e-3)  # the pressure has four digits
     roll = 6 * 2.871 * (2.767e6 - 861844.66) * 0.515 / 907240.0
     assert table["peak acceleration roll"].model == pytest.approx(roll, rel=1e-3)
+
+
+@pytest.mark.parametrize("specimen", [None, "block_4_9MN"])
+def test_the_acceleration_that_capacity_states_is_the_one_at_which_a_motion_is_refused(specimen):
+    """Bare the stated limit of 36.3 m/s2, with 4.9 MN the strength of the reaction mass, not the actuators' forces."""
+    machine = load_machine().with_valves(2)
+    machine = machine if specimen is None else machine.with_specimen(specimen)
+    stated = re.search(r"x ([\d.]+) m/s² \(([\d.]+) g, (.+?)\)", judged_by(machine_capacity(machine)))
+    limit = float(stated.group(1))
+    assert stated.group(3) == ("stated limit" if specimen is None else "strength of the reaction mass")
+    assert float(stated.group(2)) == pytest.approx(limit / 9.80665, rel=5e-3)  # three digits of both
+    target = make_target(find_motion("sine", axis="x", amplitude=0.02, period=0.1), rate=float(SAMPLE_RATE))
+    peak = float(np.abs(target.acceleration[:, 0]).max())
+    motions = [with_scale(target, factor * limit / peak) for factor in (0.98, 1.02)]
+    check_motion_limits(make_plant(machine), motions[0])
+    with pytest.raises(OutOfRangeError, match="x acceleration" if specimen is None else "x reaction mass strength"):
+        check_motion_limits(make_plant(machine), motions[1])
 
 
 def test_the_two_readings_of_the_valve_equation_are_beside_what_is_stated():

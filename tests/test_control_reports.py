@@ -17,6 +17,8 @@ from lhpost6_pin.show.report.iterate_report import write_iterate_report
 from lhpost6_pin.show.report.scales import decibels, degrees
 from lhpost6_pin.show.report.sine_report import write_sine_report
 from lhpost6_pin.show.report.tune_report import write_tune_report
+from lhpost6_pin.show.result_tables import print_tuning
+from lhpost6_pin.show.results import tuning_entries
 from lhpost6_pin.tuning.iterate import identify_inverse, iterate
 from lhpost6_pin.tuning.margins import LoopModel, Margin
 from lhpost6_pin.tuning.sine import sine_test
@@ -147,6 +149,16 @@ def test_settings_that_were_unstable_before_are_called_so_and_have_no_curve(tmp_
     assert "before: unstable" in page.words and "– to –" not in page.words and not NO_NUMBER.search(page.words)
     assert {t["name"] for t in page.figures["bode-x"]["traces"]} == {"after", "linear model"}
     assert len([k for k in page.figures["overview"]["layout"] if k.startswith("yaxis")]) == 1
+
+
+def test_a_response_measured_with_clipped_commands_is_not_passed_off_as_linear(tmp_path, capsys, machine, settings):
+    tuning = make_tuning(machine, settings, doubt="2195 spool commands were clipped")
+    level, verdict = Reader(write_tune_report(tuning, tmp_path / "t.html")).verdict
+    sentence = "The response measured is not that of a linear table in x: 2195 spool commands were clipped."
+    assert level == "attention" and sentence in verdict
+    print_tuning(tuning)
+    assert sentence in " ".join(capsys.readouterr().out.split())
+    assert tuning_entries(tuning)["axes"]["x"]["doubt"] == "2195 spool commands were clipped"
 
 
 def test_a_loop_that_is_unstable_with_doubled_gains_is_pointed_out(tmp_path, machine, settings):

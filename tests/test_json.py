@@ -16,6 +16,7 @@ from machine_cases import PRACTICE, REFERENCE
 
 from lhpost6_pin import cli
 from lhpost6_pin.core.jsonable import as_json, jsonable
+from lhpost6_pin.data.records import load_record
 from lhpost6_pin.machine.machine import load_machine
 
 pytestmark = pytest.mark.long
@@ -69,6 +70,8 @@ def test_a_machine_its_capacity_and_motions_are_stated_with_units_sources_and_op
         assert line["deviation"] == pytest.approx(line["model"] / line["printed"] - 1, rel=1e-12)
     assert sum(line["printed"] is not None for line in entries["capacity"]) > 20
     assert entries["limits"]["bare table"]["z"]["acceleration"][0]["by"].startswith("unloading of V")
+    assert "x 36.3 m/s² (3.7 g, stated limit)" in entries["judged_by"]  # 62.5 m/s2 are the actuators' alone
+    assert machine.parameters["limits.acceleration"].source in entries["judged_by"]
     assert {mode["axis"] for mode in entries["modes"]} == {"x", "y", "z", "roll", "pitch", "yaw"}
     assert any(m["name"] == "ridgecrest-ccc" and m["available"] for m in said("motions")[0]["motions"])
     assert {"amplitude", "cycles"} <= {option["option"] for option in said("motions", "sine")[0]["options"]}
@@ -92,6 +95,28 @@ def test_a_run_states_what_its_report_says_first(said):
     assert set(entries) == documented("run") - {"against_record", "interface"}
     named = {"actuator velocity", "actuator stroke", "push", "spool", "displacement"}
     assert named <= {use["quantity"] for use in entries["limits"]}
+
+
+def test_a_platen_that_lifts_off_an_actuator_is_trouble_in_record_report_and_result(said, tmp_path):
+    """400 t beside the centre, shaken up and down beyond what the hold-down bears."""
+    (tmp_path / "heavy.toml").write_text(
+        '[mass]\nmass = { value = 400, unit = "t" }\ncentre_of_gravity = { value = [0, 0, 3], unit = "m" }\n'
+        'inertia = { value = [1.5e6, 1.5e6, 1.5e6], unit = "kg m2" }\n'
+    )
+    loaded = ("--specimen", tmp_path / "heavy.toml", "--specimen-at", "5,2,0", "--beyond-limits")
+    shaken = ("--axes", "z=x", "--set", "amplitude=0.04", "--set", "period=0.5", "--out", tmp_path / "out")
+    entries, code = said("run", *SHORT, *loaded, *shaken)
+    record = load_record(tmp_path / "out" / "record.nc")
+    (leg,) = np.flatnonzero((record["chamber_pressure_a"].values < 0.0).any(axis=0))
+    pressure = record["chamber_pressure_a"].values[:, leg]
+    name, first = str(record["actuator"].values[leg]), float(record["time"][int((pressure < 0.0).argmax())])
+    began = f"became unphysical at {first:.4f} s: chamber A of {name} fell below zero pressure: its oil would cavitate"
+    assert code == 1 and entries["trouble"].startswith(f"{began}, and {name} would lose contact with the platen")
+    assert 'the effect "cavitation"' in entries["trouble"] and record.attrs["trouble"] == entries["trouble"]
+    assert entries["level"] == "bad" and entries["verdict"].startswith(f"The run {began}")
+    assert "The control loop is unstable" in entries["verdict"] and "RRMSE" not in entries["verdict"]
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert began in page and f"fell to {pressure.min() / 1e6:.3g} MPa, below zero, first at {first:.3f} s" in page
 
 
 def test_an_open_loop_states_the_comparison(said):

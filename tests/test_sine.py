@@ -82,6 +82,12 @@ def test_a_sine_that_cannot_be_is_refused(machine, axis, amplitude, frequency, m
         sine_test(load_machine(machine), load_controller(machine), **options)
 
 
+def test_a_sine_that_lifts_the_platen_off_an_actuator_is_refused():
+    machine = load_machine().with_specimen("block_4_9MN", (4.0, 1.5, 0.0))
+    with pytest.raises(SimulationError, match=r"without cancellers became unphysical at .* chamber A of V"):
+        sine_test(machine, load_controller("cautious"), axis="z", amplitude=0.08, frequency=2.0)
+
+
 def test_frequencies_without_end_and_other_modes_are_refused():
     for frequency in (0.0, 1e-4, np.nan, np.inf):  # before time and memory are spent on endless periods
         with pytest.raises(SimulationError, match=r"outside the table's band; choose a frequency from 0.07 to 33 Hz"):

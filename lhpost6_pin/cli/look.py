@@ -83,7 +83,7 @@ def capacity(
     json: Json = False,
 ) -> None:
     """Print what the table gives with what is mounted, beside Table 2.2, which limits govern, and its modes."""
-    from ..show.capacity_tables import capacity_tables, machine_capacity
+    from ..show.capacity_tables import capacity_tables, judged_by, machine_capacity
     from ..show.report.capacity_report import write_capacity_report
     from ..show.results import capacity_entries
     from ..show.tables import print_modes
@@ -95,12 +95,11 @@ def capacity(
     if out is not None:
         load = table.specimen.name if table.specimen else "bare"
         path = folder_for(out, "capacity") / "report.html"
-        files.append(
-            write_capacity_report(path, f"{table.name}, {load}", found.loads, tables[:-1], command=repeating_command())
-        )
+        title, remark = f"{table.name}, {load}", judged_by(found)
+        files.append(write_capacity_report(path, title, found.loads, tables[:-1], remark, command=repeating_command()))
 
     def show() -> None:
-        print_blocks(*tables)
+        print_blocks(*tables, judged_by(found))
         print_modes(table)
 
     print_result(json, lambda: capacity_entries(found), show, files)

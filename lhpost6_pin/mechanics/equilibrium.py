@@ -14,6 +14,7 @@ from ..effects.supply import steady_supply, supply_pressures
 from ..laws.hydraulic import Hydraulic, leak_flows, valve_flows
 from ..laws.orifice import opening, spool_for_opening
 from ..laws.supply import varies
+from ..machine.machine import Machine
 from .derivatives import evaluate
 from .modes import rest_of_modes
 from .plant import Plant, State
@@ -22,7 +23,7 @@ from .required_wrench import moving_wrenches
 from .schemes import TAU
 from .workspace import make_workspace
 
-__all__ = ["Equilibrium", "actuator_speeds", "find_equilibrium", "rest_pressures", "specimen_at_rest"]
+__all__ = ["Equilibrium", "actuator_speeds", "find_equilibrium", "rest_pressures", "rest_remedy", "specimen_at_rest"]
 __all__ += ["unloaded_speeds"]
 
 Pressures = tuple[float, ...]
@@ -119,18 +120,32 @@ def _fill(plant: Plant, force: Array, supply: Pressures, z: Array, spool: Array)
         k = row["state"]
         z[k : k + len(pressures)] = pressures
         if not all(low <= p <= high for p in pressures):
-            name, said = plant.machine.actuators[i].name, ", ".join(f"{p / 1e6:.3g}" for p in pressures)
-            if force[i] >= 0.0 and any(p > high for p in pressures):
-                what = "beyond its supply"
-                hint = "lighten the specimen, move it towards the centre, or raise hydraulics.supply_pressure"
-            else:
-                what, hint = "which unloads it", "the specimen lifts the platen there: move it towards the centre"
-            raise SimulationError(
-                f"{name} must give {force[i]:.4g} N at rest, {what}: {said} MPa is not between {low / 1e6:.3g} and "
-                f"{high / 1e6:.3g} MPa; {hint}"
-            )
+            raise SimulationError(_out_of_supply(plant.machine, i, float(force[i]), pressures, supply))
         if row["modified"]:
             start_line(row, spool[i], pressures[0], pressures[-1], high, low, z)
+
+
+def _out_of_supply(machine: Machine, i: int, force: float, pressures: Pressures, supply: Pressures) -> str:
+    """Why actuator `i` cannot give its force [N] at rest: too little load on a single chamber, or too much load."""
+    shown, low, high = (" and ".join(f"{p / 1e6:.3g}" for p in of) for of in (pressures, supply[1:2], supply[:1]))
+    start = f"{machine.actuator_names[i]} must give {force:.4g} N at rest, "
+    if machine.actuators[i].area_b is None and force < supply[1] * machine.actuators[i].area_a:
+        why = f"which unloads it: {shown} MPa in its chamber, below the return pressure of {low} MPa"
+        return f"{start}{why}; it lifts off there: {rest_remedy(machine, unloaded=True)}"
+    why = f"beyond its supply: {shown} MPa, not between {low} and {high} MPa"
+    return f"{start}{why}; {rest_remedy(machine, unloaded=False)}"
+
+
+def rest_remedy(machine: Machine, *, unloaded: bool) -> str:
+    """What helps an actuator that bears too little at rest to stay in contact, or more than its supply can give."""
+    mounted = machine.specimen is not None
+    if unloaded:
+        struts = dict.fromkeys(f"{strut.kind}.pressure" for strut in machine.struts)
+        found = ["move the specimen towards the centre"] * mounted
+        found += [f"raise the pressure of the struts ({', '.join(struts)})"] if struts else []
+    else:
+        found = ["lighten the specimen", "move it towards the centre"] * mounted + ["raise hydraulics.supply_pressure"]
+    return ", or ".join(found) or "check the masses and places of its parts"
 
 
 def _rest_of_modified(p: Hydraulic, force: float, supply: Pressures) -> tuple[tuple[float, ...], float]:

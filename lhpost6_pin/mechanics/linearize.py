@@ -70,12 +70,13 @@ def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
     return LinearPlant(a, b, nv)
 
 
-def oil_column_modes(machine: Machine, *, undamped: bool = True) -> tuple[OilColumnMode, ...]:
+def oil_column_modes(machine: Machine, *, undamped: bool = True, loaded: bool = False) -> tuple[OilColumnMode, ...]:
     """Modes of the platen on its oil columns in the control zero-position, slowest first, valves closed.
 
-    undamped leaves out leakage, friction and viscous damping. Only the platen's own modes: a specimen is left off.
+    undamped leaves out leakage, friction and viscous damping. A specimen is left off, or `loaded` as one rigid body.
     """
-    bare = replace(machine, specimen=None)
+    specimen = replace(machine.specimen, locked=True) if loaded and machine.specimen else None
+    bare = replace(machine, specimen=specimen)
     if undamped:
         kinds = {c.kind for c in machine.components}
         names = ("leakage", "viscous", "seal_friction", "pad_friction")

@@ -15,7 +15,7 @@ from ..core.names import AXES
 from ..machine.strength import Strength, stated_strength
 from ..motions import Demand, MotionCheck
 from .actuator_forces import axis_capacity, force_range, required_forces, rest_forces, wrench_at_bearings
-from .equilibrium import actuator_speeds
+from .equilibrium import actuator_speeds, rest_remedy
 from .plant import Plant
 from .pose import PlatenMotion, leg_displacements, rotation
 from .specimen_joints import specimen_mass
@@ -73,15 +73,19 @@ def _refuse_unheld(plant: Plant, share: Array) -> None:
         return
     worst = int(np.argmax(np.abs(share)))
     name, span = plant.machine.actuator_names[worst], force_range(plant)
-    bound, hint = (
-        (span.least, "move the specimen towards the centre") if share[worst] < 0.0 else (span.most, "lighten it")
-    )
     force = span.middle[worst] + span.half[worst] * share[worst]
+    unloaded = bool(share[worst] < 0.0) and plant.machine.actuators[worst].area_b is None
+    bound = (span.least if share[worst] < 0.0 else span.most)[worst]
+    what, quantity = f"beyond its limit of {bound:.4g} N", "actuator pull" if share[worst] < 0.0 else "actuator push"
+    if unloaded:
+        least = bound / plant.actuators.area_a[worst] / 1e6
+        what = f"which unloads it: its chamber is to keep {least:.3g} MPa, {bound:.4g} N"
+        quantity = "actuator unloading"
     raise OutOfRangeError(
-        f"{plant.machine.name} cannot run with what is mounted: {name} must give {force:.4g} N at rest, beyond its "
-        f"limit of {bound[worst]:.4g} N; {hint}",
+        f"{plant.machine.name} cannot run with what is mounted: {name} must give {force:.4g} N at rest, {what}; "
+        f"{rest_remedy(plant.machine, unloaded=unloaded)}",
         0.0,
-        ("actuator unloading" if share[worst] < 0.0 else "actuator push",),
+        (quantity,),
     )
 
 

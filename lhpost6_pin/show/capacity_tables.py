@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import xarray as xr
 
 from ..core.errors import LhpostError
+from ..core.names import AXES
 from ..machine.machine import Machine
 from ..mechanics.capacity import (
     Capacity,
@@ -23,7 +24,8 @@ from .report.page import Table
 from .report.performance_plots import Load, performance_table
 from .report.scales import SCALES, Scale
 
-__all__ = ["MachineCapacity", "capacity_entries", "capacity_tables", "judged", "machine_capacity", "performance_loads"]
+__all__ = ["MachineCapacity", "capacity_entries", "capacity_tables", "judged", "judged_by", "machine_capacity"]
+__all__ += ["performance_loads"]
 
 
 SHOWN = {"m/s2": SCALES["acceleration"], "rad": SCALES["rotation"], "N": SCALES["force"]}
@@ -107,6 +109,18 @@ def capacity_tables(found: MachineCapacity) -> list[Table]:
     return [*tables, performance_table(found.loads)]
 
 
+def judged_by(found: MachineCapacity) -> str:
+    """What accelerations a motion is judged by, and how those that the actuators alone give belong to them."""
+    load = found.loads[0 if found.machine.specimen is None else -1]
+    bounds = [(one.axis, one.bound("acceleration")) for one in load.axes if one.axis in AXES[:3]]
+    words = [f"{axis} {b.value:.3g} m/s² ({_shown(b.value, SHOWN['m/s2'])} g, {b.by})" for axis, b in bounds]
+    return (
+        "Rows “peak acceleration X”, Y and Z are what the forces of the actuators alone give. A motion is judged "
+        f"by the least of the limits of sinusoidal motion; {load.name}: {', '.join(words)}. The stated limit is "
+        f"limits.acceleration of the machine file: {found.machine.parameters['limits.acceleration'].source}."
+    )
+
+
 def _row(line: Capacity) -> tuple[str, ...]:
     """A row with accelerations in g and angles in degrees, as Table 2.2."""
     shown = SHOWN.get(line.unit, Scale(1.0, line.unit))
@@ -137,6 +151,7 @@ def capacity_entries(found: MachineCapacity) -> dict[str, Any]:
         for load in found.loads
     }
     return {
+        "judged_by": judged_by(found),
         "capacity": lines(found.rows),
         "payload": lines(found.payload),
         "flow_readings": [reading._asdict() for reading in found.readings],

@@ -28,6 +28,7 @@ from ..mechanics.pose import PlatenMotion
 from ..motions import Target, find_motion, make_target
 from .outputs import record_of_run
 from .simulate import ClosedLoop, fastest_engine, simulate
+from .trouble import with_pressure_trouble
 
 __all__ = ["SensorErrors", "as_sensed", "draw_errors", "load_procedure", "simulate_campaign", "tests_of"]
 
@@ -58,7 +59,8 @@ def simulate_campaign(
     scale is a factor on all motions; errors draws calibration errors within the ranges of the sensors, the same for all
     tests. Deterministic for a seed.
 
-    Raises SimulationError if a test stops early, UnknownNameError for a test that the file does not have.
+    A test that becomes unphysical is a warning, and `trouble` of its record. Raises SimulationError if one stops early,
+    UnknownNameError for a test that the file does not have.
     """
     numbers = load_procedure(procedure)
     rng = np.random.default_rng(seed)
@@ -84,7 +86,7 @@ def simulate_campaign(
             "controller": settings.name,
             "motion": str(numbers.words[f"{test}.motion"]),
         }
-        record = record_of_run(run, facts, motion)
+        record = record_of_run(with_pressure_trouble(run), facts, motion)
         if machine.accelerometers:  # they are what is measured
             record = record.drop_vars("platen_acceleration")
         if drawn is None:

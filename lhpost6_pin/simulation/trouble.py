@@ -1,7 +1,9 @@
 """What in a finished run is not physical, or near its end: empty chambers, lost contact, strokes at their ends."""
 
+import logging
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,60 +14,96 @@ from ..mechanics.pose import platen_motion
 from ..mechanics.strokes import stroke_ends
 from .simulate import Run
 
-__all__ = ["EmptyChambers", "run_doubts", "with_pressure_trouble"]
+__all__ = ["EmptyChambers", "pressure_trouble", "run_doubts", "with_pressure_trouble"]
 
-REMEDY = (
-    "what follows is not physical: scale the motion down, move the specimen towards the centre, or add the effect "
-    '"cavitation" of the library, which keeps pressures above that of vapour'
+log = logging.getLogger(__name__)
+
+_REMEDY = (
+    "what follows is not physical: scale the motion down, move the specimen towards the centre, or {more}, which keeps "
+    "pressures above that of vapour"
 )
+_WITHOUT = 'add the effect "cavitation" of the library'
+_WITH = 'raise "share" of its effect "cavitation"'
+
+
+class _Chamber(NamedTuple):
+    """A chamber of a plant."""
+
+    actuator: Actuator
+    name: str  # A or B
+    place: int  # of its pressure among the hidden states
+    vapour: float  # pressure at which its oil cavitates [Pa]; 0 without the effect
+
+    @property
+    def bears(self) -> bool:
+        """Whether its actuator is not held to the platen: it cannot pull."""
+        return self.actuator.mount == "bearing"
+
+    def __str__(self) -> str:
+        return f"chamber {self.name} of {self.actuator.name}"
+
+
+class _Low(NamedTuple):
+    """A chamber whose pressure fell below a level."""
+
+    chamber: _Chamber
+    time: float  # first [s]
+    least: float  # [Pa]
 
 
 def with_pressure_trouble(run: Run) -> Run:
-    """The run, with trouble if a chamber's pressure fell below zero: oil bears no tension.
-
-    A bearing actuator with an empty chamber loses contact with the platen. Chambers of an actuator with the effect
-    `cavitation` are exempt. A run that has trouble already is returned as it is.
-    """
-    if run.trouble is not None:
+    """The run, with its `pressure_trouble`, which is logged; it stands before trouble that the run has already."""
+    trouble = pressure_trouble(run)
+    if not trouble:
         return run
-    found = [(at, name, chamber) for name, chamber, at, _, voids in _lowest(run, 0.0) if not voids]
-    return replace(run, trouble=_said(run.plant, *min(found))) if found else run
+    log.warning("the run %s", trouble)
+    return replace(run, trouble=trouble if run.trouble is None else f"{trouble}; then: {run.trouble}")
+
+
+def pressure_trouble(run: Run) -> str:
+    """From when on and why a run is not physical, as a chamber's pressure fell below zero; empty if none did.
+
+    Oil bears no tension: it cavitates, and a bearing actuator with an empty chamber loses contact with the platen.
+    """
+    first = min(_lowest(run, 0.0), key=lambda one: one.time, default=None)
+    return "" if first is None else _unphysical(first.chamber, first.time)
 
 
 class EmptyChambers:
     """The same of a plant that runs sample by sample: its `trouble`, empty until a pressure falls below zero."""
 
     def __init__(self, plant: Plant) -> None:
-        """Watch the chambers of a plant whose actuators lack the effect `cavitation`."""
-        self.plant, self.trouble = plant, ""
-        self._chambers = [(a.name, chamber, place) for a, chamber, place, voids in _chambers(plant) if not voids]
-        self._places = np.array([place for _, _, place in self._chambers], int)
+        """Watch all chambers of a plant."""
+        self.trouble, self._chambers = "", list(_chambers(plant))
+        self._places = np.array([chamber.place for chamber in self._chambers], int)
 
     def look(self, z: Array, time: float) -> bool:
         """Whether hidden states z (n_states,) at a time [s] are the first with an empty chamber."""
         if self.trouble or not (empty := z[self._places] < 0.0).any():
             return False
-        name, chamber, _ = self._chambers[int(empty.argmax())]
-        self.trouble = _said(self.plant, time, name, chamber)
+        self.trouble = _unphysical(self._chambers[int(empty.argmax())], time)
         return True
 
 
-def _said(plant: Plant, at: float, name: str, chamber: str) -> str:
-    actuator = next(a for a in plant.machine.actuators if a.name == name)
-    contact = f", and {name} would lose contact with the platen" if actuator.mount == "bearing" else ""
-    what = f"became unphysical at {at:.4f} s: chamber {chamber} of {name} fell below zero pressure{contact}"
-    return f"{what}; {REMEDY}"
+def _unphysical(chamber: _Chamber, at: float) -> str:
+    """Trouble of a chamber that was first empty at a time [s]."""
+    name = chamber.actuator.name
+    lifts = f", and {name} would lose contact with the platen (uplift)" if chamber.bears else ""
+    what = f"became unphysical at {at:.4f} s: {chamber} fell below zero pressure: its oil would cavitate{lifts}"
+    return f"{what}; {_REMEDY.format(more=_WITH if chamber.vapour else _WITHOUT)}"
 
 
 def run_doubts(run: Run) -> list[str]:
     """Remarks on a run: chambers below the return pressure, strokes that reached their ends."""
     low, found = float(run.plant.supply[1]), []
-    for name, chamber, at, pressure, _ in _lowest(run, low):
-        if pressure >= 0.0:
-            found.append(
-                f"chamber {chamber} of {name} fell to {pressure / 1e6:.3g} MPa, below the return pressure of "
-                f"{low / 1e6:.3g} MPa, first at {at:.3f} s"
-            )
+    empty = {one.chamber.place: one for one in _lowest(run, 0.0)}
+    for one in _lowest(run, low):
+        chamber, at, least = empty.get(one.chamber.place, one)
+        bound = "zero" if least < 0.0 else f"the return pressure of {low / 1e6:.3g} MPa"
+        found.append(f"{chamber} fell to {least / 1e6:.3g} MPa, below {bound}, first at {at:.3f} s")
+        if 0.0 <= least < chamber.vapour:
+            lifts = f", and {chamber.actuator.name}, which cannot pull, hardly bears on the platen" * chamber.bears
+            found[-1] += f"; its oil cavitates below {chamber.vapour / 1e6:.3g} MPa{lifts}"
     displacement = platen_motion(run.plant, run.q, run.v, run.a).displacement
     for end in stroke_ends(run.plant, run.time, displacement):
         actuator = next(a for a in run.plant.machine.actuators if a.name == end.actuator)
@@ -74,21 +112,21 @@ def run_doubts(run: Run) -> list[str]:
     return found
 
 
-def _lowest(run: Run, level: float) -> list[tuple[str, str, float, float, bool]]:
-    """Chambers that fell below a level: actuator, chamber, first time [s], least pressure [Pa], cavitation modelled."""
+def _lowest(run: Run, level: float) -> list[_Low]:
+    """Chambers that fell below a level [Pa]."""
     found = []
-    for actuator, chamber, place, voids in _chambers(run.plant):
-        pressure = run.z[:, place]
+    for chamber in _chambers(run.plant):
+        pressure = run.z[:, chamber.place]
         below = pressure < level
         if below.any():
-            first, least = float(run.time[int(below.argmax())]), float(np.nanmin(pressure))
-            found.append((actuator.name, chamber, first, least, voids))
+            found.append(_Low(chamber, float(run.time[int(below.argmax())]), float(np.nanmin(pressure))))
     return found
 
 
-def _chambers(plant: Plant) -> Iterator[tuple[Actuator, str, int, bool]]:
-    """Chambers: actuator, A or B, place of the pressure among hidden states, and whether cavitation is modelled."""
-    rows = plant.rows[plant.tables.actuators]
-    for actuator, row, voids in zip(plant.machine.actuators, rows, plant.actuators.voids, strict=True):
-        for i, chamber in enumerate("AB" if actuator.area_b is not None else "A"):
-            yield actuator, chamber, int(row["state"]) + i, bool(voids)
+def _chambers(plant: Plant) -> Iterator[_Chamber]:
+    """All chambers of a plant's actuators."""
+    rows, oil = plant.rows[plant.tables.actuators], plant.actuators
+    for i, (actuator, row) in enumerate(zip(plant.machine.actuators, rows, strict=True)):
+        vapour = float(oil.vapour_pressure[i]) if oil.voids[i] else 0.0
+        for k, name in enumerate("AB" if actuator.area_b is not None else "A"):
+            yield _Chamber(actuator, name, int(row["state"]) + k, vapour)

@@ -26,7 +26,7 @@ def bandwidth_limitation(
         )
     if abs(gain) > tolerance:
         words.append(f"gain {gain:+.1f} dB at {f[at]:.3g} Hz: beyond the correction of three feed-forward gains")
-    modes = oil_column_modes(plant.machine)
+    modes = oil_column_modes(plant.machine, loaded=True)
     near = min(modes, key=lambda mode: abs(np.log(mode.frequency / f[at])))
     if abs(np.log2(near.frequency / f[at])) < 0.5:
         words.append(f"near the oil column at {near.frequency:.3g} Hz ({near.axis})")

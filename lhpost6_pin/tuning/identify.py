@@ -23,6 +23,7 @@ from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.pose import platen_motion
 from ..motions import GroundMotion, Target, find_motion, make_target
 from ..simulation.simulate import ClosedLoop, fastest_engine, simulate
+from ..simulation.trouble import pressure_trouble
 
 __all__ = ["identify", "identify_axes", "noise_target", "run_noise", "section", "tuning_numbers"]
 
@@ -71,8 +72,8 @@ def noise_target(
     return replace(target, **{n: factor * getattr(target, n) for n in ("displacement", "velocity", "acceleration")})
 
 
-def run_noise(controller: Controller, rest: Equilibrium, target: Target) -> Array:
-    """Acceleration (n, 6) of C and Euler angles under a target.
+def run_noise(controller: Controller, rest: Equilibrium, target: Target) -> tuple[Array, str]:
+    """Acceleration (n, 6) of C and Euler angles under a target, and what in the run was not linear, such as clipping.
 
     Raises SimulationError if the run stops early: noise is small, so the loop is unstable.
     """
@@ -81,24 +82,36 @@ def run_noise(controller: Controller, rest: Equilibrium, target: Target) -> Arra
     run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(drive), engine=fastest_engine(plant))
     if run.trouble:
         raise SimulationError(f"white noise: {run.trouble}; the loop is unstable, lower its gains")
-    return platen_motion(plant, run.q, run.v, run.a).acceleration
+    clipped = f"{run.clipped} spool commands were clipped" if run.clipped else ""
+    empty = pressure_trouble(run).partition(";")[0]
+    doubt = ", and ".join(filter(None, [clipped, empty and f"the run {empty}"]))
+    return platen_motion(plant, run.q, run.v, run.a).acceleration, doubt
 
 
 def identify(
     controller: Controller, rest: Equilibrium, target: Target, axes: Sequence[str], segment: float
 ) -> Transfer:
     """Transfer function (m, k, k) of the k axes named from one run in which all of them move; segment [s]."""
-    achieved = run_noise(controller, rest, target)
+    return _identified(controller, rest, target, axes, segment)[0]
+
+
+def _identified(
+    controller: Controller, rest: Equilibrium, target: Target, axes: Sequence[str], segment: float
+) -> tuple[Transfer, str]:
+    achieved, doubt = run_noise(controller, rest, target)
     columns = [AXES.index(name) for name in axes]
-    return estimate_transfer(
+    found = estimate_transfer(
         target.acceleration[:, columns], achieved[:, columns], float(SAMPLE_RATE), segment=segment, axes=tuple(axes)
     )
+    return found, doubt
 
 
 def identify_axes(
     controllers: Sequence[Controller], rest: Equilibrium, noise: Callable[[str], Target], segment: float
-) -> list[list[Transfer]]:
+) -> list[list[tuple[Transfer, str]]]:
     """Response of each free axis, alone, to its own `noise`, with each of the controllers of one plant.
+
+    Beside it what in that run was not linear, as of `run_noise`.
 
     In parallel over threads; targets and runs of an axis are discarded before the next, since long ones fill memory.
     """
@@ -106,9 +119,9 @@ def identify_axes(
 
     plant = controllers[0].plant
 
-    def one(axis: str) -> list[Transfer]:
+    def one(axis: str) -> list[tuple[Transfer, str]]:
         target = noise(axis)
-        return [identify(controller, rest, target, (axis,), segment) for controller in controllers]
+        return [_identified(controller, rest, target, (axis,), segment) for controller in controllers]
 
     threads = 1 if fastest_engine(plant) == "pinocchio" else -1  # that engine holds the interpreter
     return list(Parallel(n_jobs=threads, prefer="threads")(delayed(one)(AXES[k]) for k in plant.axes))

@@ -28,6 +28,7 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..motions import Target, find_motion, make_target, motion_options, smooth_step
 from ..simulation.simulate import ClosedLoop, Run, fastest_engine, simulate
+from ..simulation.trouble import with_pressure_trouble
 from .identify import section, tuning_numbers
 from .margins import expected_response, make_loop_model
 
@@ -134,7 +135,7 @@ def sine_test(
 ) -> SineTest:
     """Run a sine [m or rad, Hz] from rest without and with APC and AHC; options go to `simulate`.
 
-    Raises SimulationError if a run does not last.
+    Raises SimulationError if a run does not last or becomes unphysical.
     """
     parameters = tuning_numbers()
     numbers = section(parameters, "sine")
@@ -148,7 +149,9 @@ def sine_test(
     found = []
     extended = np.column_stack([wanted, target.acceleration, level])
     for n, (controller, drive) in enumerate(((alone, wanted), (adaptive, extended))):
-        run = simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
+        run = with_pressure_trouble(
+            simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
+        )
         if run.trouble:
             raise SimulationError(f"{'with' if n else 'without'} cancellers {run.trouble}")
         found.append(_evaluate(run, target, AXES.index(axis), frequency, measured, counted))

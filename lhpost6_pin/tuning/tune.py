@@ -60,6 +60,7 @@ class AxisTuning:
     margin_before: Margin
     margin_after: Margin
     limited_by: str  # bandwidth limitation
+    doubt: str = ""  # what in the run behind `after` was not linear: clipped commands, empty chambers
 
 
 @dataclass(frozen=True)
@@ -104,14 +105,15 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
     job.done(11)
     limits = targets.decibels, targets.coherence
     found = []
-    for a, (after, *rest) in enumerate(responses):  # settings unstable on this machine have no response
-        before = rest[0] if rest else replace(after, response=np.nan * after.response, coherence=0.0 * after.coherence)
+    for a, ((after, doubt), *rest) in enumerate(responses):  # settings unstable on this machine have no response
+        lost = replace(after, response=np.nan * after.response, coherence=0.0 * after.coherence)
+        before = rest[0][0] if rest else lost
         margin = old[0][a] if old else Margin(*(np.nan,) * 4)
         was, now = (band_within(t, 0, *limits) for t in (before, after))
         delay_was, delay_now = (delay_of(t, 0, 0, targets.low, targets.high) for t in (before, after))
         reason = bandwidth_limitation(job.plant, after, now, *limits, targets.high)
         axis = AXES[job.plant.axes[a]]
-        found.append(AxisTuning(axis, before, after, was, now, delay_was, delay_now, margin, new[a], reason))
+        found.append(AxisTuning(axis, before, after, was, now, delay_was, delay_now, margin, new[a], reason, doubt))
     stable = stays_stable(machine, replace(tuned, master_gain=tuple(2.0 * g for g in tuned.master_gain)))
     job.done(12)
     return Tuning(
@@ -288,7 +290,8 @@ def _tune_feedforward(job: _Job, settings: ControllerSettings) -> tuple[Controll
     delay = 0.0
     for n, (stage, terms) in enumerate(stages):
         found = identify_axes([job.controller(tuned)], job.rest, targets.__getitem__, segment)
-        fits = [FeedforwardFit(t, tuned, int(k), bands, terms) for (t,), k in zip(found, job.plant.axes, strict=True)]
+        seen = zip((transfer for ((transfer, _),) in found), job.plant.axes, strict=True)
+        fits = [FeedforwardFit(transfer, tuned, int(k), bands, terms) for transfer, k in seen]
         if stage == "Kaf":
             delay = best_delay(fits, goals.largest_delay)
         for fit, k in zip(fits, map(int, job.plant.axes), strict=True):

@@ -11,9 +11,12 @@ __all__ = ["write_capacity_report"]
 
 
 def write_capacity_report(
-    path: Path, title: str, loads: Sequence[Load], tables: Sequence[Table], *, command: str | None = None
+    path: Path, title: str, loads: Sequence[Load], tables: Sequence[Table], remark: str, *, command: str | None = None
 ) -> Path:
-    """Write the self-contained HTML report of a capacity; `tables` without that of the governing limits."""
+    """Write the self-contained HTML report of a capacity; `tables` without that of the governing limits.
+
+    remark: how the tables belong to what a motion is judged by.
+    """
     last = loads[-1]
     sentences = []
     for load in loads:
@@ -32,7 +35,7 @@ def write_capacity_report(
         ],
         sections=[
             Section("performance", "Performance curves", performance_blocks(loads)),
-            Section("capacity", "Capacity beside what is stated", list(tables)),
+            Section("capacity", "Capacity beside what is stated", [remark, *tables]),
         ],
         command=command,
     )

@@ -24,11 +24,11 @@ def verdict_of_run(
     uses: Sequence[LimitUse],
     notes: Sequence[str],
 ) -> tuple[str, Level]:
-    """Return the verdict and its level: clipped spools, tracking, limits, notes."""
+    """Return the verdict and its level: clipped spools, tracking, limits, control loop, notes."""
     stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
-    clipped = _clipped(record, spools)
+    clipped, loop, unstable = _clipped(record, spools), *_loop(record)
     if stopped != "none":  # the part before the stop does not represent the test
-        sentences = [f"The run {stopped}: tracking is not judged.", clipped, "See the notes."]
+        sentences = [f"The run {stopped}: tracking is not judged.", clipped, loop, "See the notes."]
         return " ".join(filter(None, sentences)), "bad"
     tracked, level = _followed(record, found, clipped=bool(clipped))
     beyond = [use for use in uses if use.decides and use.quantity != "spool" and use.share > 1.0 + TOLERANCE]
@@ -43,11 +43,11 @@ def verdict_of_run(
         sentences.append("No spool reached its limit.")
     if clipped or beyond:
         level = "bad"
-    loop = str(record.attrs.get("loop", "stable"))
-    if loop != "stable":
-        remedy = f" (mend it by “{record.attrs['loop_remedy']}”)" if "loop_remedy" in record.attrs else ""
-        sentences.append(f"{record.attrs.get('loop_summary', f'The control loop is {loop}')}{remedy}.")
-        level = "bad" if loop == "unstable" else "attention" if level in ("good", "plain") else level
+    sentences.append(loop)
+    if unstable:
+        level = "bad"
+    elif loop:
+        level = "attention" if level in ("good", "plain") else level
     if notes:
         level = "attention" if level in ("good", "plain") else level
         sentences.append("See the notes.")
@@ -92,6 +92,15 @@ def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
         return ""
     start = f"{count} spool commands were clipped" if count else "Spools reached their full stroke"
     return f"{start}: {', '.join(full)}." if full else f"{start}."
+
+
+def _loop(record: xr.Dataset) -> tuple[str, bool]:
+    """The sentence on a control loop that is not stable, or thinly, empty for others; and whether it is unstable."""
+    loop = str(record.attrs.get("loop", "stable"))
+    if loop == "stable":
+        return "", False
+    remedy = f" (mend it by “{record.attrs['loop_remedy']}”)" if "loop_remedy" in record.attrs else ""
+    return f"{record.attrs.get('loop_summary', f'The control loop is {loop}')}{remedy}.", loop == "unstable"
 
 
 def _worst_rrmse(found: Sequence[Tracking]) -> Headline:

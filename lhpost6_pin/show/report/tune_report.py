@@ -10,7 +10,7 @@ from .page import Block, Headline, Level, Page, Section, Table, bullet_list, gri
 from .scales import decibels, degrees, milliseconds
 from .tune_plots import bode_figure, overview_figure
 
-__all__ = ["tuning_tables", "write_tune_report"]
+__all__ = ["measuring_doubts", "tuning_tables", "write_tune_report"]
 
 # Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
 FOLLOWED = (0.1, 20.0)  # [Hz]
@@ -68,10 +68,18 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
         if low
         else f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.",
         f"The loop is {'stable' if tuning.doubled else 'unstable'} with all master gains doubled.",
+        *measuring_doubts(tuning),
     ]
     if any(np.isnan(axis.band_after[0]) for axis in tuning.axes):
         return " ".join(words), "bad"
-    return " ".join(words), "attention" if short or low or not tuning.doubled else "good"
+    doubtful = short or low or not tuning.doubled or measuring_doubts(tuning)
+    return " ".join(words), "attention" if doubtful else "good"
+
+
+def measuring_doubts(tuning: Tuning) -> list[str]:
+    """Sentences on axes whose response was measured in a run that was not linear."""
+    start = "The response measured is not that of a linear table in"
+    return [f"{start} {axis.axis}: {axis.doubt}." for axis in tuning.axes if axis.doubt]
 
 
 def _headlines(tuning: Tuning) -> list[Headline]:

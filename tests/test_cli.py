@@ -182,6 +182,14 @@ def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6
     assert ended.code == 0  # it can be used, with care
 
 
+def test_check_of_a_campaign_begins_its_summary_with_a_line_for_each_test(lhpost6, tmp_path):
+    for test in ("TX", "WN"):
+        save_record(load_record(PRACTICE.with_name(f"practice_a_{test}.nc")), tmp_path / "campaign" / f"{test}.nc")
+    ended = lhpost6("check", tmp_path / "campaign")
+    assert re.search(r"TX 11\.0 512 82 0\.2 x ", ended.words)
+    assert re.search(r"WN 10\.0 512 82 0\.02 x ", ended.words)
+
+
 @pytest.mark.parametrize("name", ["absent.nc", "[red]absent.nc", "[/red].nc", "a folder"])
 def test_check_of_what_is_no_record_exits_1_and_names_it(lhpost6, tmp_path, name):
     (tmp_path / "a folder").mkdir()

@@ -151,6 +151,8 @@ def campaign(
     """Simulate a campaign of tests, recorded through sensors with noise and errors: to plan a real one."""
     from ..data.campaign import save_campaign
     from ..data.sensors import load_sensors
+    from ..data.summary import summarise_records
+    from ..show.check_tables import print_tests, summary_entries
     from ..simulation.simulated_campaign import simulate_campaign
 
     table = machine.load()
@@ -169,8 +171,9 @@ def campaign(
         made = simulate_campaign(
             table, settings, known, seed=seed, errors=errors, tests=chosen, scale=scale, name=name, progress=progress
         )
-    entries = {"campaign": name, "tests": [str(record.attrs["test"]) for record in made.records]}
-    print_result(json, lambda: entries, lambda: None, save_campaign(made, folder))
+    files, summaries = save_campaign(made, folder), summarise_records(made.records)
+    entries = {"campaign": name, "tests": [one.test for one in summaries], **summary_entries(summaries)}
+    print_result(json, lambda: entries, lambda: print_tests(summaries), files)
 
 
 @command()

@@ -20,7 +20,6 @@ class RecordSummary(NamedTuple):
     peaks: Mapping[str, Mapping[str, float]]  # largest |platen motion| by quantity and axis, SI
 
 
-
 def summarise_records(records: Sequence[xr.Dataset]) -> tuple[RecordSummary, ...]:
     """Summaries of records, in their order; motions that a record lacks are omitted."""
     found = []
@@ -34,5 +33,7 @@ def summarise_records(records: Sequence[xr.Dataset]) -> tuple[RecordSummary, ...
         columns = [v for v in record.data_vars.values() if v.dims[:1] == ("time",) and v.dtype.kind in "fiu"]
         count = sum(v[0].size for v in columns)
         seconds = step * (record.sizes["time"] - 1)
-        found.append(RecordSummary(str(record.attrs.get("test", "")), seconds, float(f"{1 / step:.6g}"), count, motions))
+        found.append(
+            RecordSummary(str(record.attrs.get("test", "")), seconds, float(f"{1 / step:.6g}"), count, motions)
+        )
     return tuple(found)

@@ -94,7 +94,7 @@ def capacity(
     tables = capacity_tables(found)
     if out is not None:
         load = table.specimen.name if table.specimen else "bare"
-        path = folder_for(out, "capacity") / "report.html"
+        path = folder_for(out, "capacity", "report.html") / "report.html"
         files.append(
             write_capacity_report(path, f"{table.name}, {load}", found.loads, tables[:-1], command=repeating_command())
         )

@@ -145,7 +145,7 @@ def decompose(
 
     measured = load_record(record)
     table = machine.onto_for(machine.load_bare(), [measured])
-    folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces")
+    folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces", "ledger.nc", "report.html")
     known = None
     if is_measured(measured) or sensors:
         known = find_sensors(table, [measured], sensors, opt.measuring(record.parent, machine.machine))
@@ -185,7 +185,7 @@ def validate(
     tests = load_campaign(campaign, bare)
     table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
-    folder = opt.folder_for(out, f"{tests.name}_validation")
+    folder = opt.folder_for(out, f"{tests.name}_validation", "metrics.json", "report.html")
     with progress_bar(f"validating {table.name} on {tests.name}") as progress:
         found = validate_campaign(
             table, tests, sensors=known, settings=settings, phases=numbers, jobs=jobs, progress=progress
@@ -220,7 +220,7 @@ def calibrate(
     tests = usable_tests(load_campaign(campaign, bare))
     table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
-    folder = opt.folder_for(out, f"{tests.name}_calibration")
+    folder = opt.folder_for(out, f"{tests.name}_calibration", "override.toml", "report.html")
     with progress_bar(f"calibrating {table.name} on {tests.name}") as progress:
         found = calibrate_machine(
             *(table, tests.records, known),

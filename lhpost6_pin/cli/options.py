@@ -27,7 +27,16 @@ EXCHANGES = ("sample", "step")
 """How often a specimen that is a program exchanges motion and wrench."""
 
 __all__ = ["Beyond", "CampaignFolder", "Cancel", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
-__all__ += ["ExchangeOptions", "MountOptions", "Out", "PhaseSettingsName", "Processes", "SensorsName", "SettingsName"]
+__all__ += [
+    "ExchangeOptions",
+    "MountOptions",
+    "Out",
+    "PhaseSettingsName",
+    "Processes",
+    "ResumedOut",
+    "SensorsName",
+    "SettingsName",
+]
 __all__ += ["SpecimenOptions", "StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring"]
 __all__ += ["record_name"]
 
@@ -47,7 +56,14 @@ _settings = completing(lambda: shipped("controllers"))
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
-Out = Annotated[Path | None, typer.Option(help="Directory of the results; default: out/NAME.")]
+Out = Annotated[
+    Path | None,
+    typer.Option(help="Directory of the results; default: out/NAME. Earlier ones there are replaced, with a warning."),
+]
+ResumedOut = Annotated[
+    Path | None,
+    typer.Option(help="Directory of the results; default: out/NAME. What was interrupted there is resumed."),
+]
 Jobs = Annotated[int, _jobs("threads", "Threads; -1: all cores.")]
 Processes = Annotated[int, _jobs("processes", "Processes; -1: one a core.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
@@ -315,12 +331,18 @@ def find_controller(name: str | None, table: "Machine") -> "ControllerSettings |
     return load_plugged(name) if name and is_plugged(name) else find_settings(name, table)
 
 
-def folder_for(out: Path | None, name: str) -> Path:
-    """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written."""
+def folder_for(out: Path | None, name: str, *files: str) -> Path:
+    """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written.
+
+    Those of `files`, which the command will write, that are there already are a warning.
+    """
     from ..core.files import refuse_folder
 
     folder = out or Path("out") / name
     refuse_folder(folder)
+    if earlier := [file for file in files if (folder / file).exists()]:
+        what = f"{', '.join(earlier[:3])}{f' and {len(earlier) - 3} more' * (len(earlier) > 3)}"
+        log.warning("%s: %s of an earlier command will be replaced; --out names another directory", folder, what)
     return folder
 
 

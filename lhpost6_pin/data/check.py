@@ -17,6 +17,7 @@ from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..core.names import AXES
 from ..machine.machine import Machine
+from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
 from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
 from .conditioning import resolution
@@ -105,6 +106,7 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
         length = float(time[-1] - time[0])
         span = f"{count} samples, {length:g} s, {(count - 1) / length if length else np.nan:.6g} Hz"
         yield "", None, f"{title}: {span}".lstrip(": "), ""
+    yield from (("", None, sentence, "") for sentence in changes_summary(dataset.attrs))
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind in "fiu" and variable.size and np.isfinite(variable).any():
             yield from _extents(variable, "" if name in LAYOUT else ", not of the layout")

@@ -12,6 +12,7 @@ from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
+from ..machine.recorded_changes import change_facts
 from ..machine.recorded_specimen import specimen_facts
 from ..machine.structure import BODIES
 from ..mechanics.accelerometers import accelerometer_rows
@@ -100,6 +101,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     facts: dict[str, Any] = {
         "kind": "simulated",
         "machine": machine.name,
+        **change_facts(machine),
         **specimen_facts(machine.specimen),
         "scheme": run.scheme,
         "steps_per_second": run.steps_per_second,

@@ -12,6 +12,7 @@ from ..core.errors import ParameterError, RecordError, UnknownNameError
 from ..core.files import shipped, shipped_specimens
 from ..core.names import ENGINES, SCHEMES
 from .completion import completing
+from .results_folder import Out, ResumedOut, folder_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,14 +57,6 @@ _settings = completing(lambda: shipped("controllers"))
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
-Out = Annotated[
-    Path | None,
-    typer.Option(help="Directory of the results; default: out/NAME. Earlier ones there are replaced, with a warning."),
-]
-ResumedOut = Annotated[
-    Path | None,
-    typer.Option(help="Directory of the results; default: out/NAME. What was interrupted there is resumed."),
-]
 Jobs = Annotated[int, _jobs("threads", "Threads; -1: all cores.")]
 Processes = Annotated[int, _jobs("processes", "Processes; -1: one a core.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
@@ -329,21 +322,6 @@ def find_controller(name: str | None, table: "Machine") -> "ControllerSettings |
     from ..control.plug import is_plugged, load_plugged
 
     return load_plugged(name) if name and is_plugged(name) else find_settings(name, table)
-
-
-def folder_for(out: Path | None, name: str, *files: str) -> Path:
-    """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written.
-
-    Those of `files`, which the command will write, that are there already are a warning.
-    """
-    from ..core.files import refuse_folder
-
-    folder = out or Path("out") / name
-    refuse_folder(folder)
-    if earlier := [file for file in files if (folder / file).exists()]:
-        what = f"{', '.join(earlier[:3])}{f' and {len(earlier) - 3} more' * (len(earlier) > 3)}"
-        log.warning("%s: %s of an earlier command will be replaced; --out names another directory", folder, what)
-    return folder
 
 
 def measuring(campaign: Path, machine: str) -> str:

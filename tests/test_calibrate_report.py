@@ -27,7 +27,9 @@ from lhpost6_pin.identification.calibration.result import (
 from lhpost6_pin.identification.calibration.sensor_errors import RemovedDelay, SensorUnknown
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.report.calibrate_plots import INTERVAL
 from lhpost6_pin.show.report.calibrate_report import write_calibrate_report
+from lhpost6_pin.show.report.calibrate_sections import parameter_table
 from lhpost6_pin.show.result_tables import print_calibration
 from lhpost6_pin.show.results import calibration_entries
 
@@ -172,6 +174,23 @@ def test_errors_of_sensors_within_their_stated_ranges_are_no_cause_for_attention
         assert ("Sensor errors beyond their stated ranges: gain actuator_force[H1]." in page) == bool(wrong)
     skewed = np.where(np.arange(7) == delay, 1.9 * stated, found.estimate)  # of its own and of the platen's channels
     assert out_of_range(replace(found, estimate=skewed)) == []
+
+
+def test_an_error_beyond_its_stated_range_within_its_uncertainty_is_not_said_to_be_within_it(found, tmp_path, capsys):
+    gain, stated = 5, np.sqrt(3.0) * found.prior
+    some = replace(found, estimate=np.where(np.arange(7) == gain, 1.08 * stated, found.estimate))
+    assert out_of_range(some) == []
+    print_calibration(some)
+    for words in (page_of(some, tmp_path), " ".join(capsys.readouterr().out.split())):
+        assert "108 %" in words and "all within their stated ranges" not in words
+        assert "none beyond its stated range by more than 3 predicted deviations" in words
+        assert "(beyond it by less: gain actuator_force[H1] 108 % of it)" in words
+
+
+def test_the_interval_of_a_parameter_stands_beside_its_estimate(found):
+    header = parameter_table(found).header
+    assert header.index(INTERVAL) == header.index("Estimate") + 1
+    assert len(header) <= 7  # as many columns as fit the page
 
 
 def test_pairs_of_sensors_that_are_alike_are_not_held_against_parameters(found):

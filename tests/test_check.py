@@ -9,6 +9,7 @@ import xarray as xr
 from lhpost6_pin.data.check import check_dataset, check_record
 from lhpost6_pin.data.layout_faults import RecordFinding
 from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.data.summary import summarise_records
 from lhpost6_pin.machine.machine import load_machine
 
 pytestmark = pytest.mark.long
@@ -60,7 +61,14 @@ def test_the_reference_record_gives_one_warning_that_is_true():
 def test_the_contents_are_listed_with_units_ranges_rate_and_duration():
     lines = [str(f) for f in check_record(RECORDS / "practice_a_TX.nc") if f.severity == "info"]
     assert "measured TX" in lines[0] and "5632 samples" in lines[0] and "512 Hz" in lines[0]
-    assert any(line.startswith("platen_displacement: m, rad, 5632 x 6, -0.200") for line in lines)
+    assert any(line.startswith("platen_displacement[x, y, z]: m, 5632 x 3, -0.200") for line in lines)
+
+
+def test_metres_and_radians_have_a_range_each():
+    lines = [str(f) for f in check_record(RECORDS / "practice_a_TX.nc") if f.severity == "info"]
+    turned = next(line for line in lines if line.startswith("platen_displacement[roll, pitch, yaw]: rad, 5632 x 3, "))
+    assert max(abs(float(word)) for word in turned.split(", ")[-1].split(" to ")) < 0.01
+    assert not any(f"{unit}, rad" in line for line in lines for unit in ("m", "m/s", "m/s2"))
 
 
 def test_what_a_record_cannot_be_used_for_is_said(tests):
@@ -220,6 +228,51 @@ def test_noise_is_not_taken_for_a_wrong_gain_of_forces(tests):
     assert faults(check_dataset(still, MACHINE)) == []  # 1.5 kN beside the others' tens
     halved = change(record, "actuator_force[V3]", values=0.5 * force)
     assert faults(check_dataset(halved, MACHINE)) == [("warning", "actuator_force[V3]", None)]
+
+
+def at_rest(record: xr.Dataset, actuators: tuple[str, ...], motion: float = 0.0) -> xr.Dataset:
+    """The record with a share of the motion of some actuators, in force and pressures of the noise of their sensors."""
+    rng = np.random.default_rng(7)
+    for name, noise in (("actuator_force", 1300.0), ("chamber_pressure_a", 3100.0), ("chamber_pressure_b", 3100.0)):
+        for actuator in actuators:
+            if name == "chamber_pressure_b" and actuator.startswith("V"):
+                continue
+            x = series(record, f"{name}[{actuator}]")
+            x = x.mean() + motion * (x - x.mean()) + noise * rng.standard_normal(len(x))
+            record = change(record, f"{name}[{actuator}]", values=x)
+    return record
+
+
+def contradicting_pressures(record: xr.Dataset) -> set[str]:
+    return {f.channel for f in check_dataset(record, MACHINE) if f.severity == "warning" and "P_A" in f.message}
+
+
+@pytest.mark.parametrize("motion", [0.0, 0.003, 0.01, 0.03])
+def test_forces_of_actuators_that_hardly_move_in_a_test_are_not_doubted(tests, motion):
+    quiet = at_rest(tests["EQ"], ("H1", "H2", "H3", "H4"), motion)
+    assert contradicting_pressures(quiet) == set()
+
+
+def test_a_record_of_noise_alone_has_no_doubtful_force(tests):
+    still = at_rest(tests["EQ"], tuple(MACHINE.actuator_names))
+    assert contradicting_pressures(still) == set()
+
+
+def test_forces_of_two_actuators_that_are_swapped_are_found(tests):
+    forces = {name: series(tests["EQ"], f"actuator_force[{name}]") for name in ("H1", "V2")}
+    swapped = change(tests["EQ"], "actuator_force[H1]", values=forces["V2"])
+    swapped = change(swapped, "actuator_force[V2]", values=forces["H1"])
+    assert contradicting_pressures(swapped) == {"actuator_force[H1]", "actuator_force[V2]"}
+
+
+def test_a_campaign_has_a_summary_of_its_tests(tests):
+    first, second = summarise_records([tests["TX"], tests["WN"].drop_vars("platen_velocity")])
+    assert (first.test, first.rate_hz, first.seconds) == ("TX", 512.0, pytest.approx(5631 / 512))
+    moved = tests["TX"]["platen_displacement"]
+    assert first.peaks["displacement"]["x"] == float(abs(moved.sel(axis="x")).max())
+    assert first.peaks["displacement"]["yaw"] == float(abs(moved.sel(axis="yaw")).max())
+    assert "velocity" not in second.peaks
+    assert first.channels == second.channels + 6
 
 
 # -------------------------------------------------------------------------------------------------- errors

@@ -182,6 +182,14 @@ def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6
     assert ended.code == 0  # it can be used, with care
 
 
+def test_check_of_a_campaign_begins_its_summary_with_a_line_for_each_test(lhpost6, tmp_path):
+    for test in ("TX", "WN"):
+        save_record(load_record(PRACTICE.with_name(f"practice_a_{test}.nc")), tmp_path / "campaign" / f"{test}.nc")
+    ended = lhpost6("check", tmp_path / "campaign")
+    assert re.search(r"TX 11\.0 512 82 0\.2 x ", ended.words)
+    assert re.search(r"WN 10\.0 512 82 0\.02 x ", ended.words)
+
+
 @pytest.mark.parametrize("name", ["absent.nc", "[red]absent.nc", "[/red].nc", "a folder"])
 def test_check_of_what_is_no_record_exits_1_and_names_it(lhpost6, tmp_path, name):
     (tmp_path / "a folder").mkdir()
@@ -205,9 +213,12 @@ def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lh
     assert "lhpost6 run sine --set amplitude=0.02" in page  # how to repeat it
 
 
-def test_run_names_a_folder_after_the_motion_and_overwrites_its_own_results(lhpost6, tmp_path):
+def test_run_names_a_folder_after_the_motion_and_replaces_its_own_results_with_a_warning(lhpost6, tmp_path, caplog):
     for scale in ("1", "0.5"):
+        caplog.clear()
         assert lhpost6("run", *COARSE, "--scale", scale).code == 0
+        warned = "out/sine: record.nc, report.html of an earlier command will be replaced" in caplog.text
+        assert warned == (scale == "0.5")
         peak = np.abs(sound(tmp_path / "out" / "sine")["reference_displacement"].values).max()
         assert peak == pytest.approx(0.02 * float(scale), rel=1e-3)
     assert everything(tmp_path) == ["out/sine/record.nc", "out/sine/report.html"]
@@ -439,7 +450,9 @@ def test_open_loop_drives_the_plant_with_a_records_spools(lhpost6, tmp_path, eng
     simulated = load_record(folder / "record.nc")
     assert simulated.attrs["spool_interpolation"] == how and record.name in simulated.attrs["source"]
     row = next(line for line in ended.out.splitlines() if re.match(r"│ platen_displacement x +│", line))
-    assert float(row.split("│")[4]) < rrmse  # as printed: noise and another step in the practice record
+    assert (
+        float(row.split("│")[4].strip().removesuffix("%").replace("−", "-")) < 100 * rrmse
+    )  # as printed: noise and another step in the practice record
 
 
 def test_a_record_is_not_replayed_without_its_specimen_nor_over_itself(lhpost6, tmp_path):

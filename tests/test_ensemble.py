@@ -22,6 +22,7 @@ from lhpost6_pin.identification.calibration import with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.motions import response_spectrum
+from lhpost6_pin.show.ensemble_tables import spread_table
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.studies import ensemble
 from lhpost6_pin.studies.draws import draw_machines
@@ -31,7 +32,7 @@ from lhpost6_pin.studies.importance import importances
 from lhpost6_pin.studies.plan_file import load_plan, plan_from
 from lhpost6_pin.studies.quantities import LIMITS
 from lhpost6_pin.studies.store import BlockStore, open_results
-from lhpost6_pin.studies.summary import summarise
+from lhpost6_pin.studies.summary import Spread, summarise
 
 NUMBERS = load_parameters(models_folder() / "procedures" / "ensemble.toml")
 SINE = {"name": "sine", "options": {"amplitude": 0.05, "cycles": 1.0, "ramp_cycles": 0.5}}
@@ -360,6 +361,13 @@ def test_specimens_controllers_and_guided_machines_have_their_place(tmp_path):
     with open_results(run_ensemble(plan_from(one_axis, Path(), "test"), tmp_path / "uni", jobs=1)) as results:
         assert results.sizes["actuator"] == len(machine_named("uniaxial").actuator_names)
         assert np.isfinite(results["rrmse_displacement"].sel(axis="x")).all()
+
+
+def test_ratios_are_in_per_cent_as_everywhere():
+    quantiles = np.array([0.2, 0.223, 0.3])
+    one = Spread("sine", 1.0, "none", "tuned", "acceleration RRMSE, worst axis", "1", quantiles, 0.2, 0.3, 9)
+    (row,) = spread_table([one]).rows
+    assert row[1:4] == ("%", "22.3", "20.0 to 30.0")
 
 
 def test_a_file_that_holds_no_ensemble_is_named(tmp_path):

@@ -251,6 +251,29 @@ def test_a_matlab_struct_may_hold_a_table_with_names_units_and_a_rate(tmp_path, 
     np.testing.assert_array_equal(found.time, TIME)
 
 
+@pytest.mark.parametrize("names", ["chanNames", "channel_names", "ChNames", "signalNames"])
+@pytest.mark.parametrize("clock", ["time", "sampleRate", "column"])
+def test_a_matlab_table_may_stand_beside_names_and_units_of_its_channels(tmp_path, names, clock):
+    content = {"data": VALUES, names: np.array(NAMES, object), "units": np.array(UNITS, object)}
+    if clock == "column":
+        labels, units = ([first, *texts] for first, texts in (("Time", NAMES), ("ms", UNITS)))
+        content |= {"data": np.column_stack([1e3 * TIME, VALUES])}
+        content |= {names: np.array(labels, object), "units": np.array(units, object)}
+    content |= {"time": {"time": TIME}, "sampleRate": {"sampleRate": RATE}, "column": {}}[clock]
+    scipy.io.savemat(tmp_path / "run.mat", content)
+    found = one(tmp_path / "run.mat")
+    assert found.names == tuple(f"{n} [{u}]" for n, u in zip(NAMES, UNITS, strict=True))
+    assert found.units == UNITS
+    np.testing.assert_array_equal(found.values, VALUES)
+    np.testing.assert_allclose(found.time, TIME, rtol=1e-14)
+
+
+def test_a_unit_that_was_left_empty_leaves_the_others(tmp_path):
+    units = np.array([UNITS[0], *[np.zeros(0)] * (len(UNITS) - 1)], object)
+    scipy.io.savemat(tmp_path / "run.mat", {"data": VALUES, "chanNames": np.array(NAMES, object), "units": units})
+    assert one(tmp_path / "run.mat").units == (UNITS[0], *[None] * (len(UNITS) - 1))
+
+
 def test_matlab_structs_of_two_rates_are_two_samplings(tmp_path):
     slow = {"t": TIME[::2], "x": VALUES[::2, 0]}
     scipy.io.savemat(tmp_path / "run.mat", {"fast": {"t": TIME, "x": VALUES[:, 0]}, "slow": slow})
@@ -705,6 +728,18 @@ def test_a_guess_says_what_it_left_open(tmp_path):
     assert (
         '"platen_displacement[yaw]" = { unit = "rad", constant = 0.0 }  # not found; if it is known to be zero' in text
     )
+
+
+def test_columns_without_units_share_one_remark_with_their_number():
+    names = [
+        f"{quantity} {axis}" for quantity in ("Displ", "Accel") for axis in ("x", "y", "z", "roll", "pitch", "yaw")
+    ]
+    found = guess_map([columns_called(names)], LABELS)
+    assert len(found.channels.channels) == 12
+    (remark,) = [one for one in found.remarks if "unit" in one]
+    assert remark.startswith("add the units of 12 channels")
+    assert "platen_displacement[x, y, z, roll, pitch, yaw], platen_acceleration[x, y, z, roll, pitch, yaw]" in remark
+    assert remark.endswith("the first is column 1 of run.csv, 'Displ x'")
 
 
 ONE = {"actuator": ("A1",), "horizontal": ("A1",), "strut": ()}

@@ -119,6 +119,14 @@ def test_a_platen_that_lifts_off_an_actuator_is_trouble_in_record_report_and_res
     assert began in page and f"fell to {pressure.min() / 1e6:.3g} MPa, below zero, first at {first:.3f} s" in page
 
 
+def test_a_run_states_what_was_run_on_what(said, tmp_path):
+    (tmp_path / "leaky.toml").write_text('[horizontal]\nleakage = { value = 5.0, unit = "l/min/MPa" }\n')
+    mounted = ("--specimen", "block_4_9MN", "--override", tmp_path / "leaky.toml")
+    entries, _ = said("run", *SHORT, "--scale", "0.5", *mounted)
+    wanted = {"machine": "LHPOST6", "motion": "sine", "scale": 0.5, "specimen": "block_4_9MN", "effects": None}
+    assert wanted.items() <= entries.items() and "horizontal.leakage" in entries["overrides"]
+
+
 def test_an_open_loop_states_the_comparison(said):
     entries, _ = said("open-loop", REFERENCE, "--engine", "fused")
     x = next(row for row in entries["against_record"] if row["channel"] == "platen_displacement x")

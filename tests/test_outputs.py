@@ -14,6 +14,7 @@ from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.layout_faults import layout_faults
 from lhpost6_pin.data.records import load_record, save_record
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.machine.recorded_changes import changes_summary
 from lhpost6_pin.mechanics.kinematics import inverse_kinematics
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.outputs import record_of_run
@@ -158,6 +159,25 @@ def test_trouble_clipping_valves_and_what_is_given_by_hand_are_in_the_attributes
     attrs = record_of_run(troubled, {"kind": "measured", "operator": "me"}).attrs
     assert "V1" in attrs["trouble"] and attrs["spool_values_clipped"] == 7
     assert attrs["kind"] == "measured" and attrs["operator"] == "me" and attrs["valves_per_horizontal_actuator"] == 2
+
+
+def test_what_was_changed_of_the_machine_is_in_the_attributes_and_shown(tmp_path):
+    nominal = load_machine()
+    machine = nominal.with_params({"horizontal.leakage": {"value": 5.0, "unit": "l/min/MPa"}, "vertical.viscous": 9e3})
+    machine = machine.with_params({"vertical.viscous": nominal.parameters.number("vertical.viscous")})  # as before
+    machine = machine.with_effect("stray_spring", ("platen.x",), name="cable", stiffness=2e5).with_effect("backlash")
+    record = record_of_run(short_run(machine, samples=4), {})
+    assert record.attrs["overrides"] == "horizontal.leakage = 8.33333e-11 m3/s/Pa (was 4.58333e-11 m3/s/Pa)"
+    first, second = record.attrs["effects"].split("; ")
+    assert first.startswith("cable: stray_spring on platen.x, stiffness = 200000 N/m")
+    assert second.startswith("backlash: backlash")
+    said = [f.message for f in check_dataset(record) if f.severity == "info"]
+    assert f"made with effects: {first}; {second}" in said
+    assert any(one.startswith("made with overrides: horizontal.leakage") for one in said)
+    assert changes_summary(record.attrs, 1)[0] == f"made with effects: {first}; and 1 more"
+    save_record(record, tmp_path / "changed.nc")
+    assert load_record(tmp_path / "changed.nc").attrs["effects"] == record.attrs["effects"]
+    assert not {"effects", "overrides"} & set(record_of_run(short_run(nominal, samples=4), {}).attrs)
 
 
 # Other machines and specimens -----------------------------------------------------------------------------------------

@@ -16,9 +16,10 @@ from plotly.offline import get_plotlyjs
 from scipy.constants import g
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
+from lhpost6_pin.data.metrics import QUANTITIES
 from lhpost6_pin.show.report.page import Page, bar, number, render_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
-from lhpost6_pin.show.report.run_report import RunSummary, write_run_report
+from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
@@ -146,6 +147,20 @@ def test_the_delay_of_the_table_is_found_and_removing_it_removes_the_error(tmp_p
     quiet = [row for row in summary.tracking if row.axis not in "xyz"]
     assert all(np.isnan(row.rrmse) for row in quiet)
     assert summary.level == "good"
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+def test_a_negative_delay_is_explained_and_only_that(tmp_path, ahead):
+    record = make_record()
+    if ahead:  # what was the target is achieved, DELAY before what was achieved
+        pairs = [(f"platen_{q}", f"reference_{q}") for q in QUANTITIES]
+        swapped = {a: record[b].values for one in pairs for a, b in (one, one[::-1])}
+        record = record.assign({name: record[name].copy(data=values) for name, values in swapped.items()})
+    summary, page = report(tmp_path, record)
+    assert bool(lead_summary(summary.tracking)) == ahead
+    assert ("A negative delay: the achieved motion is ahead of its target (x displacement," in page) == ahead
+    assert ("25.0\N{NO-BREAK SPACE}ms ahead of the target" in page) == ahead
+    assert ("delay 25.0\N{NO-BREAK SPACE}ms" in page) != ahead
 
 
 def test_figures_hold_the_recorded_peaks_in_the_unit_they_name(tmp_path):

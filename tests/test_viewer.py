@@ -386,6 +386,14 @@ def test_a_picture_stands_in_a_notebook_and_in_a_file_alike(machine, record, tmp
 
 
 # ------------------------------------------------------------------------------------------------ the command
+def test_the_page_says_what_was_changed_of_the_machine(machine, record):
+    assert "made with" not in show_record(machine, record).page
+    changed = record.assign_attrs(effects="cable: stray_spring on platen.x", overrides="a.b = 1 m (was 2 m); c; d; e")
+    page = show_record(machine, changed).page
+    assert "made with effects: cable: stray_spring on platen.x" in page
+    assert "made with overrides: a.b = 1 m (was 2 m); c; and 2 more" in page
+
+
 def test_the_command_writes_one_file_and_says_what_it_cannot_show(lhpost6, record, tmp_path):
     page = tmp_path / "page.html"
     ended = lhpost6("view", RECORD, RECORD, "--export", page, "--amplify", 20, "--fps", 10, "--gap", 2)

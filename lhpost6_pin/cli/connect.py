@@ -125,7 +125,7 @@ def link(
     target = motion.target(table)
     moved = target.reference.motion
     name = moved.replace("/", "_") + "_link"
-    folder = motion.folder(out, name)
+    folder = motion.folder(out, name, "record.nc")
     plant = make_plant(table)
     loop = loop_for(plant, find_equilibrium(plant), chosen, target)
     loop = loop if cancel is None else cancelling(loop, target, cancel)

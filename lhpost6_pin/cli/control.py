@@ -36,7 +36,7 @@ def tune(
     table = machine.load(valves)
     settings = opt.find_settings(controller, table)
     load = table.specimen.name if table.specimen else "bare"
-    folder = opt.folder_for(out, f"tune_{table.name}")
+    folder = opt.folder_for(out, f"tune_{table.name}", "controller.toml", "report.html")
     with progress_bar(f"tuning {table.name}") as progress:
         found = tune_controller(table, settings, progress=progress)
     named = replace(found.after, name=f"tuned for {table.name}, {load}")
@@ -72,7 +72,7 @@ def iterate(
     settings = opt.find_settings(controller, table)
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
-    folder = opt.folder_for(out, f"{name}_iterated")
+    folder = opt.folder_for(out, f"{name}_iterated", "drive.nc", "inverse.nc", "report.html")
     checked_loop(table, settings, machine)
     with progress_bar(f"iterating {name} on {table.name}") as progress:
         result = iterate_drive(table, target, settings, most=most, gain=gain, progress=progress)
@@ -117,7 +117,7 @@ def replay(
             f"{drive} is for reference generators in {found.mode} mode; {settings.name} has {settings.mode} mode"
         )
     name = f"{found.target.reference.motion.replace('/', '_')}_replay"
-    folder = opt.folder_for(out, name)
+    folder = opt.folder_for(out, name, "record.nc", "report.html")
     facts = loop_facts(checked_loop(table, settings, machine), machine)
     attrs = {"test": name, "title": f"{name} on {table.name}", "drive": str(drive), **facts}
     with progress_bar(f"{name} on {table.name}") as progress:
@@ -160,7 +160,7 @@ def sine(
     plant = make_plant(table)
     axis_row(plant, axis)
     settings = opt.find_settings(controller, table)
-    folder = opt.folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz")
+    folder = opt.folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz", "report.html")
     if not beyond:
         check_motion_limits(plant, sine_target(axis, amplitude, frequency)[0])
     checked_loop(table, settings, machine)

@@ -9,7 +9,18 @@ import typer
 
 from .app import command, print_result, progress_bar, repeating_command
 from .live_view import NoOpen
-from .options import CampaignFolder, Jobs, Json, MachineName, MountOptions, Out, SensorsName, folder_for, measuring
+from .options import (
+    CampaignFolder,
+    Jobs,
+    Json,
+    MachineName,
+    MountOptions,
+    Out,
+    ResumedOut,
+    SensorsName,
+    folder_for,
+    measuring,
+)
 
 __all__ = ["demo", "discover"]
 
@@ -26,7 +37,7 @@ def discover(
         list[str] | None,
         typer.Option(help="Held-out test, excluded from the search; may be repeated. none: hold out no test."),
     ] = None,
-    out: Out = None,
+    out: ResumedOut = None,
     machine: MachineName = "lhpost6",
     sensors: SensorsName = None,
     seed: Annotated[int, typer.Option(help="Seed of the simulated sensor noise.")] = 0,
@@ -80,7 +91,7 @@ def demo(
     from ..show.viewer import Look, show_record
 
     machine, sensors = load_machine(), load_sensors()
-    folder = folder_for(out, "demo")
+    folder = folder_for(out, "demo", "verdict.json", "model.toml", "report.html", "view.html")
     measured = folder / "measured"
     name, component, numbers = hidden_effect()
     family = find_family(name)

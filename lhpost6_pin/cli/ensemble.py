@@ -73,7 +73,7 @@ def ensemble(
     dask: Annotated[
         str | None, typer.Option(help="Run on a Dask cluster: its address, or local for one on this computer.")
     ] = None,
-    out: opt.Out = None,
+    out: opt.ResumedOut = None,
     json: opt.Json = False,
 ) -> None:
     """Run a plan of many runs: motions x scales x specimens x controllers x machines; writes ensemble.nc and a report.

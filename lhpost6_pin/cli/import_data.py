@@ -142,7 +142,8 @@ def _import_many(files: Sequence[Path], table: "Machine", map_: Path | None, out
     from ..show.results import finding_entries
 
     tests = find_tests(files)
-    folder = opt.folder_for(out, next((path for path in files if path.is_dir()), Path("campaign")).resolve().name)
+    name = next((path for path in files if path.is_dir()), Path("campaign")).resolve().name
+    folder = opt.folder_for(out, name, *(f"{test.name}.nc" for test in tests))
     made: dict[Path, tuple[xr.Dataset, Sequence[RecordFinding]]] = {}
     failed: dict[str, str] = {}
     for test in tests:

@@ -94,7 +94,7 @@ def capacity(
     tables = capacity_tables(found)
     if out is not None:
         load = table.specimen.name if table.specimen else "bare"
-        path = folder_for(out, "capacity") / "report.html"
+        path = folder_for(out, "capacity", "report.html") / "report.html"
         title, remark = f"{table.name}, {load}", judged_by(found)
         files.append(write_capacity_report(path, title, found.loads, tables[:-1], remark, command=repeating_command()))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,7 +31,8 @@ def check(
     from ..data.campaign_check import check_campaign
     from ..data.check import check_record
     from ..data.measured_sensors import save_sensors
-    from ..show.check_tables import check_entries, print_check
+    from ..data.summary import summarise_records
+    from ..show.check_tables import check_entries, print_check, print_tests, summary_entries
     from ..show.results import finding_entries
     from ..show.tables import print_findings
 
@@ -57,14 +58,21 @@ def check(
         save_sensors(checked.content, sensors_out)
         written = [sensors_out]
 
+    summaries, skipped = (summarise_records(tests.records), tests.skipped) if tests else ((), ())
+
     def show() -> None:
         for path, findings in found.items():
             print_findings(path, findings)
+        if len(files) > 1 and summaries:
+            print_tests(summaries)
         if checked is not None:
             print_check(checked)
 
-    skipped = dict(tests.skipped) if tests else {}
-    print_result(json, lambda: {**finding_entries(found), **check_entries(checked), "skipped": skipped}, show, written)
+    def entries() -> dict[str, Any]:
+        summary = summary_entries(summaries)
+        return {**finding_entries(found), **summary, **check_entries(checked), "skipped": dict(skipped)}
+
+    print_result(json, entries, show, written)
     if wrong:
         raise typer.Exit(1)
 
@@ -137,7 +145,7 @@ def decompose(
 
     measured = load_record(record)
     table = machine.onto_for(machine.load_bare(), [measured])
-    folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces")
+    folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces", "ledger.nc", "report.html")
     known = None
     if is_measured(measured) or sensors:
         known = find_sensors(table, [measured], sensors, opt.measuring(record.parent, machine.machine))
@@ -177,7 +185,7 @@ def validate(
     tests = load_campaign(campaign, bare)
     table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
-    folder = opt.folder_for(out, f"{tests.name}_validation")
+    folder = opt.folder_for(out, f"{tests.name}_validation", "metrics.json", "report.html")
     with progress_bar(f"validating {table.name} on {tests.name}") as progress:
         found = validate_campaign(
             table, tests, sensors=known, settings=settings, phases=numbers, jobs=jobs, progress=progress
@@ -212,7 +220,7 @@ def calibrate(
     tests = usable_tests(load_campaign(campaign, bare))
     table = machine.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, opt.measuring(campaign, machine.machine))
-    folder = opt.folder_for(out, f"{tests.name}_calibration")
+    folder = opt.folder_for(out, f"{tests.name}_calibration", "override.toml", "report.html")
     with progress_bar(f"calibrating {table.name} on {tests.name}") as progress:
         found = calibrate_machine(
             *(table, tests.records, known),

@@ -98,9 +98,9 @@ class MotionOptions:
             check_motion_limits(make_plant(table), target)
         return target
 
-    def folder(self, out: Path | None, name: str) -> Path:
-        """Directory of the results; raises RecordError where they would replace a record that is run."""
-        folder = folder_for(out, name)
+    def folder(self, out: Path | None, name: str, *files: str) -> Path:
+        """Directory for `files` of results; raises RecordError where they would replace a record that is run."""
+        folder = folder_for(out, name, *files)
         for word in self.motion:
             if Path(word).resolve() == (folder / "record.nc").resolve():
                 raise RecordError(f"{word} would be replaced by its own run; choose another folder with --out")

@@ -12,6 +12,7 @@ from ..core.errors import ParameterError, RecordError, UnknownNameError
 from ..core.files import shipped, shipped_specimens
 from ..core.names import ENGINES, SCHEMES
 from .completion import completing
+from .results_folder import Out, ResumedOut, folder_for
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +28,16 @@ EXCHANGES = ("sample", "step")
 """How often a specimen that is a program exchanges motion and wrench."""
 
 __all__ = ["Beyond", "CampaignFolder", "Cancel", "ControllerName", "Jobs", "Json", "MachineName", "MachineOptions"]
-__all__ += ["ExchangeOptions", "MountOptions", "Out", "PhaseSettingsName", "Processes", "SensorsName", "SettingsName"]
+__all__ += [
+    "ExchangeOptions",
+    "MountOptions",
+    "Out",
+    "PhaseSettingsName",
+    "Processes",
+    "ResumedOut",
+    "SensorsName",
+    "SettingsName",
+]
 __all__ += ["SpecimenOptions", "StepOptions", "Valves", "find_controller", "find_settings", "folder_for", "measuring"]
 __all__ += ["record_name"]
 
@@ -47,7 +57,6 @@ _settings = completing(lambda: shipped("controllers"))
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
-Out = Annotated[Path | None, typer.Option(help="Directory of the results; default: out/NAME.")]
 Jobs = Annotated[int, _jobs("threads", "Threads; -1: all cores.")]
 Processes = Annotated[int, _jobs("processes", "Processes; -1: one a core.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
@@ -313,15 +322,6 @@ def find_controller(name: str | None, table: "Machine") -> "ControllerSettings |
     from ..control.plug import is_plugged, load_plugged
 
     return load_plugged(name) if name and is_plugged(name) else find_settings(name, table)
-
-
-def folder_for(out: Path | None, name: str) -> Path:
-    """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written."""
-    from ..core.files import refuse_folder
-
-    folder = out or Path("out") / name
-    refuse_folder(folder)
-    return folder
 
 
 def measuring(campaign: Path, machine: str) -> str:

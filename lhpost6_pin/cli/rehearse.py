@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+TEST_FACTS = ("machine", "motion", "scale", "specimen", "effects", "overrides")
+"""Attributes of a record that say what was run on what, for `--json`."""
+
 __all__ = ["campaign", "motions", "open_loop", "run", "save_run"]
 
 
@@ -72,7 +75,7 @@ def run(
         check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
-    folder = motion.folder(out, name)
+    folder = motion.folder(out, name, "record.nc", "report.html")
     given = chosen
     more: list[Path] = []
     if retune:
@@ -129,7 +132,7 @@ def open_loop(
     name = f"{test}_open_loop"
     if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():
         raise RecordError(f"{record} would be replaced by its own replay; choose another folder with --out")
-    folder = opt.folder_for(out, name)
+    folder = opt.folder_for(out, name, "record.nc")
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
     with progress_bar(f"{name} on {table.name}") as progress:
         simulated = replay(table, measured, attrs=attrs, progress=progress, **options)
@@ -139,7 +142,9 @@ def open_loop(
 @command()
 def campaign(
     machine: opt.SpecimenOptions,
-    out: opt.Out = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory of the records, without any so far; default: out/campaign.")
+    ] = None,
     controller: opt.SettingsName = None,
     sensors: opt.SensorsName = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
@@ -151,6 +156,8 @@ def campaign(
     """Simulate a campaign of tests, recorded through sensors with noise and errors: to plan a real one."""
     from ..data.campaign import save_campaign
     from ..data.sensors import load_sensors
+    from ..data.summary import summarise_records
+    from ..show.check_tables import print_tests, summary_entries
     from ..simulation.simulated_campaign import simulate_campaign
 
     table = machine.load()
@@ -169,8 +176,9 @@ def campaign(
         made = simulate_campaign(
             table, settings, known, seed=seed, errors=errors, tests=chosen, scale=scale, name=name, progress=progress
         )
-    entries = {"campaign": name, "tests": [str(record.attrs["test"]) for record in made.records]}
-    print_result(json, lambda: entries, lambda: None, save_campaign(made, folder))
+    files, summaries = save_campaign(made, folder), summarise_records(made.records)
+    entries = {"campaign": name, "tests": [one.test for one in summaries], **summary_entries(summaries)}
+    print_result(json, lambda: entries, lambda: print_tests(summaries), files)
 
 
 @command()
@@ -245,7 +253,8 @@ def save_run(
 
     def entries() -> dict[str, Any]:
         loop = {} if summary is None else {key: record.attrs.get(key) for key in LOOP_FACTS}
-        return run_entries(done, summary) | loop | ({} if against is None else {"against_record": compared})
+        test = {key: record.attrs.get(key) for key in TEST_FACTS}
+        return test | run_entries(done, summary) | loop | ({} if against is None else {"against_record": compared})
 
     print_result(json, entries, show, files)
     if done.trouble:

@@ -17,6 +17,7 @@ from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..core.names import AXES
 from ..machine.machine import Machine
+from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
 from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
 from .conditioning import resolution
@@ -34,7 +35,8 @@ START_NOISE = 8.0  # and how many standard deviations of the noise
 STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop at once by itself
 SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike and a kink look alike
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
-NEARLY_STILL = 0.1  # share of the variation of others of its kind below which the gain of a channel is unknown
+UNRELATED, FOLLOWS = 0.5, 0.95  # correlations of force and pressures: below, noise or another actuator's; the same
+MOVES = 0.5  # share of the largest variation of its kind from which a force must follow its pressures
 GAIN_TOLERANCE = 0.1  # between a channel and the derivative of another; calibration errors are far smaller
 LIKE_AXES = tuple((j, k) for k in range(6) for j in range(6) if j // 3 == k // 3)  # of one unit
 USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
@@ -104,16 +106,32 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
         length = float(time[-1] - time[0])
         span = f"{count} samples, {length:g} s, {(count - 1) / length if length else np.nan:.6g} Hz"
         yield "", None, f"{title}: {span}".lstrip(": "), ""
+    yield from (("", None, sentence, "") for sentence in changes_summary(dataset.attrs))
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind in "fiu" and variable.size and np.isfinite(variable).any():
-            extent = f"{float(variable.min()):.6g} to {float(variable.max()):.6g}"
-            units = variable.attrs.get("units", "no units")
-            further = "" if name in LAYOUT else ", not of the layout"
-            yield str(name), None, f"{units}, {' x '.join(map(str, variable.shape))}, {extent}{further}", ""
+            yield from _extents(variable, "" if name in LAYOUT else ", not of the layout")
     for job in sorted({job for channel in LAYOUT.values() for job in channel.needed_by}):
         missing = [name for name, it in LAYOUT.items() if job in it.needed_by and not _given(dataset, name)]
         if missing:
             yield "", None, f"{job} is not possible without {', '.join(missing)}", ""
+
+
+def _extents(variable: xr.DataArray, further: str) -> Iterator[_Warning]:
+    """Shape and range of a variable, of its columns of each unit apart."""
+    units = str(variable.attrs.get("units", "no units"))
+    if variable.ndim != 2 or "," not in units or variable.dims[1] not in variable.coords:
+        parts = [(str(variable.name), units, variable.values)]
+    else:
+        names = [str(label) for label in variable[variable.dims[1]].values]
+        each = [channel_unit(channel_name(variable, k), units) for k in range(len(names))]
+        parts = []
+        for unit in dict.fromkeys(each):
+            own = [k for k, other in enumerate(each) if other == unit]
+            label = f"{variable.name}[{', '.join(names[k] for k in own)}]"
+            parts.append((label, unit, variable.values[:, own]))
+    for label, unit, values in parts:
+        extent = f"{np.nanmin(values):.6g} to {np.nanmax(values):.6g}"
+        yield label, None, f"{unit}, {' x '.join(map(str, values.shape))}, {extent}{further}", ""
 
 
 def _given(dataset: xr.Dataset, name: str) -> bool:
@@ -278,20 +296,29 @@ def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
 
 
 def _inconsistent_forces(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:
+    """Compare forces with the chamber pressures where these vary beyond noise.
+
+    Noise in pressures lowers the gain by regression on them, noise in the force raises that by regression on it: the
+    gain lies between both (Frisch's bounds).
+    """
     if machine is None or not {"actuator_force", "chamber_pressure_a"} <= set(dataset.data_vars):
         return
-    expected = hydraulic_force(machine, dataset)
-    expected = expected - expected.mean(axis=0)  # NaN where a pressure is missing
-    sd = np.std(expected, axis=0)
-    kinds = [(a.area_a, a.area_b) for a in machine.actuators]
+    dt = sample_interval(dataset)
+    cutoff, kinds = min(20.0, 0.2 / dt), [(a.area_a, a.area_b) for a in machine.actuators]
+    forces = dataset["actuator_force"].values, hydraulic_force(machine, dataset)  # NaN where a pressure is missing
+    found, expected = (lowpass_zero_phase(x - x.mean(axis=0), dt, cutoff) for x in forces)
+    sd_found, sd = np.std(found, axis=0), np.std(expected, axis=0)
+    product = sd_found * sd
+    match = np.divide(np.mean(found * expected, axis=0), product, out=np.zeros_like(sd), where=product > 0)
     for k, actuator in enumerate(machine.actuators):
-        alike = [sd[j] for j, kind in enumerate(kinds) if kind == kinds[k] and np.isfinite(sd[j])]
-        if not np.isfinite(sd[k]) or sd[k] < NEARLY_STILL * max(alike):
-            continue  # unknown, or noise for the most part
-        found, varying = dataset["actuator_force"].sel(actuator=actuator.name).values, expected[:, k]
-        moving = found - found.mean()
-        error = float(np.std(moving - varying) / (sd[k] or np.inf))
-        gain = float(moving @ varying / (varying @ varying or np.inf))
-        if error > GAIN_TOLERANCE and abs(gain - 1.0) > GAIN_TOLERANCE:  # with a right gain the rest is noise
-            what = f"is {gain:.3g} times P_A A_1 - P_B A_2, {100 * error:.0f} % off"
-            yield f"actuator_force[{actuator.name}]", None, what, "check unit and sign of force and pressures"
+        r, ratio = float(match[k]), float(sd_found[k] / (sd[k] or np.inf))
+        if abs(r) < UNRELATED:
+            sure = [sd[j] for j, kind in enumerate(kinds) if kind == kinds[k] and abs(match[j]) >= FOLLOWS]
+            if not (sure and sd[k] >= MOVES * max(sure)):
+                continue  # unknown, or noise for the most part
+            what = f"does not follow P_A A_1 - P_B A_2: their correlation is {r:.2f}"
+        elif r * ratio > 1 + GAIN_TOLERANCE or ratio / r < 1 - GAIN_TOLERANCE:
+            what = f"is {r * ratio:.3g} times P_A A_1 - P_B A_2"
+        else:
+            continue
+        yield f"actuator_force[{actuator.name}]", None, what, "check unit and sign of force and pressures"

@@ -51,6 +51,7 @@ class Parameters(Mapping[str, Quantity]):
     words: Mapping[str, str | int]
     origin: str
     effects: Mapping[str, EffectEntry] = field(default_factory=dict)  # by name
+    replaced: Mapping[str, Quantity | str | int] = field(default_factory=dict)  # what overrides replaced, by path
 
     def __getitem__(self, path: str) -> Quantity:
         """Return the quantity at `path`; raises UnknownNameError that lists the section's paths."""
@@ -125,7 +126,7 @@ def _overridden(
     in_a_file: bool = False,
 ) -> Parameters:
     quantities, words = dict(parameters.quantities), dict(parameters.words)
-    effects = {**parameters.effects, **added}
+    effects, replaced = {**parameters.effects, **added}, dict(parameters.replaced)
     for key, entry in entries.items():
         if key.startswith("effect."):
             _override_effect(effects, key, entry, origin)
@@ -134,16 +135,18 @@ def _overridden(
         if key in words or inherited in words:
             if isinstance(entry, bool) or not isinstance(entry, str | int):
                 raise ParameterError(f"{key}: {entry!r} should be a word or a whole number")
+            replaced.setdefault(key, words.get(key, words.get(inherited, entry)))
             words[key] = entry
             continue
         base = quantities.get(key) or quantities.get(inherited)
         if base is None:
             raise _unknown_parameter(key, (*quantities, *words))
+        replaced.setdefault(key, base)
         quantities[key] = _changed(base, entry, key, origin)
         if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
             raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
     origins = f"{parameters.origin.removesuffix(f' + {origin}')} + {origin}"
-    return Parameters(quantities, words, origins, effects)
+    return Parameters(quantities, words, origins, effects, replaced)
 
 
 def _unknown_parameter(path: str, known: Iterable[str]) -> UnknownNameError:

@@ -1,14 +1,18 @@
-"""Tables of `lhpost6 check` for a campaign: noise, disagreement of redundant sensors, what sensors can tell."""
+"""Tables of `lhpost6 check` for a campaign: its tests, noise, disagreement of redundant sensors, what sensors tell."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
+from ..core.names import AXES
 from ..data.campaign_check import CampaignCheck
+from ..data.metrics import QUANTITIES
+from ..data.summary import RecordSummary
 from .report.page import Table
 from .tables import print_sensor_findings
 from .terminal import print_blocks
 
-__all__ = ["check_entries", "print_check"]
+__all__ = ["check_entries", "print_check", "print_tests", "summary_entries"]
 
 VERDICTS = {"yes": "yes", "ratio": "partly", "no": "no"}
 
@@ -45,3 +49,24 @@ def print_check(found: CampaignCheck) -> None:
         print_sensor_findings(found.findings)
     told = [(one.quantity, VERDICTS[one.verdict], one.why) for one in found.observable]
     print_blocks(Table("What these sensors can tell", ("quantity", "", "why"), told))
+
+
+def summary_entries(tests: Sequence[RecordSummary]) -> dict[str, Any]:
+    """Duration, rate, channels and peak motions by test, for `--json`."""
+    return {"summary": {one.test: {k: v for k, v in one._asdict().items() if k != "test"} for one in tests}}
+
+
+def print_tests(tests: Sequence[RecordSummary]) -> None:
+    """Print a line a test, with the peak motion of the axis that moves farthest."""
+    wanted = [(q, AXES[:3], f"{q} [{unit}]") for q, unit in zip(QUANTITIES, ("m", "m/s", "m/s2"), strict=True)]
+    wanted.append((QUANTITIES[0], AXES[3:], "rotation [rad]"))
+    rows = []
+    for one in tests:
+        row = [one.test, f"{one.seconds:.1f}", f"{one.rate_hz:g}", str(one.channels)]
+        for quantity, axes, _ in wanted:
+            moved = {axis: peak for axis, peak in one.peaks.get(quantity, {}).items() if axis in axes and peak > 0}
+            axis = max(moved, key=lambda name: moved[name], default="")
+            row.append(f"{moved[axis]:.3g} {axis}" if axis else "")
+        rows.append(row)
+    header = ("test", "seconds", "Hz", "channels", *(f"peak {label}" for *_, label in wanted))
+    print_blocks(Table("Tests, with the measured peaks of the platen's motion and their axes", header, rows))

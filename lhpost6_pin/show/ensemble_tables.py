@@ -12,7 +12,7 @@ from .terminal import print_blocks
 
 __all__ = ["ensemble_entries", "ensemble_verdict", "importance_table", "print_ensemble", "risk_table", "spread_table"]
 
-_SCALES = {"N": SCALES["force"], "N m": SCALES["moment"]}
+_SCALES = {"N": SCALES["force"], "N m": SCALES["moment"], "1": Scale(100.0, "%")}
 
 
 def ensemble_verdict(found: EnsembleSummary) -> str:
@@ -86,9 +86,8 @@ def spread_table(spreads: Sequence[Spread]) -> Table:
     for one in spreads:
         scale = _SCALES.get(one.units, Scale(1.0, one.units))
         low, middle, high = (_shown(float(q), scale) for q in one.quantiles)
-        unit = "–" if scale.unit == "1" else scale.unit
         ends = f"{low} to {high}", _shown(one.most, scale)
-        rows.append((one.result, *_where(one, shown), unit, middle, *ends, one.runs))
+        rows.append((one.result, *_where(one, shown), scale.unit, middle, *ends, one.runs))
     header = ("Result", *shown, "Unit", "Median", "5 to 95 %", "Largest", "Runs")
     return Table("Results", header, rows)
 

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from ..machine.machine import Machine
 from .report.page import Table
+from .report.scales import percent
 from .terminal import print_blocks
 
 if TYPE_CHECKING:
@@ -209,7 +210,7 @@ def print_comparison(compared: Sequence[Compared]) -> None:
     rows = [
         (
             *(c.channel, f"{c.peak_recorded:.4g} {c.unit}", f"{c.largest_difference:.3g} {c.unit}"),
-            *("" if math.isnan(c.rrmse) else f"{c.rrmse:.3g}", f"{c.drift:.3g} {c.unit}/s"),
+            *(percent(c.rrmse), f"{c.drift:.3g} {c.unit}/s"),
         )
         for c in compared
     ]
@@ -221,11 +222,12 @@ def print_run(run: "Run", summary: "RunSummary | None") -> None:
     """Print the summary of a run, its duration, scheme and rate."""
     if summary is not None:
         from .report.run_limits import limit_table
-        from .report.run_report import metrics_table
+        from .report.run_report import lead_summary, metrics_table
 
         moved = [row for row in summary.tracking if row.peak_target]
         tables = metrics_table(moved, summary.limits), limit_table(summary.limits)
         print_blocks(Text(summary.verdict, style="bold"), *(table for table in tables if table.rows))
+        print_blocks(lead_summary(moved))
     seconds = run.time[-1] + 1 / run.rate
     print_blocks(f"{seconds:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")
     if run.coupling is not None:

@@ -14,6 +14,7 @@ from ..data.records import make_record
 from ..effects.actuator import rod_travels
 from ..effects.supply import drawn_flows
 from ..machine.power_supply import power_supply
+from ..machine.recorded_changes import change_facts
 from ..machine.recorded_specimen import specimen_facts
 from ..machine.structure import BODIES
 from ..mechanics.accelerometers import accelerometer_rows
@@ -102,6 +103,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     facts: dict[str, Any] = {
         "kind": "simulated",
         "machine": machine.name,
+        **change_facts(machine),
         **specimen_facts(machine.specimen),
         "scheme": run.scheme,
         "steps_per_second": run.steps_per_second,

@@ -14,9 +14,13 @@ from .raw import RawTest, make_raw
 
 __all__ = ["Leaf", "leaves_of", "raws_of_leaves"]
 
-_STEPS = ("dt", "delta_t", "time_step", "sample_interval", "sampling_interval", "ts")
-_RATES = ("fs", "rate", "sample_rate", "sample_rate_hz", "sampling_rate", "sampling_frequency")
+_STEPS = ("dt", "deltat", "timestep", "sampleinterval", "samplinginterval", "ts")
+_RATES = ("fs", "rate", "samplerate", "sampleratehz", "samplingrate", "samplingfrequency")
 _NAMES, _UNITS = ("columns", "names", "channels", "labels", "label", "desc", "name"), ("units", "unit")
+_OF_CHANNELS = re.compile(
+    r"(?:chan(?:nel)?|ch|col(?:umn)?|signal|sensor|var(?:iable)?)s?(?=names?$|labels?$|desc$|units?$)"
+)
+"""What may stand before the word: `chanNames`, `channel_units`."""
 
 
 class Leaf(NamedTuple):
@@ -48,11 +52,23 @@ def leaves_of(tree: Mapping[str, Any], group: tuple[str, ...] = ()) -> tuple[lis
             facts[name] = value
         elif _is_array(value):
             own = names if named == [name] else []  # names beside several arrays could be those of any
-            if len(units) == len(own) > 1:
-                own = [f"{column} [{unit}]" for column, unit in zip(own, units, strict=True)]
+            each = units if len(units) == len(own) > 1 else [""] * len(own)
             unit = units[0] if len(units) == 1 and [*arrays] == [name] else None
-            leaves.append(Leaf(group, name, value, unit, step, tuple(own)))
+            leaves += _with_own_time(Leaf(group, name, value, unit, step, tuple(own)), each)
     return leaves, facts
+
+
+def _with_own_time(leaf: Leaf, units: Sequence[str]) -> list[Leaf]:
+    """An array with the units (k,) of its named columns in their names, and its column of time, if any, as another."""
+    named = [*zip(leaf.columns, units, strict=True)]
+    columns = tuple(f"{name} [{unit}]" if unit else name for name, unit in named)
+    clocks = [time_unit(name, unit or None) for name, unit in named] if leaf.values.ndim == 2 else []
+    k = next((k for k, unit in enumerate(clocks) if unit), None)
+    if k is None or len(columns) < 2:
+        return [leaf._replace(columns=columns)]
+    along = leaf.values.shape.index(len(columns))
+    time = Leaf(leaf.group, "time", np.take(leaf.values, k, along), clocks[k])
+    return [time, leaf._replace(values=np.delete(leaf.values, k, along), columns=columns[:k] + columns[k + 1 :])]
 
 
 def raws_of_leaves(leaves: Sequence[Leaf], facts: Mapping[str, str], source: str, form: str) -> tuple[RawTest, ...]:
@@ -124,7 +140,7 @@ def _step(tree: Mapping[str, Any]) -> float | None:
         number = np.asarray(value) if isinstance(value, int | float | np.generic | np.ndarray) else np.zeros(0)
         if number.size != 1 or number.dtype.kind not in "fiu" or not float(number.item()) > 0:
             continue
-        word = re.sub(r"[\s_]+", "_", name.strip().lower())
+        word = _word(name)
         if word in _STEPS:
             return float(number.item())
         if word in _RATES:
@@ -132,10 +148,16 @@ def _step(tree: Mapping[str, Any]) -> float | None:
     return None
 
 
+def _word(name: str) -> str:
+    """A name of a value without case, blanks and underscores."""
+    return re.sub(r"[\s_]+", "", name.lower())
+
+
 def _texts(tree: Mapping[str, Any], keys: Sequence[str]) -> list[str]:
     """Texts under the first of `keys` that holds any: one, or a list or array of them."""
-    for value in (v for wanted in keys for k, v in tree.items() if k.lower() == wanted):
-        items = [value] if isinstance(value, str) else list(np.ravel(value)) if np.size(value) else []
-        if items and all(isinstance(item, str) for item in items):
-            return [item.strip() for item in items]
+    for value in (v for wanted in keys for k, v in tree.items() if _OF_CHANNELS.sub("", _word(k)) == wanted):
+        cells = [value] if isinstance(value, str) else value if isinstance(value, list | tuple) else np.ravel(value)
+        texts = ["" if not isinstance(cell, str) and np.size(cell) == 0 else cell for cell in cells]
+        if any(texts) and all(isinstance(cell, str) for cell in texts):
+            return [cell.strip() for cell in texts]
     return []

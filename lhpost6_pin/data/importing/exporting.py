@@ -45,6 +45,13 @@ def export_record(record: xr.Dataset, path: Path | str, form: str) -> None:
     columns = {"time [s]": record["time"].values.astype(float)}
     for channel, unit, values in channel_units(record):
         columns[f"{channel.replace('[', '_').rstrip(']')} [{unit}]"] = values
+    if form == "parquet":
+        need_package("pyarrow", f"{path}: writing Parquet")
+    if form == "mat":
+        columns = {_matlab_name(name): values for name, values in columns.items()}
+        if long := next((name for name in columns if len(name) > 63), None):
+            what = f"{long} is longer than the 63 characters of a MATLAB name"
+            raise RecordError(f"{path}: {what}; export to csv or parquet")
     facts = {"layout_version": str(LAYOUT_VERSION)}
     facts |= {str(key): " ".join(str(value).split()) for key, value in record.attrs.items()}
     with write_whole(path) as beside:
@@ -60,7 +67,6 @@ def _write_csv(columns: dict[str, Array], facts: dict[str, str], path: Path) -> 
 
 
 def _write_parquet(columns: dict[str, Array], facts: dict[str, str], path: Path) -> None:
-    need_package("pyarrow", f"{path}: writing Parquet")
     import pandas as pd
 
     table = pd.DataFrame(columns)
@@ -71,10 +77,7 @@ def _write_parquet(columns: dict[str, Array], facts: dict[str, str], path: Path)
 def _write_mat(columns: dict[str, Array], facts: dict[str, str], path: Path) -> None:
     from scipy.io import savemat
 
-    named: dict[str, Any] = {_matlab_name(name): values.reshape(-1, 1) for name, values in columns.items()}
-    long = next((name for name in named if len(name) > 63), None)
-    if long:
-        raise RecordError(f"{path}: {long} is longer than the 63 characters of a MATLAB name; export to csv or parquet")
+    named: dict[str, Any] = {name: values.reshape(-1, 1) for name, values in columns.items()}
     savemat(path, named | {"facts": facts}, long_field_names=True)
 
 

@@ -73,6 +73,7 @@ def guess_map(
     found: dict[str, Source] = {}
     unknown: list[tuple[Source, str]] = []
     remarks: list[str] = []
+    bare: dict[str, str] = {}
     for raw, name, number in ((r, n, k) for r in raws for k, n in enumerate(r.names, 1)):
         unit = raw.units[number - 1]
         channel, like = _channel(name, unit, machine)
@@ -92,7 +93,9 @@ def guess_map(
         else:
             found[channel] = source
             if unit is None:
-                remarks.append(f"add the unit of {channel}: {where}, {name!r}")
+                bare[channel] = f"{where}, {name!r}"
+    if bare:
+        remarks.append(_without_units(bare))
     partly = {machine.known[name][0] for name in found}
     for name, (variable, label) in machine.known.items():
         if variable in partly and name not in found and not _is_still(label, machine):
@@ -115,6 +118,15 @@ def other_columns(first: Sequence[RawTest], other: Sequence[RawTest]) -> str:
     more, less = [n for n in theirs if n not in ours], [n for n in ours if n not in theirs]
     parts = [f"{word} {shown(names)}" for word, names in (("has also", more), ("lacks", less)) if names]
     return f"{other[0].source}: {'; '.join(parts)}" if parts else ""
+
+
+def _without_units(columns: Mapping[str, str]) -> str:
+    """A remark on all channels whose columns have no unit."""
+    channel, column = next(iter(columns.items()))
+    if len(columns) == 1:
+        return f"add the unit of {channel}: {column}"
+    how = 'to the line of each, such as unit = "mm"'
+    return f"add the units of {len(columns)} channels, {how}: {_short([*columns])}; the first is {column}"
 
 
 def _without_masses(found: Mapping[str, Source], stated: set[str]) -> list[str]:

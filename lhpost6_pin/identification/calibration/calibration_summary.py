@@ -3,7 +3,7 @@
 import numpy as np
 
 from .free_parameters import parameter_changes
-from .result import Calibration, contradictions, out_of_range
+from .result import Calibration, contradictions, out_of_range, stated_range
 
 __all__ = ["chance", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
 __all__ += ["delay_summary", "friction_summary", "lacking", "range_summary"]
@@ -23,10 +23,14 @@ def cut_strokes(calibration: Calibration) -> list[str]:
 
 def range_summary(calibration: Calibration) -> str:
     """Whether sensor errors exceed their stated ranges, to follow their number."""
-    wrong = out_of_range(calibration)
-    if not wrong:
+    if wrong := out_of_range(calibration):
+        return f"beyond their stated ranges: {', '.join(calibration.names[i] for i in wrong)}"
+    share = np.abs(calibration.estimate) / stated_range(calibration)
+    over = [f"{calibration.names[i]} {100 * share[i]:.0f} %" for i in np.argsort(-share) if share[i] > 1.0]
+    if not over:
         return "all within their stated ranges"
-    return f"beyond their stated ranges: {', '.join(calibration.names[i] for i in wrong)}"
+    sure = f"more than {calibration.limit:g} predicted deviations"
+    return f"none beyond its stated range by {sure} (beyond it by less: {', '.join(over)} of it)"
 
 
 def delay_summary(calibration: Calibration) -> str:

@@ -114,7 +114,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     apart = len(contradictions(calibration))
     by_chance = number(chance(calibration), 1)
     wrong = len(out_of_range(calibration))
-    ranges = f"{wrong} beyond their stated ranges" if wrong else range_summary(calibration)
+    ranges = f"{wrong or 'none'} significantly beyond {'their' if wrong > 1 else 'its'} stated range{'s' * (wrong > 1)}"
     trust: Level = "attention" if wrong else "good"
     return [
         Headline("yes" if calibration.converged else "no", "Converged", f"rounds: {calibration.rounds}", good),

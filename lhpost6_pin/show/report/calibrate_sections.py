@@ -46,26 +46,25 @@ KINDS = {"wrench": "wrench at C", "flow": "oil flow", "gas": "gas law", "force":
 
 # ---------------------------------------------------------------------------------------- parameters and sensors
 def parameter_table(calibration: Calibration) -> Table:
-    """Return estimates and priors of all parameters."""
-    deviations, ratio = far(calibration), calibration.sd / calibration.prior
+    """Return nominal values and estimates of all parameters; what they say beyond the priors is in `test_blocks`."""
+    deviations = far(calibration)
     rows = []
     for i, parameter in enumerate(calibration.parameters):
         low, high = calibration.interval(i, PROBABILITY)
+        verdict = MARKS.get(verdict_on(calibration, i), verdict_on(calibration, i))
         rows.append(
             (
                 parameter.name,
-                MARKS.get(verdict_on(calibration, i), verdict_on(calibration, i)),
+                f"{verdict} ({number(float(deviations[i]), 2)})",
                 _plain(parameter.value),
                 _plain(parameter.at(float(calibration.estimate[i]))),
+                f"{_plain(low)} to {_plain(high)}" if calibration.converged else "none",
                 parameter.unit,
                 change_of(calibration, i),
-                number(float(deviations[i]), 2),
-                number(float(ratio[i]), 2),
-                f"{_plain(low)} to {_plain(high)}" if calibration.converged else "none",
             )
         )
-    header = ("Parameter", "Verdict", "Nominal", "Estimate", "Unit", "Change", "Deviations")
-    return Table("All parameters", (*header, "Predicted over prior", INTERVAL), rows)
+    header = ("Parameter", "Verdict (deviations)", "Nominal", "Estimate", INTERVAL, "Unit", "Change")
+    return Table("All parameters", header, rows)
 
 
 def parameter_blocks(calibration: Calibration) -> list[Block]:
@@ -75,7 +74,8 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
         "At its bound: the limit of the fit, from its prior or from an unbuildable machine. "
         f"Changed: more than {calibration.limit:g} predicted deviations and {material:g} prior deviations from "
         f"nominal. Unchanged: less, and identifiable (predicted deviation below {informed:g} of the prior's). Not "
-        "informed: mostly the prior. A height is the mean over the components of its kind, which move together."
+        "informed: mostly the prior. In brackets: predicted deviations from nominal. A height is the mean over the "
+        "components of its kind, which move together."
     )
     tables = (parameter_table(calibration), *ratio_tables(calibration))
     return [forest_figure(calibration), how, *tables, *cut_strokes(calibration)]

@@ -17,8 +17,8 @@ __all__ = ["match_tables", "residual_tables", "write_decompose_report"]
 
 EXACT = 1e-3  # fraction of the measured force below which the residual of a noise-free record counts as small
 MATCH = (
-    "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured force, "
-    "given where their correlation is high enough to determine it."
+    "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured force "
+    "(negative: ahead of it), given where their correlation is high enough to determine it."
 )
 EXPLANATIONS: dict[Explanation, tuple[str, str]] = {  # sufficient explanation, and the residual by it
     "none needed": ("–", ""),

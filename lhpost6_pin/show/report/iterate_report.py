@@ -150,7 +150,9 @@ def iteration_tables(result: Iterated) -> list[Table]:
     header = ("Iteration", *_moved(result))
     return [
         Table("Acceleration RRMSE, delay removed", (*header, "Largest spool command", "Commands clipped"), errors),
-        Table("Delay removed, of the acceleration", header, rows("delay", milliseconds)),
+        Table(
+            "Delay removed, of the acceleration (negative: ahead of its target)", header, rows("delay", milliseconds)
+        ),
         Table("Displacement RRMSE, delay removed", header, rows("displacement", percent)),
     ]
 

@@ -10,7 +10,7 @@ from ...data.metrics import QUANTITIES, Tracking, channel, commanded_axes, drift
 from .page import Block, Figure, Table, details, missing, number
 from .plots import ACHIEVED, RECORDED, TARGET, Row, Trace, palette_traces, time_figure
 from .run_components import draw_over_time
-from .scales import SCALES, axis_scale, axis_title, milliseconds, percent
+from .scales import SCALES, axis_scale, axis_title, late_or_ahead, percent
 
 __all__ = ["drift_blocks", "tracking_blocks"]
 
@@ -82,8 +82,10 @@ def _axis_figure(
         note = f", RRMSE {percent(row.rrmse_aligned)}" if row else ""
         rows += [Row(quantity.capitalize(), traces, axis_scale(axis, quantity), note=note)] if traces else []
         if row:
-            after = f"{percent(row.rrmse_aligned)} after removing {milliseconds(row.delay)}"
-            words.append(f"{quantity} RRMSE {percent(row.rrmse)} as recorded, {after}")
+            late = late_or_ahead(row.delay)
+            words.append(
+                f"{quantity} RRMSE {percent(row.rrmse)} as recorded ({late}), {percent(row.rrmse_aligned)} aligned"
+            )
     text = "; ".join(words) or untracked
     bands = [(start + window[0] * step, start + window[1] * step)] if window else []
     description = f"{text[0].upper()}{text[1:]}."
@@ -96,7 +98,7 @@ def _close_up(record: xr.Dataset, found: Sequence[Tracking], axis: str, window: 
     row = _tracked(found, axis, quantity)
     words = f"{quantity.capitalize()} around its peak, every sample."
     if row:
-        words += f" The dotted line is as recorded, {milliseconds(row.delay)} later."
+        words += f" The dotted line is as recorded, {late_or_ahead(row.delay)}."
     rows = [Row(quantity.capitalize(), _traces(record, row, axis, quantity), axis_scale(axis, quantity))]
     title, (start, step) = f"{axis_title(axis)}, close-up", sampling(record)
     return time_figure(

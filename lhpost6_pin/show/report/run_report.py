@@ -34,7 +34,7 @@ from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
 from .specimen_section import response_blocks
 
-__all__ = ["RunSummary", "metrics_table", "write_run_report"]
+__all__ = ["RunSummary", "lead_summary", "metrics_table", "write_run_report"]
 
 EXPECTED = (
     *(f"platen_{q}" for q in QUANTITIES),
@@ -121,7 +121,9 @@ def write_run_report(
         Section(
             "metrics",
             "Table of metrics",
-            [metrics_table(found, uses) if found else missing(motion, "Peaks and tracking are not tabulated.")],
+            [metrics_table(found, uses), *filter(None, [lead_summary(found)])]
+            if found
+            else [missing(motion, "Peaks and tracking are not tabulated.")],
         ),
         Section("assumptions", "Assumptions and sources", _assumptions(list(machine_table or ()))),
         Section("record", "The record", _contents(record)),
@@ -180,6 +182,18 @@ def metrics_table(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> Table:
         rows.append((f"{row.axis} {row.quantity}", scale.unit, *peaks, bar(used, TOLERANCE), *errors))
     header = ("Motion", "Unit", "Peak target", "Peak achieved", "Demand / capacity")
     return Table("Peaks and tracking of every axis", (*header, "RRMSE", "Delay", "RRMSE, delay removed"), rows)
+
+
+def lead_summary(found: Sequence[Tracking]) -> str:
+    """What negative delays mean, with the motions that have one; empty if none has."""
+    ahead = [f"{row.axis} {row.quantity}" for row in found if row.delay < 0.0]
+    if not ahead:
+        return ""
+    return (
+        f"A negative delay: the achieved motion is ahead of its target ({', '.join(ahead)}), by the controller's "
+        "feed-forward; in a displacement also by a slow error that the shift reduces, and in measured data where "
+        "channels are late."
+    )
 
 
 def _assumptions(rows: Sequence[Sequence[Any]]) -> list[Block]:

@@ -8,7 +8,7 @@ import xarray as xr
 from ...data.metrics import SpoolUse, Tracking, channel, labels
 from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
 from .page import Headline, Level, number
-from .scales import SCALES, axis_scale, milliseconds, percent, shown_as
+from .scales import SCALES, axis_scale, late_or_ahead, percent, shown_as
 
 __all__ = ["headlines", "verdict_of_run"]
 
@@ -107,7 +107,7 @@ def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
     for quantity in ("acceleration", "velocity", "displacement"):
         worst = _worst(found, quantity)
         if worst:
-            note = f"axis {worst.axis}; {percent(worst.rrmse)} as recorded, delay {milliseconds(worst.delay)}"
+            note = f"axis {worst.axis}; {percent(worst.rrmse)} as recorded, {late_or_ahead(worst.delay)}"
             level: Level = "attention" if worst.rrmse_aligned > FOLLOWED.get(quantity, np.inf) else "good"
             return Headline(percent(worst.rrmse_aligned), f"Worst {quantity} RRMSE, delay removed", note, level)
     return Headline("–", "Worst acceleration RRMSE", "no target and achieved motion in the record")

@@ -16,6 +16,7 @@ __all__ = [
     "decibels",
     "degrees",
     "force_scale",
+    "late_or_ahead",
     "milliseconds",
     "percent",
     "shown_as",
@@ -78,6 +79,11 @@ def shown_as(value: float, scale: Scale) -> str:
 def milliseconds(seconds: float) -> str:
     """Return a time [s] in milliseconds."""
     return shown_as(seconds, Scale(1e3, "ms"))
+
+
+def late_or_ahead(delay: float) -> str:
+    """Return a delay [s] in words: of a motion behind its target, or if it is negative, ahead of it."""
+    return f"delay {milliseconds(delay)}" if not delay < 0.0 else f"{milliseconds(-delay)} ahead of the target"
 
 
 def signed(value: float, digits: int) -> str:

@@ -194,7 +194,8 @@ def _metrics(phase: Phase) -> Markup:
         rows.append((f"{named(a.quantity)}, {a.column}", *ratios, *errors))
     heads = (*header, "÷ noise", "Mean error")
     how = (
-        "Delay: of the model behind the measurement. Correlation and RMS error: delay removed. A dash: almost at rest. "
+        "Delay: of the model behind the measurement (negative: ahead of it). Correlation and RMS error: delay "
+        "removed. A dash: almost at rest. "
         "Values with and without delay: metrics.json."
     )
     return details("All numbers", how, Table(f"{PHASES[phase.number].capitalize()}, {phase.test}", heads, rows))

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import xarray as xr
 
 from ...machine.machine import Machine
+from ...machine.recorded_changes import changes_summary
 from ..bodies import load_bodies
 from ..urdf import drawing_colour
 from .animation import draw_animation, leg_forces
@@ -69,6 +70,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     carried = str(record.attrs.get("specimen", "none"))
     if carried != "none" and machine.specimen is None:
         note += f"; specimen {carried} not drawn: give --specimen"
+    note += "".join(f"; {sentence}" for sentence in changes_summary(record.attrs, 2))
     legend = machine_legend(machine) | {"path of C": drawing_colour("trace")}
     legend |= {f"{g.label} (outline)": drawing_colour(g.name) for g in frames.ghosts}
     layers = {"names": names_layer(), "path of C": [f"meshcat/{ROOT}/trace"]}

@@ -1,0 +1,37 @@
+"""The option --out of commands, and the directory that it names."""
+
+import logging
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..core.files import refuse_folder
+
+__all__ = ["Out", "ResumedOut", "folder_for"]
+
+log = logging.getLogger(__name__)
+
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        help="Directory of the results; default: out/NAME. Earlier files are replaced, with a warning."
+    ),
+]
+ResumedOut = Annotated[
+    Path | None,
+    typer.Option(help="Directory of the results; default: out/NAME. What was interrupted there is resumed."),
+]
+
+
+def folder_for(out: Path | None, name: str, *files: str) -> Path:
+    """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written.
+
+    Those of `files`, which the command will write, that are there already are a warning.
+    """
+    folder = out or Path("out") / name
+    refuse_folder(folder)
+    if earlier := [file for file in files if (folder / file).exists()]:
+        what = f"{', '.join(earlier[:3])}{f' and {len(earlier) - 3} more' * (len(earlier) > 3)}"
+        log.warning("%s: %s of an earlier command will be replaced; --out names another directory", folder, what)
+    return folder

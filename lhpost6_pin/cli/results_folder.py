@@ -14,7 +14,9 @@ log = logging.getLogger(__name__)
 
 Out = Annotated[
     Path | None,
-    typer.Option(help="Directory of the results; default: out/NAME. Files of earlier ones are replaced, with a warning."),
+    typer.Option(
+        help="Directory of the results; default: out/NAME. Earlier results there are replaced, with a warning."
+    ),
 ]
 ResumedOut = Annotated[
     Path | None,

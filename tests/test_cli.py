@@ -459,6 +459,42 @@ def test_a_record_is_not_replayed_without_its_specimen_nor_over_itself(lhpost6, 
     assert ended.code == 0 and "report.html" not in ended.words  # which an earlier run left
 
 
+ANALYSES = ("decompose", "validate", "calibrate", "discover", "view", "open-loop")
+"""Commands that take records made with a specimen."""
+
+
+@pytest.mark.parametrize("command", ANALYSES)
+def test_commands_that_take_records_can_mount_the_specimen_that_they_ask_for(lhpost6, tmp_path, command):
+    record = load_record(PRACTICE).assign_attrs(specimen="tower", specimen_file=str(tmp_path / "tower.urdf"))
+    record = record.assign_attrs(specimen_position=np.zeros(3), specimen_rpy=np.zeros(3), specimen_locked=1)
+    (tmp_path / "tests").mkdir()
+    save_record(record, tmp_path / "tests" / "TX.nc")
+    taken = "tests" if command in ("validate", "calibrate", "discover") else "tests/TX.nc"
+    more = ("--export", "page.html") if command == "view" else ("--out", "out")
+    if command != "view":
+        assert refused(lhpost6(command, taken, *more), "tower.urdf, which is not there; mount it with --specimen FILE")
+    absent = lhpost6(command, taken, *more, "--specimen", "absent.urdf")
+    assert refused(absent, "absent.urdf: no such URDF file")  # the option is there, and is taken
+
+
+def test_a_view_mounts_what_the_record_states_and_warns_where_it_cannot(lhpost6, tmp_path, caplog):
+    mounted = ("--specimen", "pendulum", "--specimen-at", "1,0.5,0", "--locked")
+    assert lhpost6("run", *COARSE, *mounted, "--out", "made").code == 0
+    record = load_record(tmp_path / "made" / "record.nc")
+    moved, old = record.assign_attrs(specimen_file="/elsewhere/pendulum.urdf"), record.copy()
+    del old.attrs["specimen_file"]  # as records of earlier versions
+    sizes, warned = {}, {"stated": "", "moved": "elsewhere/pendulum.urdf, which is not there", "old": "not stated"}
+    for name, shown in (("stated", record), ("moved", moved), ("old", old)):
+        save_record(shown, tmp_path / f"{name}.nc")
+        caplog.clear()
+        ended = lhpost6("view", f"{name}.nc", "--export", f"{name}.html")
+        assert ended.code == 0 and warned[name] in caplog.text
+        assert ("it is not drawn" in caplog.text) == (name != "stated")
+        sizes[name] = (tmp_path / f"{name}.html").stat().st_size
+    assert sizes["stated"] > sizes["old"]  # the pendulum's shapes
+    assert abs(sizes["moved"] - sizes["old"]) < 1000
+
+
 def test_open_loop_replays_a_record_of_another_machine_on_that_machine_only(lhpost6, tmp_path):
     assert lhpost6("run", *SHORT, "--rate", "2048", "--machine", "uniaxial", "--out", "a").code == 0
     again = ("open-loop", tmp_path / "a" / "record.nc", "--rate", "2048")

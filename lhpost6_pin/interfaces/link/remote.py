@@ -16,6 +16,7 @@ from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
 from ...core.progress import Progress
 from ...data.records import make_record
+from ...machine.recorded_specimen import specimen_facts
 from ...mechanics.plant import Plant
 from ...simulation.simulate import ClosedLoop, PluggedLoop, check_closed_loop
 from .client import LinkClient
@@ -95,7 +96,7 @@ def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> 
     facts = {
         "kind": "simulated",
         "machine": plant.machine.name,
-        "specimen": plant.machine.specimen.name if plant.machine.specimen else "none",
+        **specimen_facts(plant.machine.specimen),
         "trouble": "the plant tripped" if run.tripped else "none",
     }
     time = np.arange(len(run.answered)) / SAMPLE_RATE

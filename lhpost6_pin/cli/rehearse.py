@@ -12,7 +12,7 @@ from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
-from .live_view import LiveOptions, watched
+from .live_view import LiveOptions, ended_by_signal, watched
 from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts, retuned
 from .motion_options import MotionOptions
 
@@ -49,7 +49,10 @@ def run(
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
     json: opt.Json = False,
 ) -> None:
-    """Run a motion in closed loop on the virtual table; writes record.nc and report.html."""
+    """Run a motion in closed loop on the virtual table; writes record.nc and report.html.
+
+    With --live, Ctrl-C or SIGTERM ends the motion, and what was done is written.
+    """
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
     from ..simulation.compile_ahead import compile_ahead, wait_for
@@ -82,7 +85,11 @@ def run(
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{name} at scale {motion.scale:g} on {table.name}"
     wait_for(compiling)
-    with watched(view, table, title, err=json) as watch, progress_bar(f"{name} on {table.name}") as progress:
+    with (
+        watched(view, table, title, err=json) as watch,
+        ended_by_signal(view) as stop,
+        progress_bar(f"{name} on {table.name}") as progress,
+    ):
         test = rehearse(
             table,
             target,
@@ -94,6 +101,7 @@ def run(
             beyond_limits=True,
             progress=progress,
             watch=watch,
+            stop=stop,
             **options,
         )
     shown = interaction_of(table, given, chosen, inverse)

@@ -252,7 +252,7 @@ RUN = ("out/record.nc", "out/report.html")
 COMMANDS = (
     Command("record", "check {}", quick=True),
     Command("long record", "check {}", quick=True),
-    Command("record", "open-loop {} --engine fused --rate 2048 --out out", RUN[:1]),
+    Command("record", "open-loop {} --engine fused --rate 2048 --out out", RUN),
     Command("long record", "decompose {} --out out", ("out/ledger.nc", "out/report.html")),
     Command("record", "view {} --export page.html", ("page.html",)),
     Command("record", "export {} --to csv --out out/record.csv", ("out/record.csv",)),
